@@ -1,0 +1,1 @@
+"""Messages, topics and the Zenoh star that carries them between processes."""

@@ -1,0 +1,132 @@
+"""The bus over Zenoh: one router listens, every other process is a client of it (a star).
+
+The only module that imports zenoh and the only place where its configuration is built.
+"""
+
+import json
+import logging
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import zenoh
+
+from groundstation.bus import keys
+from groundstation.bus.api import Sample, Subscription
+from groundstation.bus.sender import Sender
+from groundstation.bus.topics import Quality, Topic
+from groundstation.errors import GroundStationError
+
+_log = logging.getLogger(__name__)
+
+# Setpoints and sensor samples are small and late when batched; express sends each at once (zenoh.md 5).
+_PRIORITY = {
+    Quality.CONTROL: ("REAL_TIME", True),
+    Quality.SENSOR: ("DATA_HIGH", True),
+    Quality.STATE: ("DATA", False),
+    Quality.BULK: ("DATA_LOW", False),
+}
+
+
+def _configuration(mode: str, endpoint: str) -> zenoh.Config:
+    listens = mode == "router"
+    settings: dict[str, Any] = {
+        "mode": mode,
+        "listen": {"endpoints": [endpoint] if listens else [], "exit_on_failure": True},
+        "connect": {
+            "endpoints": [] if listens else [endpoint],
+            "timeout_ms": 500,
+            "exit_on_failure": True,
+            "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
+        },
+        "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {
+            "link": {
+                "tx": {
+                    "lease": 2000,
+                    "keep_alive": 4,
+                    "queue": {"congestion_control": {"block": {"wait_before_close": 200000}}},
+                }
+            },
+            "shared_memory": {"enabled": False},
+        },
+    }
+    return zenoh.Config.from_json5(json.dumps(settings))
+
+
+def open_router(endpoint: str) -> Any:
+    """Return a listening router session; raises GroundStationError when the port is taken."""
+    try:
+        return zenoh.open(_configuration("router", endpoint))
+    except zenoh.ZError as error:
+        raise GroundStationError(f"cannot listen on {endpoint}: is another run using this port? ({error})") from error
+
+
+class ZenohBus(Sender):
+    """A client of the router. Callbacks only enqueue; publishers are declared once per key."""
+
+    def __init__(self, session: Any, site: str, source: str) -> None:
+        super().__init__(site, source)
+        self._session = session
+        self._publishers: dict[str, Any] = {}
+        self._subscribers: list[Any] = []
+
+    def put(self, topic: Topic, entity: str, payload: bytes, attachment: bytes) -> None:
+        """Hand bytes to Zenoh; DROP everywhere, since a blocking put can hang for seconds (zenoh.md 0.5)."""
+        key = self.key(topic, entity)
+        publisher = self._publishers.get(key) or self._declare(key, topic)
+        try:
+            publisher.put(payload, attachment=attachment or None)
+        except zenoh.ZError as error:
+            _log.debug("put on %s failed: %s", key, error)
+
+    def _declare(self, key: str, topic: Topic) -> Any:
+        priority, express = _PRIORITY[topic.quality]
+        publisher = self._session.declare_publisher(
+            key,
+            encoding=topic.encoding,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=getattr(zenoh.Priority, priority),
+            express=express,
+        )
+        self._publishers[key] = publisher
+        return publisher
+
+    def subscribe(
+        self, topics: Iterable[Topic], entity: str = "*", source: str = "*", capacity: int = 4096, newest: bool = False
+    ) -> Subscription:
+        """Return one queue fed by all given topics of the given entity and source."""
+        subscription = Subscription(capacity, newest)
+        for topic in topics:
+            expression = keys.expression(self.site, topic, entity, source)
+            self._subscribers.append(self._session.declare_subscriber(expression, _enqueue_into(subscription)))
+        return subscription
+
+    def close(self) -> None:
+        """Undeclare and leave; a session left open would keep the interpreter from exiting (zenoh.md 1.9)."""
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
+        self._subscribers.clear()
+        self._session.close()
+
+
+def _enqueue_into(subscription: Subscription) -> Callable[[Any], None]:
+    def enqueue(sample: Any) -> None:
+        attachment = sample.attachment
+        subscription.offer(
+            Sample(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
+        )
+
+    return enqueue
+
+
+def open_bus(endpoint: str, site: str, source: str, timeout_s: float = 10.0) -> ZenohBus:
+    """Connect to the router, retrying until the time-out; raises GroundStationError naming the endpoint."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        try:
+            return ZenohBus(zenoh.open(_configuration("client", endpoint)), site, source)
+        except zenoh.ZError as error:
+            if time.monotonic() > deadline:
+                raise GroundStationError(f"no router answers at {endpoint}: is the ground station running?") from error
+            time.sleep(0.05)

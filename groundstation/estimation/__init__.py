@@ -1,0 +1,1 @@
+"""The joint belief over all robots and the target: motion models, observation models, EKF."""

@@ -1,0 +1,38 @@
+"""The joint Gaussian belief as a value."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.estimation.layout import Layout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class JointBelief:
+    """Mean (n) and covariance (n, n) of the state described by `layout`, valid at `stamp_ns`; read-only."""
+
+    mean: Array
+    covariance: Array
+    layout: Layout
+    stamp_ns: int
+
+    def __post_init__(self) -> None:
+        n = self.layout.dim
+        for name, shape in (("mean", (n,)), ("covariance", (n, n))):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise ValueError(f"{name} must be finite with shape {shape}")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def mean_of(self, name: str) -> Array:
+        """Return an entity's part of the mean."""
+        return self.mean[self.layout.block(name).slice]
+
+    def covariance_of(self, name: str) -> Array:
+        """Return an entity's own covariance."""
+        part = self.layout.block(name).slice
+        return self.covariance[part, part]

@@ -1,0 +1,86 @@
+"""Which entry of the joint state means what."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class EntityKind(StrEnum):
+    """What a block of the state describes."""
+
+    ROBOT = "robot"
+    TARGET = "target"
+
+
+ROBOT_CORE = ("x", "y", "z", "yaw")
+TARGET_CORE = ("x", "y", "vx", "vy")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One entity's entries: robots begin with x, y, z, yaw; targets with x, y, vx, vy [m, rad, m/s; world]."""
+
+    name: str
+    kind: EntityKind
+    start: int
+    labels: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """Return the number of entries."""
+        return len(self.labels)
+
+    @property
+    def slice(self) -> slice:
+        """Return where the block stands in the state."""
+        return slice(self.start, self.start + self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Blocks in state order; names are unique."""
+
+    blocks: tuple[Block, ...] = ()
+
+    @property
+    def dim(self) -> int:
+        """Return the dimension of the state."""
+        return sum(block.size for block in self.blocks)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Return the names of all robots in state order."""
+        return tuple(block.name for block in self.blocks if block.kind is EntityKind.ROBOT)
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Return the names of all targets in state order."""
+        return tuple(block.name for block in self.blocks if block.kind is EntityKind.TARGET)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Return `entity.entry` for every entry, for the bus."""
+        return tuple(f"{block.name}.{label}" for block in self.blocks for label in block.labels)
+
+    def __contains__(self, name: str) -> bool:
+        return any(block.name == name for block in self.blocks)
+
+    def block(self, name: str) -> Block:
+        """Return an entity's block; raises KeyError when it is not in the state."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        raise KeyError(name)
+
+    def with_entity(self, name: str, kind: EntityKind, labels: tuple[str, ...]) -> "Layout":
+        """Return the layout with one more block at the end; raises ValueError when it is already there."""
+        if name in self:
+            raise ValueError(f"{name} is already in the state")
+        return Layout((*self.blocks, Block(name, kind, self.dim, labels)))
+
+    def without(self, name: str) -> "Layout":
+        """Return the layout with an entity's block taken out and the later ones moved up."""
+        layout = Layout()
+        for block in self.blocks:
+            if block.name != name:
+                layout = layout.with_entity(block.name, block.kind, block.labels)
+        return layout

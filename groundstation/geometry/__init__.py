@@ -1,0 +1,1 @@
+"""Angles, rotations, poses, lens model and marker layout; pure functions on numpy arrays."""

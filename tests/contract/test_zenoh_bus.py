@@ -1,0 +1,80 @@
+"""The star over real Zenoh on loopback: delivery, forwarding past a stalled reader, absent and taken endpoints."""
+
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import closing
+
+import pytest
+
+from groundstation.bus import topics, zenoh_bus
+from groundstation.bus.messages import Event, Severity
+from groundstation.errors import GroundStationError
+
+
+def free_endpoint() -> str:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture
+def endpoint() -> Iterator[str]:
+    address = free_endpoint()
+    router = zenoh_bus.open_router(address)
+    yield address
+    router.close()
+
+
+def send_until_heard(sender: zenoh_bus.ZenohBus, subscription: zenoh_bus.Subscription) -> int:
+    """Publish until the subscription has been learnt everywhere; returns how many were heard."""
+    for _ in range(100):
+        sender.publish(topics.EVENT, Event(header=sender.header("drone_1"), severity=Severity.INFO, text="x"))
+        if subscription.wait(0.05):
+            return len(subscription.drain())
+    return 0
+
+
+def test_clients_hear_each_other_through_the_router(endpoint: str) -> None:
+    with closing(zenoh_bus.open_bus(endpoint, "lab", "a")) as a, closing(zenoh_bus.open_bus(endpoint, "lab", "b")) as b:
+        assert send_until_heard(a, b.subscribe([topics.EVENT])) >= 1
+
+
+def test_another_site_hears_nothing(endpoint: str) -> None:
+    with (
+        closing(zenoh_bus.open_bus(endpoint, "lab", "a")) as a,
+        closing(zenoh_bus.open_bus(endpoint, "barn", "b")) as b,
+    ):
+        here, there = a.subscribe([topics.EVENT]), b.subscribe([topics.EVENT])
+        assert send_until_heard(a, here) >= 1
+        assert there.drain() == []
+
+
+def test_a_reader_that_never_drains_stalls_nobody(endpoint: str) -> None:
+    with (
+        closing(zenoh_bus.open_bus(endpoint, "lab", "a")) as a,
+        closing(zenoh_bus.open_bus(endpoint, "lab", "b")) as b,
+        closing(zenoh_bus.open_bus(endpoint, "lab", "c")) as c,
+    ):
+        stalled, reader = b.subscribe([topics.EVENT], capacity=10), c.subscribe([topics.EVENT])
+        assert send_until_heard(a, reader) >= 1
+        for number in range(1000):
+            a.publish(topics.EVENT, Event(header=a.header("drone_1"), severity=Severity.INFO, text=str(number)))
+        texts: list[str] = []
+        deadline = time.monotonic() + 5
+        while "999" not in texts and time.monotonic() < deadline:
+            reader.wait(0.1)
+            texts += [item.message.text for item in reader.drain() if isinstance(item.message, Event)]
+        assert [text for text in texts if text != "x"] == [str(number) for number in range(1000)]
+        assert len(stalled.drain_samples()) == 10
+
+
+def test_an_absent_router_is_named() -> None:
+    endpoint = free_endpoint()
+    with pytest.raises(GroundStationError, match=endpoint):
+        zenoh_bus.open_bus(endpoint, "lab", "a", timeout_s=0.2)
+
+
+def test_a_taken_port_is_named(endpoint: str) -> None:
+    with pytest.raises(GroundStationError, match="is another run using this port"):
+        zenoh_bus.open_router(endpoint)

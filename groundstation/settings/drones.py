@@ -1,0 +1,108 @@
+"""One drone: how it is reached, what it may do, what it carries, how well it measures itself."""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from groundstation.settings.room import Calibration
+from groundstation.settings.values import Address, MarkerCode, Name, Section, SquareSize, Vector2, Vector3, VideoDelay
+
+StdDeviation = Annotated[float, Field(gt=0, le=10)]
+Delay = Annotated[float, Field(ge=0, le=1000)]
+
+
+class Limits(Section):
+    """What a drone is never asked to exceed; battery_min is a share of 1."""
+
+    max_speed_m_s: Annotated[float, Field(gt=0, le=3)] = 0.6
+    max_climb_m_s: Annotated[float, Field(gt=0, le=1.5)] = 0.4
+    max_yaw_rate_deg_s: Annotated[float, Field(gt=0, le=180)] = 60.0
+    max_tilt_deg: Annotated[float, Field(ge=3, le=25)] = 12.0
+    battery_min: Annotated[float, Field(ge=0.05, le=0.9)] = 0.15
+    battery_hold_s: Annotated[float, Field(ge=0, le=30)] = 3.0
+
+    @property
+    def max_yaw_rate_rad_s(self) -> float:
+        """Return the largest turn rate [rad/s]."""
+        return math.radians(self.max_yaw_rate_deg_s)
+
+    @property
+    def max_tilt_rad(self) -> float:
+        """Return the largest tilt [rad]."""
+        return math.radians(self.max_tilt_deg)
+
+
+class RobotMarker(Section):
+    """Checkerboard flat on top of a drone: its identity and where its centre is [base]."""
+
+    code: MarkerCode
+    square_mm: SquareSize = 44.0
+    position_m: Vector3 = (0.0, 0.0, 0.08)
+
+    @property
+    def square_m(self) -> float:
+        """Return the side of one square [m]."""
+        return self.square_mm / 1000
+
+
+class OnboardCamera(Section):
+    """The camera of a drone: where it sits [base], tilted down from the horizon, panned left."""
+
+    source: Annotated[str, Field(min_length=1)]
+    calibration: Calibration
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+    tilt_down_deg: Annotated[float, Field(ge=-90, le=90)] = 45.0
+    pan_left_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    video_delay_ms: VideoDelay = 120.0
+
+    @property
+    def tilt_down_rad(self) -> float:
+        """Return the tilt below the horizon [rad]."""
+        return math.radians(self.tilt_down_deg)
+
+    @property
+    def pan_left_rad(self) -> float:
+        """Return the pan to the left [rad]."""
+        return math.radians(self.pan_left_deg)
+
+
+class OdometryCalibration(Section):
+    """Figures measured on this kind of vehicle: true velocity = scale x reported velocity; one sigma; delays."""
+
+    velocity_scale: Annotated[float, Field(ge=0.2, le=5)] = 1.0
+    velocity_std_m_s: StdDeviation = 0.05
+    velocity_delay_ms: Delay = 30.0
+    height_std_m: StdDeviation = 0.04
+    height_delay_ms: Delay = 85.0
+    attitude_std_deg: StdDeviation = 1.0
+    yaw_rate_std_deg_s: StdDeviation = 1.0
+
+    @property
+    def attitude_std_rad(self) -> float:
+        """Return the error of roll and pitch [rad]."""
+        return math.radians(self.attitude_std_deg)
+
+    @property
+    def yaw_rate_std_rad_s(self) -> float:
+        """Return the error of the turn rate [rad/s]."""
+        return math.radians(self.yaw_rate_std_deg_s)
+
+
+class Drone(Section):
+    """One drone with all three levels merged. `pad_m` is where it takes off, `pad_yaw_deg` how it stands there."""
+
+    kind: Literal["ardrone"]
+    type: Name | None = None
+    address: Address
+    limits: Limits = Limits()
+    marker: RobotMarker
+    camera: OnboardCamera
+    odometry: OdometryCalibration = OdometryCalibration()
+    pad_m: Vector2
+    pad_yaw_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+
+    @property
+    def pad_yaw_rad(self) -> float:
+        """Return the heading on the pad [rad; world]."""
+        return math.radians(self.pad_yaw_deg)

@@ -1,0 +1,38 @@
+"""The resolved field: what every process may know of the room, the team and how it is to behave."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field as Constraint
+
+from groundstation.settings.behaviour import Console, Estimator, Planner, Recording, Safety
+from groundstation.settings.drones import Drone
+from groundstation.settings.room import Room, WorldCamera
+from groundstation.settings.target import Target
+from groundstation.settings.values import Name, Section
+
+SCHEMA_VERSION: Literal[1] = 1
+
+
+class Field(Section):
+    """A field file after its three levels are merged and its calibrations read in.
+
+    Travels to other processes as JSON: `Field.model_validate_json(field.model_dump_json())` is the same field.
+    """
+
+    schema_version: Literal[1] = SCHEMA_VERSION
+    site: Name
+    room: Room
+    cameras: dict[Name, WorldCamera] = Constraint(default_factory=dict)
+    drones: Annotated[dict[Name, Drone], Constraint(min_length=1)]
+    target: Target
+    estimator: Estimator = Estimator()
+    planner: Planner
+    safety: Safety = Safety()
+    recording: Recording = Recording()
+    console: Console = Console()
+
+    @property
+    def marker_codes(self) -> dict[int, str]:
+        """Return who carries which marker."""
+        codes = {drone.marker.code: name for name, drone in self.drones.items()}
+        return codes | {self.target.marker.code: self.target.name}

@@ -1,0 +1,50 @@
+"""Kinds of values that a field file is made of, and the base of its sections."""
+
+import ipaddress
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+NAME_PATTERN = r"^[a-z][a-z0-9_]{0,47}$"
+
+
+class Section(BaseModel):
+    """Base of all settings: frozen, strict, finite, and without room for unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def of_length(length: int) -> BeforeValidator:
+    """Return a check that a list holds so many numbers."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, list | tuple) and len(value) != length:
+            raise PydanticCustomError("entries", "must hold {n} numbers (got {m})", {"n": length, "m": len(value)})
+        return tuple(value) if isinstance(value, list) else value
+
+    return BeforeValidator(check)
+
+
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] >= value[1]:
+        raise PydanticCustomError("rising", "the first number must be smaller than the second")
+    return value
+
+
+def _is_address(value: str) -> str:
+    try:
+        ipaddress.IPv4Address(value)
+    except ValueError:
+        raise PydanticCustomError("address", "must be an IPv4 address such as 192.168.1.11") from None
+    return value
+
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+Vector2 = Annotated[tuple[float, float], of_length(2)]
+Vector3 = Annotated[tuple[float, float, float], of_length(3)]
+Interval = Annotated[Vector2, AfterValidator(_rising)]
+VideoDelay = Annotated[float, Field(ge=0, le=2000)]
+SquareSize = Annotated[float, Field(ge=5, le=200)]
+MarkerCode = Annotated[int, Field(ge=0, le=15)]
+Address = Annotated[str, AfterValidator(_is_address)]

@@ -1,0 +1,184 @@
+"""What a child process has in hand: its bus, its heartbeat, its lifecycle, and whether it should go on."""
+
+import logging
+import os
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.topics import EVENT, PROCESS_STATUS
+from groundstation.process import log
+from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
+from groundstation.process.parent import ParentWatch
+from groundstation.process.signals import StopSignal
+
+_STATUS_PERIOD_NS = 1_000_000_000
+_SUPERVISOR_STALE_NS = 300_000_000
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class ChildSpec:
+    """What a child is told at its start.
+
+    name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none),
+    with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did).
+    """
+
+    name: str
+    role: str
+    endpoint: str
+    site: str
+    heartbeat: str = ""
+    heartbeat_index: int = 0
+    section: str = "{}"
+    parent_pid: int = 0
+
+
+class Child:
+    """Context manager around the life of one child process; use it in the main thread.
+
+    Inside the block, `bus` is connected, SIGINT is ignored, and SIGTERM or SIGHUP set `stop_requested`.
+    Call `beat` and `tick_status` at least 10 times a second once `ready` was called.
+    """
+
+    bus: Bus
+
+    def __init__(self, spec: ChildSpec) -> None:
+        self.spec = spec
+        self.name = spec.name
+        self.section = spec.section
+        self._block: HeartbeatBlock | None = None
+        self._state = Lifecycle.STARTING
+        self._detail = ""
+        self._counters = (0, 0, 0)
+        self._next_status_ns = 0
+        self._cpu_mark = (time.monotonic_ns(), time.process_time_ns())
+
+    def __enter__(self) -> Self:
+        with suppress(PermissionError):  # already the leader of a group
+            os.setsid()  # keeps the terminal's Ctrl-C and hang-up away from what has to land first
+        log.configure(self.name)
+        self._parent = ParentWatch(self.spec.parent_pid)
+        self._stop = StopSignal(self._parent)
+        self._stop.install()
+        if self.spec.heartbeat:
+            self._block = HeartbeatBlock.attach(self.spec.heartbeat)
+        self._set_state(Lifecycle.STARTING, "")
+        if self.spec.endpoint:
+            from groundstation.bus.zenoh_bus import open_bus
+
+            self.bus = open_bus(self.spec.endpoint, self.spec.site, self.name)
+            self.publish_status()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._set_state(Lifecycle.STOPPING, str(error) if error else "")
+        if error is not None:
+            _log.error("ends by %s: %s", kind.__name__ if kind else "?", error)
+        if self._has_bus:
+            self.publish_status()
+            self.bus.close()
+        self._stop.close()
+        self._parent.close()
+        if self._block is not None:
+            self._block.close()
+            self._block = None
+
+    @property
+    def _has_bus(self) -> bool:
+        return bool(self.spec.endpoint) and hasattr(self, "bus")
+
+    @property
+    def stop_requested(self) -> bool:
+        """SIGTERM or SIGHUP came: a driver lands and exits, others finish and exit."""
+        return self._stop.requested
+
+    @property
+    def supervisor_alive(self) -> bool:
+        """Whether the supervisor lives; once False: a driver hovers, lands and exits, others exit."""
+        return self._parent.alive
+
+    @property
+    def supervisor_fresh(self) -> bool:
+        """Whether the supervisor's own heartbeat is younger than 0.3 s (False while it is frozen)."""
+        if self._block is None:
+            return True
+        return self._block.age_ns(SUPERVISOR_SLOT, time.monotonic_ns()) < _SUPERVISOR_STALE_NS
+
+    def sleep_until(self, deadline_ns: int) -> bool:
+        """Sleep until a monotonic time; False when a stop, or the supervisor's death, woke it (each wakes once)."""
+        return self._stop.sleep_until(deadline_ns)
+
+    def beat(self) -> None:
+        """Say "my main loop turns"; about a microsecond."""
+        if self._block is not None:
+            self._block.beat(self.spec.heartbeat_index)
+
+    def starting(self, detail: str) -> None:
+        """Say what the start waits for; shown to the operator."""
+        self._announce(Lifecycle.STARTING, detail)
+
+    def ready(self, detail: str = "") -> None:
+        """Declare the start finished: from now on the hang limit counts."""
+        self._announce(Lifecycle.READY, detail)
+
+    def degrade(self, detail: str) -> None:
+        """Declare that the process runs but lacks something; `ready` ends it."""
+        self._announce(Lifecycle.DEGRADED, detail)
+
+    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
+        """Remember the loop's counters and publish the status once a second; call it each turn."""
+        self._counters = (ticks, overruns, overflowed)
+        if time.monotonic_ns() >= self._next_status_ns:
+            self.publish_status()
+
+    def publish_status(self) -> None:
+        """Publish the ProcessStatus now."""
+        if not self._has_bus:
+            return
+        wall_ns, cpu_ns = time.monotonic_ns(), time.process_time_ns()
+        elapsed_ns = wall_ns - self._cpu_mark[0]
+        share = (cpu_ns - self._cpu_mark[1]) / elapsed_ns if elapsed_ns > 0 else 0.0
+        self._cpu_mark = (wall_ns, cpu_ns)
+        self._next_status_ns = wall_ns + _STATUS_PERIOD_NS
+        ticks, overruns, overflowed = self._counters
+        status = ProcessStatus(
+            header=self.bus.header(self.name),
+            state=self._state,
+            pid=os.getpid(),
+            cpu=share,
+            ticks=ticks,
+            overruns=overruns,
+            overflowed=overflowed,
+            detail=self._detail,
+        )
+        self.bus.publish(PROCESS_STATUS, status)
+
+    def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
+        """Publish and log something that happened, about this process unless an entity is named."""
+        level = {Severity.INFO: logging.INFO, Severity.WARNING: logging.WARNING, Severity.ERROR: logging.ERROR}
+        severity = Severity(severity)
+        _log.log(level[severity], "%s%s", text, f" ({remedy})" if remedy else "")
+        if self._has_bus:
+            header = self.bus.header(entity or self.name)
+            self.bus.publish(EVENT, Event(header=header, severity=severity, text=text, remedy=remedy))
+
+    def _announce(self, state: Lifecycle, detail: str) -> None:
+        if (state, detail) == (self._state, self._detail):
+            return
+        if detail and detail != self._detail:
+            _log.info("%s: %s", state, detail)
+        self._set_state(state, detail)
+        self.publish_status()
+
+    def _set_state(self, state: Lifecycle, detail: str) -> None:
+        self._state, self._detail = state, detail
+        if self._block is not None:
+            self._block.set_state(self.spec.heartbeat_index, SlotState[state.name])

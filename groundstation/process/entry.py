@@ -1,0 +1,45 @@
+"""First code of a child: `python -m groundstation.process.entry NAME MODULE:FUNCTION`, its ChildSpec on stdin.
+
+The specification comes through a memory file and not through the disk: a restart in flight must work on a full one.
+"""
+
+import importlib
+import logging
+import sys
+import time
+from collections.abc import Callable
+
+import msgspec
+
+from groundstation.errors import GroundStationError
+from groundstation.process.child import Child, ChildSpec
+
+EXIT_FAILED = 1
+_log = logging.getLogger(__name__)
+
+
+def resolve(entry: str) -> Callable[[Child], int]:
+    """Return the function named by "module:function"; imports the module."""
+    module, _, function = entry.partition(":")
+    run: Callable[[Child], int] = getattr(importlib.import_module(module), function)
+    return run
+
+
+def main(arguments: list[str]) -> int:
+    """Run one child to its end and return its exit code."""
+    spec = msgspec.json.decode(sys.stdin.buffer.read(), type=ChildSpec)
+    try:
+        with Child(spec) as child:
+            began = time.monotonic()
+            run = resolve(arguments[1])
+            _log.info("imported %s in %.2f s", arguments[1], time.monotonic() - began)
+            return run(child)
+    except GroundStationError as error:
+        _log.error("%s", error)
+    except Exception:  # noqa: BLE001 - the outermost loop of the process: log, then let the supervisor decide
+        _log.exception("crashed")
+    return EXIT_FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

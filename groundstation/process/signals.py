@@ -1,0 +1,67 @@
+"""Signals of a child: SIGINT belongs to the terminal and is ignored, SIGTERM and SIGHUP ask it to stop."""
+
+import os
+import select
+import signal
+import time
+from contextlib import suppress
+
+from groundstation.process.parent import ParentWatch
+
+_NS_PER_MS = 1_000_000
+
+
+class StopSignal:
+    """The wish to stop, and a sleep that ends early when it (or the parent's death) arrives.
+
+    Each of the two wakes one sleep only: a driver that still has to land after a stop keeps its loop rate.
+    """
+
+    def __init__(self, parent: ParentWatch) -> None:
+        self.requested = False
+        self._parent = parent
+        self._parent_reported = False
+        self._read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+
+    def install(self) -> None:
+        """Take over the signals of this process; main thread only."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._request)
+        # The kernel may hand the signal to a network thread; the wake-up descriptor ends the sleep all the same.
+        signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+
+    def _request(self, _number: int, _frame: object) -> None:
+        self.requested = True
+
+    def sleep_until(self, deadline_ns: int) -> bool:
+        """Sleep until a monotonic time; returns False when a stop or the parent's death ended the sleep."""
+        poll = select.poll()
+        poll.register(self._read, select.POLLIN)
+        if self._parent.descriptor >= 0 and not self._parent_reported:
+            poll.register(self._parent.descriptor, select.POLLIN)
+        while (left_ns := deadline_ns - time.monotonic_ns()) > 0:
+            if self._woken(poll.poll(max(1, left_ns // _NS_PER_MS) if left_ns >= _NS_PER_MS else 0)):
+                return False
+            if left_ns < _NS_PER_MS:
+                time.sleep(max(0, deadline_ns - time.monotonic_ns()) / 1e9)
+        return not self._woken(poll.poll(0))
+
+    def _woken(self, ready: list[tuple[int, int]]) -> bool:
+        woken = False
+        for descriptor, _ in ready:
+            if descriptor == self._read:
+                with suppress(BlockingIOError):
+                    os.read(self._read, 512)
+                woken |= self.requested
+            elif not self._parent_reported:
+                self._parent_reported = woken = True
+        return woken
+
+    def close(self) -> None:
+        """Give the signals back; idempotent."""
+        if self._read >= 0:
+            signal.set_wakeup_fd(-1)
+            os.close(self._read)
+            os.close(self._write)
+            self._read = self._write = -1

@@ -1,1 +1,1 @@
-"""TODO"""
+"""AR.Drone protocol as pure bytes: AT commands, navdata, state word, configuration keys; standard library only."""

@@ -1,0 +1,181 @@
+"""Configuration keys of the drone: type, category, default, range, and their text form.
+
+WIRE: keys and defaults of the SDK 2.0.1 and of dumps of real drones (AR.Drone sheet 5.4).
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.ardrone.wire.errors import WireError
+
+Scalar = bool | int | float | str
+
+
+class Category(StrEnum):
+    """Which set a key is stored in; all but COMMON may differ between multi-configuration ids."""
+
+    COMMON = "common"
+    APPLICATION = "applis"
+    USER = "profiles"
+    SESSION = "sessions"
+
+
+class Access(StrEnum):
+    """Who may write: nobody, everybody, or only a custom (non-zero) set of ids."""
+
+    READ = "R"
+    WRITE = "RW"
+    CUSTOM = "CUSTOM"
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One configuration key; the type of `default` is the type of the key."""
+
+    name: str
+    default: Scalar
+    category: Category = Category.COMMON
+    access: Access = Access.WRITE
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+_A, _U, _S = Category.APPLICATION, Category.USER, Category.SESSION
+_READ, _CUSTOM, _RW = Access.READ, Access.CUSTOM, Access.WRITE
+_COMMON = Category.COMMON
+
+_KEYS = (
+    Key("general:num_version_config", 1, access=_READ),
+    Key("general:num_version_mb", 33, access=_READ),
+    Key("general:num_version_soft", "2.3.3", access=_READ),
+    Key("general:drone_serial", "XXXXXXXXXX", access=_READ),
+    Key("general:soft_build_date", "2013-01-01 00:00", access=_READ),
+    Key("general:ardrone_name", "My ARDrone"),
+    Key("general:flying_time", 0, access=_READ),
+    Key("general:navdata_demo", False),
+    Key("general:navdata_options", 65537, _A),
+    Key("general:com_watchdog", 2, _COMMON, _RW, 0, 60),
+    Key("general:video_enable", True),
+    Key("general:vision_enable", True),
+    Key("general:vbat_min", 9000, access=_READ),
+    Key("general:localtime", 0),
+    Key("control:control_level", 0, _A),
+    Key("control:euler_angle_max", 0.20943999, _U, _RW, 0.0, 0.52),
+    Key("control:altitude_max", 3000, _COMMON, _RW, 500, 100000),
+    Key("control:altitude_min", 50),
+    Key("control:control_iphone_tilt", 0.34906584, _U),
+    Key("control:control_vz_max", 700.0, _U, _RW, 200, 2000),
+    Key("control:control_yaw", 1.7453290, _U, _RW, 0.7, 6.11),
+    Key("control:outdoor", False),
+    Key("control:flight_without_shell", False),
+    Key("control:autonomous_flight", False),
+    Key("control:manual_trim", False, _U),
+    Key("control:indoor_euler_angle_max", 0.20943999, _U, _RW, 0.0, 0.52),
+    Key("control:indoor_control_vz_max", 700.0, _U, _RW, 200, 2000),
+    Key("control:indoor_control_yaw", 1.7453290, _U, _RW, 0.7, 6.11),
+    Key("control:outdoor_euler_angle_max", 0.34906580, _U, _RW, 0.0, 0.52),
+    Key("control:outdoor_control_vz_max", 1000.0, _U, _RW, 200, 2000),
+    Key("control:outdoor_control_yaw", 3.4906585, _U, _RW, 0.7, 6.11),
+    Key("control:flying_mode", 0, _S),
+    Key("control:hovering_range", 1000, _S),
+    Key("control:flight_anim", "0,0"),
+    Key("network:ssid_single_player", "ardrone2"),
+    Key("network:ssid_multi_player", "ardrone2"),
+    Key("network:wifi_mode", 0),
+    Key("network:wifi_rate", 0),
+    Key("network:owner_mac", "00:00:00:00:00:00"),
+    Key("pic:ultrasound_freq", 8, _COMMON, _RW, 7, 8),
+    Key("pic:ultrasound_watchdog", 3),
+    Key("pic:pic_version", 184877090, access=_READ),
+    Key("video:camif_fps", 30, access=_READ),
+    Key("video:codec_fps", 30, _S, _CUSTOM),
+    Key("video:camif_buffers", 2, access=_READ),
+    Key("video:num_trackers", 12, access=_READ),
+    Key("video:video_codec", 129, _S, _CUSTOM),
+    Key("video:video_slices", 0, _S),
+    Key("video:video_live_socket", 0, _S),
+    Key("video:video_storage_space", 15360, access=_READ),
+    Key("video:bitrate", 1000, _A, _CUSTOM),
+    Key("video:max_bitrate", 1000, _S, _CUSTOM, 250, 4000),
+    Key("video:bitrate_ctrl_mode", 0, _A, _CUSTOM),
+    Key("video:bitrate_storage", 4000, _A),
+    Key("video:video_channel", 0, _S),
+    Key("video:video_on_usb", True),
+    Key("video:video_file_index", 1),
+    Key("leds:leds_anim", "0,0,0"),
+    Key("detect:enemy_colors", 1),
+    Key("detect:groundstripe_colors", 16, _S),
+    Key("detect:enemy_without_shell", 0),
+    Key("detect:detect_type", 3, _S),
+    Key("detect:detections_select_h", 0, _S),
+    Key("detect:detections_select_v_hsync", 0, _S),
+    Key("detect:detections_select_v", 0, _S),
+    Key("syslog:output", 7),
+    Key("syslog:max_size", 102400),
+    Key("syslog:nb_files", 5),
+    Key("userbox:userbox_cmd", "0", _S),
+    Key("gps:latitude", 500.0, _S),
+    Key("gps:longitude", 500.0, _S),
+    Key("gps:altitude", 0.0, _S),
+    Key("custom:application_id", "00000000", _S),
+    Key("custom:profile_id", "00000000", _S),
+    Key("custom:session_id", "00000000", _S),
+    Key("custom:application_desc", "Default application configuration", _A),
+    Key("custom:profile_desc", "Default profile configuration", _U),
+    Key("custom:session_desc", "Default session configuration", _S),
+)
+CONFIGURATION: dict[str, Key] = {key.name: key for key in _KEYS}
+
+
+def parse_value(name: str, text: str) -> Scalar:
+    """Return the value a CONFIG command sets a key to, clamped to the key's range.
+
+    Keys and booleans are accepted in any case, as real drones do. Raises WireError (unknown_key, value).
+    """
+    key = CONFIGURATION.get(name.lower())
+    if key is None:
+        raise WireError("unknown_key", name)
+    try:
+        value = _parse(text.strip(), key.default)
+    except (ValueError, OverflowError) as error:
+        raise WireError("value", f"{name} = {text!r}") from error
+    return _clamp(key, value)
+
+
+def _parse(text: str, like: Scalar) -> Scalar:
+    if isinstance(like, bool):
+        if text.upper() not in ("TRUE", "FALSE"):
+            raise ValueError(text)
+        return text.upper() == "TRUE"
+    if isinstance(like, int):
+        return int(text)
+    if isinstance(like, float):
+        value = float(text)
+        if value - value != 0.0:  # an infinity or not a number
+            raise ValueError(text)
+        return value
+    return text
+
+
+def _clamp(key: Key, value: Scalar) -> Scalar:
+    if isinstance(value, str | bool):
+        return value
+    if key.minimum is not None and value < key.minimum:
+        return type(value)(key.minimum)
+    if key.maximum is not None and value > key.maximum:
+        return type(value)(key.maximum)
+    return value
+
+
+def format_value(value: Scalar) -> str:
+    """Return the text of a value in CONFIG commands and dumps: TRUE/FALSE, decimal, %.7e."""
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, float):
+        return f"{value:.7e}"
+    return str(value)
+
+
+def format_dump(values: dict[str, Scalar]) -> bytes:
+    """Return the configuration dump of TCP port 5559: `key = value` lines ended by a NUL."""
+    return "".join(f"{name} = {format_value(value)}\n" for name, value in values.items()).encode("latin-1") + b"\0"

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from drivers.ardrone.wire.errors import WireError
-from drivers.ardrone.wire.options import Layout, Tag
+from drivers.ardrone.wire.layout import Layout
+from drivers.ardrone.wire.options import Tag
 
 MAGIC = 0x55667788
 MAX_SIZE = 4096  # WIRE: the SDK's receive buffer

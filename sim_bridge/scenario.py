@@ -1,0 +1,198 @@
+"""What the simulator does: target path, figures of the emulated sensors, faults, seed.
+
+The file format of `config/scenarios/*.yaml`. The ground station passes a scenario on unread, as JSON; it is validated
+here. Units are in the key names; a pair of numbers is a range that each drone draws its own value from.
+"""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from groundstation.errors import SettingsError
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def _rising(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise PydanticCustomError("rising", "the first number of a range must not exceed the second")
+    return interval
+
+
+Gain = Annotated[float, Field(ge=0.3, le=1.5)]
+Delay = Annotated[float, Field(ge=0, le=500)]
+Jump = Annotated[float, Field(ge=0, le=180)]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class FigureEight(_Section):
+    """A lemniscate along world x, at constant speed; `start_phase` in turns (0: centre, heading to +x +y)."""
+
+    shape: Literal["figure_eight"] = "figure_eight"
+    half_length_m: Annotated[float, Field(gt=0, le=50)] = 3.1
+    half_width_m: Annotated[float, Field(gt=0, le=50)] = 0.8
+    speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.2
+    start_phase: Annotated[float, Field(ge=0, le=1)] = 0.0
+    centre_m: tuple[float, float] = (0.0, 0.0)
+
+
+class Standstill(_Section):
+    """A target that waits where it is until it is steered over `@sim`."""
+
+    shape: Literal["none"] = "none"
+    position_m: tuple[float, float] = (0.0, 0.0)
+    yaw_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+
+
+class TargetScenario(_Section):
+    """The TurtleBot: its path, its top speed, and the standard deviation of its wheel slip (share of the speed)."""
+
+    path: Annotated[FigureEight | Standstill, Field(discriminator="shape")] = FigureEight()
+    max_speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.7
+    slip: Annotated[float, Field(ge=0, le=0.5)] = 0.05
+
+
+class DroneScenario(_Section):
+    """Every emulated AR.Drone: rate and errors of its navdata, battery, unrest of the air, wake of the others."""
+
+    navdata_hz: Annotated[float, Field(ge=1, le=200)] = 200.0
+    velocity_gain: Annotated[tuple[Gain, Gain], AfterValidator(_rising)] = (0.80, 0.90)
+    velocity_delay_ms: Annotated[tuple[Delay, Delay], AfterValidator(_rising)] = (20.0, 40.0)
+    velocity_noise_m_s: Annotated[float, Field(ge=0, le=1)] = 0.03
+    height_noise_m: Annotated[float, Field(ge=0, le=1)] = 0.034
+    height_delay_ms: Annotated[float, Field(ge=0, le=500)] = 85.0
+    attitude_noise_deg: Annotated[float, Field(ge=0, le=20)] = 1.0
+    attitude_correlation_s: Annotated[float, Field(gt=0, le=1000)] = 5.0
+    yaw_wander_deg: Annotated[float, Field(ge=0, le=90)] = 3.0
+    yaw_wander_correlation_s: Annotated[float, Field(gt=0, le=1000)] = 30.0
+    yaw_jump_at_lift_off_deg: Annotated[tuple[Jump, Jump], AfterValidator(_rising)] = (60.0, 143.0)
+    battery: Annotated[tuple[Share, Share], AfterValidator(_rising)] = (0.85, 1.0)
+    battery_drain_per_min: Annotated[float, Field(ge=0, le=10)] = 0.06
+    air_unrest_m_s2: Annotated[float, Field(ge=0, le=5)] = 0.08
+    downwash: bool = True
+
+
+class CameraScenario(_Section):
+    """Every emulated camera: its stream and the errors of its picture.
+
+    video_jitter_ms: half width of the uniform spread about the delay; corner_noise_px: displacement of a corner's
+    image, one sigma per axis; pixel_noise: one sigma in grey levels; blur_px: sigma of the lens and motion blur.
+    """
+
+    fps: Annotated[float, Field(gt=0, le=60)] = 15.0
+    video_delay_ms: Annotated[float, Field(ge=0, le=1000)] = 120.0
+    video_jitter_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
+    frame_loss: Annotated[float, Field(ge=0, le=1)] = 0.05
+    corner_noise_px: Annotated[float, Field(ge=0, le=5)] = 0.2
+    pixel_noise: Annotated[float, Field(ge=0, le=100)] = 2.0
+    blur_px: Annotated[float, Field(ge=0, le=10)] = 0.7
+
+
+class FaultKind(StrEnum):
+    """What a scenario can break."""
+
+    NAVDATA_SILENT = "navdata_silent"
+    AT_DEAF = "at_deaf"
+    CAMERA_CUT = "camera_cut"
+    CAMERA_STALL = "camera_stall"
+    BATTERY_DROP = "battery_drop"
+
+
+class Fault(_Section):
+    """One thing that breaks at `start_s` and, if it says so, heals at `end_s` [s after the simulator is ready].
+
+    entity: drone or camera; value: new battery charge (0..1) for a drop.
+    """
+
+    kind: FaultKind
+    entity: str
+    start_s: Annotated[float, Field(ge=0)]
+    end_s: Annotated[float, Field(ge=0)] | None = None
+    value: Annotated[float, Field(ge=0, le=1)] | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> "Fault":
+        if self.end_s is not None and self.end_s <= self.start_s:
+            raise PydanticCustomError("order", "end_s must be after start_s")
+        if (self.kind is FaultKind.BATTERY_DROP) != (self.value is not None):
+            raise PydanticCustomError("value", "value belongs to battery_drop, and only there")
+        return self
+
+
+class Scenario(_Section):
+    """A scenario file; every key has the honest figure as its default."""
+
+    schema_version: Literal[1] = 1
+    seed: Annotated[int, Field(ge=0)] = 1
+    target: TargetScenario = TargetScenario()
+    drones: DroneScenario = DroneScenario()
+    cameras: CameraScenario = CameraScenario()
+    faults: tuple[Fault, ...] = ()
+
+
+def parse_scenario(text: str | bytes) -> Scenario:
+    """Return the scenario in a JSON text; raises SettingsError naming every wrong key at once."""
+    try:
+        return Scenario.model_validate_json(text)
+    except ValidationError as error:
+        raise SettingsError(describe_problems("scenario", error)) from None
+
+
+def describe_problems(what: str, error: ValidationError) -> list[str]:
+    """Return one line for each wrong key: where, what is wrong, and what was found."""
+    lines = []
+    for problem in error.errors(include_url=False):
+        where = ".".join(str(part) for part in problem["loc"]) or "(all of it)"
+        lines.append(f"{what}: {where}: {problem['msg']} (got {problem['input']!r})")
+    return lines
+
+
+# What the default scenario promises: a weaker value would make a run look better than a flight.
+_HONEST: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
+    ("drones.navdata_hz: 200", lambda s: s.drones.navdata_hz == 200),
+    (
+        "drones.velocity_gain: reaching down to 0.80, at most 0.90",
+        lambda s: _within(s.drones.velocity_gain, 0.80, 0.90),
+    ),
+    ("drones.velocity_delay_ms: from 20 up to 40", lambda s: _at_least(s.drones.velocity_delay_ms, 20, 40)),
+    ("drones.velocity_noise_m_s: >= 0.03", lambda s: s.drones.velocity_noise_m_s >= 0.03),
+    ("drones.height_noise_m: >= 0.034", lambda s: s.drones.height_noise_m >= 0.034),
+    ("drones.height_delay_ms: >= 85", lambda s: s.drones.height_delay_ms >= 85),
+    ("drones.attitude_noise_deg: >= 1", lambda s: s.drones.attitude_noise_deg >= 1),
+    ("drones.attitude_correlation_s: >= 5", lambda s: s.drones.attitude_correlation_s >= 5),
+    ("drones.yaw_wander_deg: >= 3", lambda s: s.drones.yaw_wander_deg >= 3),
+    (
+        "drones.yaw_jump_at_lift_off_deg: from 60 up to 143",
+        lambda s: _at_least(s.drones.yaw_jump_at_lift_off_deg, 60, 143),
+    ),
+    ("drones.downwash: true", lambda s: s.drones.downwash),
+    ("cameras.fps: <= 15", lambda s: s.cameras.fps <= 15),
+    ("cameras.video_delay_ms: >= 120", lambda s: s.cameras.video_delay_ms >= 120),
+    ("cameras.video_jitter_ms: >= 20", lambda s: s.cameras.video_jitter_ms >= 20),
+    ("cameras.frame_loss: >= 0.05", lambda s: s.cameras.frame_loss >= 0.05),
+    ("cameras.corner_noise_px: >= 0.2", lambda s: s.cameras.corner_noise_px >= 0.2),
+    ("target.path: a figure eight at >= 0.2 m/s", lambda s: _is_honest_path(s.target.path)),
+    ("target.slip: > 0", lambda s: s.target.slip > 0),
+)
+
+
+def _within(interval: tuple[float, float], low: float, high: float) -> bool:
+    return interval[0] <= low and interval[1] <= high
+
+
+def _at_least(interval: tuple[float, float], low: float, high: float) -> bool:
+    return interval[0] >= low and interval[1] >= high
+
+
+def _is_honest_path(path: FigureEight | Standstill) -> bool:
+    return isinstance(path, FigureEight) and path.speed_m_s >= 0.2
+
+
+def weaker_than_reality(scenario: Scenario) -> list[str]:
+    """Return what a scenario claims that real drones and cameras do not keep; empty for an honest one."""
+    return [promise for promise, keeps in _HONEST if not keeps(scenario)]

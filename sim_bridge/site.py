@@ -1,0 +1,113 @@
+"""The part of a resolved field that the simulator builds its room from.
+
+The field's full model belongs to the settings of the ground station; a simulator that read all of it would break with
+every new key, so what is not named here is ignored.
+"""
+
+import math
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from groundstation.errors import SettingsError
+from sim_bridge.scenario import describe_problems
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+
+class Room(_Part):
+    """Size along x, y, z; the origin is on the floor in the middle."""
+
+    size_m: tuple[float, float, float]
+
+
+class Lens(_Part):
+    """Pinhole with plumb-bob distortion k1 k2 p1 p2 k3."""
+
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float]
+
+
+class Marker(_Part):
+    """The checkerboard of a drone."""
+
+    code: int
+    square_mm: float
+    position_m: tuple[float, float, float]
+
+
+class OnboardCamera(_Part):
+    """A drone's camera [base]."""
+
+    calibration: Lens
+    position_m: tuple[float, float, float]
+    tilt_down_deg: float
+    pan_left_deg: float = 0.0
+
+
+class SiteDrone(_Part):
+    """One drone: kind, place and heading of its pad, what it carries."""
+
+    kind: Literal["ardrone"]
+    pad_m: tuple[float, float]
+    pad_yaw_deg: float = 0.0
+    marker: Marker
+    camera: OnboardCamera | None = None
+
+    @property
+    def pad_yaw_rad(self) -> float:
+        """Return the heading on the pad [rad; world]."""
+        return math.radians(self.pad_yaw_deg)
+
+
+class SiteCamera(_Part):
+    """A camera fixed in the world, looking straight down."""
+
+    calibration: Lens
+    position_m: tuple[float, float, float]
+    looking: Literal["down"] = "down"
+
+
+class TargetMarker(_Part):
+    """The checkerboard of the target, flat, `height_m` above the floor."""
+
+    code: int
+    height_m: float
+    square_mm: float
+
+
+class SiteTarget(_Part):
+    """The TurtleBot."""
+
+    name: str
+    marker: TargetMarker
+
+
+class Site(_Part):
+    """Room, drones, cameras and target of a resolved field."""
+
+    site: str
+    room: Room
+    cameras: dict[str, SiteCamera] = {}
+    drones: dict[str, SiteDrone]
+    target: SiteTarget
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Return the names of all that moves: drones in the field's order, then the target."""
+        return (*self.drones, self.target.name)
+
+
+def parse_site(field: object) -> Site:
+    """Return the simulator's view of a resolved field (decoded JSON); raises SettingsError with all problems."""
+    try:
+        return Site.model_validate(field)
+    except ValidationError as error:
+        raise SettingsError(describe_problems("field", error)) from None

@@ -1,0 +1,73 @@
+"""Scenario files: every key is checked, and the default one flatters nobody."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from groundstation.errors import SettingsError
+from sim_bridge.scenario import Scenario, parse_scenario, weaker_than_reality
+
+SCENARIOS = Path(__file__).parents[2] / "config" / "scenarios"
+
+
+def read(name: str) -> dict[str, Any]:
+    data: dict[str, Any] = YAML(typ="safe").load((SCENARIOS / name).read_text())
+    return data
+
+
+def test_the_default_scenario_is_honest() -> None:
+    assert weaker_than_reality(parse_scenario(json.dumps(read("realistic.yaml")))) == []
+
+
+def test_the_default_scenario_names_every_figure() -> None:
+    data = read("realistic.yaml")
+    for section in ("drones", "cameras", "target"):
+        assert set(data[section]) >= set(Scenario.model_fields[section].annotation.model_fields) - {"downwash"}, section
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("drones", "navdata_hz", 100),
+        ("drones", "velocity_gain", [0.85, 1.0]),
+        ("drones", "velocity_gain", [0.86, 0.9]),
+        ("drones", "velocity_delay_ms", [0, 40]),
+        ("drones", "velocity_delay_ms", [20, 30]),
+        ("drones", "height_noise_m", 0.033),
+        ("drones", "height_delay_ms", 84),
+        ("drones", "attitude_noise_deg", 0.9),
+        ("drones", "attitude_correlation_s", 1.0),
+        ("drones", "yaw_wander_deg", 2.9),
+        ("drones", "yaw_jump_at_lift_off_deg", [0, 0]),
+        ("cameras", "video_delay_ms", 119),
+        ("cameras", "video_jitter_ms", 19),
+        ("cameras", "fps", 30),
+        ("cameras", "frame_loss", 0.04),
+        ("cameras", "corner_noise_px", 0.19),
+        ("target", "path", {"shape": "none"}),
+        ("target", "path", {"shape": "figure_eight", "speed_m_s": 0.19}),
+    ],
+)
+def test_weaker_values_are_refused(section: str, key: str, value: Any) -> None:
+    data = read("realistic.yaml")
+    data[section][key] = value
+    assert [line for line in weaker_than_reality(parse_scenario(json.dumps(data))) if line.startswith(section)]
+
+
+def test_all_problems_are_named_at_once() -> None:
+    text = '{"drones": {"velocity_gain": [0.9, 0.8], "speling": 1}, "seed": -1, "faults": [{"kind": "flood"}]}'
+    with pytest.raises(SettingsError) as refused:
+        parse_scenario(text)
+    lines = str(refused.value)
+    for part in ("drones.velocity_gain", "drones.speling", "seed", "faults.0.kind", "faults.0.entity"):
+        assert part in lines
+
+
+def test_faults_need_what_they_use() -> None:
+    with pytest.raises(SettingsError, match="end_s must be after start_s"):
+        parse_scenario('{"faults": [{"kind": "navdata_silent", "entity": "d", "start_s": 2, "end_s": 1}]}')
+    with pytest.raises(SettingsError, match="value belongs to battery_drop"):
+        parse_scenario('{"faults": [{"kind": "battery_drop", "entity": "d", "start_s": 2}]}')

@@ -1,0 +1,157 @@
+"""Pinhole camera with plumb-bob distortion (k1 k2 p1 p2 k3): points to pixels, pixels to rays, and derivatives.
+
+Pixel (0, 0) is the centre of the top left pixel, as in OpenCV. Normalised coordinates are x / z, y / z.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Newton converges quadratically from the distorted point; 12 steps are ample even for k1 = -0.5 at the corners.
+_NEWTON_STEPS = 12
+_NEWTON_TOLERANCE = 1e-13
+_MAX_RADIUS = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class CameraIntrinsics:
+    """Calibration of one camera: picture size, focal lengths, principal point [px], distortion (k1 k2 p1 p2 k3).
+
+    residual_px: rms reprojection error of the calibration. Raises ValueError for figures no camera has.
+    """
+
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    residual_px: float = 0.2
+
+    def __post_init__(self) -> None:
+        if self.width_px < 1 or self.height_px < 1 or len(self.distortion) != 5:
+            raise ValueError("a camera needs a positive picture size and five distortion coefficients")
+        figures = (self.fx_px, self.fy_px, self.cx_px, self.cy_px, *self.distortion, self.residual_px)
+        if not all(math.isfinite(figure) for figure in figures) or min(self.fx_px, self.fy_px) <= 0.0:
+            raise ValueError("calibration figures must be finite and focal lengths positive")
+
+    @property
+    def matrix(self) -> Array:
+        """Return the camera matrix K (3, 3)."""
+        return np.array([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
+
+    @property
+    def max_radius(self) -> float:
+        """Return the undistorted radius up to which the distortion grows with the radius, so that it can be undone."""
+        return _fold_radius(self.distortion)
+
+    def project(self, points: Array) -> Array:
+        """Return pixels (..., 2) of points (..., 3) [camera_optical]; NaN for points behind or beyond the lens model."""
+        points = np.asarray(points, dtype=np.float64)
+        depth = points[..., 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            normalised = np.where((depth > 1e-9)[..., None], points[..., :2] / depth[..., None], np.nan)
+        return self.pixels_from_normalised(normalised)
+
+    def pixels_from_normalised(self, normalised: Array) -> Array:
+        """Return pixels (..., 2) of undistorted normalised coordinates (..., 2); NaN where the lens model folds."""
+        x, y = normalised[..., 0], normalised[..., 1]
+        with np.errstate(invalid="ignore"):
+            inside = x * x + y * y <= self.max_radius**2
+        x_d, y_d = _distort(x, y, self.distortion)
+        pixels = np.stack((self.fx_px * x_d + self.cx_px, self.fy_px * y_d + self.cy_px), axis=-1)
+        return np.where(inside[..., None], pixels, np.nan)
+
+    def normalised_from_pixels(self, pixels: Array) -> Array:
+        """Return undistorted normalised coordinates (..., 2) of pixels (..., 2), by Newton's method.
+
+        Pixels that no ray of the lens model reaches come back as NaN.
+        """
+        pixels = np.asarray(pixels, dtype=np.float64)
+        x_d = (pixels[..., 0] - self.cx_px) / self.fx_px
+        y_d = (pixels[..., 1] - self.cy_px) / self.fy_px
+        x, y = _undistort(x_d, y_d, self.distortion)
+        with np.errstate(invalid="ignore"):
+            inside = x * x + y * y <= self.max_radius**2
+        return np.where(inside[..., None], np.stack((x, y), axis=-1), np.nan)
+
+    def project_jacobian(self, points: Array) -> Array:
+        """Return d(pixel) / d(point) (..., 2, 3) for points (..., 3) [px/m; camera_optical]."""
+        points = np.asarray(points, dtype=np.float64)
+        z = points[..., 2]
+        x, y = points[..., 0] / z, points[..., 1] / z
+        lens = _distort_jacobian(x, y, self.distortion)
+        zero = np.zeros_like(z)
+        pinhole = np.stack((np.stack((1 / z, zero, -x / z), -1), np.stack((zero, 1 / z, -y / z), -1)), -2)
+        focal = np.array([[self.fx_px], [self.fy_px]])
+        return focal * np.asarray(lens @ pinhole)
+
+    def contains(self, pixels: Array, margin_px: float = 0.0) -> NDArray[np.bool_]:
+        """Return which pixels (..., 2) lie in the picture, at least `margin_px` from its border."""
+        u, v = pixels[..., 0], pixels[..., 1]
+        with np.errstate(invalid="ignore"):
+            return np.asarray(
+                (u >= margin_px - 0.5)
+                & (v >= margin_px - 0.5)
+                & (u <= self.width_px - 0.5 - margin_px)
+                & (v <= self.height_px - 0.5 - margin_px)
+            )
+
+
+@cache
+def _fold_radius(distortion: tuple[float, ...]) -> float:
+    k1, k2, _, _, k3 = distortion
+    radius = np.linspace(0.0, _MAX_RADIUS, 801)
+    slope = 1.0 + radius**2 * (3 * k1 + radius**2 * (5 * k2 + radius**2 * 7 * k3))
+    folds = np.flatnonzero(slope <= 1e-3)
+    return float(radius[folds[0]]) if folds.size else _MAX_RADIUS
+
+
+def _distort(x: Array, y: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
+    k1, k2, p1, p2, k3 = distortion
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return (
+        x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+    )
+
+
+def _distort_jacobian(x: Array, y: Array, distortion: tuple[float, ...]) -> Array:
+    """Return d(distorted) / d(undistorted) (..., 2, 2)."""
+    k1, k2, p1, p2, k3 = distortion
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3)
+    xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
+    xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
+    yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
+    return np.stack((np.stack((xx, xy), -1), np.stack((xy, yy), -1)), -2)
+
+
+def _undistort(x_d: Array, y_d: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
+    # OpenCV 5 stops after five fixed-point steps, which is pixels off at the corners of a wide lens.
+    x, y = x_d.copy(), y_d.copy()
+    if not any(distortion):
+        return x, y
+    for _ in range(_NEWTON_STEPS):
+        x_now, y_now = _distort(x, y, distortion)
+        error_x, error_y = x_now - x_d, y_now - y_d
+        jacobian = _distort_jacobian(x, y, distortion)
+        a, b, d = jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 1, 1]
+        determinant = a * d - b * b
+        determinant = np.where(np.abs(determinant) < 1e-6, 1e-6, determinant)
+        step_x, step_y = (d * error_x - b * error_y) / determinant, (a * error_y - b * error_x) / determinant
+        # A bounded step keeps pixels outside the lens model from running away.
+        x, y = x - np.clip(step_x, -0.5, 0.5), y - np.clip(step_y, -0.5, 0.5)
+        if max(np.abs(step_x).max(initial=0.0), np.abs(step_y).max(initial=0.0)) < _NEWTON_TOLERANCE:
+            break
+    x_now, y_now = _distort(x, y, distortion)
+    bad = np.hypot(x_now - x_d, y_now - y_d) > 1e-9
+    return np.where(bad, np.nan, x), np.where(bad, np.nan, y)

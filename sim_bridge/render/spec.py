@@ -1,0 +1,95 @@
+"""What a render process is told: one camera, what it can see, how bad the picture is, where to serve it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+
+
+class BodyShape(StrEnum):
+    """What a body looks like under its board."""
+
+    DRONE = "drone"
+    TURTLEBOT = "turtlebot"
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Where the camera sits: `body` "" means the world.
+
+    parent_from_optical: base_from_camera_optical on a body, world_from_camera_optical for a world-fixed camera.
+    """
+
+    parent_from_optical: Pose
+    body: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSpec:
+    """A marker lying flat on a body: its code, square size, and its place on the body [m; base]."""
+
+    body: str
+    code: int
+    square_mm: float
+    position_m: tuple[float, float, float]
+    shape: BodyShape = BodyShape.DRONE
+
+
+class OutageKind(StrEnum):
+    """How a stream fails: `STALL` keeps the connection but sends nothing, `CUT` closes it and refuses new ones."""
+
+    STALL = "stall"
+    CUT = "cut"
+
+
+@dataclass(frozen=True, slots=True)
+class Outage:
+    """A planned failure of the stream, in seconds since the process began to serve."""
+
+    kind: OutageKind
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class CameraScenario:
+    """How good the camera and its link are.
+
+    video_delay_ms +- video_jitter_ms (uniform) from exposure to arrival; frame_loss: share of frames never sent;
+    corner_noise_px: rms error of each board corner (print, lens model), pixel_noise: grey levels rms; blur_px: sigma
+    of the defocus; exposure_ms: motion blur.
+    """
+
+    fps: float = 15.0
+    video_delay_ms: float = 120.0
+    video_jitter_ms: float = 20.0
+    frame_loss: float = 0.05
+    corner_noise_px: float = 0.2
+    pixel_noise: float = 2.0
+    blur_px: float = 0.7
+    exposure_ms: float = 4.0
+    jpeg_quality: int = 85
+    outages: tuple[Outage, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RenderSpec:
+    """All that `sim_bridge.render.process.run` needs; picklable.
+
+    truth_name: shared memory of the TruthBoard; bodies: its bodies in order; room_size_m: (x, y, z), the floor is
+    centred at the origin; address, port: where the MJPEG stream is served; parent_pid: exit when it is gone (0: never).
+    """
+
+    camera: str
+    mount: Mount
+    intrinsics: CameraIntrinsics
+    boards: tuple[BoardSpec, ...]
+    truth_name: str
+    bodies: tuple[str, ...]
+    address: str
+    port: int
+    scenario: CameraScenario = CameraScenario()
+    seed: int = 1
+    room_size_m: tuple[float, float, float] = (8.0, 6.0, 4.5)
+    parent_pid: int = 0

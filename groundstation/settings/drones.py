@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from groundstation.settings.room import Calibration
-from groundstation.settings.values import Address, MarkerCode, Name, Section, SquareSize, Vector2, Vector3, VideoDelay
+from groundstation.settings.values import Address, MarkerCode, Section, Source, SquareSize, Vector2, Vector3, VideoDelay
 
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
 Delay = Annotated[float, Field(ge=0, le=1000)]
@@ -49,7 +49,7 @@ class RobotMarker(Section):
 class OnboardCamera(Section):
     """The camera of a drone: where it sits [base], tilted down from the horizon, panned left."""
 
-    source: Annotated[str, Field(min_length=1)]
+    source: Source
     calibration: Calibration
     position_m: Vector3 = (0.0, 0.0, 0.0)
     tilt_down_deg: Annotated[float, Field(ge=-90, le=90)] = 45.0
@@ -93,7 +93,7 @@ class Drone(Section):
     """One drone with all three levels merged. `pad_m` is where it takes off, `pad_yaw_deg` how it stands there."""
 
     kind: Literal["ardrone"]
-    type: Name | None = None
+    enabled: bool = True
     address: Address
     limits: Limits = Limits()
     marker: RobotMarker

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from groundstation.settings.values import Interval, Section, Vector3, VideoDelay, of_length
+from groundstation.settings.values import Interval, Section, Source, Vector3, VideoDelay, of_length
 
 Length = Annotated[float, Field(gt=0, le=100)]
 
@@ -59,7 +59,7 @@ class Calibration(Section):
 class WorldCamera(Section):
     """A camera fixed in the world. `looking: down`: picture right is world x, picture down is world -y."""
 
-    source: Annotated[str, Field(min_length=1)]
+    source: Source
     calibration: Calibration
     position_m: Vector3
     looking: Literal["down"] = "down"

@@ -22,7 +22,7 @@ class Field(Section):
     schema_version: Literal[1] = SCHEMA_VERSION
     site: Name
     room: Room
-    cameras: dict[Name, WorldCamera] = Constraint(default_factory=dict)
+    cameras: Annotated[dict[Name, WorldCamera], Constraint(min_length=1)]
     drones: Annotated[dict[Name, Drone], Constraint(min_length=1)]
     target: Target
     estimator: Estimator = Estimator()

@@ -1,6 +1,7 @@
 """Kinds of values that a field file is made of, and the base of its sections."""
 
 import ipaddress
+import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
@@ -40,6 +41,12 @@ def _is_address(value: str) -> str:
     return value
 
 
+def _is_source(value: str) -> str:
+    if not re.fullmatch(r"[a-z][a-z0-9+]*://\S+|/dev/\S+", value):
+        raise PydanticCustomError("source", "must be an address such as http://192.168.1.50:8080/video.mjpg")
+    return value
+
+
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Vector2 = Annotated[tuple[float, float], of_length(2)]
 Vector3 = Annotated[tuple[float, float, float], of_length(3)]
@@ -47,4 +54,5 @@ Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]
+Source = Annotated[str, AfterValidator(_is_source)]
 Address = Annotated[str, AfterValidator(_is_address)]

@@ -1,0 +1,187 @@
+"""What must hold between settings: each check yields the path at fault and what is wrong with it."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import combinations
+
+from groundstation.settings.behaviour import Estimator, Planner, Safety
+from groundstation.settings.document import KeyPath
+from groundstation.settings.drones import Drone
+from groundstation.settings.room import Calibration, Room, WorldCamera
+from groundstation.settings.target import Target
+
+Finding = tuple[KeyPath, str]
+
+# Names of processes and of scopes on the bus: an entity of the same name would be taken for them.
+RESERVED = frozenset({"team", "operator", "router", "tracker", "recorder", "console", "monitor", "supervisor"})
+_ROBOT_HEIGHT_M = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The sections that are sound in themselves; a check is left out where one that it needs is missing."""
+
+    room: Room | None = None
+    cameras: dict[str, WorldCamera] = field(default_factory=dict)
+    drones: dict[str, Drone] = field(default_factory=dict)
+    target: Target | None = None
+    estimator: Estimator | None = None
+    planner: Planner | None = None
+    safety: Safety | None = None
+
+    @property
+    def flying(self) -> dict[str, Drone]:
+        """Return the drones that are enabled."""
+        return {name: drone for name, drone in self.drones.items() if drone.enabled}
+
+
+def findings(parts: Parts) -> Iterator[Finding]:
+    """Return everything that is wrong between the given sections."""
+    for check in _CHECKS:
+        yield from check(parts)
+
+
+def _fence_in_room(parts: Parts) -> Iterator[Finding]:
+    if parts.room is None:
+        return
+    size, fence = parts.room.size_m, parts.room.fence
+    walls = {"x_m": (-size[0] / 2, size[0] / 2), "y_m": (-size[1] / 2, size[1] / 2), "z_m": (0.0, size[2])}
+    for name, (low, high) in walls.items():
+        least, most = getattr(fence, name)
+        if least < low or most > high:
+            yield ("room", "fence", name), f"must lie inside the room, {low:g} to {high:g} (got {least:g} to {most:g})"
+
+
+def _cameras_above_fence(parts: Parts) -> Iterator[Finding]:
+    if parts.room is None:
+        return
+    size, top = parts.room.size_m, parts.room.fence.z_m[1]
+    for name, camera in parts.cameras.items():
+        x, y, z = camera.position_m
+        path = ("cameras", name, "position_m")
+        if abs(x) > size[0] / 2 or abs(y) > size[1] / 2 or z > size[2]:
+            yield path, "must lie inside the room"
+        elif z <= top:
+            yield path, f"must hang above the fence: height > {top:g} (got {z:g})"
+
+
+def _team(parts: Parts) -> Iterator[Finding]:
+    if parts.drones and not parts.flying:
+        yield ("drones",), "at least one drone must be enabled"
+
+
+def _pads(parts: Parts) -> Iterator[Finding]:
+    if parts.room is not None:
+        for name, drone in parts.flying.items():
+            if not parts.room.fence.contains(*drone.pad_m):
+                yield ("drones", name, "pad_m"), f"must lie inside the fence (got {list(drone.pad_m)})"
+    if parts.safety is None:
+        return
+    least = parts.safety.min_separation_m
+    for (first, one), (second, other) in combinations(parts.flying.items(), 2):
+        distance = math.dist(one.pad_m, other.pad_m)
+        if distance < least:
+            yield (
+                ("drones", second, "pad_m"),
+                f"is {distance:.2f} m from the pad of {first}: must be >= {least:g} (safety.min_separation_m)",
+            )
+
+
+def _unique(values: Iterable[tuple[KeyPath, object, str]], what: str) -> Iterator[Finding]:
+    holders: dict[object, str] = {}
+    for path, value, holder in values:
+        if value in holders:
+            yield path, f"{what} {value} is already that of {holders[value]}"
+        else:
+            holders[value] = holder
+
+
+def _distinct(parts: Parts) -> Iterator[Finding]:
+    codes: list[tuple[KeyPath, object, str]] = [
+        (("drones", name, "marker", "code"), drone.marker.code, name) for name, drone in parts.drones.items()
+    ]
+    sources: list[tuple[KeyPath, object, str]] = [
+        (("cameras", name, "source"), camera.source, name) for name, camera in parts.cameras.items()
+    ]
+    if parts.target is not None:
+        codes.append((("target", "marker", "code"), parts.target.marker.code, parts.target.name))
+    sources += [(("drones", name, "camera", "source"), d.camera.source, name) for name, d in parts.drones.items()]
+    yield from _unique(codes, "marker code")
+    yield from _unique(sources, "camera source")
+    yield from _unique(((("drones", n, "address"), d.address, n) for n, d in parts.drones.items()), "address")
+
+
+def _names(parts: Parts) -> Iterator[Finding]:
+    named: list[tuple[KeyPath, str]] = [(("drones", name), name) for name in parts.drones]
+    named += [(("cameras", name), name) for name in parts.cameras]
+    if parts.target is not None:
+        named.append((("target", "name"), parts.target.name))
+    for path, name in named:
+        if name in RESERVED or name.startswith("sim_"):
+            yield path, f"the name {name} is taken by the ground station itself"
+    yield from _unique(((path, name, _kind_of(path)) for path, name in named), "the name")
+
+
+def _kind_of(path: KeyPath) -> str:
+    """Return what kind of thing a path of the field file names."""
+    return {"drones": "a drone", "cameras": "a camera"}.get(str(path[0]), "the target")
+
+
+def _heights(parts: Parts) -> Iterator[Finding]:
+    if parts.planner is None:
+        return
+    rows = parts.planner.level_heights_m
+    if parts.flying and len(rows) < len(parts.flying):
+        yield (
+            ("planner", "level_heights_m"),
+            f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones (got {len(rows)} rows)",
+        )
+    low = parts.target.marker.height_m + _ROBOT_HEIGHT_M if parts.target else 0.0
+    high = math.inf
+    if parts.room is not None:
+        low, high = max(low, parts.room.fence.z_m[0]), parts.room.fence.z_m[1]
+    for index, row in enumerate(rows):
+        for slot, height in enumerate(row):
+            if not low <= height <= high:
+                path = ("planner", "level_heights_m", index, slot)
+                yield path, f"must be between {low:g} (over the target) and {high:g} (the fence) (got {height:g})"
+
+
+def _rates_and_times(parts: Parts) -> Iterator[Finding]:
+    planner, safety, estimator = parts.planner, parts.safety, parts.estimator
+    if planner and estimator and planner.rate_hz > estimator.rate_hz:
+        yield ("planner", "rate_hz"), f"must be <= {estimator.rate_hz} (estimator.rate_hz) (got {planner.rate_hz})"
+    if planner and safety and planner.separation_m < safety.min_separation_m:
+        yield (
+            ("planner", "separation_m"),
+            f"must be >= {safety.min_separation_m:g} (safety.min_separation_m) (got {planner.separation_m:g})",
+        )
+    if safety and safety.setpoint_lifetime_ms >= safety.land_after_s * 1000:
+        yield ("safety", "land_after_s"), f"must be > {safety.setpoint_lifetime_ms / 1000:g} (the set-point's lifetime)"
+
+
+def _calibrations(parts: Parts) -> Iterator[Finding]:
+    held: list[tuple[KeyPath, Calibration]] = [
+        (("cameras", name, "calibration"), camera.calibration) for name, camera in parts.cameras.items()
+    ]
+    held += [(("drones", name, "camera", "calibration"), d.camera.calibration) for name, d in parts.drones.items()]
+    for path, lens in held:
+        for name, value, size in (("cx_px", lens.cx_px, lens.width_px), ("cy_px", lens.cy_px, lens.height_px)):
+            if not 0.25 * size <= value <= 0.75 * size:
+                yield (*path, name), f"must lie near the middle of the picture, {size} wide or high (got {value:g})"
+        if not 0.8 <= lens.fx_px / lens.fy_px <= 1.25:
+            yield (*path, "fy_px"), f"must be close to fx_px = {lens.fx_px:g}: pixels are square (got {lens.fy_px:g})"
+
+
+_CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
+    _fence_in_room,
+    _cameras_above_fence,
+    _team,
+    _pads,
+    _distinct,
+    _names,
+    _heights,
+    _rates_and_times,
+    _calibrations,
+)

@@ -1,0 +1,148 @@
+"""From a field file as written to a field as resolved: options, calibrations, then defaults < type < robot."""
+
+from difflib import get_close_matches
+from pathlib import Path
+
+from groundstation.errors import SettingsError
+from groundstation.settings.document import KeyPath, Node, Origin, dotted, parse, read
+from groundstation.settings.wording import problem
+
+_NAMED = ("drones", "cameras", "types")  # mappings of names: an option may change an entry, not invent one
+
+
+def with_option(tree: Node, option: str) -> Node:
+    """Return the tree with `a.b=c` set; c is YAML, null removes the key. Raises SettingsError naming the option."""
+    place = f"--set {option}"
+    name, equals, text = option.partition("=")
+    path = tuple(part.strip() for part in name.split("."))
+    if not equals or not all(path):
+        raise SettingsError([f"{place}: must look like path.to.key=value"])
+    value = parse(text, place, line=0) if text.strip() else Node("", Origin(place, 0))
+    return _placed(tree, path, value, (), place)
+
+
+def _placed(tree: Node, path: KeyPath, value: Node, done: KeyPath, place: str) -> Node:
+    if not path:
+        return _moved(value, done)
+    key, rest = path[0], path[1:]
+    if isinstance(tree.value, list):
+        if not str(key).isdigit() or int(key) >= len(tree.value):
+            raise SettingsError([f"{place}: {dotted(done)} is a list of {len(tree.value)}, {key!r} is not in it"])
+        items = list(tree.value)
+        items[int(key)] = _placed(items[int(key)], rest, value, (*done, int(key)), place)
+        return Node(items, Origin(place, 0, done))
+    if not isinstance(tree.value, dict):
+        raise SettingsError([f"{place}: {dotted(done)} is a single value, nothing lies below it"])
+    entries = dict(tree.value)
+    if len(done) == 1 and done[0] in _NAMED and key not in entries:
+        near = get_close_matches(str(key), entries, 1, 0.5)
+        meant = f"did you mean {dotted((*done, near[0]))}?" if near else f"there are {', '.join(entries)}"
+        raise SettingsError([f"{place}: there is no {dotted((*done, key))}, {meant}"])
+    if not rest and value.value is None:
+        entries.pop(str(key), None)
+        return Node(entries, tree.origin)
+    below = entries.get(str(key)) or Node({}, Origin(place, 0, (*done, key)))
+    entries[str(key)] = _placed(below, rest, value, (*done, key), place)
+    return Node(entries, tree.origin)
+
+
+def _moved(node: Node, base: KeyPath) -> Node:
+    origin = Origin(node.origin.place, node.origin.line, (*base, *node.origin.path))
+    if isinstance(node.value, dict):
+        return Node({key: _moved(inner, base) for key, inner in node.value.items()}, origin)
+    if isinstance(node.value, list):
+        return Node([_moved(inner, base) for inner in node.value], origin)
+    return Node(node.value, origin)
+
+
+def merged(lower: Node, upper: Node) -> Node:
+    """Return a mapping in which entries of `upper` win over those of `lower`, level by level."""
+    if not isinstance(lower.value, dict) or not isinstance(upper.value, dict):
+        return upper
+    entries = dict(lower.value)
+    for key, node in upper.value.items():
+        entries[key] = merged(entries[key], node) if key in entries else node
+    return Node(entries, upper.origin)
+
+
+class Calibrations:
+    """Reads calibration files beside the field file, each once; notes what is wrong and at which entries."""
+
+    def __init__(self, directory: Path, name: str) -> None:
+        self._directory = directory
+        self._name = name
+        self._known: dict[str, Node | None] = {}
+        self.problems: list[str] = []
+        self.failed: set[Origin] = set()
+
+    def inlined(self, holder: Node) -> Node:
+        """Return a mapping (a camera, or a drone with one) with the name of a calibration replaced by its content."""
+        if not isinstance(holder.value, dict):
+            return holder
+        entries = dict(holder.value)
+        camera, calibration = holder.get("camera"), holder.get("calibration")
+        if camera is not None:
+            entries["camera"] = self.inlined(camera)
+        if calibration is not None and isinstance(calibration.value, str):
+            content = self._content(calibration)
+            if content is None:
+                self.failed.add(calibration.origin)
+            else:
+                entries["calibration"] = content
+        return Node(entries, holder.origin)
+
+    def _content(self, entry: Node) -> Node | None:
+        name = entry.value
+        if name not in self._known:
+            try:
+                self._known[name] = read(self._directory / name, str(Path(self._name).parent / name))
+            except SettingsError as error:
+                self._known[name] = None
+                self.problems += [problem(entry.origin, text) for text in error.problems]
+        return self._known[name]
+
+
+class Levels:
+    """The resolved tree of a field file, and the fragments (`defaults`, `types`) it was merged from."""
+
+    def __init__(self, tree: Node, calibrations: Calibrations) -> None:
+        self.problems: list[str] = []
+        self.untyped: set[str] = set()
+        self._entries = dict(tree.value)
+        none = Node({}, tree.origin)
+        self.defaults = calibrations.inlined(self._entries.pop("defaults", none))
+        types = self._entries.pop("types", none)
+        self.types = self._mapping(types, "type names") and {
+            name: calibrations.inlined(node) for name, node in types.value.items()
+        }
+        for key in ("drones", "cameras"):
+            section = self._entries.get(key)
+            if section is not None and isinstance(section.value, dict):
+                entries = {name: calibrations.inlined(node) for name, node in section.value.items()}
+                self._entries[key] = Node(entries, section.origin)
+        drones = self._entries.get("drones")
+        if drones is not None and isinstance(drones.value, dict):
+            entries = {name: self._resolved(name, node) for name, node in drones.value.items()}
+            self._entries["drones"] = Node(entries, drones.origin)
+        self.tree = Node(self._entries, tree.origin)
+
+    def _mapping(self, node: Node, what: str) -> dict[str, Node]:
+        if isinstance(node.value, dict):
+            return node.value
+        self.problems.append(problem(node.origin, f"must be a mapping of {what}"))
+        return {}
+
+    def _resolved(self, name: str, drone: Node) -> Node:
+        if not isinstance(drone.value, dict):
+            return drone
+        entries = dict(drone.value)
+        kind = entries.pop("type", None)
+        base = self.defaults
+        if kind is not None and kind.value in self.types:
+            base = merged(base, self.types[kind.value])
+        elif kind is not None:
+            self.untyped.add(name)
+            near = get_close_matches(str(kind.value), self.types, 1, 0.5)
+            meant = f", did you mean {near[0]}?" if near else f"; there are: {', '.join(self.types) or 'none'}"
+            self.problems.append(problem(kind.origin, f"there is no type {kind.value}{meant}"))
+        return merged(base, Node(entries, drone.origin))

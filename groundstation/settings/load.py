@@ -1,0 +1,144 @@
+"""Reading a field file: every problem at once, each with the file and line to mend."""
+
+import json
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from groundstation.errors import SettingsError
+from groundstation.settings.checks import Parts, findings
+from groundstation.settings.document import KeyPath, Node, Origin, read
+from groundstation.settings.drones import Drone
+from groundstation.settings.levels import Calibrations, Levels, with_option
+from groundstation.settings.schema import SCHEMA_VERSION, Field
+from groundstation.settings.wording import problem, problem_of_error
+
+
+def load_field(path: Path | str, options: Sequence[str] = ()) -> Field:
+    """Return the resolved field of a file with `a.b=c` options applied; raises SettingsError with all problems."""
+    path = Path(path)
+    tree, problems = _with_options(read(path), options)
+    _require_version(tree, problems)
+    calibrations = Calibrations(path.parent, str(path))
+    levels = Levels(tree, calibrations)
+    problems += calibrations.problems + levels.problems
+    errors = _errors(Field, levels.tree)
+    problems += _worded(errors, levels.tree, Field, calibrations.failed, levels.untyped)
+    for fragment in (levels.defaults, *levels.types.values()):
+        problems += _worded(_partial_errors(fragment), fragment, Drone, calibrations.failed)
+    parts = _sound_parts(levels.tree.plain(), [error["loc"] for error in errors])
+    problems += [problem(levels.tree.origin_of(at), text) for at, text in findings(parts)]
+    if problems:
+        raise SettingsError(_ordered(problems))
+    field = Field.model_validate_json(json.dumps(levels.tree.plain()))
+    flying = {name: drone for name, drone in field.drones.items() if drone.enabled}
+    return field.model_copy(update={"drones": flying})
+
+
+def _with_options(tree: Node, options: Iterable[str]) -> tuple[Node, list[str]]:
+    if not isinstance(tree.value, dict):
+        raise SettingsError([f"{tree.origin}: must be a mapping with schema_version, room, drones, ..."])
+    problems: list[str] = []
+    for option in options:
+        try:
+            tree = with_option(tree, option)
+        except SettingsError as error:
+            problems += error.problems
+    return tree, problems
+
+
+def _require_version(tree: Node, problems: list[str]) -> None:
+    """Raise at once for another version: nothing else in such a file can be judged."""
+    version = tree.get("schema_version")
+    if version is None:
+        raise SettingsError([*problems, f"{tree.origin}: schema_version: is required, {SCHEMA_VERSION} here"])
+    if version.value != SCHEMA_VERSION or isinstance(version.value, bool):
+        text = f"must be {SCHEMA_VERSION}, the version that this program reads (got {json.dumps(version.plain())})"
+        raise SettingsError([*problems, problem(version.origin, text)])
+
+
+def _errors(model: type[Any], tree: Node) -> list[Any]:
+    try:
+        TypeAdapter(model).validate_json(json.dumps(tree.plain()))
+    except ValidationError as error:
+        return error.errors(include_url=False)
+    return []
+
+
+def _partial_errors(fragment: Node) -> list[Any]:
+    """Return what is wrong with a part of a drone, whatever may be missing from it."""
+    return [error for error in _errors(Drone, fragment) if error["type"] != "missing"]
+
+
+def _worded(
+    errors: Iterable[Any], tree: Node, model: type[Any], failed: Collection[Origin], untyped: Collection[str] = ()
+) -> list[str]:
+    """Return a line for each error but those that only follow from a missing calibration or an unknown type."""
+
+    def follows(error: Any) -> bool:
+        lacks_type = error["type"] == "missing" and error["loc"][0] == "drones" and error["loc"][1] in untyped
+        return lacks_type or tree.origin_of(error["loc"]) in failed
+
+    return [problem_of_error(error, tree, model) for error in errors if not follows(error)]
+
+
+def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
+    """Return the sections without an error of their own, and drones and cameras but for their faulty entries."""
+
+    def sound(model: Any, *path: str) -> Any:
+        value: Any = plain
+        for key in path:
+            value = value.get(key) if isinstance(value, dict) else None
+        if any(fault[: len(path)] == path for fault in faults):
+            return None
+        if value is None:
+            return Field.model_fields[path[0]].default
+        return _valid(model, value)
+
+    def named(section: str) -> dict[str, Any]:
+        model = Field.model_fields[section].annotation.__args__[1]  # type: ignore[union-attr]
+        entries = plain.get(section)
+        if not isinstance(entries, dict):
+            return {}
+        below = [fault[1:] for fault in faults if fault[:1] == (section,)]
+        return {name: value for name, entry in _without(entries, below).items() if (value := _valid(model, entry))}
+
+    # The defaults of Field stand in for sections that are left out; one that is required is a fault of its own.
+    single = ("room", "target", "estimator", "planner", "safety")
+    return Parts(
+        cameras=named("cameras"),
+        drones=named("drones"),
+        **{name: sound(Field.model_fields[name].annotation, name) for name in single},
+    )
+
+
+def _valid(model: Any, value: Any) -> Any:
+    try:
+        return TypeAdapter(model).validate_json(json.dumps(value))
+    except ValidationError:
+        return None
+
+
+def _without(entries: dict[str, Any], faults: Collection[KeyPath]) -> dict[str, Any]:
+    """Return a copy of nested mappings that lacks the entries at the given paths."""
+    kept = {}
+    for key, value in entries.items():
+        below = [fault[1:] for fault in faults if fault[:1] == (key,)]
+        if isinstance(value, dict) and all(below):
+            kept[key] = _without(value, below)
+        elif not below:
+            kept[key] = value
+    return kept
+
+
+def _ordered(problems: list[str]) -> list[str]:
+    """Return each problem once, in the order of the file's lines."""
+
+    def rank(text: str) -> tuple[str, int]:
+        place, _, rest = text.partition(":")
+        line = rest.split(":", 1)[0]
+        return place, int(line) if line.isdigit() else 0
+
+    return sorted(dict.fromkeys(problems), key=rank)

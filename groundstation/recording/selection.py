@@ -1,0 +1,20 @@
+"""Which topics go into which file of a run."""
+
+from groundstation.bus.topics import TOPICS, Topic
+
+STATE = "state"
+RAW = "raw"
+
+# Typed messages are small and tell the whole story; pictures and datagrams are bulky and lie beside them.
+STATE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if topic.type is not None)
+IMAGE_TOPICS: tuple[Topic, ...] = tuple(
+    topic for topic in TOPICS.values() if topic.type is None and topic.encoding.startswith("image/")
+)
+DATAGRAM_TOPICS: tuple[Topic, ...] = tuple(
+    topic for topic in TOPICS.values() if topic.type is None and topic not in IMAGE_TOPICS
+)
+
+
+def stem_of(topic: Topic) -> str:
+    """Return the stem of the file that a topic is recorded in."""
+    return STATE if topic.type is not None else RAW

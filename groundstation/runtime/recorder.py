@@ -1,0 +1,186 @@
+"""The recorder process: everything on the bus into MCAP files, cheaply, and through a full disk.
+
+Started as `groundstation.runtime.recorder:run`. See groundstation/recording for files and formats.
+"""
+
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import msgspec
+
+from groundstation.bus import clock
+from groundstation.bus.api import Subscription
+from groundstation.bus.clock import NS_PER_MS, NS_PER_S
+from groundstation.bus.messages import Severity
+from groundstation.process.child import Child
+from groundstation.recording.capture import Capture
+from groundstation.recording.mcap_file import Preamble
+from groundstation.recording.selection import DATAGRAM_TOPICS, IMAGE_TOPICS, RAW, STATE, STATE_TOPICS
+from groundstation.recording.series import FileSeries
+from groundstation.recording.space import Space, assess, free_bytes
+from groundstation.recording.timeline import Timeline
+
+# 15 turns a second: the heartbeat needs 10, and each turn costs a wake-up of the interpreter.
+_PERIOD_NS = 66 * NS_PER_MS
+_SPACE_PERIOD_NS = 2 * NS_PER_S
+_CONSEQUENCE = {
+    Space.LOW: "pictures stop below 200 MB",
+    Space.NO_IMAGES: "no pictures any more",
+    Space.FULL: "disk is full",
+}
+
+
+class RecordingSettings(msgspec.Struct, frozen=True):
+    """The part of the field's `recording` section that matters here."""
+
+    raw_datagrams: bool = True
+
+
+class _FieldPart(msgspec.Struct, frozen=True):
+    site: str = ""
+    recording: RecordingSettings = RecordingSettings()
+
+
+class RecorderSection(msgspec.Struct, frozen=True):
+    """What the supervisor hands to the recorder: the resolved field as JSON, the run folder, the tracker's epoch."""
+
+    field: msgspec.Raw
+    run_dir: str
+    epoch: int = 0
+
+
+class Recorder:
+    """Drains the bus into the files of one run."""
+
+    def __init__(self, child: Child, section: RecorderSection) -> None:
+        self._child = child
+        self._folder = Path(section.run_dir)
+        self._folder.mkdir(parents=True, exist_ok=True)
+        part = msgspec.json.decode(section.field, type=_FieldPart)
+        timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
+        preamble = _preamble(section, part.site, timeline, self._folder)
+        self._capture = Capture(timeline)
+        self._space = Space.AMPLE
+        self._space_ns = 0
+        self._state = FileSeries(self._folder, STATE, preamble, has_room=self._has_room)
+        self._raw = FileSeries(self._folder, RAW, preamble, has_room=self._has_room)
+        # Bounded in bytes as well as in number: a picture is a hundred times a state message.
+        self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
+        self._image_queue = child.bus.subscribe(IMAGE_TOPICS, capacity=64)
+        self._datagram_queue = child.bus.subscribe(
+            DATAGRAM_TOPICS if part.recording.raw_datagrams else (), capacity=4096
+        )
+
+    def turn(self) -> None:
+        """Write what has arrived, flush when due, watch the disk."""
+        now_ns = clock.now_ns()
+        self._check_space(now_ns)
+        self._write(self._state_queue, self._state, now_ns)
+        self._write(self._datagram_queue, self._raw, now_ns)
+        if self._space < Space.NO_IMAGES:
+            self._write(self._image_queue, self._raw, now_ns)
+        else:
+            self._image_queue.drain_samples()
+        for series in (self._state, self._raw):
+            series.tick(now_ns)
+            self._report(series)
+
+    def _write(self, queue: Subscription, series: FileSeries, now_ns: int) -> None:
+        entry_of, write = self._capture.entry, series.write
+        for sample in queue.drain_samples():
+            entry = entry_of(sample, now_ns)
+            if entry is not None:
+                write(entry, now_ns)
+
+    def _report(self, series: FileSeries) -> None:
+        for trouble in series.take_troubles():
+            severity = Severity.INFO if trouble.recovered else Severity.ERROR
+            remedy = "" if trouble.recovered else f"free space in {self._folder}; the flight is not affected"
+            self._child.event(severity, trouble.text, remedy)
+            if trouble.recovered:
+                self.announce()
+            else:
+                self._child.degrade(trouble.text)
+
+    def announce(self) -> None:
+        """Say READY with the folder, unless a file still cannot be written."""
+        if not (self._state.failing or self._raw.failing):
+            self._child.ready(str(self._folder))
+
+    @property
+    def dropped(self) -> int:
+        """Return how many messages overflowed, were refused, or could not be written."""
+        queues = (self._state_queue, self._image_queue, self._datagram_queue)
+        refused = sum(self._capture.refused.values())
+        return sum(queue.overflowed for queue in queues) + self._state.lost + self._raw.lost + refused
+
+    @property
+    def written(self) -> int:
+        """Return how many messages are safe in the files."""
+        return self._state.written + self._raw.written
+
+    def close(self) -> None:
+        """Write what is left and finish the files."""
+        self.turn()
+        self._state.close()
+        self._raw.close()
+
+    def _has_room(self) -> bool:
+        return assess(free_bytes(self._folder)) < Space.FULL
+
+    def _check_space(self, now_ns: int) -> None:
+        if now_ns < self._space_ns:
+            return
+        self._space_ns = now_ns + _SPACE_PERIOD_NS
+        try:
+            free = free_bytes(self._folder)
+        except OSError:
+            return  # the folder is gone: writing will say so
+        before, self._space = self._space, assess(free, self._space)
+        if self._space > before:
+            text = f"{free / 1e6:.0f} MB left for recordings: {_CONSEQUENCE[self._space]}"
+            self._child.event(Severity.WARNING, text, f"free space in {self._folder}")
+        elif self._space < before:
+            self._child.event(Severity.INFO, f"{free / 1e6:.0f} MB are free for recordings again")
+
+
+def _preamble(section: RecorderSection, site: str, timeline: Timeline, folder: Path) -> Preamble:
+    created = clock.now_ns() + timeline.unix_offset_ns
+    run = {
+        "site": site,
+        "epoch": str(section.epoch),
+        "clock": timeline.clock,
+        "unix_offset_ns": str(timeline.unix_offset_ns),
+        "created_unix_ns": str(created),
+    }
+    names = ("skein-groundstation", "mcap", "msgspec", "numpy", "eclipse-zenoh")
+    versions = {name: version(name) for name in names} | {"python": platform.python_version()}
+    conventions = {
+        "world": "z up, origin on the floor in the middle of the room, metres",
+        "base": "FLU; yaw counter-clockwise, radians",
+        "log_time": "UNIX ns of the measurement: header.stamp_ns of clock `run.clock` + run.unix_offset_ns",
+        "ellipses": "95 %",
+    }
+    attachments = {"field.json": ("application/json", bytes(section.field))}
+    resolved = folder / "resolved.yaml"
+    if resolved.is_file():
+        attachments["resolved.yaml"] = ("application/yaml", resolved.read_bytes())
+    return Preamble({"run": run, "versions": versions, "conventions": conventions}, attachments, created)
+
+
+def run(child: Child) -> int:
+    """Record until asked to stop or until the supervisor is gone; then finish the files."""
+    recorder = Recorder(child, msgspec.json.decode(child.section, type=RecorderSection))
+    recorder.turn()
+    recorder.announce()
+    ticks, due_ns = 0, clock.now_ns()
+    while not child.stop_requested and child.supervisor_alive:
+        recorder.turn()
+        ticks += 1
+        child.beat()
+        child.tick_status(ticks=ticks, overflowed=recorder.dropped)
+        due_ns = max(due_ns + _PERIOD_NS, clock.now_ns())
+        child.sleep_until(due_ns)
+    recorder.close()
+    return 0

@@ -1,1 +1,1 @@
-"""TODO"""
+"""The simulated room: bodies that move by seeded dynamics in fixed steps."""

@@ -1,0 +1,203 @@
+"""The firmware of an AR.Drone as far as it flies: phases, take-off and landing profiles, hover by optical flow."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.noise import DelayLine, Draw, GaussMarkov
+
+# Profile of a recorded take-off: motors idle, lift-off at 3.1 s, 0.62 m at 3.77 s, peak 0.82 m, settled at 0.76 m.
+LIFT_OFF_S = 3.1
+HOVERING_S = 4.8
+TAKE_OFF_HEIGHT_M = 0.76
+_TAKE_OFF_RATE, _TAKE_OFF_DAMPING = 3.66, 0.627
+
+COMMAND_DELAY_S = 0.05
+_CLIMB_RATE = 1.4  # 1/s: first order (tum_ardrone's identified model)
+_HEIGHT_GAIN = 0.8
+_BRAKE_GAIN, _HOLD_GAIN = 2.2, 1.0
+_BRAKED_M_S = 0.1
+_DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
+
+
+class Phase(Enum):
+    """What the firmware is doing; CUT is the emergency state with the motors off."""
+
+    LANDED = auto()
+    TAKING_OFF = auto()
+    HOVERING = auto()
+    FLYING = auto()
+    BRAKING = auto()
+    LANDING = auto()
+    CUT = auto()
+
+
+AIRBORNE = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING, Phase.LANDING})
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """What the firmware allows; factory values."""
+
+    tilt_rad: float = 0.20943999
+    climb_m_s: float = 0.7
+    yaw_rate_rad_s: float = 1.7453290
+    height_m: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """References while FLYING [rad, rad, m/s, rad/s; FLU]."""
+
+    roll_rad: float
+    pitch_rad: float
+    climb_m_s: float
+    yaw_rate_rad_s: float
+
+
+class Autopilot:
+    """Turns requests into references for the airframe. Motion commands take effect after `COMMAND_DELAY_S`."""
+
+    def __init__(self, airframe: Airframe, tick_s: float, draw: Draw) -> None:
+        self.phase = Phase.LANDED
+        self.limits = FlightLimits()
+        self._airframe = airframe
+        self._tick_s = tick_s
+        self._since_s = 0.0
+        self._wanted: Motion | None = None
+        self._delayed: DelayLine[Motion | None] = DelayLine(COMMAND_DELAY_S, tick_s, None)
+        self._held_height_m: float | None = None
+        self._drift = (0.0, 0.0)
+        # Optical flow is biased for seconds at a time: that is why a hovering drone wanders.
+        self._flow_error = (GaussMarkov(0.015, 8.0, tick_s, draw), GaussMarkov(0.015, 8.0, tick_s, draw))
+
+    @property
+    def motors_on(self) -> bool:
+        """Whether the propellers turn."""
+        return self.phase not in (Phase.LANDED, Phase.CUT)
+
+    def take_off(self) -> None:
+        """Start the motors, if landed."""
+        if self.phase is Phase.LANDED:
+            self._enter(Phase.TAKING_OFF)
+
+    def land(self) -> None:
+        """Descend and stop the motors; a drone that has not lifted off yet stops them at once."""
+        if self.phase is Phase.TAKING_OFF and self._airframe.on_ground:
+            self._enter(Phase.LANDED)
+        elif self.motors_on and self.phase is not Phase.LANDING:
+            self._enter(Phase.LANDING)
+
+    def cut_motors(self) -> None:
+        """Emergency: motors off, whatever the height."""
+        self._enter(Phase.CUT)
+
+    def clear_emergency(self) -> None:
+        """Leave the emergency state, once on the floor."""
+        if self.phase is Phase.CUT and self._airframe.on_ground:
+            self._enter(Phase.LANDED)
+
+    def move(self, motion: Motion) -> None:
+        """Fly with these references (clamped to the limits) until told otherwise."""
+        limits = self.limits
+        self._wanted = Motion(
+            _clamp(motion.roll_rad, limits.tilt_rad),
+            _clamp(motion.pitch_rad, limits.tilt_rad),
+            _clamp(motion.climb_m_s, limits.climb_m_s),
+            _clamp(motion.yaw_rate_rad_s, limits.yaw_rate_rad_s),
+        )
+
+    def hover(self) -> None:
+        """Brake and hold position by optical flow."""
+        self._wanted = None
+
+    def step(self, push: tuple[float, float, float]) -> None:
+        """Advance the airframe by one tick; push: acceleration by the air [m/s^2; world]."""
+        self._since_s += self._tick_s
+        motion = self._delayed.push(self._wanted)
+        match self.phase:
+            case Phase.LANDED:
+                return
+            case Phase.CUT:
+                self._fall(push)
+            case Phase.TAKING_OFF:
+                self._step_take_off(push)
+            case Phase.LANDING:
+                self._step_landing(push)
+            case Phase.HOVERING | Phase.FLYING | Phase.BRAKING:
+                self._step_flight(motion, push)
+
+    def _enter(self, phase: Phase) -> None:
+        if phase is not self.phase:
+            self.phase = phase
+            self._since_s = 0.0
+            self._drift = (0.0, 0.0)
+            self._held_height_m = None
+
+    def _fall(self, push: tuple[float, float, float]) -> None:
+        if not self._airframe.on_ground:
+            body = self._airframe
+            self._airframe.step(self._tick_s, (body.roll, body.pitch), -GRAVITY_M_S2, 0.0, push)
+
+    def _step_take_off(self, push: tuple[float, float, float]) -> None:
+        if self._since_s < LIFT_OFF_S:
+            return
+        if self._since_s >= HOVERING_S:
+            self._enter(Phase.HOVERING)
+            self._held_height_m = TAKE_OFF_HEIGHT_M
+        body = self._airframe
+        rise = _TAKE_OFF_RATE**2 * (TAKE_OFF_HEIGHT_M - body.z) - 2 * _TAKE_OFF_DAMPING * _TAKE_OFF_RATE * body.vz
+        body.step(self._tick_s, self._hover_tilt(), rise, 0.0, push)
+
+    def _step_landing(self, push: tuple[float, float, float]) -> None:
+        body = self._airframe
+        descent = _DESCENT_M_S if body.z > _FLARE_M else _TOUCH_DOWN_M_S
+        body.step(self._tick_s, self._hover_tilt(), self._climb(-descent), 0.0, push)
+        if body.on_ground:
+            self._enter(Phase.LANDED)
+
+    def _step_flight(self, motion: Motion | None, push: tuple[float, float, float]) -> None:
+        body = self._airframe
+        if motion is None:
+            if self.phase is Phase.FLYING:
+                self._enter(Phase.BRAKING)
+            elif self.phase is Phase.BRAKING and math.hypot(body.vx, body.vy) < _BRAKED_M_S:
+                self._enter(Phase.HOVERING)
+            body.step(self._tick_s, self._hover_tilt(), self._climb(0.0), 0.0, push)
+        else:
+            self._enter(Phase.FLYING)
+            tilt = (motion.roll_rad, motion.pitch_rad)
+            body.step(self._tick_s, tilt, self._climb(motion.climb_m_s), motion.yaw_rate_rad_s, push)
+        if body.on_ground:
+            self._enter(Phase.LANDED)
+
+    def _climb(self, climb_m_s: float) -> float:
+        """Return the vertical acceleration that follows a climb rate, or holds the height when it is zero."""
+        body = self._airframe
+        if climb_m_s != 0.0:
+            self._held_height_m = None
+        else:
+            if self._held_height_m is None:
+                self._held_height_m = body.z + body.vz / _CLIMB_RATE / 2
+            climb_m_s = _clamp(_HEIGHT_GAIN * (self._held_height_m - body.z), self.limits.climb_m_s)
+        ceiling = self.limits.height_m - body.z
+        return _CLIMB_RATE * (min(climb_m_s, ceiling) - body.vz)
+
+    def _hover_tilt(self) -> tuple[float, float]:
+        """Return (roll, pitch) that stop the flow seen below and hold the place found by integrating it."""
+        forward, left = self._airframe.velocity_stabilized()
+        forward += self._flow_error[0].step()
+        left += self._flow_error[1].step()
+        x, y = self._drift
+        if math.hypot(forward, left) < 0.5:  # holds a place only once it has slowed down
+            x, y = x + forward * self._tick_s, y + left * self._tick_s
+            self._drift = (x, y)
+        limit = self.limits.tilt_rad
+        pitch = -(_BRAKE_GAIN * forward + _HOLD_GAIN * x) / GRAVITY_M_S2
+        roll = (_BRAKE_GAIN * left + _HOLD_GAIN * y) / GRAVITY_M_S2
+        return _clamp(roll, limit), _clamp(pitch, limit)
+
+
+def _clamp(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

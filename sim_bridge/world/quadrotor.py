@@ -1,0 +1,65 @@
+"""One AR.Drone in the room: airframe, autopilot, battery, and the air that pushes it."""
+
+import math
+
+import numpy as np
+
+from sim_bridge.scenario import DroneScenario
+from sim_bridge.world.airframe import Airframe
+from sim_bridge.world.autopilot import Autopilot
+from sim_bridge.world.noise import GaussMarkov, standard_normals
+
+_UNREST_CORRELATION_S = 0.8
+
+# A modest wake: momentum theory gives 7.5 m/s under an AR.Drone, and forces of several do not add linearly.
+_WAKE_RADIUS_M = 0.3
+_WAKE_REACH_M = 0.5
+_WAKE_DOWN_M_S2 = 1.2
+_WAKE_OUT_M_S2 = 0.6
+_WAKE_NEAR_M = 1.2
+
+
+class Quadrotor:
+    """A drone standing on its pad. `autopilot` takes the requests, `airframe` holds the true state."""
+
+    def __init__(
+        self,
+        pad_m: tuple[float, float],
+        yaw_rad: float,
+        scenario: DroneScenario,
+        tick_s: float,
+        rng: np.random.Generator,
+    ) -> None:
+        draw = standard_normals(rng)
+        self.airframe = Airframe(*pad_m, yaw_rad)
+        self.autopilot = Autopilot(self.airframe, tick_s, draw)
+        self.battery = float(rng.uniform(*scenario.battery))
+        self._drain = scenario.battery_drain_per_min / 60.0 * tick_s
+        self._unrest = tuple(
+            GaussMarkov(scenario.air_unrest_m_s2 * share, _UNREST_CORRELATION_S, tick_s, draw)
+            for share in (1.0, 1.0, 0.5)
+        )
+
+    @property
+    def airborne(self) -> bool:
+        """Whether it has no contact with the floor."""
+        return not self.airframe.on_ground
+
+    def step(self, wake: tuple[float, float, float]) -> None:
+        """Advance by one tick under the wake of the others [m/s^2; world]."""
+        if self.autopilot.motors_on:
+            self.battery = max(0.0, self.battery - self._drain)
+            a, b, c = self._unrest
+            wake = (wake[0] + a.step(), wake[1] + b.step(), wake[2] + c.step())
+        self.autopilot.step(wake)
+
+    def wake_on(self, other: Airframe) -> tuple[float, float, float] | None:
+        """Return how this drone's downwash accelerates another one below it, None when out of its reach."""
+        body = self.airframe
+        dx, dy, below = other.x - body.x, other.y - body.y, body.z - other.z
+        if body.on_ground or below < 0.1 or abs(dx) > _WAKE_REACH_M or abs(dy) > _WAKE_REACH_M:
+            return None
+        radius = math.hypot(dx, dy) / _WAKE_RADIUS_M
+        strength = math.exp(-radius * radius) * min(1.0, _WAKE_NEAR_M / below)
+        outward = _WAKE_OUT_M_S2 * strength / _WAKE_RADIUS_M
+        return outward * dx, outward * dy, -_WAKE_DOWN_M_S2 * strength

@@ -1,0 +1,79 @@
+"""The room with everything that moves in it, advanced in fixed steps of 5 ms; no clock of its own."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_bridge.scenario import Scenario
+from sim_bridge.site import Site
+from sim_bridge.truth import WIDTH
+from sim_bridge.world.noise import generator_of
+from sim_bridge.world.onboard import Onboard
+from sim_bridge.world.quadrotor import Quadrotor
+from sim_bridge.world.unicycle import Unicycle
+
+TICK_S = 0.005
+TICK_NS = 5_000_000
+_STILL_AIR = (0.0, 0.0, 0.0)
+
+
+class World:
+    """Drones, target, and the onboard sensors of each drone.
+
+    `bodies` names the rows of `states()`: the drones, then the target.
+    """
+
+    def __init__(self, site: Site, scenario: Scenario, seed: int) -> None:
+        self.bodies = site.bodies
+        self.ticks = 0
+        self.drones: dict[str, Quadrotor] = {}
+        self.onboard: dict[str, Onboard] = {}
+        for name, drone in site.drones.items():
+            body = Quadrotor(drone.pad_m, drone.pad_yaw_rad, scenario.drones, TICK_S, generator_of(seed, name))
+            self.drones[name] = body
+            sensors = generator_of(seed, f"{name}/onboard")
+            self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors)
+        self.target_name = site.target.name
+        self.target = Unicycle(scenario.target, TICK_S, generator_of(seed, site.target.name))
+        self._downwash = scenario.drones.downwash
+        self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
+        self._states = np.zeros((len(self.bodies), WIDTH))
+
+    @property
+    def time_s(self) -> float:
+        """Return the simulated time since the start."""
+        return self.ticks * TICK_S
+
+    @property
+    def airborne(self) -> tuple[str, ...]:
+        """Return the names of the drones without contact to the floor."""
+        return tuple(name for name, drone in self.drones.items() if drone.airborne)
+
+    def step(self) -> None:
+        """Advance everything by one tick."""
+        drones = self.drones
+        wakes = {name: self._wake(name) for name in drones} if self._downwash and len(drones) > 1 else {}
+        for name, drone in drones.items():
+            drone.step(wakes.get(name, _STILL_AIR))
+            drone.airframe.confine(*self._half_room)
+            self.onboard[name].step(drone, drone.autopilot.motors_on)
+        self.target.step()
+        self.target.confine(self._half_room[0], self._half_room[1])
+        self.ticks += 1
+
+    def states(self) -> NDArray[np.float64]:
+        """Return the true states (n, 13), columns as in `truth.FIELDS`; the array is reused by the next call."""
+        rows = self._states
+        for index, drone in enumerate(self.drones.values()):
+            rows[index] = drone.airframe.row()
+        rows[-1] = self.target.row()
+        return rows
+
+    def _wake(self, name: str) -> tuple[float, float, float]:
+        below = self.drones[name].airframe
+        if below.on_ground:
+            return _STILL_AIR
+        strongest = _STILL_AIR
+        for other, drone in self.drones.items():
+            if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
+                strongest = push  # wakes do not add
+        return strongest

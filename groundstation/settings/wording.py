@@ -89,7 +89,7 @@ def _meant(key: str, model: type[BaseModel], path: tuple[str | int, ...]) -> str
     owner = _model_at(model, path)
     if owner is None:
         return ""
-    siblings = list(owner.model_fields)
+    siblings = [*owner.model_fields, *(("defaults", "types") if not path and "drones" in owner.model_fields else ())]
     near = get_close_matches(key, siblings, 1)
     if near:
         return f", did you mean {near[0]}?"

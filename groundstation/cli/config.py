@@ -1,0 +1,116 @@
+"""`groundstation config`: check, show, describe or start a field file."""
+
+import json
+import shutil
+from pathlib import Path
+
+import click
+
+from groundstation.errors import SettingsError
+
+_OPTION = click.option(
+    "--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; may be given often."
+)
+
+
+@click.group()
+def config() -> None:
+    """Check, show, describe or start a field file."""
+
+
+@config.command(
+    epilog="\b\nExamples:\n  groundstation config check lab.yaml\n"
+    "  groundstation config check lab.yaml --set drones.drone_2.enabled=false --scenario realistic"
+)
+@click.argument("field")
+@_OPTION
+@click.option("--scenario", metavar="S", help="Check a scenario (a name or a path) as well.")
+@click.option("--json", "as_json", is_flag=True, help='Print {"ok": ..., "problems": [...]}.')
+def check(field: str, options: tuple[str, ...], scenario: str | None, as_json: bool) -> int:
+    """Name every mistake in a field file (a path, or `lab`), each with its line.
+
+    Exit code 0 when there is none, 2 otherwise.
+    """
+    problems: list[str] = []
+    try:
+        _check(field, options, scenario)
+    except SettingsError as error:
+        if not as_json:
+            raise
+        problems = error.problems
+    if as_json:
+        click.echo(json.dumps({"ok": not problems, "problems": problems}))
+    return 2 if problems else 0
+
+
+def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.load import load_field
+    from groundstation.settings.scenario import load_scenario
+
+    path = find_field(name)
+    problems: list[str] = []
+    try:
+        field = load_field(path, options)
+        team = f"{len(field.drones)} drone(s), {len(field.cameras)} fixed camera(s), target {field.target.name}"
+    except SettingsError as error:
+        problems += error.problems
+    if scenario is not None:
+        try:
+            load_scenario(find_scenario(scenario, path))
+        except SettingsError as error:
+            problems += error.problems
+    if problems:
+        raise SettingsError(problems)
+    click.echo(f"{path}: good ({team})", err=True)
+
+
+@config.command(
+    epilog="\b\nExamples:\n  groundstation config show lab.yaml\n"
+    "  groundstation config show lab.yaml --resolved > flown.yaml\n"
+    "  groundstation config show lab.yaml --resolved --json | jq .drones"
+)
+@click.argument("field")
+@_OPTION
+@click.option("--resolved", is_flag=True, help="Print every setting as the processes will see it.")
+@click.option("--json", "as_json", is_flag=True, help="Print the resolved settings as JSON.")
+def show(field: str, options: tuple[str, ...], resolved: bool, as_json: bool) -> None:
+    """Show a field file: a page to read, or (--resolved) every setting with its three levels merged."""
+    from groundstation.settings.files import find_field
+    from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import summary_of, yaml_of
+
+    settings = load_field(find_field(field), options)
+    if as_json:
+        click.echo(settings.model_dump_json(indent=2))
+    else:
+        click.echo(yaml_of(settings) if resolved else summary_of(settings))
+
+
+@config.command(
+    epilog="\b\nExample:\n  groundstation config schema > field.schema.json\n"
+    "  (then, as first line of lab.yaml: # yaml-language-server: $schema=field.schema.json)"
+)
+def schema() -> None:
+    """Print the JSON Schema of a field file, with which editors complete and check it."""
+    from groundstation.settings.json_schema import field_file_schema
+
+    click.echo(json.dumps(field_file_schema(), indent=2))
+
+
+@config.command(epilog="\b\nExample:\n  groundstation config init my_lab && groundstation sitl my_lab/lab.yaml")
+@click.argument("directory", type=click.Path(path_type=Path, file_okay=False))
+def init(directory: Path) -> None:
+    """Write a commented field file, its camera calibrations and a scenario into DIRECTORY, to start from."""
+    from groundstation.settings.files import SHIPPED
+
+    copies = [SHIPPED / "lab.yaml", *sorted(SHIPPED.glob("cameras/*.yaml")), *sorted(SHIPPED.glob("scenarios/*.yaml"))]
+    targets = [directory / source.relative_to(SHIPPED) for source in copies]
+    standing = [str(target) for target in targets if target.exists()]
+    if standing:
+        raise SettingsError([f"{target}: is there already; nothing was written" for target in standing])
+    for source, target in zip(copies, targets, strict=True):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, target)
+        click.echo(f"wrote {target}")
+    click.echo(f"next: mend the addresses in {targets[0]}, then: groundstation config check {targets[0]}")

@@ -1,0 +1,54 @@
+"""Exit codes of the `groundstation` command, for scripts."""
+
+from enum import IntEnum
+
+import click
+
+from groundstation.errors import GroundStationError, SettingsError
+
+
+class ExitCode(IntEnum):
+    """What became of a command."""
+
+    OK = 0
+    FAILED = 1
+    SETTINGS = 2
+    UNREACHABLE = 3
+    FAULT = 4
+    BUG = 70
+    INTERRUPTED = 130
+
+    @property
+    def meaning(self) -> str:
+        """Return one line for the help text."""
+        return _MEANING[self]
+
+
+_MEANING = {
+    ExitCode.OK: "done",
+    ExitCode.FAILED: "the run failed its own criteria (report.json says which)",
+    ExitCode.SETTINGS: "wrong settings or wrong usage",
+    ExitCode.UNREACHABLE: "no running ground station could be reached",
+    ExitCode.FAULT: "a driver, a link or a process failed",
+    ExitCode.BUG: "a fault of the program itself, with a traceback",
+    ExitCode.INTERRUPTED: "interrupted by the operator",
+}
+
+
+class UnreachableError(GroundStationError):
+    """No running ground station answers."""
+
+
+def exit_code_of(error: BaseException) -> ExitCode:
+    """Return the code that a failed command ends with."""
+    match error:
+        case SettingsError() | click.UsageError():
+            return ExitCode.SETTINGS
+        case UnreachableError():
+            return ExitCode.UNREACHABLE
+        case GroundStationError() | click.ClickException() | OSError():
+            return ExitCode.FAULT
+        case KeyboardInterrupt() | click.Abort():
+            return ExitCode.INTERRUPTED
+        case _:
+            return ExitCode.BUG

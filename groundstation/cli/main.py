@@ -1,0 +1,155 @@
+"""The command line: a table of verbs, each imported only when it is called, and one place for errors."""
+
+import importlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+
+from groundstation.cli.exits import ExitCode, exit_code_of
+from groundstation.errors import GroundStationError, SettingsError
+
+
+@dataclass(frozen=True, slots=True)
+class Verb:
+    """One row of the table: where the command is (`module:function`), and its line in the help."""
+
+    family: str
+    target: str
+    summary: str
+
+
+VERBS: dict[str, Verb] = {
+    "demo": Verb("Fly", "groundstation.cli.demo:demo", "Two emulated drones track a TurtleBot; needs no hardware."),
+    "sitl": Verb("Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras."),
+    "fly": Verb("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones."),
+    "takeoff": Verb("Command", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
+    "track": Verb("Command", "groundstation.cli.stop:track", "Let the tracker move the drones."),
+    "resume": Verb("Command", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),
+    "hold": Verb("Stop", "groundstation.cli.stop:hold", "Hover where they are."),
+    "land": Verb("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones."),
+    "cut-motors": Verb("Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall."),
+    "monitor": Verb("Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station."),
+    "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
+    "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
+    "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
+    "version": Verb("Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."),
+}
+
+
+class VerbGroup(click.Group):
+    """A click group whose commands are imported one at a time, so that `land` does not wait for what it never uses."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of the table."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a verb, importing its module now; None for an unknown verb."""
+        verb = VERBS.get(cmd_name)
+        if verb is None:
+            return None
+        module, _, function = verb.target.partition(":")
+        command = getattr(importlib.import_module(module), function)
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command for the first argument; an unknown one fails with the verb that was probably meant."""
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            from difflib import get_close_matches
+
+            near = get_close_matches(args[0], VERBS, 1, 0.5)
+            meant = f" Did you mean {near[0]!r}?" if near else ""
+            raise click.UsageError(f"There is no command {args[0]!r}.{meant}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the table by families, without importing any command."""
+        for family in dict.fromkeys(verb.family for verb in VERBS.values()):
+            with formatter.section(family):
+                formatter.write_dl([(name, verb.summary) for name, verb in VERBS.items() if verb.family == family])
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples and the exit codes."""
+        with formatter.section("Examples"):
+            formatter.write_dl(list(_EXAMPLES))
+        with formatter.section("Exit codes"):
+            formatter.write_dl([(str(int(code)), code.meaning) for code in ExitCode])
+
+
+_EXAMPLES = (
+    ("groundstation demo", "see it fly, in 60 s, on this machine"),
+    ("groundstation config check lab.yaml", "name every mistake in a field file"),
+    ("groundstation sitl lab.yaml --seed 3", "rehearse a field file"),
+    ("groundstation fly lab.yaml", "fly it"),
+    ("groundstation land", "from any other terminal"),
+)
+
+
+@click.command(cls=VerbGroup, name="groundstation", context_settings={"help_option_names": ["-h", "--help"]})
+def groundstation() -> None:
+    """Ground station for small teams of drones that track a moving target together."""
+
+
+def check_installation() -> None:
+    """Raise GroundStationError when the packages come from different places: two versions would be mixed."""
+    places = {}
+    for package in ("groundstation", "drivers", "sim_bridge"):
+        spec = find_spec(package)
+        if spec is None or not spec.origin:
+            raise GroundStationError(f"the package {package} is not installed beside groundstation: install again")
+        places[package] = Path(spec.origin).parent.parent
+    if len(set(places.values())) > 1:
+        found = ", ".join(f"{package} in {place}" for package, place in places.items())
+        raise GroundStationError(f"the packages come from different places ({found}): install again")
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Return the exit code of one command; what went wrong is on stderr, without a traceback unless it is a bug."""
+    try:
+        check_installation()
+        result = groundstation.main(
+            args=None if arguments is None else list(arguments), prog_name="groundstation", standalone_mode=False
+        )
+    except click.ClickException as error:
+        error.show()
+        return exit_code_of(error)
+    except (GroundStationError, click.Abort, KeyboardInterrupt, OSError) as error:
+        _tell(error)
+        return exit_code_of(error)
+    return result if isinstance(result, int) else ExitCode.OK
+
+
+def _tell(error: BaseException) -> None:
+    match error:
+        case SettingsError(problems=problems):
+            count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
+            click.echo("\n".join([*problems, f"{count}: nothing was started"]), err=True)
+        case click.Abort() | KeyboardInterrupt():
+            click.echo("interrupted", err=True)
+        case BrokenPipeError():
+            sys.stderr.close()  # the reader of our output has gone; python would complain once more at exit
+        case _:
+            click.echo(f"groundstation: {error}", err=True)
+
+
+def main() -> None:
+    """Entry point of the `groundstation` script."""
+    try:
+        code = run()
+    except Exception:  # noqa: BLE001  the outermost loop: a bug must not look like a failed run (exit code 1)
+        import traceback
+
+        traceback.print_exc()
+        code = ExitCode.BUG
+    sys.exit(int(code))
+
+
+if __name__ == "__main__":
+    main()

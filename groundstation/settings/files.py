@@ -1,0 +1,33 @@
+"""Where field files and scenarios are looked for, and the ones that come with the program."""
+
+from pathlib import Path
+
+from groundstation.errors import SettingsError
+
+SHIPPED = Path(__file__).parent / "shipped"  # the repository's config/, in an installed package a copy of it
+
+
+def find_field(name: str) -> Path:
+    """Return the field file of a path, or of a shipped one's name (`lab`); raises SettingsError."""
+    return _find(name, "field file", (SHIPPED,))
+
+
+def find_scenario(name: str, field_file: Path) -> Path:
+    """Return the scenario of a path, or of a name in `scenarios/` beside the field file or among the shipped ones."""
+    return _find(name, "scenario", (field_file.parent / "scenarios", SHIPPED / "scenarios"))
+
+
+def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
+    if "/" in name or name.endswith((".yaml", ".yml")):
+        return Path(name)  # read() names a missing file and what was probably meant
+    known: list[str] = []
+    for folder in folders:
+        candidate = folder / f"{name}.yaml"
+        if candidate.is_file():
+            return candidate
+        known += [path.stem for path in sorted(folder.glob("*.yaml"))]
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, known, 1, 0.5)
+    meant = f"did you mean {near[0]}?" if near else f"there are: {', '.join(dict.fromkeys(known)) or 'none'}"
+    raise SettingsError([f"there is no {what} {name!r}, {meant} (or give the path of a YAML file)"])

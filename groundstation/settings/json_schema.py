@@ -1,0 +1,50 @@
+"""JSON Schema of a field file as written (with its three levels), for editors that complete and check it."""
+
+from typing import Any
+
+from groundstation.settings.schema import Field
+
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def field_file_schema() -> dict[str, Any]:
+    """Return the schema: that of the resolved field, plus `defaults`, `types` and names of calibration files."""
+    schema = Field.model_json_schema(mode="validation")
+    definitions: dict[str, Any] = schema["$defs"]
+    for owner in ("WorldCamera", "OnboardCamera"):
+        definitions[owner]["properties"]["calibration"] = {
+            "description": "Name of a calibration file beside the field file, or its content.",
+            "anyOf": [{"type": "string"}, {"$ref": "#/$defs/Calibration"}],
+        }
+    # Any part of a drone may stand at any level, so nothing is required of one level alone.
+    for name in _parts_of_drone(definitions, "Drone"):
+        definitions[name].pop("required", None)
+    drone = definitions["Drone"]
+    level = {**drone, "title": "Level", "description": "What drones share; a robot's own entry wins."}
+    definitions["Level"] = level
+    drone["properties"] = {"type": {"type": "string", "description": "An entry of `types`."}} | drone["properties"]
+    reference = {"$ref": "#/$defs/Level"}
+    schema["properties"] |= {
+        "defaults": reference,
+        "types": {"type": "object", "additionalProperties": reference},
+    }
+    schema["required"] = sorted({*schema["required"], "schema_version"})
+    return {"$schema": _DIALECT, **schema, "title": "Field file"}
+
+
+def _parts_of_drone(definitions: dict[str, Any], name: str) -> set[str]:
+    """Return the definitions that stand below one, but for Calibration, which is a file of its own."""
+    found = {name}
+    for inner in _references(definitions[name]):
+        if inner not in ("Calibration", *found):
+            found |= _parts_of_drone(definitions, inner)
+    return found
+
+
+def _references(node: Any) -> list[str]:
+    if isinstance(node, dict):
+        own = [node["$ref"].rsplit("/", 1)[-1]] if "$ref" in node else []
+        return own + [name for value in node.values() for name in _references(value)]
+    if isinstance(node, list):
+        return [name for value in node for name in _references(value)]
+    return []

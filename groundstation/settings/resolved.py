@@ -1,0 +1,71 @@
+"""A resolved field in the forms that people and other programs read."""
+
+import io
+
+from groundstation.settings.drones import Drone
+from groundstation.settings.schema import Field
+
+# Printed so that nobody has to guess what wins; drivers.watchdog is where it is enforced.
+STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > set-point > TAKEOFF"
+
+
+def yaml_of(field: Field) -> str:
+    """Return the field as YAML: itself a valid field file, with nothing left to merge or to look up."""
+    from ruamel.yaml import YAML
+
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.width = 120
+    stream = io.StringIO()
+    yaml.dump(field.model_dump(mode="json"), stream)
+    return stream.getvalue()
+
+
+def summary_of(field: Field) -> str:
+    """Return a page for the operator: who is in the team, what each may do, and what happens when something fails."""
+    x, y, z = field.room.size_m
+    fence = field.room.fence
+    lines = [
+        f"site {field.site}: room {x:g} x {y:g} x {z:g} m, fence x {_span(fence.x_m)} y {_span(fence.y_m)}"
+        f" z {_span(fence.z_m)} m",
+        "",
+    ]
+    for name, camera in field.cameras.items():
+        lines.append(f"camera {name}: {camera.source}, {camera.position_m[2]:g} m up, looks {camera.looking},")
+        lines.append(f"  observes {' and '.join(camera.observes)}")
+    lines += [line for name, drone in field.drones.items() for line in _drone_lines(name, drone)]
+    marker = field.target.marker
+    lines += [f"target {field.target.name}: marker {marker.code} at {marker.height_m:g} m", "", *_safety_lines(field)]
+    return "\n".join(lines)
+
+
+def _span(interval: tuple[float, float]) -> str:
+    return f"{interval[0]:g}..{interval[1]:g}"
+
+
+def _drone_lines(name: str, drone: Drone) -> list[str]:
+    limits = drone.limits
+    return [
+        f"drone {name}: {drone.kind} at {drone.address}, pad {_pair(drone.pad_m)} m, marker {drone.marker.code}",
+        f"  camera {drone.camera.source}, {drone.camera.tilt_down_deg:g} deg down",
+        f"  at most {limits.max_speed_m_s:g} m/s, climb {limits.max_climb_m_s:g} m/s,"
+        f" turn {limits.max_yaw_rate_deg_s:g} deg/s; lands below {limits.battery_min:.0%} battery"
+        f" held {limits.battery_hold_s:g} s",
+    ]
+
+
+def _pair(point: tuple[float, float]) -> str:
+    return f"({point[0]:g}, {point[1]:g})"
+
+
+def _safety_lines(field: Field) -> list[str]:
+    safety = field.safety
+    return [
+        f"who wins: {STOP_PRIORITY}",
+        f"no fresh set-point for {safety.setpoint_lifetime_ms / 1000:g} s: hover;"
+        f" for {safety.land_after_s:g} s: land (until a new take-off)",
+        f"not seen for {safety.unseen_land_after_s:g} s after take-off: land;"
+        f" position known worse than {safety.max_position_std_m:g} m: hover",
+        f"drones stay {safety.min_separation_m:g} m apart and inside the fence",
+    ]

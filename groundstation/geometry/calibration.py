@@ -18,8 +18,8 @@ def intrinsics_from_mapping(document: Mapping[str, Any]) -> CameraIntrinsics:
     for name in (*_SIZES, *_FIGURES, "distortion"):
         if name not in document:
             raise ValueError(f"{name}: is missing")
-    sizes = [int(document[name]) for name in _SIZES]
-    figures = [float(document[name]) for name in _FIGURES]
+    width, height = (int(document[name]) for name in _SIZES)
+    fx, fy, cx, cy = (float(document[name]) for name in _FIGURES)
     k1, k2, p1, p2, k3 = (float(value) for value in document["distortion"])
     residual = float(document.get("residual_px", 0.2))
-    return CameraIntrinsics(sizes[0], sizes[1], *figures, (k1, k2, p1, p2, k3), residual)
+    return CameraIntrinsics(width, height, fx, fy, cx, cy, (k1, k2, p1, p2, k3), residual)

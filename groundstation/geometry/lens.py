@@ -52,7 +52,7 @@ class CameraIntrinsics:
         return _fold_radius(self.distortion)
 
     def project(self, points: Array) -> Array:
-        """Return pixels (..., 2) of points (..., 3) [camera_optical]; NaN for points behind or beyond the lens model."""
+        """Return pixels (..., 2) of points (..., 3) [optical]; NaN behind the camera and beyond the lens model."""
         points = np.asarray(points, dtype=np.float64)
         depth = points[..., 2]
         with np.errstate(divide="ignore", invalid="ignore"):

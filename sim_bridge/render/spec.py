@@ -45,11 +45,11 @@ class OutageKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outage:
-    """A planned failure of the stream, in seconds since the process began to serve."""
+    """A planned failure of the stream, in seconds since the first true state was written (end_s None: for good)."""
 
     kind: OutageKind
     start_s: float
-    end_s: float
+    end_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,117 @@
+"""One process per emulated camera: truth in by shared memory, MJPEG out over HTTP."""
+
+import logging
+import os
+import signal
+import threading
+import time
+from types import FrameType
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_bridge.devices.camera_stream import CameraStream
+from sim_bridge.render.renderer import Renderer
+from sim_bridge.render.spec import Outage, OutageKind, RenderSpec
+from sim_bridge.truth import TruthBoard
+
+_log = logging.getLogger(__name__)
+_NS = 1_000_000_000
+_NS_PER_MS = 1_000_000
+_IDLE_S = 0.05
+
+
+def run(spec: RenderSpec) -> int:
+    """Render and serve until SIGTERM or until the parent has gone; returns the exit code."""
+    stop = threading.Event()
+    _obey_signals(stop)
+    cv2.setNumThreads(1)
+    truth = TruthBoard.attach(spec.truth_name, spec.bodies)
+    renderer = Renderer(spec)
+    stream = CameraStream(spec.address, spec.port)
+    try:
+        _Exposures(spec, truth, renderer, stream).run(stop)
+    finally:
+        stream.close()
+        truth.close()
+    return 0
+
+
+def _obey_signals(stop: threading.Event) -> None:
+    def request_stop(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, request_stop)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class Link:
+    """What the network does to frames: loss, and a delay with jitter that keeps their order."""
+
+    def __init__(self, spec: RenderSpec) -> None:
+        self._scenario = spec.scenario
+        self._random = np.random.default_rng([spec.seed, 7, *spec.camera.encode()])
+        self._last_ns = 0
+
+    def release_ns(self, exposure_ns: int) -> int | None:
+        """Return when a frame arrives, or None when it is lost."""
+        lost = self._random.random() < self._scenario.frame_loss
+        jitter_ms = self._random.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
+        if lost:
+            return None
+        delay_ms = max(0.0, self._scenario.video_delay_ms + jitter_ms)
+        self._last_ns = max(self._last_ns, exposure_ns + round(delay_ms * _NS_PER_MS))
+        return self._last_ns
+
+
+def active_outage(outages: tuple[Outage, ...], seconds: float) -> OutageKind | None:
+    """Return how the stream fails at a time since the first true state, if it does; a cut outdoes a stall."""
+    kinds = [o.kind for o in outages if o.start_s <= seconds and (o.end_s is None or seconds < o.end_s)]
+    return min(kinds, default=None)
+
+
+class _Exposures:
+    """The camera's loop: exposures on an absolute schedule."""
+
+    def __init__(self, spec: RenderSpec, truth: TruthBoard, renderer: Renderer, stream: CameraStream) -> None:
+        self._spec, self._truth, self._renderer, self._stream = spec, truth, renderer, stream
+        self._link = Link(spec)
+        self._first_ns = 0
+        self._last_ns = 0
+
+    def run(self, stop: threading.Event) -> None:
+        """Expose until told to stop."""
+        period_ns = round(_NS / self._spec.scenario.fps)
+        next_ns = time.monotonic_ns()
+        while not stop.is_set() and self._parent_lives():
+            wait_s = (next_ns - time.monotonic_ns()) / _NS
+            if wait_s > 0.0:
+                stop.wait(min(wait_s, _IDLE_S))
+                continue
+            self._expose()
+            next_ns += period_ns
+            if time.monotonic_ns() - next_ns > _NS:  # frozen for a while: never make up for it
+                next_ns = time.monotonic_ns()
+
+    def _parent_lives(self) -> bool:
+        return self._spec.parent_pid in (0, os.getppid())
+
+    def _expose(self) -> None:
+        exposure_ns, states = self._truth.read()
+        if exposure_ns in (0, self._last_ns):  # nothing true yet, or the world stands still: no new picture
+            return
+        self._first_ns = self._first_ns or exposure_ns
+        self._last_ns = exposure_ns
+        outage = active_outage(self._spec.scenario.outages, (exposure_ns - self._first_ns) / _NS)
+        self._stream.set_accepting(outage is not OutageKind.CUT)
+        release_ns = self._link.release_ns(exposure_ns)
+        if release_ns is None or outage is not None or not self._stream.clients:
+            return
+        self._stream.send_at(release_ns, self._jpeg(states))
+
+    def _jpeg(self, states: NDArray[np.float64]) -> bytes:
+        picture = self._renderer.render(states)
+        quality = [cv2.IMWRITE_JPEG_QUALITY, self._spec.scenario.jpeg_quality]
+        return cv2.imencode(".jpg", picture, quality)[1].tobytes()

@@ -1,0 +1,137 @@
+"""The recorder's loop against a memory bus: a full disk is loud once and costs nothing but the recording."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import Event, Severity
+from groundstation.bus.topics import EVENT, IMAGE
+from groundstation.recording import series as series_module
+from groundstation.recording import space
+from groundstation.recording.mcap_file import McapFile
+from groundstation.recording.reader import open_recording, parts
+from groundstation.runtime import recorder as recorder_module
+from groundstation.runtime.recorder import Recorder, RecorderSection
+
+
+class FakeChild:
+    """Notes what the recorder says of itself."""
+
+    def __init__(self, bus: MemoryBus) -> None:
+        self.bus = bus
+        self.name = "recorder"
+        self.states: list[tuple[str, str]] = []
+        self.events: list[tuple[str, str]] = []
+
+    def ready(self, detail: str = "") -> None:
+        self.states.append(("READY", detail))
+
+    def degrade(self, detail: str) -> None:
+        self.states.append(("DEGRADED", detail))
+
+    def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:
+        self.events.append((str(severity), text))
+
+
+@pytest.fixture
+def sender() -> tuple[MemoryBus, FakeChild]:
+    exchange = MemoryExchange()
+    return MemoryBus(exchange, "lab", "tester"), FakeChild(MemoryBus(exchange, "lab", "recorder"))
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    clock = [1_000_000_000]
+    monkeypatch.setattr(recorder_module.clock, "now_ns", lambda: clock[0])
+    monkeypatch.setattr(recorder_module, "free_bytes", lambda _folder: 10**12)
+    return clock
+
+
+def _recorder(child: Any, folder: Path, **recording: bool) -> Recorder:
+    field = {"site": "lab", "recording": recording}
+    return Recorder(child, RecorderSection(msgspec.Raw(json.dumps(field).encode()), str(folder), 1))
+
+
+def _say(bus: MemoryBus, text: str) -> None:
+    bus.publish(EVENT, Event(header=bus.header("drone_1"), severity=Severity.INFO, text=text))
+
+
+def test_write_error_degrades_once_and_recovers(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, child = sender
+    recorder = _recorder(child, tmp_path)
+    recorder.turn()
+    _say(bus, "before")
+    recorder.turn()
+    now[0] += 600_000_000
+    recorder.turn()
+
+    def fail(_file: McapFile, *_arguments: object) -> None:
+        raise OSError(28, os.strerror(28))
+
+    with monkeypatch.context() as broken:
+        broken.setattr(McapFile, "write", fail)
+        broken.setattr(McapFile, "_begin", fail)
+        for _ in range(6):
+            _say(bus, "lost")
+            now[0] += 1_000_000_000
+            recorder.turn()
+    assert [severity for severity, _ in child.events] == ["ERROR"]
+    assert child.states[-1][0] == "DEGRADED"
+    assert recorder.dropped == 6
+    now[0] += series_module.RETRY_PERIOD_NS
+    recorder.turn()
+    _say(bus, "after")
+    recorder.close()
+    assert child.states[-1][0] == "READY"
+    assert [severity for severity, _ in child.events] == ["ERROR", "INFO"]
+    read = [[raw.data for raw in open_recording(path).raw_records()] for path in parts(tmp_path, "state")]
+    assert [len(part) for part in read] == [1, 1]
+    assert b"before" in read[0][0] and b"after" in read[1][0]
+
+
+def test_low_disk_warns_then_drops_pictures_only(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, child = sender
+    recorder = _recorder(child, tmp_path)
+    for free in (10**10, 8 * 10**8, 10**8):
+        monkeypatch.setattr(recorder_module, "free_bytes", lambda _folder, free=free: free)
+        now[0] += 3_000_000_000
+        bus.publish_bytes(IMAGE, bus.header("drone_1"), b"jpeg")
+        _say(bus, "state goes on")
+        recorder.turn()
+    recorder.close()
+    assert [severity for severity, _ in child.events] == ["WARNING", "WARNING"]
+    assert recorder._space is space.Space.NO_IMAGES
+    assert len(list(open_recording(tmp_path / "raw.mcap").raw_records())) == 2
+    assert len(list(open_recording(tmp_path / "state.mcap").raw_records())) == 3
+
+
+def test_datagrams_are_left_out_on_request(sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path) -> None:
+    from groundstation.bus.topics import RAW_RX
+
+    bus, child = sender
+    recorder = _recorder(child, tmp_path, raw_datagrams=False)
+    bus.publish_bytes(RAW_RX, bus.header("drone_1"), b"navdata")
+    bus.publish_bytes(IMAGE, bus.header("drone_1"), b"jpeg")
+    recorder.close()
+    assert [raw.key.topic for raw in open_recording(tmp_path / "raw.mcap").raw_records()] == [IMAGE]
+
+
+def test_garbage_on_the_bus_is_counted_and_not_recorded(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path
+) -> None:
+    bus, child = sender
+    recorder = _recorder(child, tmp_path)
+    bus.put(EVENT, "drone_1", b"{garbage", b"")
+    _say(bus, "fine")
+    recorder.close()
+    assert recorder.dropped == 1
+    assert recorder.written == 1

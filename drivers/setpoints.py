@@ -1,0 +1,75 @@
+"""Which setpoint may move a vehicle: the newest in sequence, of the authorised epoch, not expired.
+
+Pure; times are monotonic nanoseconds handed in.
+"""
+
+from dataclasses import dataclass
+
+from groundstation.bus.clock import NS_PER_MS
+from groundstation.bus.messages import VelocitySetpoint
+
+
+@dataclass(slots=True)
+class SetpointGate:
+    """Remembers the newest setpoint and when the authorised epoch was last heard.
+
+    max_lifetime_ns caps the lifetime that a setpoint claims. epoch: the one that may move the vehicle (None: the first
+    that comes is authorised). last_heard_ns: receipt of the last live setpoint of that epoch.
+    """
+
+    max_lifetime_ns: int
+    clock: str
+    epoch: int | None = None
+    last_heard_ns: int | None = None
+    newest: VelocitySetpoint | None = None
+    expires_ns: int = 0
+
+    def accept(self, now_ns: int, setpoint: VelocitySetpoint) -> str:
+        """Take a setpoint; returns "" or why it is ignored (old_epoch, old_sequence, expired)."""
+        if self.newest is not None:
+            if setpoint.epoch < self.newest.epoch:
+                return "old_epoch"
+            if setpoint.epoch == self.newest.epoch and setpoint.header.seq <= self.newest.header.seq:
+                return "old_sequence"
+        expires_ns = self._expiry(now_ns, setpoint)
+        if expires_ns <= now_ns:
+            return "expired"
+        self.newest, self.expires_ns = setpoint, expires_ns
+        if self.epoch is None:
+            self.epoch = setpoint.epoch
+        if self.epoch == setpoint.epoch:
+            self.last_heard_ns = now_ns
+        return ""
+
+    def _expiry(self, now_ns: int, setpoint: VelocitySetpoint) -> int:
+        # The earlier of receipt + lifetime and, where the clocks are the same, stamp + lifetime.
+        lifetime_ns = min(setpoint.lifetime_ms * NS_PER_MS, self.max_lifetime_ns)
+        if setpoint.header.clock != self.clock:
+            return now_ns + lifetime_ns
+        return min(now_ns, setpoint.header.stamp_ns) + lifetime_ns
+
+    def live(self, now_ns: int) -> VelocitySetpoint | None:
+        """Return the newest setpoint of any epoch unless it expired."""
+        return self.newest if self.newest is not None and now_ns < self.expires_ns else None
+
+    def obeyed(self, now_ns: int) -> VelocitySetpoint | None:
+        """Return the setpoint that may move the vehicle now: authorised epoch, converged, live."""
+        setpoint = self.live(now_ns)
+        return setpoint if setpoint is not None and setpoint.converged and setpoint.epoch == self.epoch else None
+
+    @property
+    def foreign(self) -> bool:
+        """Whether a newer epoch than the authorised one speaks."""
+        return self.newest is not None and self.epoch is not None and self.newest.epoch != self.epoch
+
+    def adopt(self, now_ns: int) -> bool:
+        """Authorise the newest epoch if its setpoint is live and converged; returns whether it did."""
+        setpoint = self.live(now_ns)
+        if setpoint is None or not setpoint.converged:
+            return False
+        self.epoch, self.last_heard_ns = setpoint.epoch, now_ns
+        return True
+
+    def forget_epoch(self) -> None:
+        """Authorise nobody yet (a new take-off); sequence and epoch order are still remembered."""
+        self.epoch = self.last_heard_ns = None

@@ -1,0 +1,292 @@
+"""Who may move a vehicle, and what it is to do now: one state machine for all kinds of vehicles.
+
+Pure: `now_ns` and inputs in, a decision out. Priority: CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF. LAND latches
+until a new TAKEOFF. Silence of the tracker, the vehicle or the supervisor stops, then lands. Tables: README.md.
+"""
+
+from drivers.authority import (
+    AIRBORNE,
+    ALOFT,
+    FREE,
+    UP,
+    Ack,
+    Action,
+    AuthorityLimits,
+    Decision,
+    Mode,
+    Upstream,
+    VehicleView,
+)
+from drivers.lease import LeaseBook
+from drivers.setpoints import SetpointGate
+from groundstation.bus.messages import AckStage, Command, FlightState, Lease, VelocitySetpoint, Verb
+
+NS_PER_S = 1_000_000_000
+_REMEMBERED_COMMANDS = 256
+
+
+class Watchdog:
+    """Authority over one vehicle. Feed it with `accept_*`, then call `step` at the sender's rate.
+
+    mode, reason: see `Decision`. The vehicle's and upstream's last words are remembered between steps.
+    """
+
+    def __init__(self, limits: AuthorityLimits, clock: str) -> None:
+        self.limits = limits
+        self.mode = Mode.CONNECTING
+        self.reason = "waiting for the vehicle's first word"
+        self.gate = SetpointGate(int(limits.hover_after_s * NS_PER_S), clock)
+        self.lease = LeaseBook(clock)
+        self.vehicle = VehicleView()
+        self.upstream = Upstream()
+        self._since: dict[str, int] = {}
+        self._mode_since_ns = 0
+        self._last_step_ns: int | None = None
+        self._airborne_since_ns = 0
+        self._brake_until_ns = 0
+        self._clearing = False
+        self._answers: dict[str, Ack] = {}
+        self._pending: Command | None = None
+
+    # -- inputs -------------------------------------------------------------------------------------------------------
+
+    def accept_setpoint(self, now_ns: int, setpoint: VelocitySetpoint) -> str:
+        """Take a setpoint; returns "" or a countable reason why it is ignored."""
+        return self.gate.accept(now_ns, setpoint)
+
+    def accept_lease(self, now_ns: int, lease: Lease) -> str:
+        """Take a lease; returns "" or why it is ignored."""
+        return self.lease.accept(now_ns, lease)
+
+    def accept_command(self, now_ns: int, command: Command) -> tuple[Ack, ...]:
+        """Obey or refuse a command; returns the answers to publish. A repeated id is answered, not obeyed, again."""
+        received = Ack(command.id, command.verb, AckStage.RECEIVED)
+        if command.id in self._answers:
+            return received, self._answers[command.id]
+        refusal = self.lease.refusal(now_ns, command) or self._obey(now_ns, command)
+        stage = AckStage.REFUSED if refusal else AckStage.ACCEPTED
+        answer = Ack(command.id, command.verb, stage, refusal)
+        if len(self._answers) >= _REMEMBERED_COMMANDS:
+            self._answers.pop(next(iter(self._answers)))
+        self._answers[command.id] = answer
+        if not refusal:
+            self._pending = command
+        return received, answer
+
+    def _obey(self, now_ns: int, command: Command) -> str:
+        match command.verb:
+            case Verb.CUT_MOTORS:
+                return self._enter(now_ns, Mode.CUT, f"motors cut by {command.issuer}")
+            case Verb.LAND:
+                return self._obey_land(now_ns, command)
+            case Verb.HOLD:
+                return self._obey_hold(now_ns, command)
+            case Verb.TAKEOFF:
+                return self._obey_take_off(now_ns, command)
+            case Verb.TRACK | Verb.RESUME:
+                return self._obey_track(now_ns, command)
+
+    def _obey_land(self, now_ns: int, command: Command) -> str:
+        if self.mode in ALOFT:
+            return self._enter(now_ns, Mode.LANDING, f"landing for {command.issuer}")
+        return "motors are cut" if self.mode is Mode.CUT else self._end_braking()
+
+    def _end_braking(self) -> str:
+        self._brake_until_ns = 0
+        return ""
+
+    def _obey_hold(self, now_ns: int, command: Command) -> str:
+        if self.mode is Mode.TAKING_OFF and self.vehicle.flight_state is FlightState.LANDED:
+            return self._enter(now_ns, Mode.LANDED, f"take-off cancelled by {command.issuer}")
+        if self.mode in ALOFT:
+            return self._enter(now_ns, Mode.HOLD, f"held by {command.issuer}")
+        return f"{self.mode} goes before HOLD" if self.mode in (Mode.LANDING, Mode.CUT) else ""
+
+    def _obey_take_off(self, now_ns: int, command: Command) -> str:
+        refusal = self._take_off_refusal()
+        if refusal:
+            return refusal
+        self._clearing = self.vehicle.flight_state is FlightState.EMERGENCY
+        self.gate.forget_epoch()
+        self._since.clear()
+        return self._enter(now_ns, Mode.TAKING_OFF, f"taking off for {command.issuer}")
+
+    def _take_off_refusal(self) -> str:
+        battery = self.vehicle.battery
+        if self.mode not in (Mode.LANDED, Mode.CUT):
+            return "the vehicle was not heard yet" if self.mode is Mode.CONNECTING else f"already {self.mode}"
+        if not self.vehicle.fresh:
+            return "no telemetry from the vehicle"
+        if self.vehicle.flight_state not in (FlightState.LANDED, FlightState.EMERGENCY):
+            return f"the vehicle says {self.vehicle.flight_state}"
+        if battery is None or battery < self.limits.battery_min:
+            known = "unknown" if battery is None else f"{battery:.0%}"
+            return f"battery {known}, at least {self.limits.battery_min:.0%} needed"
+        return self._upstream_refusal() or self.vehicle.not_ready
+
+    def _upstream_refusal(self) -> str:
+        if self.upstream.stop_requested or not self.upstream.supervisor_alive:
+            return "the ground station is stopping"
+        return "" if self.upstream.supervisor_fresh else "the supervisor does not answer"
+
+    def _obey_track(self, now_ns: int, command: Command) -> str:
+        if self.mode not in FREE:
+            return f"the vehicle is {self.mode}"
+        if not self.vehicle.fresh:
+            return "no telemetry from the vehicle"
+        refusal = self._upstream_refusal()
+        if refusal:
+            return refusal
+        if self.gate.foreign:
+            if command.verb is not Verb.RESUME:
+                return "the tracker was restarted: RESUME is needed"
+            if not self.gate.adopt(now_ns):
+                return "the restarted tracker has no converged belief of this drone yet"
+        return self._enter(now_ns, Mode.TRACK, f"tracking for {command.issuer}")
+
+    def _enter(self, now_ns: int, mode: Mode, reason: str, brake: bool = False) -> str:
+        if mode is not self.mode:
+            self._mode_since_ns = now_ns
+        self.mode, self.reason = mode, reason
+        self._brake_until_ns = now_ns + int(self.limits.brake_s * NS_PER_S) if brake else 0
+        if mode not in ALOFT and self._pending is not None and self._pending.verb not in (Verb.LAND, Verb.CUT_MOTORS):
+            self._pending = None  # cannot become effective any more
+        return ""
+
+    # -- step ---------------------------------------------------------------------------------------------------------
+
+    def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> Decision:
+        """Return what to do now; call it at the sender's rate, 30 Hz."""
+        self.vehicle, self.upstream = vehicle, upstream
+        gap_s = 0.0 if self._last_step_ns is None else (now_ns - self._last_step_ns) / NS_PER_S
+        self._last_step_ns = now_ns
+        self._follow_vehicle(now_ns)
+        if self.mode in ALOFT:
+            self._heed_silence(now_ns, gap_s)
+        setpoint = self._obeyed_setpoint(now_ns)
+        acks = self._effective_ack(now_ns)
+        if setpoint is None:
+            return Decision(self.mode, self._action(now_ns), reason=self.reason, acks=acks)
+        return Decision(self.mode, Action.FLY, setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.reason, acks)
+
+    def _follow_vehicle(self, now_ns: int) -> None:
+        state = self.vehicle.flight_state
+        self._clearing = self._clearing and state is FlightState.EMERGENCY
+        if not self.vehicle.fresh or state in (FlightState.UNKNOWN, FlightState.LOST):
+            return
+        if self.mode is Mode.CONNECTING:
+            self._meet_vehicle(now_ns)
+        elif state is FlightState.EMERGENCY:
+            cleared_in_time = now_ns - self._mode_since_ns < self.limits.clear_s * NS_PER_S
+            if self.mode in ALOFT | {Mode.LANDING} and not (self._clearing and cleared_in_time):
+                self._enter(now_ns, Mode.CUT, "the vehicle reports an emergency")
+        elif state is FlightState.LANDED:
+            if self.mode in FREE | {Mode.LANDING}:
+                self._enter(now_ns, Mode.LANDED, f"landed ({self.reason})")
+        elif self.mode is Mode.LANDED:
+            self._enter(now_ns, Mode.LANDING, "airborne without a take-off of ours")
+        elif state is FlightState.LANDING and self.mode in ALOFT:
+            self._enter(now_ns, Mode.LANDING, "the vehicle lands by itself")
+        elif state in UP and self.mode is Mode.TAKING_OFF:
+            self._airborne_since_ns = now_ns
+            self._enter(now_ns, Mode.HOVER, "airborne, waiting for TRACK")
+
+    def _meet_vehicle(self, now_ns: int) -> None:
+        # A restarted driver: what flies is stopped and landed, what stands never takes off by itself.
+        if self.vehicle.flight_state in AIRBORNE:
+            self._enter(now_ns, Mode.LANDING, "it was flying when this driver started", brake=True)
+        else:
+            self._enter(now_ns, Mode.LANDED, "connected")
+
+    def _heed_silence(self, now_ns: int, gap_s: float) -> None:
+        limits, up, vehicle = self.limits, self.upstream, self.vehicle
+        dead_s = self._lasted("dead", not up.supervisor_alive, now_ns)
+        frozen_s = self._lasted("frozen", not up.supervisor_fresh, now_ns)
+        lost_s = self._lasted("lost", not vehicle.fresh, now_ns)
+        low = vehicle.battery is not None and vehicle.battery < limits.battery_min
+        low_s = self._lasted("battery", low, now_ns)
+        landings = (
+            (up.stop_requested, "the driver was told to stop"),
+            (dead_s >= limits.brake_s, "the supervisor is dead"),
+            (frozen_s >= limits.land_after_s, "the supervisor does not answer"),
+            (lost_s >= limits.land_after_s, "no telemetry from the vehicle"),
+            (low and low_s >= limits.battery_hold_s, "battery below its limit"),
+            (self._take_off_overdue(now_ns), "take-off took too long"),
+            (self._tracker_silent(now_ns), "no setpoint from the tracker"),
+        )
+        for applies, reason in landings:
+            if applies:
+                self._enter(now_ns, Mode.LANDING, reason)
+                return
+        suspensions = (
+            (gap_s > limits.gap_s, f"this driver stood still for {gap_s:.1f} s"),
+            (not up.supervisor_alive, "the supervisor is dead"),
+            (frozen_s >= limits.resume_within_s, "the supervisor does not answer"),
+            (lost_s >= limits.resume_within_s, "no telemetry from the vehicle"),
+        )
+        for applies, reason in suspensions:
+            if applies and self.mode is Mode.TRACK:
+                self._enter(now_ns, Mode.HOVER, f"{reason}; RESUME is needed")
+
+    def _lasted(self, what: str, condition: bool, now_ns: int) -> float:
+        # Seconds for which a condition has held without a break.
+        if not condition:
+            self._since.pop(what, None)
+            return 0.0
+        return (now_ns - self._since.setdefault(what, now_ns)) / NS_PER_S
+
+    def _take_off_overdue(self, now_ns: int) -> bool:
+        return self.mode is Mode.TAKING_OFF and now_ns - self._mode_since_ns > self.limits.take_off_s * NS_PER_S
+
+    def _tracker_silent(self, now_ns: int) -> bool:
+        if self.mode is Mode.TAKING_OFF:
+            return False
+        heard_ns = self.gate.last_heard_ns
+        unseen_until_ns = self._airborne_since_ns + int(self.limits.unseen_land_after_s * NS_PER_S)
+        if heard_ns is None:
+            return now_ns >= unseen_until_ns
+        return now_ns - heard_ns >= self.limits.land_after_s * NS_PER_S
+
+    def _obeyed_setpoint(self, now_ns: int) -> VelocitySetpoint | None:
+        heard = self.vehicle.fresh and self.upstream.supervisor_fresh and self.upstream.supervisor_alive
+        return self.gate.obeyed(now_ns) if self.mode is Mode.TRACK and heard else None
+
+    def _action(self, now_ns: int) -> Action:
+        match self.mode:
+            case Mode.CONNECTING:
+                return Action.WAIT
+            case Mode.LANDED:
+                return Action.IDLE
+            case Mode.TAKING_OFF:
+                return Action.TAKE_OFF
+            case Mode.LANDING:
+                return Action.HOVER if now_ns < self._brake_until_ns else Action.LAND
+            case Mode.CUT:
+                return Action.CUT
+            case _:
+                return Action.HOVER
+
+    # -- acknowledgement ----------------------------------------------------------------------------------------------
+
+    def _effective_ack(self, now_ns: int) -> tuple[Ack, ...]:
+        if self._pending is None or not self._is_effective(self._pending.verb, now_ns):
+            return ()
+        ack = Ack(self._pending.id, self._pending.verb, AckStage.EFFECTIVE)
+        self._pending = None
+        self._answers[ack.command_id] = ack
+        return (ack,)
+
+    def _is_effective(self, verb: Verb, now_ns: int) -> bool:
+        # Seen on the vehicle, not merely sent.
+        state = self.vehicle.flight_state if self.vehicle.fresh else FlightState.UNKNOWN
+        match verb:
+            case Verb.TAKEOFF:
+                return self.mode in FREE and state in UP
+            case Verb.TRACK | Verb.RESUME:
+                return self._obeyed_setpoint(now_ns) is not None
+            case Verb.HOLD:
+                return self.mode in (Mode.HOLD, Mode.LANDED) and state in (FlightState.HOVERING, FlightState.LANDED)
+            case Verb.LAND:
+                return state is FlightState.LANDED
+            case Verb.CUT_MOTORS:
+                return state in (FlightState.EMERGENCY, FlightState.LANDED)

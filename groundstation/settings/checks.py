@@ -13,7 +13,8 @@ from groundstation.settings.target import Target
 
 Finding = tuple[KeyPath, str]
 
-# Names of processes and of scopes on the bus: an entity of the same name would be taken for them.
+# Names of processes and of scopes on the bus: an entity of the same name would be taken for them. So would one that
+# starts with sim_ (the simulator) or ends with _camera (the driver of the camera that a drone carries).
 RESERVED = frozenset({"team", "operator", "router", "tracker", "recorder", "console", "monitor", "supervisor"})
 _ROBOT_HEIGHT_M = 0.3
 
@@ -118,7 +119,7 @@ def _names(parts: Parts) -> Iterator[Finding]:
     if parts.target is not None:
         named.append((("target", "name"), parts.target.name))
     for path, name in named:
-        if name in RESERVED or name.startswith("sim_"):
+        if name in RESERVED or name.startswith("sim_") or name.endswith("_camera"):
             yield path, f"the name {name} is taken by the ground station itself"
     yield from _unique(((path, name, _kind_of(path)) for path, name in named), "the name")
 

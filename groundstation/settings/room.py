@@ -66,7 +66,7 @@ class WorldCamera(Section):
     video_delay_ms: VideoDelay = 120.0
     attitude_std_deg: Annotated[float, Field(gt=0, le=10)] = 0.2
     position_std_m: Annotated[float, Field(gt=0, le=0.5)] = 0.01
-    observes: tuple[Literal["robots", "targets"], ...] = ("robots",)
+    observes: Annotated[tuple[Literal["robots", "targets"], ...], Field(min_length=1)] = ("robots",)
 
     @property
     def attitude_std_rad(self) -> float:

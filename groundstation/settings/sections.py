@@ -1,0 +1,154 @@
+"""From the field to what each process is handed: its own part, as JSON, and nothing else."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.camera.settings import CameraDriverSettings
+from groundstation.settings.drones import Drone
+from groundstation.settings.room import Calibration, WorldCamera
+from groundstation.settings.schema import Field
+
+_SEARCH_RATE_HZ = 2.0
+
+
+class DriverKind(StrEnum):
+    """What a driver process talks to; the value is its package below `drivers`."""
+
+    ARDRONE = "ardrone"
+    CAMERA = "camera"
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSection:
+    """One driver process: its name, what it drives (a drone or a camera of the field), its entry point and section."""
+
+    name: str
+    kind: DriverKind
+    entity: str
+    section: str
+
+    @property
+    def entry(self) -> str:
+        """Return the entry point of the process."""
+        return f"drivers.{self.kind}.driver:run"
+
+
+def camera_name(drone: str) -> str:
+    """Return the name on the bus of the camera that a drone carries."""
+    return f"{drone}_camera"
+
+
+def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, tuple[str, int]]) -> Field:
+    """Return the same field with other addresses of drones and other sources of cameras, by name.
+
+    addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
+    port). This is all that simulation changes. Raises KeyError for a name that is not in the field.
+    """
+    for name in (*addresses, *streams):
+        if name not in field.drones and name not in field.cameras:
+            raise KeyError(name)
+    drones = {}
+    for name, drone in field.drones.items():
+        camera = drone.camera.model_copy(update=_source(streams.get(name)))
+        address = {"address": addresses[name]} if name in addresses else {}
+        drones[name] = drone.model_copy(update={"camera": camera, **address})
+    cameras = {name: camera.model_copy(update=_source(streams.get(name))) for name, camera in field.cameras.items()}
+    return field.model_copy(update={"drones": drones, "cameras": cameras})
+
+
+def _source(stream: tuple[str, int] | None) -> dict[str, str]:
+    return {} if stream is None else {"source": f"http://{stream[0]}:{stream[1]}/video.mjpg"}
+
+
+def core_section(field: Field, run_dir: str, epoch: int) -> str:
+    """Return what tracker, recorder and monitor are handed."""
+    return json.dumps({"field": field.model_dump(mode="json"), "run_dir": run_dir, "epoch": epoch})
+
+
+def driver_sections(field: Field) -> list[DriverSection]:
+    """Return all driver processes of a field: vehicles, then cameras; full searches of cameras are staggered."""
+    count = len(field.cameras) + len(field.drones)
+    phases = [index / (count * _SEARCH_RATE_HZ) for index in range(count)]
+    vehicles = [
+        DriverSection(name, DriverKind.ARDRONE, name, _ardrone(field, name, index).model_dump_json())
+        for index, name in enumerate(field.drones)
+    ]
+    fixed = [
+        DriverSection(name, DriverKind.CAMERA, name, _world_camera(field, name, camera, phase).model_dump_json())
+        for (name, camera), phase in zip(field.cameras.items(), phases, strict=False)
+    ]
+    carried = [
+        DriverSection(
+            camera_name(name), DriverKind.CAMERA, name, _onboard_camera(field, name, drone, phase).model_dump_json()
+        )
+        for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
+    ]
+    return vehicles + fixed + carried
+
+
+def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
+    drone = field.drones[name]
+    return ArDroneDriverSettings.model_validate(
+        {
+            "name": name,
+            "address": drone.address,
+            "limits": drone.limits.model_dump(),
+            "odometry": drone.odometry.model_dump(),
+            "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
+            # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
+            "flight": {"altitude_max_m": max(0.5, field.room.fence.z_m[1]), "ultrasound_freq": 7 + index % 2},
+            "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
+        }
+    )
+
+
+def _world_camera(field: Field, name: str, camera: WorldCamera, phase_s: float) -> CameraDriverSettings:
+    mount = {"parent": "world", "position_m": camera.position_m, "looking": camera.looking}
+    robots = list(field.drones) if "robots" in camera.observes else []
+    targets = [field.target.name] if "targets" in camera.observes else []
+    common = _camera(field, camera.source, camera.calibration, camera.video_delay_ms, phase_s)
+    return CameraDriverSettings.model_validate({"name": name, "mount": mount, "observes": robots + targets, **common})
+
+
+def _onboard_camera(field: Field, name: str, drone: Drone, phase_s: float) -> CameraDriverSettings:
+    camera = drone.camera
+    mount = {
+        "parent": name,
+        "position_m": camera.position_m,
+        "tilt_down_deg": camera.tilt_down_deg,
+        "pan_deg": camera.pan_left_deg,
+    }
+    common = _camera(field, camera.source, camera.calibration, camera.video_delay_ms, phase_s)
+    return CameraDriverSettings.model_validate({"name": camera_name(name), "mount": mount, **common})
+
+
+def _camera(field: Field, source: str, lens: Calibration, delay_ms: float, phase_s: float) -> dict[str, Any]:
+    calibration = lens.model_dump(mode="json", exclude_none=True)
+    return {
+        "source": source,
+        "calibration": calibration,
+        "video_delay_ms": delay_ms,
+        "markers": _markers(field),
+        "image_fps": field.recording.image_fps,
+        "search_rate_hz": _SEARCH_RATE_HZ,
+        "search_phase_s": phase_s,
+    }
+
+
+def _markers(field: Field) -> list[dict[str, Any]]:
+    robots = [{"entity": name, "kind": "robot", **drone.marker.model_dump()} for name, drone in field.drones.items()]
+    target = field.target.marker
+    return [
+        *robots,
+        {
+            "entity": field.target.name,
+            "kind": "target",
+            "code": target.code,
+            "square_mm": target.square_mm,
+            "position_m": target.position_m,
+        },
+    ]

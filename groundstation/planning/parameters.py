@@ -1,0 +1,79 @@
+"""What the planner is told once: horizon, limits, slots, noise it counts on, weights."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from groundstation.sensing.models import Rectangle
+
+NO_FENCE = Rectangle((-math.inf, math.inf), (-math.inf, math.inf))
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """What one robot is never asked to exceed."""
+
+    max_speed_m_s: float = 0.6
+    max_climb_m_s: float = 0.4
+    max_yaw_rate_rad_s: float = math.radians(60)
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessNoise:
+    """White-noise densities: robots' position [m^2/s] and yaw [rad^2/s], targets' acceleration [m^2/s^3]."""
+
+    robot_position: float = 2e-3
+    robot_yaw: float = 3e-4
+    target_acceleration: float = 0.09
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Weights beside the uncertainty [m^2]: see planning/README.md. PAPER: the forms are ours."""
+
+    repulsion: float = 0.05
+    fence: float = 1.0
+    effort: float = 2e-4
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerParameters:
+    """Settings of the planner.
+
+    level_heights_m: row n-1 holds the height slots of a topology with n levels, top first; more levels than rows are
+    not considered. hysteresis: relative gain a new topology must bring; within min_dwell_s of the last switch it must
+    bring urgent_gain. fence: drones' box in the floor plan, kept fence_margin_m away from (softly).
+    evaluation_budget and tolerance: of one solve. starts: how many starts of each topology are optimised.
+    """
+
+    level_heights_m: tuple[tuple[float, ...], ...]
+    horizon_steps: int = 10
+    step_s: float = 0.2
+    discount: float = 0.9
+    hysteresis: float = 0.05
+    min_dwell_s: float = 2.0
+    urgent_gain: float = 0.5
+    separation_m: float = 1.0
+    fence: Rectangle = NO_FENCE
+    fence_margin_m: float = 0.3
+    limits: Mapping[str, MotionLimits] = field(default_factory=dict)
+    noise: ProcessNoise = ProcessNoise()
+    weights: Weights = Weights()
+    mode: Literal["certified", "paper"] = "certified"
+    evaluation_budget: int = 60
+    tolerance: float = 2e-3
+    starts: int = 2
+
+    @property
+    def horizon_s(self) -> float:
+        """Return how far ahead the planner looks [s]."""
+        return self.horizon_steps * self.step_s
+
+    def limits_of(self, robot: str) -> MotionLimits:
+        """Return a robot's motion limits."""
+        return self.limits.get(robot, MotionLimits())
+
+    def slots(self, levels: int) -> tuple[float, ...] | None:
+        """Return the heights of a topology with so many levels [m], or None when it has no slots."""
+        return self.level_heights_m[levels - 1] if 0 < levels <= len(self.level_heights_m) else None

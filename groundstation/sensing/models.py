@@ -1,0 +1,165 @@
+"""What is believed about each camera: where it sits, what it sees, how well it measures there."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z
+
+Array = NDArray[np.float64]
+
+OPTICAL_FROM_WORLD_LOOKING_DOWN: Array = np.diag([1.0, -1.0, -1.0])
+OPTICAL_FROM_WORLD_LOOKING_DOWN.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Frustum:
+    """A view pyramid: tangents of its half angles, and how far and how near its border a marker is counted on.
+
+    border_m: a marker's centre must be this far inside the side planes (half the board's diagonal).
+    """
+
+    half_width_tan: float
+    half_height_tan: float
+    range_m: float
+    border_m: float = 0.15
+
+    @classmethod
+    def of_picture(
+        cls, width_px: int, height_px: int, fx_px: float, fy_px: float, range_m: float, border_m: float = 0.15
+    ) -> "Frustum":
+        """Return the frustum of a pinhole with its principal point in the middle."""
+        return cls(width_px / (2 * fx_px), height_px / (2 * fy_px), range_m, border_m)
+
+    def margin(self, point: Array) -> float:
+        """Return the least signed distance to the planes and the range limit [m; camera optical]; >= 0 is in view."""
+        x, y, z = (float(value) for value in point)
+        across, along = self.half_width_tan, self.half_height_tan
+        side = (z * across - abs(x)) / math.hypot(1.0, across) - self.border_m
+        edge = (z * along - abs(y)) / math.hypot(1.0, along) - self.border_m
+        return min(side, edge, self.range_m - math.hypot(x, y, z))
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviation of a relative position: hypot(base_m, per_m d, per_m2 d^2), isotropic; and of a heading."""
+
+    base_m: float = 0.02
+    per_m: float = 0.0175
+    per_m2: float = 0.004
+    yaw_rad: float = 0.05
+
+    def position_std_m(self, distance_m: float) -> float:
+        """Return the standard deviation per axis at a distance [m]."""
+        return math.hypot(self.base_m, self.per_m * distance_m, self.per_m2 * distance_m**2)
+
+
+@dataclass(frozen=True, slots=True)
+class Softness:
+    """Shape of the smooth availability: see sensing/README.md."""
+
+    width_m: float = 0.08
+    tail_share: float = 2e-3
+    tail_m: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class WorldCamera:
+    """A camera fixed in the world: position [m; world], optical_from_world (3, 3), what it sees and how well."""
+
+    position_m: tuple[float, float, float]
+    view: Frustum
+    noise: Noise = Noise(0.02, 0.004, 0.0, 0.035)
+    optical_from_world: Array = field(default_factory=lambda: OPTICAL_FROM_WORLD_LOOKING_DOWN, compare=False)
+
+    def optical(self, point: Array) -> Array:
+        """Return a world point in the camera's optical frame."""
+        return np.asarray(self.optical_from_world @ (point - np.array(self.position_m)))
+
+
+@dataclass(frozen=True, slots=True)
+class OnboardCamera:
+    """A robot's forward camera: position [m; base], tilted down and panned left, what it sees and how well."""
+
+    position_m: tuple[float, float, float]
+    view: Frustum
+    tilt_down_rad: float = math.radians(45)
+    pan_left_rad: float = 0.0
+    noise: Noise = Noise()
+
+    @property
+    def optical_from_base(self) -> Array:
+        """Return the rotation (3, 3) from base_stabilized to the optical frame."""
+        return base_from_tilted_optical(self.tilt_down_rad, self.pan_left_rad).T
+
+    def optical(self, robot: Array, point: Array) -> Array:
+        """Return a world point in the optical frame of the camera of a level robot at (x, y, z, yaw)."""
+        relative = rotation_z(float(robot[3])).T @ (point - robot[:3])
+        return np.asarray(self.optical_from_base @ (relative - np.array(self.position_m)))
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """An axis-parallel rectangle of the floor plan [m; world]."""
+
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """Return the middle."""
+        return (sum(self.x_m) / 2, sum(self.y_m) / 2)
+
+    def shrunk(self, by_m: float) -> "Rectangle":
+        """Return the rectangle with each side moved inwards, at most to the middle."""
+        (x0, x1), (y0, y1) = self.x_m, self.y_m
+        dx, dy = min(by_m, (x1 - x0) / 2), min(by_m, (y1 - y0) / 2)
+        return Rectangle((x0 + dx, x1 - dx), (y0 + dy, y1 - dy))
+
+    def nearest(self, x: float, y: float) -> tuple[float, float]:
+        """Return the point of the rectangle that is closest to a point."""
+        return min(max(x, self.x_m[0]), self.x_m[1]), min(max(y, self.y_m[0]), self.y_m[1])
+
+
+@dataclass(frozen=True, slots=True)
+class SensorSuite:
+    """All cameras and marker heights of the team.
+
+    marker_height_m: of robots above their centre, of targets above the floor.
+    """
+
+    world: Mapping[str, WorldCamera]
+    onboard: Mapping[str, OnboardCamera]
+    marker_height_m: Mapping[str, float]
+    softness: Softness = Softness()
+
+    def marker(self, name: str, mean: Array, is_robot: bool) -> Array:
+        """Return the centre of an entity's marker [m; world] from its part of the belief's mean."""
+        height = self.marker_height_m[name] + (float(mean[2]) if is_robot else 0.0)
+        return np.array([mean[0], mean[1], height])
+
+    def world_in_view(self, camera: str, point: Array) -> bool:
+        """Return whether a world-fixed camera has a marker at a world point in view (hard limits)."""
+        eye = self.world[camera]
+        return eye.view.margin(eye.optical(point)) >= 0
+
+    def onboard_in_view(self, robot: str, mean: Array, point: Array) -> bool:
+        """Return whether a robot at (x, y, z, yaw) has a marker at a world point in view (hard limits)."""
+        eye = self.onboard[robot]
+        return eye.view.margin(eye.optical(mean, point)) >= 0
+
+    def root_views(self, height_m: float) -> tuple[Rectangle, ...]:
+        """Return where world-fixed cameras that look down count on seeing a marker at this height."""
+        found = []
+        for camera in self.world.values():
+            x, y, z = camera.position_m
+            across = (z - height_m) * camera.view.half_width_tan
+            across -= camera.view.border_m * math.hypot(1.0, camera.view.half_width_tan)
+            along = (z - height_m) * camera.view.half_height_tan
+            along -= camera.view.border_m * math.hypot(1.0, camera.view.half_height_tan)
+            if across > 0 and along > 0 and camera.optical_from_world[2, 2] < -0.99:
+                found.append(Rectangle((x - across, x + across), (y - along, y + along)))
+        return tuple(found)

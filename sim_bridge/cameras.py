@@ -1,0 +1,148 @@
+"""The emulated cameras: one render process each, told what to see and where to serve it."""
+
+import math
+import multiprocessing
+import os
+import socket
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from multiprocessing.context import SpawnProcess
+
+import numpy as np
+
+from groundstation.errors import GroundStationError
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+from groundstation.geometry.rotations import base_from_tilted_optical
+from sim_bridge.faults import CAMERA_FAULTS
+from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, Outage, OutageKind, RenderSpec
+from sim_bridge.scenario import FaultKind, Scenario
+from sim_bridge.site import Lens, Site
+
+Stream = tuple[str, int]
+_START_LIMIT_S = 45.0
+_STOP_LIMIT_S = 1.5
+# Picture right is world +x, picture down is world -y, the optical axis points at the floor.
+_WORLD_FROM_DOWN_OPTICAL = np.diag([1.0, -1.0, -1.0])
+
+
+def render_specs(
+    site: Site, scenario: Scenario, streams: dict[str, Stream], truth_name: str, seed: int
+) -> list[RenderSpec]:
+    """Return the orders of all render processes; raises GroundStationError for a stream of no known camera."""
+    return [
+        RenderSpec(
+            camera=name,
+            mount=_mount(site, name),
+            intrinsics=_intrinsics(_lens(site, name)),
+            boards=_boards(site),
+            truth_name=truth_name,
+            bodies=site.bodies,
+            address=address,
+            port=port,
+            scenario=_camera_scenario(scenario, name),
+            seed=seed,
+            room_size_m=site.room.size_m,
+            parent_pid=os.getpid(),
+        )
+        for name, (address, port) in streams.items()
+    ]
+
+
+def _lens(site: Site, name: str) -> Lens:
+    drone = site.drones.get(name)
+    if name in site.cameras:
+        return site.cameras[name].calibration
+    if drone is None or drone.camera is None:
+        raise GroundStationError(f"stream {name!r} belongs to no camera of the field")
+    return drone.camera.calibration
+
+
+def _mount(site: Site, name: str) -> Mount:
+    drone = site.drones.get(name)
+    if drone is None or drone.camera is None:
+        camera = site.cameras.get(name)
+        position = camera.position_m if camera else (0.0, 0.0, 0.0)
+        return Mount(Pose(_WORLD_FROM_DOWN_OPTICAL, np.array(position)))
+    eye = drone.camera
+    rotation = base_from_tilted_optical(math.radians(eye.tilt_down_deg), math.radians(eye.pan_left_deg))
+    return Mount(Pose(rotation, np.array(eye.position_m)), name)
+
+
+def _intrinsics(lens: Lens) -> CameraIntrinsics:
+    return CameraIntrinsics(
+        lens.width_px, lens.height_px, lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, lens.distortion
+    )
+
+
+def _boards(site: Site) -> tuple[BoardSpec, ...]:
+    drones = tuple(
+        BoardSpec(name, drone.marker.code, drone.marker.square_mm, drone.marker.position_m)
+        for name, drone in site.drones.items()
+    )
+    marker = site.target.marker
+    place = (0.0, 0.0, marker.height_m)
+    return (*drones, BoardSpec(site.target.name, marker.code, marker.square_mm, place, BodyShape.TURTLEBOT))
+
+
+def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
+    kinds = {FaultKind.CAMERA_CUT: OutageKind.CUT, FaultKind.CAMERA_STALL: OutageKind.STALL}
+    outages = tuple(
+        Outage(kinds[fault.kind], fault.start_s, fault.end_s)
+        for fault in scenario.faults
+        if fault.kind in CAMERA_FAULTS and fault.entity == name
+    )
+    return CameraScenario(**scenario.cameras.model_dump(), outages=outages)
+
+
+def _render(spec: RenderSpec) -> None:
+    from sim_bridge.render.process import run
+
+    raise SystemExit(run(spec))
+
+
+class Cameras:
+    """The render processes, from start to end."""
+
+    def __init__(self, specs: Iterable[RenderSpec]) -> None:
+        # spawn: a fork would copy the threads of Zenoh in an undefined state
+        context = multiprocessing.get_context("spawn")
+        self._specs = tuple(specs)
+        self._processes: dict[str, SpawnProcess] = {}
+        for spec in self._specs:
+            process = context.Process(target=_render, args=(spec,), name=f"render-{spec.camera}", daemon=True)
+            process.start()
+            self._processes[spec.camera] = process
+
+    def wait_until_serving(self, should_stop: Callable[[], bool]) -> None:
+        """Return when every stream accepts connections; raises GroundStationError naming the one that does not."""
+        deadline = time.monotonic() + _START_LIMIT_S
+        for spec in self._specs:
+            while not should_stop() and not _accepts(spec.address, spec.port):
+                if spec.camera in self.ended() or time.monotonic() > deadline:
+                    raise GroundStationError(
+                        f"camera {spec.camera} does not serve {spec.address}:{spec.port}: is the port in use?"
+                    )
+                time.sleep(0.05)
+
+    def ended(self) -> list[str]:
+        """Return the cameras whose process is gone."""
+        return [name for name, process in self._processes.items() if not process.is_alive()]
+
+    def stop(self) -> None:
+        """End all render processes, at the latest after 1.5 s by force."""
+        for process in self._processes.values():
+            process.terminate()
+        deadline = time.monotonic() + _STOP_LIMIT_S
+        for process in self._processes.values():
+            process.join(max(0.0, deadline - time.monotonic()))
+            if process.is_alive():
+                process.kill()
+                process.join()
+
+
+def _accepts(address: str, port: int) -> bool:
+    with suppress(OSError), socket.create_connection((address, port), timeout=0.5):
+        return True
+    return False

@@ -1,0 +1,36 @@
+"""Ticks on an absolute schedule of the boot clock, and the count of those that came late."""
+
+from groundstation.bus.clock import NS_PER_MS
+from sim_bridge.world.world import TICK_NS
+
+LATE_NS = 10 * NS_PER_MS
+# After a longer pause (SIGSTOP, a suspended laptop) the world has stood still; running after it would be a burst.
+_GIVE_UP_NS = 250 * NS_PER_MS
+TOLERATED_SHARE = 0.01
+
+
+class Clockwork:
+    """Hands out the deadline of each tick; a tick that begins > 10 ms after its deadline is an overrun."""
+
+    def __init__(self, now_ns: int) -> None:
+        self.deadline_ns = now_ns
+        self.ticks = 0
+        self.overruns = 0
+
+    def next_deadline(self) -> int:
+        """Return when the next tick is due [ns]."""
+        self.deadline_ns += TICK_NS
+        self.ticks += 1
+        return self.deadline_ns
+
+    def begin(self, now_ns: int) -> None:
+        """Note when the tick really began; a schedule that is hopelessly behind starts anew."""
+        late_ns = now_ns - self.deadline_ns
+        self.overruns += late_ns > LATE_NS
+        if late_ns > _GIVE_UP_NS:
+            self.deadline_ns = now_ns
+
+    @property
+    def keeps_time(self) -> bool:
+        """Whether at most 1 % of the ticks were late: otherwise the run is invalid."""
+        return self.overruns <= max(1.0, TOLERATED_SHARE * self.ticks)

@@ -1,0 +1,171 @@
+"""The bridge's one loop: sockets, a step of the world, navdata, truth; 200 times a second in real time."""
+
+import gc
+import os
+import select
+import time
+from collections.abc import Callable
+
+from groundstation.bus.messages import Severity, SimCommand, SimStatus, TruthState
+from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
+from groundstation.process.child import Child
+from sim_bridge.cameras import Cameras, render_specs
+from sim_bridge.clockwork import Clockwork
+from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.faults import FaultSchedule
+from sim_bridge.order import Order
+from sim_bridge.truth import TruthBoard, remove_stale_boards
+from sim_bridge.world.world import World
+
+_TRUTH_TICKS = 4  # 50 Hz
+_COMMAND_TICKS = 10
+_STATUS_TICKS = 200
+_LANDING_LIMIT_S = 20.0
+
+
+class Harness:
+    """World, emulators and truth of one run. `close` releases everything, in any state."""
+
+    def __init__(self, child: Child, order: Order) -> None:
+        self._child, self._order = child, order
+        self.world = World(order.site, order.scenario, order.seed)
+        self.emulators: dict[str, ArDroneEmulator] = {}
+        self._board: TruthBoard | None = None
+        self._cameras: Cameras | None = None
+        self._poll = select.poll()
+        self._readers: dict[int, Callable[[], None]] = {}
+        self._clock = Clockwork(time.monotonic_ns())
+        self._commands = child.bus.subscribe([SIM_COMMAND], entity=order.site.target.name)
+
+    def open(self) -> None:
+        """Take the ports, share the truth, start the cameras; returns when everything listens."""
+        self._open_emulators()
+        self._faults = FaultSchedule(self._order.scenario.faults, self.world, self.emulators)
+        remove_stale_boards()
+        name = f"{os.getpid()}-{self._order.site.site}"
+        self._board = TruthBoard.create(name, self.world.bodies)
+        order = self._order
+        if order.streams:
+            self._child.starting(f"{len(order.streams)} cameras")
+            self._cameras = Cameras(render_specs(order.site, order.scenario, order.streams, name, order.seed))
+            self._cameras.wait_until_serving(lambda: self._child.stop_requested)
+
+    def run(self) -> None:
+        """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""
+        self._child.ready(f"{len(self.emulators)} drones, {len(self._order.streams)} cameras")
+        gc.collect()
+        gc.freeze()  # the start's objects live as long as the process: never look at them again
+        self._clock = Clockwork(time.monotonic_ns())
+        orphaned_ns = 0
+        while not self._child.stop_requested:
+            self._child.sleep_until(self._clock.next_deadline())
+            now_ns = time.monotonic_ns()
+            self._clock.begin(now_ns)
+            self.tick(self._clock.deadline_ns)
+            self._child.beat()
+            if self._clock.ticks % _COMMAND_TICKS == 0 and not self._child.supervisor_alive:
+                orphaned_ns = orphaned_ns or now_ns
+                if self._all_landed() or now_ns - orphaned_ns > _LANDING_LIMIT_S * 1e9:
+                    return
+
+    def tick(self, stamp_ns: int) -> None:
+        """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
+        for descriptor, _ in self._poll.poll(0):
+            self._readers[descriptor]()
+        self.world.step()
+        for emulator in self.emulators.values():
+            emulator.send()
+        if self._board is not None:
+            self._board.write(stamp_ns, self.world.states())
+        ticks = self.world.ticks
+        if ticks % _TRUTH_TICKS == 0:
+            self._publish_truth(stamp_ns)
+        if ticks % _COMMAND_TICKS == 0:
+            self._obey()
+            self._break_things()
+            self._child.tick_status(self._clock.ticks, self._clock.overruns)
+        if ticks % _STATUS_TICKS == 0:
+            self._publish_status()
+
+    def close(self) -> None:
+        """Stop the cameras, close the ports, remove the truth; idempotent."""
+        if self._cameras is not None:
+            self._cameras.stop()
+            self._cameras = None
+        for emulator in self.emulators.values():
+            emulator.close()
+        self.emulators.clear()
+        if self._board is not None:
+            self._board.close()
+            self._board = None
+
+    def _open_emulators(self) -> None:
+        for name, drone in self.world.drones.items():
+            address = self._order.addresses[name]
+            rate_hz = self._order.scenario.drones.navdata_hz
+            emulator = ArDroneEmulator(name, address, drone, self.world.onboard[name], rate_hz)
+            self.emulators[name] = emulator
+            for udp, reader in (
+                (emulator.navdata_socket, emulator.receive_navdata_requests),
+                (emulator.at_socket, emulator.receive_commands),
+            ):
+                self._poll.register(udp, select.POLLIN)
+                self._readers[udp.fileno()] = reader
+
+    def _all_landed(self) -> bool:
+        return not any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())
+
+    def _publish_truth(self, stamp_ns: int) -> None:
+        bus = self._child.bus
+        for name, row in zip(self.world.bodies, self.world.states().tolist(), strict=True):
+            x, y, z, vx, vy, vz, roll, pitch, yaw, _, _, _, on_ground = row
+            bus.publish(
+                TRUTH,
+                TruthState(
+                    header=bus.header(name, stamp_ns),
+                    position_m=(x, y, z),
+                    velocity_m_s=(vx, vy, vz),
+                    attitude_rad=(roll, pitch, yaw),
+                    on_ground=on_ground > 0.5,
+                ),
+            )
+
+    def _publish_status(self) -> None:
+        clock, bus = self._clock, self._child.bus
+        status = SimStatus(
+            header=bus.header(self._child.name),
+            ticks=clock.ticks,
+            overruns=clock.overruns,
+            airborne=self.world.airborne,
+        )
+        bus.publish(SIM_STATUS, status)
+        if not clock.keeps_time:
+            self._child.degrade(f"{clock.overruns} of {clock.ticks} ticks late by > 10 ms: this run is invalid")
+        if self._cameras is not None and (ended := self._cameras.ended()):
+            self._child.degrade(f"render process of {', '.join(ended)} ended")
+
+    def _obey(self) -> None:
+        for received in self._commands.drain():
+            if isinstance(received.message, SimCommand):
+                steer(self.world, received.message)
+
+    def _break_things(self) -> None:
+        for line in self._faults.apply(self.world.time_s):
+            self._child.event(Severity.INFO, line)
+
+
+def steer(world: World, command: SimCommand) -> bool:
+    """Obey a command to the target: drive, stop, path, place; returns whether it was understood."""
+    target = world.target
+    match command.action:
+        case "drive":
+            target.drive(command.speed_m_s, command.turn_rate_rad_s)
+        case "stop":
+            target.drive(0.0, 0.0)
+        case "path":
+            target.follow_path()
+        case "place" if command.position_m is not None:
+            target.place(command.position_m[0], command.position_m[1])
+        case _:
+            return False
+    return True

@@ -117,6 +117,21 @@ def test_every_prefix_of_a_message_is_refused(data: st.DataObject) -> None:
         codec.decode(key_of(topics.ODOMETRY), payload[:cut])
 
 
+def test_a_number_that_is_not_finite_is_found_inside_nested_parts() -> None:
+    alternative = messages.PoseHypothesis((0.0, 0.0, math.inf), None, (1.0,) * 9)
+    with pytest.raises(ValueError, match="alternative is not finite"):
+        messages.RelativeObservation(
+            header=HEADER,
+            observer="drone_1",
+            subject="turtlebot",
+            camera="front",
+            position_m=(0.0, 0.0, 1.0),
+            yaw_rad=None,
+            covariance=(1.0,) * 9,
+            alternative=alternative,
+        )
+
+
 def test_messages_are_frozen() -> None:
     with pytest.raises(AttributeError):
         odometry().yaw_rad = 1.0  # type: ignore[misc]

@@ -1,0 +1,67 @@
+"""Every message on the bus, once: frozen values whose floats are finite, with unknowns as `None`.
+
+Frames and units follow the field names; covariances are row-major tuples of an (n, n) matrix.
+"""
+
+from groundstation.bus.messages.base import Header, Message, Quaternion, Vector3
+from groundstation.bus.messages.belief import Belief, EntityEstimate, Estimate, Innovation, JournalEntry, Verdict
+from groundstation.bus.messages.flight import (
+    AckStage,
+    Command,
+    CommandAck,
+    FlightState,
+    Lease,
+    VehicleStatus,
+    VelocitySetpoint,
+    Verb,
+)
+from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
+from groundstation.bus.messages.process import Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.messages.sensing import (
+    CameraStatus,
+    ClockOffset,
+    ImuSample,
+    Odometry,
+    PoseHypothesis,
+    RelativeObservation,
+)
+from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthState
+
+__all__ = [
+    "AckStage",
+    "Alternative",
+    "Belief",
+    "CameraStatus",
+    "ClockOffset",
+    "Command",
+    "CommandAck",
+    "Control",
+    "Edge",
+    "EntityEstimate",
+    "Estimate",
+    "Event",
+    "FlightState",
+    "Header",
+    "ImuSample",
+    "Innovation",
+    "JournalEntry",
+    "Lease",
+    "Lifecycle",
+    "Message",
+    "Odometry",
+    "Plan",
+    "PoseHypothesis",
+    "ProcessStatus",
+    "Quaternion",
+    "RelativeObservation",
+    "Severity",
+    "SimCommand",
+    "SimStatus",
+    "SolverReport",
+    "TruthState",
+    "Vector3",
+    "VehicleStatus",
+    "VelocitySetpoint",
+    "Verb",
+    "Verdict",
+]

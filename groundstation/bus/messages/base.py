@@ -1,0 +1,50 @@
+"""Header, finiteness and shapes that every message shares."""
+
+import math
+from typing import Any
+
+import msgspec
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+def _is_finite(value: Any) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, tuple):
+        return all(_is_finite(item) for item in value)
+    if isinstance(value, msgspec.Struct):
+        return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
+    return True
+
+
+class Header(msgspec.Struct, frozen=True, gc=False):
+    """Who says what about whom, and when it was measured.
+
+    stamp_ns: time of measurement on the boot clock named by `clock` [ns]; entity: whom it is about;
+    source: who says so; seq: rises by one per (key, sender).
+    """
+
+    stamp_ns: int
+    clock: str
+    entity: str
+    source: str
+    seq: int
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of all messages: a header, and fields whose floats are finite (ValueError otherwise)."""
+
+    header: Header
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            if not _is_finite(getattr(self, name)):
+                raise ValueError(f"{name} is not finite")
+
+
+def require_square(name: str, covariance: tuple[float, ...], sizes: tuple[int, ...]) -> None:
+    """Raise ValueError unless a row-major covariance belongs to a square matrix of one of the sizes."""
+    if len(covariance) not in {n * n for n in sizes}:
+        raise ValueError(f"{name} has {len(covariance)} entries, expected one of {[n * n for n in sizes]}")

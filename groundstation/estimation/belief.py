@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimation.layout import Layout
+from groundstation.estimation.layout import CORE_SIZE, Layout
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,3 +37,11 @@ class JointBelief:
         """Return an entity's own covariance."""
         part = self.layout.block(name).slice
         return self.covariance[part, part]
+
+    def core(self) -> "JointBelief":
+        """Return the belief of robots' (x, y, z, yaw) and targets' (x, y, vx, vy) alone, the rest marginalised."""
+        kept = [block.start + i for block in self.layout.blocks for i in range(CORE_SIZE)]
+        layout = Layout()
+        for block in self.layout.blocks:
+            layout = layout.with_entity(block.name, block.kind, block.labels[:CORE_SIZE])
+        return JointBelief(self.mean[kept], self.covariance[np.ix_(kept, kept)], layout, self.stamp_ns)

@@ -13,6 +13,7 @@ class EntityKind(StrEnum):
 
 ROBOT_CORE = ("x", "y", "z", "yaw")
 TARGET_CORE = ("x", "y", "vx", "vy")
+CORE_SIZE = 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,183 @@
+"""One correction of the joint belief by a measurement of up to four rows that touches two blocks of the state.
+
+Joseph form: P = (I - K H) P (I - K H)^T + K R K^T, symmetric by construction and positive definite for any gain.
+"""
+
+import math
+
+import numpy as np
+
+from groundstation.estimation import slots as s
+from groundstation.estimation.belief import Array, IntArray
+from groundstation.estimation.kernel import kernel
+from groundstation.estimation.linear import cholesky, solve_rows
+
+
+@kernel("void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])")
+def project(
+    P: Array, start_a: int, size_a: int, H_a: Array, start_b: int, size_b: int, H_b: Array, rows: int, W: Array
+) -> None:
+    """Write H P (rows, n) into W, H being zero outside blocks a and b."""
+    n = P.shape[0]
+    for i in range(rows):
+        for j in range(n):
+            W[i, j] = 0.0
+        for k in range(size_a):
+            f = H_a[i, k]
+            if f != 0.0:
+                for j in range(n):
+                    W[i, j] += f * P[start_a + k, j]
+        for k in range(size_b):
+            f = H_b[i, k]
+            if f != 0.0:
+                for j in range(n):
+                    W[i, j] += f * P[start_b + k, j]
+
+
+@kernel("void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])")
+def project_columns(
+    A: Array, start_a: int, size_a: int, H_a: Array, start_b: int, size_b: int, H_b: Array, rows: int, B: Array
+) -> None:
+    """Write H A^T (rows, m) into B for A (m, n): the projection of each row of A."""
+    for i in range(rows):
+        for j in range(A.shape[0]):
+            value = 0.0
+            for k in range(size_a):
+                value += H_a[i, k] * A[j, start_a + k]
+            for k in range(size_b):
+                value += H_b[i, k] * A[j, start_b + k]
+            B[i, j] = value
+
+
+@kernel("float64(float64[:,::1], float64[:,::1], float64[::1], int64, float64[:,::1])")
+def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
+    """Return the NIS of a residual and leave the Cholesky factor of S = H P H^T + R; -1 if S is not PD."""
+    for i in range(rows):
+        for j in range(rows):
+            factor[i, j] = 0.5 * (HPH[i, j] + HPH[j, i]) + R[i, j]
+    if not cholesky(factor, rows):
+        return -1.0
+    nis = 0.0
+    u = np.empty(4)
+    for i in range(rows):
+        value = y[i]
+        for k in range(i):
+            value -= factor[i, k] * u[k]
+        u[i] = value / factor[i, i]
+        nis += u[i] * u[i]
+    return nis
+
+
+@kernel("float64(float64[:,::1], int64)")
+def log_determinant(factor: Array, rows: int) -> float:
+    """Return log det S from its Cholesky factor."""
+    value = 0.0
+    for i in range(rows):
+        value += 2.0 * math.log(factor[i, i])
+    return value
+
+
+@kernel("void(float64[:,::1], float64[:,::1], int64, float64)")
+def inflate(HPH: Array, R: Array, rows: int, factor: float) -> None:
+    """Raise R so that S becomes `factor` times what it was: the soft gate."""
+    for i in range(rows):
+        for j in range(rows):
+            R[i, j] = factor * R[i, j] + (factor - 1.0) * 0.5 * (HPH[i, j] + HPH[j, i])
+
+
+@kernel(
+    "void(float64[::1], float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64,"
+    " float64[:,::1], float64[:,::1], float64[:,::1], float64[::1])"
+)
+def apply(
+    mean: Array,
+    P: Array,
+    start_a: int,
+    size_a: int,
+    H_a: Array,
+    start_b: int,
+    size_b: int,
+    H_b: Array,
+    rows: int,
+    W: Array,
+    factor: Array,
+    R: Array,
+    y: Array,
+) -> None:
+    """Correct mean and P in place, given W = H P and the Cholesky factor of S."""
+    n = P.shape[0]
+    K = np.empty((rows, n))
+    B = np.empty((rows, n))
+    solve_rows(factor, rows, W, K)
+    for i in range(rows):
+        for j in range(n):
+            mean[j] += K[i, j] * y[i]
+    for a in range(n):
+        for i in range(rows):
+            f = K[i, a]
+            if f != 0.0:
+                for j in range(n):
+                    P[a, j] -= f * W[i, j]
+    project_columns(P, start_a, size_a, H_a, start_b, size_b, H_b, rows, B)
+    for i in range(rows):
+        for k in range(rows):
+            f = R[i, k]
+            for j in range(n):
+                B[i, j] -= f * K[k, j]
+    for a in range(n):
+        for i in range(rows):
+            f = B[i, a]
+            for j in range(a, n):
+                P[a, j] -= f * K[i, j]
+        for j in range(a):
+            P[a, j] = P[j, a]
+
+
+@kernel("void(float64[::1], float64[:,::1], int64, int64, float64, float64, float64)")
+def correct_sum(mean: Array, P: Array, a: int, b: int, z: float, R: float, gate: float) -> None:
+    """Correct by a softly gated measurement of the sum of two states: height and the error of its sensor.
+
+    Over an object the height is short by the object's height: the soft gate lets the error state take it up.
+    """
+    n = P.shape[0]
+    W, K = np.empty(n), np.empty(n)
+    for j in range(n):
+        W[j] = P[a, j] + P[b, j]
+    S = W[a] + W[b] + R
+    y = z - mean[a] - mean[b]
+    if y * y > gate * S:
+        R += y * y / gate - S
+        S = y * y / gate
+    for j in range(n):
+        K[j] = W[j] / S
+        mean[j] += K[j] * y
+    for i in range(n):
+        for j in range(n):
+            P[i, j] -= K[i] * W[j]
+    for i in range(n):
+        W[i] = P[i, a] + P[i, b] - R * K[i]
+    for i in range(n):
+        for j in range(i, n):
+            P[i, j] -= W[i] * K[j]
+        for j in range(i):
+            P[i, j] = P[j, i]
+
+
+@kernel("boolean(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1])")
+def is_distribution(mean: Array, P: Array, entities: IntArray, aux: Array) -> bool:
+    """Return whether mean and P are finite and P is positive definite over the active entities."""
+    n = P.shape[0]
+    index = np.empty(n, np.int64)
+    size = 0
+    for e in range(entities.shape[0]):
+        if aux[e, s.ACTIVE] != 0.0:
+            for k in range(entities[e, s.ENTITY_SIZE]):
+                index[size] = entities[e, s.ENTITY_START] + k
+                size += 1
+    work = np.empty((n, n))
+    for i in range(size):
+        if not math.isfinite(mean[index[i]]):
+            return False
+        for j in range(size):
+            work[i, j] = P[index[i], index[j]]
+    return cholesky(work, size)

@@ -1,0 +1,111 @@
+"""Events in order of measurement time, in rows that the compiled filter reads."""
+
+from bisect import bisect_left, insort
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus.messages import PoseHypothesis, Verdict
+from groundstation.estimation import slots as s
+from groundstation.estimation.measurement import Correction, Measurement
+
+_VERDICTS = {
+    s.ACCEPTED: (Verdict.ACCEPTED, ""),
+    s.INFLATED: (Verdict.INFLATED, "beyond the gate"),
+    s.IMPLAUSIBLE: (Verdict.IMPLAUSIBLE, "far beyond the gate"),
+    s.OUT_OF_VIEW: (Verdict.OUT_OF_VIEW, "behind the camera"),
+    s.SINGULAR: (Verdict.SINGULAR, "covariance is not positive definite"),
+    s.OBSERVER_UNKNOWN: (Verdict.UNKNOWN_ENTITY, "the observer has no belief yet"),
+    s.SUBJECT_GROUNDED: (Verdict.UNKNOWN_ENTITY, "the subject does not fly"),
+    s.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
+}
+
+
+class EventLog:
+    """A pool of event rows with their outcomes, listed by (time, tie-breaker) so that arrival order cannot matter."""
+
+    def __init__(self, capacity: int = 256) -> None:
+        self.events = np.zeros((capacity, s.EVENT_COLUMNS))
+        self.outcomes = np.zeros((capacity, s.OUT_COLUMNS))
+        self._free = list(range(capacity))
+        self._order: list[tuple[int, str, int]] = []
+
+    def add(self, stamp_ns: int, tie: str, columns: list[float]) -> int:
+        """Insert an event whose leading columns are given; returns its row."""
+        if not self._free:
+            self._grow()
+        row = self._free.pop()
+        self.events[row] = 0.0
+        self.events[row, : len(columns)] = columns
+        self.outcomes[row] = 0.0
+        insort(self._order, (stamp_ns, tie, row))
+        return row
+
+    def rows_from(self, stamp_ns: int) -> NDArray[np.int64]:
+        """Return the rows of all events at or after a time, in order."""
+        first = bisect_left(self._order, (stamp_ns, "", -1))
+        return np.array([row for _, _, row in self._order[first:]], dtype=np.int64)
+
+    def forget_before(self, stamp_ns: int) -> None:
+        """Free the rows of all events before a time."""
+        count = bisect_left(self._order, (stamp_ns, "", -1))
+        if count:
+            self._free.extend(row for _, _, row in self._order[:count])
+            del self._order[:count]
+
+    def verdict_code(self, row: int) -> int:
+        """Return what became of an event so far; PENDING before it was reached."""
+        return int(self.outcomes[row, s.OUT_VERDICT])
+
+    def correction(self, row: int, observer: str, subject: str, latency_ms: float) -> Correction:
+        """Return the outcome of an observation as a value."""
+        out = self.outcomes[row]
+        verdict, reason = _VERDICTS[int(out[s.OUT_VERDICT])]
+        size = int(out[s.OUT_SIZE])
+        joined = bool(out[s.OUT_JOINED])
+        if joined:
+            reason = "joined" if size == 0 else "re-initialised: the belief contradicted several observations in a row"
+        elif out[s.OUT_OTHER_CHOSEN]:
+            reason = (reason + "; " if reason else "") + "the other pose hypothesis is more likely"
+        if size == 0:
+            return Correction(observer, subject, verdict, reason, latency_ms=latency_ms, joined=joined)
+        residual = tuple(out[s.OUT_RESIDUAL : s.OUT_RESIDUAL + size].tolist())
+        covariance = tuple(out[s.OUT_COVARIANCE : s.OUT_COVARIANCE + size * size].tolist())
+        nis = float(out[s.OUT_NIS])
+        if not (np.isfinite(nis) and nis >= 0.0):
+            return Correction(observer, subject, verdict, reason, latency_ms=latency_ms)
+        return Correction(observer, subject, verdict, reason, residual, covariance, nis, latency_ms, joined)
+
+    def _grow(self) -> None:
+        size = len(self.events)
+        self.events = np.vstack((self.events, np.zeros_like(self.events)))
+        self.outcomes = np.vstack((self.outcomes, np.zeros_like(self.outcomes)))
+        self._free.extend(range(size, 2 * size))
+
+
+def observation_columns(m: Measurement, at: float, step: int, observer: int, subject: int, camera: int) -> list[float]:
+    """Return the columns of an observation event (slots.py)."""
+    other = m.alternative
+    columns = [
+        at,
+        s.KIND_OBSERVATION,
+        observer,
+        subject,
+        camera,
+        m.roll_rad,
+        m.pitch_rad,
+        float(other is not None),
+        step,
+    ]
+    columns += _hypothesis(PoseHypothesis(m.position_m, m.yaw_rad, m.covariance))
+    columns.append(3.0 if m.yaw_rad is None else 4.0)
+    if other is not None:
+        columns += _hypothesis(other)
+    return columns
+
+
+def _hypothesis(pose: PoseHypothesis) -> list[float]:
+    if pose.yaw_rad is not None:
+        return [*pose.position_m, pose.yaw_rad, *pose.covariance]
+    c = pose.covariance
+    return [*pose.position_m, 0.0, *c[0:3], 0.0, *c[3:6], 0.0, *c[6:9], 0.0, 0.0, 0.0, 0.0, 1.0]

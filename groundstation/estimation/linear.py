@@ -1,0 +1,55 @@
+"""Small dense linear algebra in compiled loops: up to 4 rows per measurement, and the whole P once a tick."""
+
+import math
+
+from groundstation.estimation.belief import Array
+from groundstation.estimation.kernel import kernel
+
+
+@kernel("float64(float64)")
+def wrap(angle: float) -> float:
+    """Return the same direction in [-pi, pi]; exact enough for sums of a few turns."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@kernel("boolean(float64[:,::1], int64)")
+def cholesky(matrix: Array, size: int) -> bool:
+    """Overwrite the lower triangle of the leading block with its Cholesky factor; False if it is not PD."""
+    for column in range(size):
+        pivot = matrix[column, column]
+        for k in range(column):
+            pivot -= matrix[column, k] * matrix[column, k]
+        if not (pivot > 0.0 and pivot < math.inf):
+            return False
+        root = math.sqrt(pivot)
+        matrix[column, column] = root
+        for row in range(column + 1, size):
+            value = matrix[row, column]
+            for k in range(column):
+                value -= matrix[row, k] * matrix[column, k]
+            matrix[row, column] = value / root
+    return True
+
+
+@kernel("void(float64[:,::1], int64, float64[:,::1], float64[:,::1])")
+def solve_rows(factor: Array, size: int, W: Array, K: Array) -> None:
+    """Write S^-1 W into K for W, K (size, n), from the Cholesky factor of S."""
+    n = W.shape[1]
+    for i in range(size):
+        for j in range(n):
+            K[i, j] = W[i, j]
+        for k in range(i):
+            f = factor[i, k]
+            for j in range(n):
+                K[i, j] -= f * K[k, j]
+        d = 1.0 / factor[i, i]
+        for j in range(n):
+            K[i, j] *= d
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            f = factor[k, i]
+            for j in range(n):
+                K[i, j] -= f * K[k, j]
+        d = 1.0 / factor[i, i]
+        for j in range(n):
+            K[i, j] *= d

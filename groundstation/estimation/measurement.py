@@ -1,0 +1,49 @@
+"""What the filter takes in and what it answers, as values without headers."""
+
+from dataclasses import dataclass
+
+from groundstation.bus.messages import PoseHypothesis, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One camera's relative pose of one entity, as in bus.messages.RelativeObservation."""
+
+    stamp_ns: int
+    camera: str
+    subject: str
+    position_m: tuple[float, float, float]
+    yaw_rad: float | None
+    covariance: tuple[float, ...]
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    alternative: PoseHypothesis | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground."""
+
+    stamp_ns: int
+    velocity_m_s: tuple[float, float, float]
+    yaw_rad: float
+    height_m: float | None = None
+    reset: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """What one measurement did: residual y, its covariance S (row-major), NIS and verdict.
+
+    joined: the subject entered the state by it (again, where the verdict says so in `reason`).
+    """
+
+    observer: str
+    subject: str
+    verdict: Verdict
+    reason: str = ""
+    residual: tuple[float, ...] = ()
+    covariance: tuple[float, ...] = ()
+    nis: float | None = None
+    latency_ms: float = 0.0
+    joined: bool = False

@@ -1,0 +1,89 @@
+"""Everything the estimator is told before it starts, and how it follows from a resolved field."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from groundstation.estimation.models import ConstantVelocityTarget, MotionModel, MountedCamera, OdometryRobot
+from groundstation.geometry.rotations import base_from_tilted_optical
+
+# `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
+_WORLD_FROM_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorParameters:
+    """Entities and cameras by name, and the settings of the filter.
+
+    step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
+    wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
+    over at least divergence_s re-initialise the entity.
+    """
+
+    entities: Mapping[str, MotionModel]
+    cameras: Mapping[str, MountedCamera] = field(default_factory=dict)
+    step_s: float = 0.01
+    max_lateness_s: float = 0.5
+    gate_probability: float = 0.997
+    wild_gates: float = 6.0
+    divergence_count: int = 5
+    divergence_s: float = 0.25
+    max_position_std_m: float = 0.6
+
+
+def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
+    """Return the parameters for a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
+    drones = {name: drone for name, drone in resolved["drones"].items() if drone.get("enabled", True)}
+    target, estimator = resolved["target"], resolved["estimator"]
+    entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
+    entities[target["name"]] = ConstantVelocityTarget(
+        marker_height_m=target["marker"]["height_m"], acceleration_std_m_s2=target["acceleration_std_m_s2"]
+    )
+    cameras = {name: _world_camera(camera) for name, camera in resolved["cameras"].items()}
+    cameras |= {name: _onboard_camera(name, drone["camera"]) for name, drone in drones.items()}
+    return EstimatorParameters(
+        entities,
+        cameras,
+        max_lateness_s=estimator["max_lateness_s"],
+        gate_probability=estimator["gate_probability"],
+        max_position_std_m=resolved["safety"]["max_position_std_m"],
+    )
+
+
+def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
+    odometry = drone["odometry"]
+    return OdometryRobot(
+        marker_position_m=tuple(drone["marker"]["position_m"]),
+        velocity_scale=odometry["velocity_scale"],
+        velocity_std_m_s=odometry["velocity_std_m_s"],
+        velocity_delay_s=odometry["velocity_delay_ms"] / 1000,
+        yaw_std_rad=math.radians(odometry["yaw_rate_std_deg_s"]),
+        attitude_std_rad=math.radians(odometry["attitude_std_deg"]),
+        height_std_m=odometry["height_std_m"],
+        height_delay_s=odometry["height_delay_ms"] / 1000,
+        climb_std_m_s=0.5 * drone["limits"]["max_climb_m_s"],
+    )
+
+
+def _world_camera(camera: Mapping[str, Any]) -> MountedCamera:
+    return MountedCamera(
+        carrier=None,
+        rotation=_WORLD_FROM_DOWN,
+        translation=tuple(camera["position_m"]),
+        attitude_std_rad=math.radians(camera["attitude_std_deg"]),
+        position_std_m=camera["position_std_m"],
+        observes_targets="targets" in camera.get("observes", ("robots",)),
+    )
+
+
+def _onboard_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
+    return MountedCamera(
+        carrier=name,
+        rotation=base_from_tilted_optical(
+            math.radians(camera["tilt_down_deg"]), math.radians(camera.get("pan_left_deg", 0.0))
+        ),
+        translation=tuple(camera["position_m"]),
+    )

@@ -1,0 +1,253 @@
+"""The tracker as a value machine: messages in, belief, plan and setpoints out; no I/O and no clock."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
+from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
+from groundstation.control.safety import Limited, limit_setpoint
+from groundstation.control.setpoints import HOVER, setpoints_from_plan
+from groundstation.errors import EstimatorFault
+from groundstation.estimation import parameters as estimation
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.intake import REASONS, Intake
+from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.measurement import Correction
+from groundstation.planning import parameters as planning
+from groundstation.planning.plan import Planner, PlanResult
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.topology import Topology
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerParameters:
+    """Everything the tracker is told before it starts; `string_first`: first topology has one robot per level."""
+
+    estimator: estimation.EstimatorParameters
+    planner: planning.PlannerParameters
+    sensors: SensorSuite
+    control: ControlParameters
+    safety: SafetyParameters
+    string_first: bool = False
+
+
+def tracker_from_field(resolved: Mapping[str, Any], clock: str, epoch: int) -> "Tracker":
+    """Return the tracker for a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
+    parameters = TrackerParameters(
+        estimation.parameters_from_field(resolved),
+        planning.parameters_from_field(resolved),
+        sensors_from_field(resolved),
+        control_from_field(resolved),
+        safety_from_field(resolved),
+        resolved["planner"]["initial_topology"] == "string",
+    )
+    return Tracker(parameters, clock, epoch)
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something an operator should know, about an entity ("" = the tracker)."""
+
+    severity: Severity
+    text: str
+    remedy: str = ""
+    entity: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """A snapshot to plan on, away from the tracker's loop."""
+
+    belief: JointBelief
+    topology: Topology
+    warm_start: Mapping[str, Array]
+
+
+class Tracker:
+    """Holds the joint filter, the current topology and the plan in force.
+
+    Use: `ingest` what arrived, `advance` to now, read `belief`, `estimates`, `setpoints`; plan with `plan`, or with
+    `request`, `planner.plan` on another thread, and `adopt`. clock: id of the boot clock that `now_ns` is read from.
+    """
+
+    def __init__(self, parameters: TrackerParameters, clock: str, epoch: int = 0) -> None:
+        self.parameters = parameters
+        self.planner = Planner(parameters.planner, parameters.sensors)
+        self.filter = FixedLagFilter(parameters.estimator)
+        self.epoch = epoch
+        self.holding = False
+        self.current: PlanResult | None = None
+        self.rejected: Counter[str] = Counter()
+        self._intake = Intake(self.filter, parameters.estimator.cameras, clock)
+        self._topology = Topology(())
+        self._belief = self.filter.belief()
+        self._corrections: list[Correction] = []
+        self._notices: list[Notice] = []
+        self._robots = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.ROBOT)
+        self._targets = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.TARGET)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Return the names of all robots that may join."""
+        return self._robots
+
+    @property
+    def airborne(self) -> tuple[str, ...]:
+        """Return the robots that fly, as their vehicles say."""
+        return tuple(name for name in self._robots if self.filter.airborne(name))
+
+    @property
+    def belief(self) -> JointBelief:
+        """Return the belief at the time of the last `advance`."""
+        return self._belief
+
+    @property
+    def topology(self) -> Topology:
+        """Return the topology in force over the airborne robots that have joined."""
+        return self._topology
+
+    def ingest(self, key: str, message: Message, now_ns: int) -> Verdict | None:
+        """Take one message that came under a key; returns why it was refused, or None when it may count.
+
+        Never raises for what a message holds. Refused observations are also among `take_corrections`.
+        """
+        verdict = self._intake.take(key, message, now_ns)
+        if verdict is Verdict.ACCEPTED:
+            return None
+        self.rejected[f"{type(message).__name__} {verdict}"] += 1
+        if isinstance(message, RelativeObservation):
+            latency_ms = (now_ns - message.header.stamp_ns) / 1e6
+            refused = Correction(message.observer, message.subject, verdict, REASONS[verdict], latency_ms=latency_ms)
+            self._corrections.append(refused)
+        return verdict
+
+    def advance(self, now_ns: int) -> JointBelief:
+        """Bring the belief to `now_ns`; a belief that is no distribution any more is dropped, loudly."""
+        self.filter.advance(now_ns)
+        if not self.filter.is_sound():
+            self._fault("the belief is not a distribution any more")
+        self._belief = self.filter.belief()
+        for correction in self.filter.take_corrections():
+            self._corrections.append(correction)
+            self._report_joining(correction)
+        self._topology = self._topology_now()
+        if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):
+            self.holding = False
+        return self._belief
+
+    def take_corrections(self) -> list[Correction]:
+        """Return and forget what became of the observations since the last call."""
+        corrections, self._corrections = self._corrections, []
+        return corrections
+
+    def take_notices(self) -> list[Notice]:
+        """Return and forget what the operator should know."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def converged(self, name: str) -> bool:
+        """Return whether an entity's position is known well enough to fly on."""
+        if name not in self._belief.layout:
+            return False
+        variances = np.diag(self._belief.covariance_of(name))[:2]
+        return bool(variances.max() <= self.parameters.safety.max_position_std_m**2)
+
+    def estimates(self) -> tuple[EntityEstimate, ...]:
+        """Return what is believed of each entity that has joined."""
+        return tuple(self._estimate(name) for name in self._belief.layout.robots + self._belief.layout.targets)
+
+    def target_age_s(self) -> float | None:
+        """Return the time since any target was last observed; None if none ever was."""
+        age = min((self.filter.age_s(name) for name in self._targets), default=math.inf)
+        return age if math.isfinite(age) else None
+
+    def request(self) -> PlanRequest:
+        """Return the snapshot that the next plan is to be made on."""
+        warm = {} if self.current is None else {k: np.asarray(v) for k, v in self.current.controls.items()}
+        return PlanRequest(self._belief.core(), self._topology, warm)
+
+    def adopt(self, plan: PlanResult) -> None:
+        """Put a finished plan in force, as far as its robots still fly."""
+        self.current = plan
+        self._topology = plan.topology
+        self._topology = self._topology_now()
+
+    def plan(
+        self, now_ns: int, should_stop: Callable[[], bool] = lambda: False, max_evaluations: int | None = None
+    ) -> PlanResult | None:
+        """Advance, plan on the belief and adopt the plan; None when planning failed and the last plan stays."""
+        self.advance(now_ns)
+        request = self.request()
+        try:
+            plan = self.planner.plan(request.belief, request.topology, request.warm_start, should_stop, max_evaluations)
+        except EstimatorFault as fault:
+            self._fault(str(fault))
+            return None
+        self.adopt(plan)
+        return plan
+
+    def setpoints(self, now_ns: int) -> dict[str, Limited]:
+        """Return what each airborne robot is told, limited last on the newest belief; unknown robots hover."""
+        p = self.parameters
+        airborne = self.airborne
+        if self.holding:
+            return {name: Limited(HOVER, ("hold",)) for name in airborne}
+        belief = self._belief.core()
+        wanted = setpoints_from_plan(self.current, belief, airborne, self.target_age_s(), p.control, p.sensors)
+        velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
+        return {
+            name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities)
+            for name, setpoint in wanted.items()
+        }
+
+    def _topology_now(self) -> Topology:
+        flying = [name for name in self._belief.layout.robots if self.filter.airborne(name)]
+        if not self._topology.levels:
+            return (Topology.string if self.parameters.string_first else Topology.flat)(flying)
+        return self._topology.reconciled(flying)
+
+    def _fault(self, text: str) -> None:
+        """Drop the belief, hover, and begin a new epoch: drivers then move again only after an operator's RESUME."""
+        self.filter.restart()
+        self.holding = True
+        self.current = None
+        self.epoch += 1
+        remedy = "drones hover; RESUME once they are localised again, or land them"
+        self._notices.append(Notice(Severity.ERROR, f"estimator fault: {text}", remedy))
+
+    def _report_joining(self, correction: Correction) -> None:
+        if not correction.joined:
+            return
+        again = correction.nis is not None
+        severity = Severity.WARNING if again else Severity.INFO
+        text = f"{correction.subject} {'re-initialised' if again else 'localised'} by {correction.observer}"
+        self._notices.append(Notice(severity, text, entity=correction.subject))
+
+    def _estimate(self, name: str) -> EntityEstimate:
+        block = self._belief.layout.block(name)
+        mean, covariance = self._belief.mean_of(name), self._belief.covariance_of(name)
+        if block.kind is EntityKind.ROBOT:
+            size = 4
+            velocity: tuple[float, ...] = self.filter.velocity_of(name)
+        else:
+            size = 2
+            velocity = (float(mean[2]), float(mean[3]))
+        return EntityEstimate(
+            name=name,
+            kind=str(block.kind),
+            mean=tuple(mean[:size].tolist()),
+            covariance=tuple(covariance[:size, :size].ravel().tolist()),
+            velocity_m_s=velocity,
+            converged=self.converged(name),
+            age_s=self.filter.age_s(name),
+        )

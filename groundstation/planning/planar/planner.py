@@ -24,12 +24,13 @@ class Mode(StrEnum):
     """How candidates are chosen and judged.
 
     PAPER: plain neighbours, each solved, cheapest wins, no hysteresis. CERTIFIED: neighbours, radial cuts and merges,
-    dropped with proof where possible. GLOBAL: all topologies with proof, at most 6 robots.
+    dropped with proof where possible. GLOBAL: all topologies with proof, at most 6 robots. FIXED: the current one only.
     """
 
     PAPER = "paper"
     CERTIFIED = "certified"
     GLOBAL = "global"
+    FIXED = "fixed"
 
 
 class Fate(StrEnum):
@@ -104,14 +105,19 @@ class PlanarPlanner:
         self._warm = np.zeros(2 * robots * self.options.segments)
         self.stop = np.zeros(1, dtype=np.int64)
 
-    def plan(self, mean: Array, covariance: Array, level: Levels) -> PlanarPlan:
+    def plan(
+        self, mean: Array, covariance: Array, level: Levels, target_velocity_m_s: Array | None = None
+    ) -> PlanarPlan:
         """Return the decision for a belief: mean (n + 1, 2), per-axis covariance (n + 1, n + 1), current levels (n).
 
+        target_velocity_m_s (2): the target's predicted mean motion, instead of the parameters' own.
         Set `stop[0]` from another thread to end early with the best so far. Raises ValueError for a belief that is not
         finite or not positive definite, or a level vector with gaps.
         """
         level = _checked(level, len(self._neighbours) // 2)
         problem = make_problem(mean, covariance, self.parameters, self.options.segments)
+        if target_velocity_m_s is not None:
+            problem.constants[7:9] = target_velocity_m_s
         candidates = self._candidates(problem.mean, level)
         total = len(candidates)
         bounds, costs = np.empty(total), np.empty(total)
@@ -145,6 +151,8 @@ class PlanarPlanner:
         if self._all is not None:
             others = self._all[(self._all != level).any(axis=1)]
             return np.concatenate([level[None], others])
+        if self.options.mode is Mode.FIXED:
+            return level[None]
         near = self._neighbours[: neighbours(level, self._neighbours)]
         if self.options.mode is Mode.PAPER:
             return np.concatenate([level[None], near])

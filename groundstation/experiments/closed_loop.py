@@ -1,0 +1,135 @@
+"""The simulation loop: decide, move with noise, observe along the topology's edges, filter."""
+
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.experiments.filter import PlanarBelief, correct, initial_belief, predict
+from groundstation.experiments.paths import Path
+from groundstation.experiments.strategies import Strategy
+from groundstation.planning.planar.edges import list_edges
+from groundstation.planning.planar.parameters import PlanarParameters
+
+Array = NDArray[np.float64]
+Levels = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationSettings:
+    """range_m: beyond it a reading does not exist; noise_growth: reading std sigma * sqrt(1 + growth d^4) [1/m^4];
+
+    dropout: share of readings lost; kidnap: chance per step that the target jumps by up to kidnap_m; target_q: variance
+    per step that the filter gives the target; target_velocity: whether the filter models it.
+    """
+
+    steps: int
+    range_m: float = 0.5
+    noise_growth: float = 0.0
+    dropout: float = 0.0
+    kidnap: float = 0.0
+    kidnap_m: float = 0.5
+    initial_variance: float = 1e-4
+    target_q: float | None = None
+    target_velocity: bool = False
+
+
+class Step(NamedTuple):
+    """One step of a run: truth and mean of robots and target (n + 1, 2), covariance, decision, what it cost."""
+
+    truth: Array
+    mean: Array
+    covariance: Array
+    level: Levels
+    trace: float
+    error_m: float
+    readings: int
+    cpu_s: float
+    evaluations: int
+
+
+def run(
+    strategy: Strategy,
+    start: Array,
+    path: Path,
+    parameters: PlanarParameters,
+    settings: SimulationSettings,
+    generator: np.random.Generator,
+) -> list[Step]:
+    """Return all steps of a closed-loop run from robot positions (n, 2); the same for the same generator state."""
+    truth = np.vstack([start, path(0.0)])
+    belief = initial_belief(truth, settings.initial_variance, settings.target_velocity)
+    offset, steps = np.zeros(2), []
+    robot_q = parameters.robot_noise_m2_s * parameters.step_s
+    target_q = parameters.target_noise_m2_s * parameters.step_s if settings.target_q is None else settings.target_q
+    for k in range(settings.steps):
+        before = time.process_time()
+        decision = strategy.decide(belief)
+        cpu = time.process_time() - before
+        truth[:-1] += parameters.step_s * decision.velocity_m_s
+        truth[:-1] += generator.normal(0.0, np.sqrt(robot_q), truth[:-1].shape)
+        kidnapped = generator.random() < settings.kidnap
+        if kidnapped:
+            offset = offset + generator.uniform(-settings.kidnap_m, settings.kidnap_m, 2)
+        truth[-1] = path((k + 1) * parameters.step_s) + offset
+        belief = predict(belief, decision.velocity_m_s, parameters.step_s, robot_q, target_q)
+        if kidnapped:
+            belief = forget_target(belief)
+        belief, readings = observe(belief, truth, decision.level, parameters, settings, generator)
+        error = float(np.hypot(*(belief.mean[belief.robots] - truth[-1])))
+        steps.append(
+            Step(
+                truth.copy(),
+                belief.positions.copy(),
+                belief.position_covariance,
+                decision.level,
+                belief.target_trace,
+                error,
+                readings,
+                cpu,
+                decision.evaluations,
+            )
+        )
+    return steps
+
+
+def forget_target(belief: PlanarBelief) -> PlanarBelief:
+    """Return the belief with the target's block reset to a variance of 4 m^2.
+
+    PAPER: its kidnap test announces the jump to the filter in this way.
+    """
+    covariance = belief.covariance.copy()
+    covariance[belief.robots :, :] = 0.0
+    covariance[:, belief.robots :] = 0.0
+    own = range(belief.robots, len(covariance))
+    covariance[own, own] = 4.0
+    return PlanarBelief(belief.mean, covariance, belief.robots)
+
+
+def observe(
+    belief: PlanarBelief,
+    truth: Array,
+    level: Levels,
+    parameters: PlanarParameters,
+    settings: SimulationSettings,
+    generator: np.random.Generator,
+) -> tuple[PlanarBelief, int]:
+    """Fuse one reading for every edge of the topology whose ends are within range; return how many there were.
+
+    PAPER: the filter uses the edges of the selected topology only.
+    """
+    robots = len(level)
+    edges = np.empty((robots * robots // 4 + robots + 2, 2), dtype=np.int64)
+    readings = 0
+    for observer, subject in edges[: list_edges(level, edges)]:
+        true = truth[subject] - (truth[observer] if observer >= 0 else 0.0)
+        distance = float(np.hypot(*true))
+        variance = parameters.sigma_m**2 * (1.0 + settings.noise_growth * distance**4)
+        noise, lost = generator.normal(0.0, np.sqrt(variance), 2), generator.random() < settings.dropout
+        if distance > settings.range_m or lost:
+            continue
+        belief = correct(belief, int(observer), int(subject), true + noise, variance)
+        readings += 1
+    return belief, readings

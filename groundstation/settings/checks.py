@@ -136,7 +136,7 @@ def _heights(parts: Parts) -> Iterator[Finding]:
     if parts.flying and len(rows) < len(parts.flying):
         yield (
             ("planner", "level_heights_m"),
-            f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones (got {len(rows)} rows)",
+            f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones (got {len(rows)})",
         )
     low = parts.target.marker.height_m + _ROBOT_HEIGHT_M if parts.target else 0.0
     high = math.inf

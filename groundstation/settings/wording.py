@@ -30,6 +30,8 @@ _PLAIN = {
     "date_parsing": "must be a date such as 2026-11-20",
     "date_type": "must be a date such as 2026-11-20",
 }
+# Keys that a field file has and a resolved field has not.
+_ONLY_IN_FILES = {"Field": ("defaults", "types"), "Drone": ("type",)}
 _BOUNDS = {
     "greater_than": (">", "gt"),
     "greater_than_equal": (">=", "ge"),
@@ -43,10 +45,13 @@ def problem(origin: Origin, text: str) -> str:
     return f"{origin}: {dotted(origin.path)}: {text}" if origin.path else f"{origin}: {text}"
 
 
-def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel], base: tuple[str, ...] = ()) -> str:
+def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel]) -> str:
     """Return the line for one error of pydantic on the plain value of `tree` (whose root is a `model`)."""
     path = tuple(key for key in error["loc"] if key != "[key]")
-    origin = tree.origin_of((*base, *path))
+    origin = tree.origin_of(path)
+    if error["type"] == "missing" and origin.path[:1] != path[:1]:
+        # Missing from what three levels gave together: it is the robot's entry that lacks it.
+        origin = Origin(tree.origin_of(path[:2]).place, tree.origin_of(path[:2]).line, path)
     if error["type"] == "extra_forbidden":
         return problem(origin, f"unknown key{_meant(str(path[-1]), model, path[:-1])}")
     return problem(origin, _text(error))
@@ -89,7 +94,7 @@ def _meant(key: str, model: type[BaseModel], path: tuple[str | int, ...]) -> str
     owner = _model_at(model, path)
     if owner is None:
         return ""
-    siblings = [*owner.model_fields, *(("defaults", "types") if not path and "drones" in owner.model_fields else ())]
+    siblings = [*owner.model_fields, *_ONLY_IN_FILES.get(owner.__name__, ())]
     near = get_close_matches(key, siblings, 1)
     if near:
         return f", did you mean {near[0]}?"

@@ -1,0 +1,176 @@
+"""The command line as an operator meets it: help, exit codes, messages, and no slow imports."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from groundstation.cli import main as cli
+from groundstation.cli.exits import ExitCode, UnreachableError, exit_code_of
+from groundstation.errors import DriverError, GroundStationError, SettingsError
+
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "field"
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a copy of the fixture, as working directory."""
+    shutil.copytree(FIXTURE, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_help_shows_every_verb_without_importing_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["--help"]) == 0
+    text = capsys.readouterr().out
+    for name, verb in cli.VERBS.items():
+        assert name in text
+        assert verb.summary.split(";")[0].split(",")[0] in " ".join(text.split())
+    assert "Exit codes" in text
+    assert "130" in text
+
+
+def test_an_unknown_verb_is_answered_with_the_likely_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["lnad"]) == ExitCode.SETTINGS
+    assert "There is no command 'lnad'. Did you mean 'land'?" in capsys.readouterr().err
+    assert cli.run(["version", "--jsn"]) == ExitCode.SETTINGS
+
+
+def test_each_verb_is_where_the_table_says() -> None:
+    for name, verb in cli.VERBS.items():
+        module, _, function = verb.target.partition(":")
+        path = Path(cli.__file__).parents[2] / (module.replace(".", "/") + ".py")
+        if path.is_file():
+            command = cli.groundstation.get_command(click.Context(cli.groundstation), name)
+            assert command is not None, f"{name}: {function}"
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (SettingsError(["a"]), 2),
+        (click.UsageError("a"), 2),
+        (UnreachableError("a"), 3),
+        (DriverError("a"), 4),
+        (GroundStationError("a"), 4),
+        (OSError("a"), 4),
+        (KeyboardInterrupt(), 130),
+        (click.Abort(), 130),
+        (ZeroDivisionError(), 70),
+    ],
+)
+def test_exit_codes(error: BaseException, code: int) -> None:
+    assert exit_code_of(error) == code
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (DriverError("drone_1 does not answer"), "groundstation: drone_1 does not answer\n"),
+        (SettingsError(["a:1: b", "a:2: c"]), "a:1: b\na:2: c\n2 problems: nothing was started\n"),
+        (KeyboardInterrupt(), "\ninterrupted\n"),
+    ],
+)
+def test_errors_are_told_without_a_traceback(
+    error: BaseException,
+    expected: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setitem(cli.VERBS, "broken", cli.Verb("Look", f"{__name__}:broken", "Fails."))
+    monkeypatch.setattr(cli.VerbGroup, "get_command", lambda *_: click.Command("broken", callback=fail))
+    assert cli.run(["broken"]) == exit_code_of(error)
+    assert capsys.readouterr().err == expected
+
+
+def test_mixed_installations_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    real = cli.find_spec
+
+    class Elsewhere:
+        origin = str(tmp_path / "drivers" / "__init__.py")
+
+    monkeypatch.setattr(cli, "find_spec", lambda name: Elsewhere() if name == "drivers" else real(name))
+    with pytest.raises(GroundStationError, match="come from different places"):
+        cli.check_installation()
+    monkeypatch.setattr(cli, "find_spec", lambda name: None)
+    with pytest.raises(GroundStationError, match="is not installed"):
+        cli.check_installation()
+
+
+def test_start_up_imports_nothing_heavy() -> None:
+    """`land` must be quick: click and the table are all that is loaded before its module is."""
+    code = "import sys, groundstation.cli.main; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True).stdout
+    heavy = {"numpy", "pydantic", "ruamel.yaml", "zenoh", "msgspec", "rich", "scipy", "numba", "cv2", "matplotlib"}
+    assert not heavy & set(loaded.split())
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["version", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["skein-groundstation"] == "0.1.0"
+    assert found["location"] == str(Path(cli.__file__).parents[2])
+    assert cli.run(["version"]) == 0
+    assert "eclipse-zenoh" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("lab")
+def test_config_check(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["config", "check", "lab.yaml"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == "lab.yaml: good (2 drone(s), 1 fixed camera(s), target turtlebot)\n"
+    assert cli.run(["config", "check", "lab.yaml", "--set", "planner.discount=2", "--set", "site=X"]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "--set planner.discount=2: planner.discount: must be <= 1 (got 2)",
+        '--set site=X: site: must be a name such as drone_1 (a-z first, then a-z, 0-9, _) (got "X")',
+        "2 problems: nothing was started",
+    ]
+
+
+@pytest.mark.usefixtures("lab")
+def test_config_check_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["config", "check", "lab.yaml", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"ok": True, "problems": []}
+    assert cli.run(["config", "check", "lab.yaml", "--json", "--scenario", "nosuch"]) == 2
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["ok"] is False
+    assert answer["problems"][0].startswith("there is no scenario 'nosuch'")
+
+
+@pytest.mark.usefixtures("lab")
+def test_config_show(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["config", "show", "lab.yaml", "--set", "drones.drone_2.enabled=false"]) == 0
+    text = capsys.readouterr().out
+    assert "drone drone_1" in text
+    assert "drone_2" not in text
+    assert cli.run(["config", "show", "lab.yaml", "--resolved"]) == 0
+    resolved = capsys.readouterr().out
+    Path("resolved.yaml").write_text(resolved, encoding="utf-8")
+    assert cli.run(["config", "check", "resolved.yaml"]) == 0
+    capsys.readouterr()
+    assert cli.run(["config", "show", "resolved.yaml", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["drones"]["drone_1"]["odometry"]["velocity_scale"] == 1.18
+
+
+def test_config_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["config", "schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "Field file"
+
+
+def test_config_init_starts_a_field_and_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "mine"
+    assert cli.run(["config", "init", str(folder)]) == 0
+    assert cli.run(["config", "check", str(folder / "lab.yaml"), "--scenario", "realistic"]) == 0
+    (folder / "lab.yaml").write_text("mine", encoding="utf-8")
+    capsys.readouterr()
+    assert cli.run(["config", "init", str(folder)]) == 2
+    assert "is there already; nothing was written" in capsys.readouterr().err
+    assert (folder / "lab.yaml").read_text(encoding="utf-8") == "mine"

@@ -1,0 +1,104 @@
+"""What each process is handed, and that simulation changes addresses only."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.camera.settings import CameraDriverSettings
+from groundstation.settings.load import load_field
+from groundstation.settings.schema import Field
+from groundstation.settings.sections import DriverKind, core_section, driver_sections, rerouted
+
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml"
+
+
+@pytest.fixture(scope="module")
+def field() -> Field:
+    return load_field(FIXTURE)
+
+
+def cameras(field: Field) -> dict[str, CameraDriverSettings]:
+    return {
+        section.name: CameraDriverSettings.model_validate_json(section.section)
+        for section in driver_sections(field)
+        if section.kind is DriverKind.CAMERA
+    }
+
+
+def drones(field: Field) -> dict[str, ArDroneDriverSettings]:
+    return {
+        section.name: ArDroneDriverSettings.model_validate_json(section.section)
+        for section in driver_sections(field)
+        if section.kind is DriverKind.ARDRONE
+    }
+
+
+def test_one_driver_for_each_link(field: Field) -> None:
+    sections = driver_sections(field)
+    assert [(section.name, section.entity, section.entry) for section in sections] == [
+        ("drone_1", "drone_1", "drivers.ardrone.driver:run"),
+        ("drone_2", "drone_2", "drivers.ardrone.driver:run"),
+        ("ceiling", "ceiling", "drivers.camera.driver:run"),
+        ("drone_1_camera", "drone_1", "drivers.camera.driver:run"),
+        ("drone_2_camera", "drone_2", "drivers.camera.driver:run"),
+    ]
+
+
+def test_a_drone_s_driver_gets_its_limits_and_times(field: Field) -> None:
+    settings = drones(field)["drone_1"]
+    assert settings.address == "192.168.1.11"
+    assert settings.limits.model_dump() == field.drones["drone_1"].limits.model_dump()
+    assert settings.odometry.model_dump() == field.drones["drone_1"].odometry.model_dump()
+    assert settings.safety.land_after_s == field.safety.land_after_s
+    assert settings.flight.altitude_max_m == field.room.fence.z_m[1]
+
+
+def test_neighbours_do_not_hear_each_other_s_ultrasound(field: Field) -> None:
+    assert [settings.flight.ultrasound_freq for settings in drones(field).values()] == [7, 8]
+
+
+def test_fixed_cameras_report_robots_only(field: Field) -> None:
+    ceiling = cameras(field)["ceiling"]
+    assert ceiling.mount.in_world
+    assert {marker.entity for marker in ceiling.expected_markers} == {"drone_1", "drone_2"}
+    all_seeing = load_field(FIXTURE, ["cameras.ceiling.observes=[robots, targets]"])
+    assert {m.entity for m in cameras(all_seeing)["ceiling"].expected_markers} == {"drone_1", "drone_2", "turtlebot"}
+
+
+def test_a_carried_camera_reports_all_but_its_carrier(field: Field) -> None:
+    carried = cameras(field)["drone_1_camera"]
+    assert (carried.observer, carried.mount.tilt_down_deg) == ("drone_1", 45)
+    assert {marker.entity for marker in carried.expected_markers} == {"drone_2", "turtlebot"}
+    (target,) = [marker for marker in carried.expected_markers if marker.entity == "turtlebot"]
+    assert (target.position_m, target.square_mm, target.kind) == ((0, 0, 0.4), 44, "target")
+    assert carried.calibration.intrinsics().width_px == 640
+
+
+def test_full_searches_are_staggered(field: Field) -> None:
+    phases = [camera.search_phase_s for camera in cameras(field).values()]
+    assert phases == sorted(set(phases))
+    assert max(phases) < 1 / 2.0
+
+
+def test_simulation_changes_addresses_only(field: Field) -> None:
+    addresses = {"drone_1": "127.3.7.11", "drone_2": "127.3.7.12"}
+    streams = {"ceiling": ("127.3.7.50", 8080), "drone_1": ("127.3.7.51", 8080), "drone_2": ("127.3.7.52", 8080)}
+    flown = [json.loads(section.section) for section in driver_sections(field)]
+    simulated = [json.loads(section.section) for section in driver_sections(rerouted(field, addresses, streams))]
+    for real, emulated in zip(flown, simulated, strict=True):
+        assert {key for key in real if real[key] != emulated[key]} <= {"address", "source"}
+    assert simulated[0]["address"] == "127.3.7.11"
+    assert simulated[2]["source"] == "http://127.3.7.50:8080/video.mjpg"
+    assert simulated[4]["source"] == "http://127.3.7.52:8080/video.mjpg"
+    assert field.drones["drone_1"].address == "192.168.1.11", "the field itself is a value"
+    with pytest.raises(KeyError):
+        rerouted(field, {"drone_9": "127.0.0.1"}, {})
+
+
+def test_the_core_gets_the_whole_field(field: Field) -> None:
+    section = json.loads(core_section(field, "runs/x", 3))
+    assert (section["run_dir"], section["epoch"]) == ("runs/x", 3)
+    assert Field.model_validate(section["field"], strict=False) == field
+    assert Field.model_validate_json(json.dumps(section["field"])) == field

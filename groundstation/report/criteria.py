@@ -1,0 +1,84 @@
+"""What a run must reach to pass; the one place where the limits stand."""
+
+from collections.abc import Iterator
+
+import msgspec
+
+from groundstation.report.arena import Arena
+from groundstation.report.metrics import Figures
+from groundstation.report.run_facts import RunFacts
+
+MAX_TARGET_RMSE_M = 0.20
+MAX_TARGET_LOST_S = 2.0
+MAX_CPU_CORES = 1.6
+MAX_PLANNER_P99_MS = 50.0
+MAX_MISSED_PERCENT = 1.0
+MIN_RATE_SHARE = 0.98
+MAX_SIM_OVERRUN_PERCENT = 1.0
+MAX_AIRBORNE_COLD_S = 40.0
+MAX_AIRBORNE_WARM_S = 15.0
+MIN_TRACKED_SHARE = 0.98
+
+Value = float | bool | None
+
+
+class Criterion(msgspec.Struct, frozen=True):
+    """One requirement: value relation limit. A value of None was not measured, and fails."""
+
+    name: str
+    value: Value
+    relation: str
+    limit: float | bool
+    ok: bool
+
+
+def criteria_of(figures: Figures, arena: Arena, facts: RunFacts) -> list[Criterion]:
+    """Return all criteria that apply: those against the truth need a simulator."""
+    criteria = [
+        *_promises(figures, facts),
+        _below("planner_p99_ms", figures.planner_p99_ms, MAX_PLANNER_P99_MS),
+        _under("tracker_missed_percent", figures.tracker_missed_percent, MAX_MISSED_PERCENT),
+        _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * arena.estimator.rate_hz),
+    ]
+    if figures.sim_overrun_percent is not None or figures.target is not None:
+        criteria = [*_against_truth(figures, arena), *criteria]
+        criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, MAX_CPU_CORES))
+        criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
+    return criteria
+
+
+def is_valid(figures: Figures) -> bool:
+    """Return whether the simulator kept real time, so that the figures mean anything."""
+    return figures.sim_overrun_percent is None or figures.sim_overrun_percent <= MAX_SIM_OVERRUN_PERCENT
+
+
+def _against_truth(figures: Figures, arena: Arena) -> Iterator[Criterion]:
+    yield _below("target_rmse_m", figures.target_rmse_m, MAX_TARGET_RMSE_M)
+    yield _below("target_lost_s", figures.target_lost_s, MAX_TARGET_LOST_S)
+    yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
+    if len(arena.drones) > 1:
+        yield _above("min_separation_m", figures.min_separation_m, arena.safety.min_separation_m)
+        for kind in ("flat", "string"):
+            seconds = figures.topology_seconds.get(kind, 0.0)
+            yield Criterion(f"topology_seconds.{kind}", seconds, ">", 0.0, seconds > 0.0)
+    yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
+
+
+def _promises(figures: Figures, facts: RunFacts) -> Iterator[Criterion]:
+    if facts.tracking_s is not None:
+        yield _above("tracked_s", figures.tracked_s, MIN_TRACKED_SHARE * facts.tracking_s)
+    if facts.command_unix_ns:
+        limit = MAX_AIRBORNE_WARM_S if facts.warm_cache else MAX_AIRBORNE_COLD_S
+        yield _below("command_to_airborne_s", figures.command_to_airborne_s, limit)
+
+
+def _below(name: str, value: float | None, limit: float) -> Criterion:
+    return Criterion(name, value, "<=", limit, value is not None and value <= limit)
+
+
+def _under(name: str, value: float | None, limit: float) -> Criterion:
+    return Criterion(name, value, "<", limit, value is not None and value < limit)
+
+
+def _above(name: str, value: float | None, limit: float) -> Criterion:
+    return Criterion(name, value, ">=", limit, value is not None and value >= limit)

@@ -1,0 +1,135 @@
+"""From the files of a run to arrays, in one pass over the topics that matter."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from groundstation.bus import messages as m
+from groundstation.bus.topics import (
+    COMMAND,
+    COMMAND_ACK,
+    ESTIMATE,
+    EVENT,
+    INNOVATION,
+    PLAN,
+    PROCESS_STATUS,
+    SIM_STATUS,
+    TRUTH,
+    Topic,
+)
+from groundstation.recording.reader import Record, RecordingError, open_recording, parts
+from groundstation.recording.selection import STATE
+from groundstation.report import run_facts
+from groundstation.report.arena import Arena, arena_from_json
+from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Timed, TruthTrack
+
+_WANTED = frozenset(
+    (topic.plane, topic.name)
+    for topic in (COMMAND, COMMAND_ACK, ESTIMATE, EVENT, INNOVATION, PLAN, PROCESS_STATUS, SIM_STATUS, TRUTH)
+)
+
+
+def gather(run_dir: Path) -> RunData:
+    """Return the data of a run folder; raises RecordingError when it holds no recording."""
+    paths = parts(run_dir, STATE)
+    if not paths:
+        raise RecordingError(f"{run_dir}: no {STATE}.mcap in this folder; is it a run folder?")
+    data = RunData(Arena(), run_facts.read(run_dir))
+    rows = _Rows(data)
+    for path in paths:
+        recording = open_recording(path)
+        if "field.json" in recording.attachments and not data.arena.drones:
+            data.arena = _arena(recording.attachments["field.json"], data.damage)
+        rows.take(recording.records(_is_wanted))
+        data.damage.extend(f"{path.name}: {damage}" for damage in recording.damage)
+    rows.finish()
+    return data
+
+
+def _is_wanted(topic: Topic) -> bool:
+    return (topic.plane, topic.name) in _WANTED
+
+
+def _arena(attachment: bytes, damage: list[str]) -> Arena:
+    try:
+        return arena_from_json(attachment)
+    except msgspec.DecodeError as error:
+        damage.append(f"field.json: {error}")
+        return Arena()
+
+
+class _Rows:
+    """Collects plain rows, then makes arrays of them."""
+
+    def __init__(self, data: RunData) -> None:
+        self._data = data
+        self._truth: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+        self._estimates: defaultdict[str, list[tuple[float, m.EntityEstimate]]] = defaultdict(list)
+        self._processes: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+        self._sim: list[tuple[float, ...]] = []
+
+    def take(self, records: Iterable[Record]) -> None:
+        """Sort records into rows."""
+        data = self._data
+        for record in records:
+            if data.start_unix_ns == 0:
+                data.start_unix_ns = record.log_time_ns
+            time_s = (record.log_time_ns - data.start_unix_ns) / 1e9
+            data.end_s = max(data.end_s, time_s)
+            self._sort(time_s, record.message)
+
+    def _sort(self, time_s: float, message: m.Message) -> None:
+        data = self._data
+        match message:
+            case m.TruthState():
+                self._truth[message.header.entity].append(
+                    (time_s, *message.position_m, message.attitude_rad[2], float(message.on_ground))
+                )
+            case m.Estimate():
+                for entity in message.entities:
+                    self._estimates[entity.name].append((time_s, entity))
+            case m.ProcessStatus():
+                counters = (message.pid, message.ticks, message.overruns, message.overflowed)
+                self._processes[message.header.entity].append((time_s, message.cpu, *map(float, counters)))
+            case m.SimStatus():
+                self._sim.append((time_s, 0.0, float(message.ticks), float(message.overruns)))
+            case m.Command():
+                data.commands.append(Timed(time_s, message))
+            case m.CommandAck():
+                data.acks.append(Timed(time_s, message))
+            case m.Plan():
+                data.plans.append(Timed(time_s, message))
+            case m.Innovation():
+                data.innovations.append(Timed(time_s, message))
+            case m.Event():
+                data.events.append(Timed(time_s, message))
+
+    def finish(self) -> None:
+        """Make the arrays; rows are sorted by time, since senders reach the recorder in no fixed order."""
+        data = self._data
+        for name, rows in self._truth.items():
+            table = np.array(sorted(rows))
+            data.truth[name] = TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5] > 0.5)
+        for name, entries in self._estimates.items():
+            data.estimates[name] = _estimate_track(entries)
+        for name, rows in self._processes.items():
+            table = np.array(sorted(rows))
+            data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:])
+        if self._sim:
+            data.sim_counters = np.array(sorted(self._sim))[:, 1:]
+        for timed in (data.commands, data.acks, data.plans, data.innovations, data.events):
+            timed.sort(key=lambda item: item.time_s)
+
+
+def _estimate_track(entries: list[tuple[float, m.EntityEstimate]]) -> EstimateTrack:
+    size = len(entries[0][1].mean)
+    rows = sorted(
+        ((time_s, *entity.mean, *entity.covariance) for time_s, entity in entries if len(entity.mean) == size)
+    )
+    width = 1 + size + size * size
+    table = np.array([row for row in rows if len(row) == width]).reshape(-1, width)
+    covariance = table[:, 1 + size :].reshape(-1, size, size)
+    return EstimateTrack(entries[0][1].kind, table[:, 0], table[:, 1 : 1 + size], covariance)

@@ -1,0 +1,71 @@
+"""What the run cost: CPU, deadlines, planner time, lost messages."""
+
+import numpy as np
+
+from groundstation.report.tracks import Array, ProcessTrack, RunData
+
+TRACKER = "tracker"
+_PID, _TICKS, _OVERRUNS, _OVERFLOWED = range(4)
+
+
+def cpu_cores(data: RunData) -> dict[str, float]:
+    """Return mean cores used per process over the whole run (a process that ran half of it counts half)."""
+    if not data.processes:
+        return {}
+    first = min(float(track.time_s[0]) for track in data.processes.values())
+    last = max(float(track.time_s[-1]) for track in data.processes.values())
+    span = max(last - first, 1e-9)
+    # Each status covers the time since the one before.
+    return {
+        name: float(np.sum(track.cpu[1:] * np.diff(track.time_s)) / span)
+        for name, track in sorted(data.processes.items())
+    }
+
+
+def _rise(counters: Array, column: int) -> float:
+    """Return how much a counter rose, across restarts (where it begins at zero again)."""
+    if len(counters) == 0:
+        return 0.0
+    values, pids = counters[:, column], counters[:, _PID]
+    steps = np.where(pids[1:] == pids[:-1], np.diff(values), values[1:])
+    return float(values[0] + np.maximum(steps, 0.0).sum())
+
+
+def tracker_deadlines(data: RunData) -> tuple[int, int, float | None]:
+    """Return ticks, missed deadlines, and the tick rate [Hz] while it ticked (None if it never did)."""
+    track = data.processes.get(TRACKER)
+    if track is None:
+        return 0, 0, None
+    return int(_rise(track.counters, _TICKS)), int(_rise(track.counters, _OVERRUNS)), _rate(track)
+
+
+def _rate(track: ProcessTrack) -> float | None:
+    ticking = track.counters[:, _TICKS] > 0
+    if np.count_nonzero(ticking) < 2:
+        return None
+    times, counters = track.time_s[ticking], track.counters[ticking]
+    rise = _rise(counters, _TICKS) - float(counters[0, _TICKS])
+    return float(rise / max(times[-1] - times[0], 1e-9))
+
+
+def overflowed(data: RunData) -> dict[str, int]:
+    """Return messages lost in queues, for the processes that lost any."""
+    lost = {name: int(_rise(track.counters, _OVERFLOWED)) for name, track in data.processes.items()}
+    return {name: count for name, count in sorted(lost.items()) if count}
+
+
+def sim_overrun_percent(data: RunData) -> float | None:
+    """Return late ticks of the simulator in percent; None where there was none."""
+    if data.sim_counters is None:
+        return None
+    ticks, overruns = data.sim_counters[-1, 1:]
+    return float(100.0 * overruns / max(ticks, 1.0))
+
+
+def planner_ms(data: RunData) -> tuple[float, float] | None:
+    """Return median and 99th percentile of the planner's time [ms]."""
+    if not data.plans:
+        return None
+    seconds = [plan.message.solver.seconds for plan in data.plans]
+    median, high = np.percentile(seconds, [50, 99])
+    return float(median * 1000), float(high * 1000)

@@ -1,0 +1,124 @@
+"""All figures of a run, from its data; pure."""
+
+from collections import Counter
+
+import msgspec
+import numpy as np
+
+from groundstation.bus.messages import Severity, Verdict
+from groundstation.report import load, safety, topology_use
+from groundstation.report.accuracy import Accuracy, accuracy, time_grid
+from groundstation.report.interval import tracking_interval
+from groundstation.report.tracks import RunData
+
+
+class Figures(msgspec.Struct, frozen=True, kw_only=True):
+    """What report.json says of a run; None where there was nothing to measure."""
+
+    tracked_s: float
+    target_rmse_m: float | None
+    target_lost_s: float | None
+    target: Accuracy | None
+    robots: dict[str, Accuracy]
+    max_fence_violation_m: float | None
+    min_separation_m: float | None
+    landed: bool | None
+    topology_seconds: dict[str, float]
+    topology_switches: int
+    planner_p50_ms: float | None
+    planner_p99_ms: float | None
+    tracker_ticks: int
+    tracker_missed: int
+    tracker_missed_percent: float | None
+    tracker_rate_hz: float | None
+    mean_cpu_cores: float | None
+    cpu_cores: dict[str, float]
+    sim_overrun_percent: float | None
+    command_to_airborne_s: float | None
+    verdicts: dict[str, int]
+    mean_nis: dict[str, float]
+    overflowed: dict[str, int]
+    events: dict[str, int]
+    loud_events: list[str]
+
+
+_LOUD_EVENTS = 50
+
+
+def figures_of(data: RunData) -> Figures:
+    """Return the figures of a run."""
+    interval = tracking_interval(data)
+    start, end = interval or (0.0, 0.0)
+    target, robots = _accuracies(data, interval)
+    planner = load.planner_ms(data)
+    ticks, missed, rate = load.tracker_deadlines(data)
+    cores = load.cpu_cores(data)
+    return Figures(
+        tracked_s=round(end - start, 3),
+        target_rmse_m=target.rmse_m if target else None,
+        target_lost_s=target.lost_s if target else None,
+        target=target,
+        robots=robots,
+        max_fence_violation_m=safety.max_fence_violation_m(data),
+        min_separation_m=safety.min_separation_m(data),
+        landed=safety.landed(data),
+        topology_seconds=topology_use.topology_seconds(data, start, end),
+        topology_switches=topology_use.switches(data, start, end),
+        planner_p50_ms=planner[0] if planner else None,
+        planner_p99_ms=planner[1] if planner else None,
+        tracker_ticks=ticks,
+        tracker_missed=missed,
+        tracker_missed_percent=100.0 * missed / ticks if ticks else None,
+        tracker_rate_hz=rate,
+        mean_cpu_cores=sum(cores.values()) if cores else None,
+        cpu_cores=cores,
+        sim_overrun_percent=load.sim_overrun_percent(data),
+        command_to_airborne_s=_command_to_airborne_s(data),
+        verdicts=dict(Counter(str(item.message.verdict) for item in data.innovations)),
+        mean_nis=_mean_nis(data),
+        overflowed=load.overflowed(data),
+        events=dict(Counter(str(event.message.severity) for event in data.events)),
+        loud_events=_loud(data),
+    )
+
+
+def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[Accuracy | None, dict[str, Accuracy]]:
+    if interval is None:
+        return None, {}
+    grid = time_grid(*interval)
+    name = data.arena.target.name
+    target = None
+    if name in data.truth:
+        target = accuracy(grid, data.truth[name], data.estimates.get(name), 2)
+    robots = {}
+    for robot in data.drones:
+        truth = data.truth.get(robot)
+        flying = grid[truth.airborne_at(grid)] if truth is not None else grid[:0]
+        if truth is not None and len(flying):
+            robots[robot] = accuracy(flying, truth, data.estimates.get(robot), 3)
+    return target, robots
+
+
+def _command_to_airborne_s(data: RunData) -> float | None:
+    airborne = safety.all_airborne_s(data)
+    if airborne is None or data.facts.command_unix_ns == 0:
+        return None
+    return airborne + (data.start_unix_ns - data.facts.command_unix_ns) / 1e9
+
+
+def _mean_nis(data: RunData) -> dict[str, float]:
+    by_edge: dict[str, list[float]] = {}
+    for item in data.innovations:
+        innovation = item.message
+        if innovation.nis is not None and innovation.verdict is Verdict.ACCEPTED:
+            per_dim = innovation.nis / max(1, len(innovation.residual))
+            by_edge.setdefault(f"{innovation.observer} -> {innovation.subject}", []).append(per_dim)
+    return {edge: float(np.mean(values)) for edge, values in sorted(by_edge.items())}
+
+
+def _loud(data: RunData) -> list[str]:
+    loud = [event for event in data.events if event.message.severity is not Severity.INFO]
+    return [
+        f"{event.time_s:.1f} s {event.message.severity} {event.message.header.entity}: {event.message.text}"
+        for event in loud[-_LOUD_EVENTS:]
+    ]

@@ -1,0 +1,36 @@
+"""What only the command that started a run knows of it; written to `run.json` beside the recording."""
+
+from pathlib import Path
+
+import msgspec
+
+NAME = "run.json"
+
+
+class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
+    """How a run was asked for.
+
+    mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
+    tracking asked for; warm_cache: whether compiled kernels were there at the start, if known.
+    """
+
+    mode: str = ""
+    field: str = ""
+    scenario: str = ""
+    seed: int | None = None
+    command_unix_ns: int = 0
+    tracking_s: float | None = None
+    warm_cache: bool | None = None
+
+
+def write(run_dir: Path, facts: RunFacts) -> None:
+    """Write the facts into the run folder."""
+    (run_dir / NAME).write_bytes(msgspec.json.encode(facts))
+
+
+def read(run_dir: Path) -> RunFacts:
+    """Return the facts of a run, or empty ones when there are none that can be read."""
+    try:
+        return msgspec.json.decode((run_dir / NAME).read_bytes(), type=RunFacts)
+    except (OSError, msgspec.DecodeError):
+        return RunFacts()

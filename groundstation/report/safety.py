@@ -1,0 +1,60 @@
+"""What the drones really did: fence, separation, landing, time to get airborne. From the truth only."""
+
+from itertools import combinations
+
+import numpy as np
+
+from groundstation.report.arena import Fence
+from groundstation.report.tracks import RunData, TruthTrack
+
+# Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
+_TOUCH_M = 1e-3
+
+
+def fence_violation_m(track: TruthTrack, fence: Fence) -> float:
+    """Return how far outside the fence a body got while it flew [m]; 0 if never (by 1 mm)."""
+    position = track.position_m[~track.on_ground]
+    if len(position) == 0:
+        return 0.0
+    low = np.array([fence.x_m[0], fence.y_m[0], fence.z_m[0]])
+    high = np.array([fence.x_m[1], fence.y_m[1], fence.z_m[1]])
+    outside = np.maximum(np.maximum(low - position, position - high), 0.0)
+    worst = float(np.linalg.norm(outside, axis=1).max())
+    return worst if worst > _TOUCH_M else 0.0
+
+
+def max_fence_violation_m(data: RunData) -> float | None:
+    """Return the worst of all drones, or None without truth."""
+    tracks = [data.truth[name] for name in data.drones if name in data.truth]
+    return max((fence_violation_m(track, data.arena.room.fence) for track in tracks), default=None)
+
+
+def min_separation_m(data: RunData) -> float | None:
+    """Return the smallest distance between the centres of two flying drones; None if two never flew together."""
+    tracks = [data.truth[name] for name in data.drones if name in data.truth]
+    distances = [_closest(first, second) for first, second in combinations(tracks, 2)]
+    return min((distance for distance in distances if distance is not None), default=None)
+
+
+def _closest(first: TruthTrack, second: TruthTrack) -> float | None:
+    together = ~first.on_ground & second.airborne_at(first.time_s)
+    if not together.any():
+        return None
+    between = first.position_m[together] - second.position_at(first.time_s[together])
+    return float(np.linalg.norm(between, axis=1).min())
+
+
+def landed(data: RunData) -> bool | None:
+    """Return whether every drone stood on the ground at the end; None without truth."""
+    ends = [bool(data.truth[name].on_ground[-1]) for name in data.drones if name in data.truth]
+    return all(ends) and len(ends) == len(data.drones) if ends else None
+
+
+def all_airborne_s(data: RunData) -> float | None:
+    """Return the first time at which all drones flew at once [s]; None if never."""
+    tracks = [data.truth[name] for name in data.drones if name in data.truth]
+    if not tracks or len(tracks) < len(data.drones):
+        return None
+    times = tracks[0].time_s
+    together = np.logical_and.reduce([track.airborne_at(times) for track in tracks])
+    return float(times[int(np.argmax(together))]) if together.any() else None

@@ -1,0 +1,70 @@
+"""The report as it is printed at the end of a run."""
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from groundstation.report.build import JSON_NAME, PLOT_NAME, Report
+from groundstation.report.criteria import Criterion, Value
+
+_UNITS = (("_m", "m"), ("_s", "s"), ("_ms", "ms"), ("_percent", "%"), ("_hz", "Hz"), ("_cores", "cores"))
+
+
+def summary(report: Report) -> RenderableType:
+    """Return verdict, criteria and what else matters, for rich to print."""
+    parts: list[RenderableType] = [_verdict(report), _criteria(report.criteria), _details(report)]
+    for line in report.figures.loud_events[-5:]:
+        parts.append(Text(f"  {line}", style="yellow"))
+    for line in report.damage[:3]:
+        parts.append(Text(f"  recording: {line}", style="dim"))
+    parts.append(Text(f"  {report.run_dir}: {JSON_NAME}, {PLOT_NAME}", style="dim"))
+    return Group(*parts)
+
+
+def _verdict(report: Report) -> Text:
+    if report.passed:
+        return Text("PASSED", style="bold green")
+    if not report.valid:
+        return Text("INVALID: the simulator did not keep real time; close other programs and repeat", style="bold red")
+    failed = ", ".join(criterion.name for criterion in report.criteria if not criterion.ok)
+    return Text(f"FAILED: {failed}", style="bold red")
+
+
+def _criteria(criteria: tuple[Criterion, ...]) -> Table:
+    table = Table(box=None, pad_edge=True, header_style="dim")
+    for title, justify in (("", "left"), ("criterion", "left"), ("value", "right"), ("limit", "left")):
+        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    for criterion in criteria:
+        mark = Text("ok", style="green") if criterion.ok else Text("NO", style="bold red")
+        limit = f"{criterion.relation} {_text(criterion.limit)}"
+        table.add_row(mark, criterion.name, f"{_text(criterion.value)} {_unit(criterion.name)}".rstrip(), limit)
+    return table
+
+
+def _details(report: Report) -> Text:
+    figures = report.figures
+    seconds = ", ".join(
+        f"{text} {value:.0f} s" for text, value in figures.topology_seconds.items() if "_" in text and value >= 0.5
+    )
+    busiest = sorted(figures.cpu_cores.items(), key=lambda item: -item[1])[:4]
+    cores = ", ".join(f"{name} {share:.0%}" for name, share in busiest)
+    lines = [f"topologies: {seconds or 'none'}; {figures.topology_switches} switches", f"cpu: {cores or 'unknown'}"]
+    if figures.target is not None and figures.target.anees is not None:
+        lines.append(
+            f"target: covered {figures.target.covered:.0%}, normalised error {figures.target.anees:.2f} (1 = honest)"
+        )
+    return Text("\n".join(f"  {line}" for line in lines))
+
+
+def _text(value: Value) -> str:
+    if value is None:
+        return "not measured"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3f}".rstrip("0").rstrip(".")
+
+
+def _unit(name: str) -> str:
+    ending = name.split(".")[0]
+    found = [unit for suffix, unit in _UNITS if ending.endswith(suffix)]
+    return "s" if ending == "topology_seconds" else found[0] if found else ""

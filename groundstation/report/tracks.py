@@ -1,0 +1,98 @@
+"""Time series of a run as arrays; times in seconds since the first message."""
+
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus.messages import Command, CommandAck, Event, Innovation, Plan
+from groundstation.report.arena import Arena
+from groundstation.report.run_facts import RunFacts
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class TruthTrack:
+    """Where a body really was: time (n), position (n, 3), yaw (n), on_ground (n)."""
+
+    time_s: Array
+    position_m: Array
+    yaw_rad: Array
+    on_ground: Flags
+
+    def position_at(self, time_s: Array) -> Array:
+        """Return interpolated positions (m, 3); held at both ends."""
+        return np.column_stack([np.interp(time_s, self.time_s, self.position_m[:, axis]) for axis in range(3)])
+
+    def yaw_at(self, time_s: Array) -> Array:
+        """Return interpolated yaw (m), unwrapped."""
+        return np.interp(time_s, self.time_s, np.unwrap(self.yaw_rad))
+
+    def airborne_at(self, time_s: Array) -> Flags:
+        """Return whether the body flew (m); False outside the track."""
+        index = np.searchsorted(self.time_s, time_s, side="right") - 1
+        inside = (index >= 0) & (time_s <= self.time_s[-1] + 0.5)
+        flying: Flags = inside & ~self.on_ground[np.clip(index, 0, len(self.time_s) - 1)]
+        return flying
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateTrack:
+    """What was believed of an entity: time (n), mean (n, k), covariance (n, k, k)."""
+
+    kind: str
+    time_s: Array
+    mean: Array
+    covariance: Array
+
+    def latest_at(self, time_s: Array, stale_s: float) -> NDArray[np.int64]:
+        """Return the index (m) of the newest estimate at each time, -1 where there is none younger than stale_s."""
+        index = np.searchsorted(self.time_s, time_s, side="right") - 1
+        age = time_s - self.time_s[np.clip(index, 0, None)]
+        return np.where((index >= 0) & (age <= stale_s), index, -1).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Timed(Generic[T]):
+    """A message and when it was."""
+
+    time_s: float
+    message: T
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessTrack:
+    """Statuses of one process: time (n), cpu share (n), pid, ticks, overruns, overflowed (n each)."""
+
+    time_s: Array
+    cpu: Array
+    counters: Array
+
+
+@dataclass(slots=True)
+class RunData:
+    """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last."""
+
+    arena: Arena
+    facts: RunFacts
+    start_unix_ns: int = 0
+    end_s: float = 0.0
+    truth: dict[str, TruthTrack] = field(default_factory=dict)
+    estimates: dict[str, EstimateTrack] = field(default_factory=dict)
+    processes: dict[str, ProcessTrack] = field(default_factory=dict)
+    sim_counters: Array | None = None
+    commands: list[Timed[Command]] = field(default_factory=list)
+    acks: list[Timed[CommandAck]] = field(default_factory=list)
+    plans: list[Timed[Plan]] = field(default_factory=list)
+    innovations: list[Timed[Innovation]] = field(default_factory=list)
+    events: list[Timed[Event]] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+
+    @property
+    def drones(self) -> tuple[str, ...]:
+        """Return the names of all drones of the field."""
+        return tuple(self.arena.drones)

@@ -1,0 +1,313 @@
+"""The report of synthetic recordings whose figures are known beforehand."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.api import Sample
+from groundstation.bus.codec import encode
+from groundstation.bus.keys import expression
+from groundstation.recording.capture import Capture
+from groundstation.recording.mcap_file import McapFile, Preamble
+from groundstation.recording.reader import RecordingError
+from groundstation.recording.timeline import Timeline
+from groundstation.report import run_facts
+from groundstation.report.build import build_report, judge
+from groundstation.report.gather import gather
+from groundstation.report.run_facts import RunFacts
+from groundstation.report.summary import summary
+
+S = 1_000_000_000
+UNIX = 1_700_000_000 * S
+FLAT, STRING = "drone_1,drone_2", "drone_1/drone_2"
+FIELD = {
+    "site": "lab",
+    "room": {"size_m": [8.0, 6.0, 4.5], "fence": {"x_m": [-3.7, 3.7], "y_m": [-2.7, 2.7], "z_m": [0.0, 2.8]}},
+    "cameras": {
+        "ceiling": {
+            "position_m": [0.0, 0.0, 4.2],
+            "calibration": {"width_px": 1280, "height_px": 720, "fx_px": 763.0, "fy_px": 763.0},
+        }
+    },
+    "drones": {"drone_1": {}, "drone_2": {}},
+    "target": {"name": "turtlebot"},
+    "planner": {"level_heights_m": [[1.3], [2.2, 1.3]]},
+    "safety": {"min_separation_m": 0.6},
+}
+
+
+@dataclass
+class Flight:
+    """A flight: 2 s on the ground, take-off, TRACK at 10 s, LAND at 10 s + tracking_s, on the ground 3 s later."""
+
+    tracking_s: float = 20.0
+    target_bias_m: float = 0.1
+    target_missing: tuple[float, float] = (0.0, 0.0)
+    offset_2_m: tuple[float, float, float] = (-1.0, 0.0, 0.0)
+    land_at_all: bool = True
+    estimator_stops_s: float = 1e9
+    topology: Callable[[float], str] = field(default=lambda time_s: FLAT if time_s < 20.0 else STRING)
+    missed_per_s: int = 0
+    sim_late_per_s: int = 0
+
+    @property
+    def end_s(self) -> float:
+        return 10.0 + self.tracking_s
+
+    def target(self, time_s: float) -> tuple[float, float]:
+        phase = 2 * math.pi * time_s / 62.0
+        return 3.1 * math.sin(phase), 0.8 * math.sin(2 * phase)
+
+    def drone(self, name: str, time_s: float) -> tuple[float, float, float]:
+        x, y = self.target(time_s)
+        height = 1.3 * min(1.0, max(0.0, (time_s - 2.0) / 4.0))
+        offset = self.offset_2_m if name == "drone_2" else (0.0, 0.0, 0.0)
+        string = self.topology(time_s) == STRING and name == "drone_1"
+        return 0.8 * x + offset[0], 0.8 * y + offset[1], height + offset[2] + (0.9 if string else 0.0)
+
+    def on_ground(self, time_s: float) -> bool:
+        return time_s < 2.0 or (self.land_at_all and time_s > self.end_s + 3.0)
+
+
+class Tape:
+    """Writes messages with chosen stamps into a recording."""
+
+    def __init__(self, folder: Path) -> None:
+        attachments = {"field.json": ("application/json", json.dumps(FIELD).encode())}
+        self._file = McapFile(folder / "state.mcap", Preamble({}, attachments, UNIX))
+        self._capture = Capture(Timeline("here", UNIX))
+        self._seq = 0
+
+    def header(self, time_s: float, entity: str, source: str) -> m.Header:
+        self._seq += 1
+        return m.Header(round(time_s * S), "here", entity, source, self._seq)
+
+    def put(self, topic: t.Topic, message: m.Message) -> None:
+        header = message.header
+        key = expression("lab", topic, header.entity, header.source)
+        entry = self._capture.entry(Sample(key, encode(message)), header.stamp_ns)
+        assert entry is not None
+        self._file.write(entry)
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def fly(folder: Path, flight: Flight) -> Path:
+    """Record a flight; returns the run folder."""
+    tape = Tape(folder)
+    for tick in range(round((flight.end_s + 4.0) * 50)):
+        time_s = tick / 50
+        _truth(tape, flight, time_s)
+        if time_s < flight.estimator_stops_s:
+            _estimate(tape, flight, time_s)
+        if tick % 5 == 0 and time_s > 5.0:
+            _plan(tape, flight, time_s)
+        if tick % 50 == 0:
+            _statuses(tape, flight, time_s)
+        if tick == 500:
+            _command(tape, time_s, m.Verb.TRACK)
+        if tick == round(flight.end_s * 50):
+            _command(tape, time_s, m.Verb.LAND)
+    header = tape.header(12.0, "drone_1", "drone_1")
+    tape.put(t.EVENT, m.Event(header=header, severity=m.Severity.WARNING, text="battery low"))
+    tape.close()
+    return folder
+
+
+def _truth(tape: Tape, flight: Flight, time_s: float) -> None:
+    bodies = {name: flight.drone(name, time_s) for name in ("drone_1", "drone_2")}
+    bodies["turtlebot"] = (*flight.target(time_s), 0.0)
+    for name, position in bodies.items():
+        ground = name == "turtlebot" or flight.on_ground(time_s)
+        zero = (0.0, 0.0, 0.0)
+        header = tape.header(time_s, name, "sim_bridge")
+        state = m.TruthState(
+            header=header, position_m=position, velocity_m_s=zero, attitude_rad=(0.0, 0.0, 3.1), on_ground=ground
+        )
+        tape.put(t.TRUTH, state)
+
+
+def _estimate(tape: Tape, flight: Flight, time_s: float) -> None:
+    def entity(name: str, kind: str, mean: tuple[float, ...], variance: float) -> m.EntityEstimate:
+        size = len(mean)
+        covariance = tuple(variance if row == column else 0.0 for row in range(size) for column in range(size))
+        return m.EntityEstimate(name, kind, mean, covariance, (0.0,) * 3, True, 0.1)
+
+    entities = [
+        entity(name, "robot", (*flight.drone(name, time_s)[:2], flight.drone(name, time_s)[2] + 0.05, -3.1), 0.0025)
+        for name in ("drone_1", "drone_2")
+    ]
+    x, y = flight.target(time_s)
+    if not flight.target_missing[0] <= time_s < flight.target_missing[1]:
+        entities.append(entity("turtlebot", "target", (x + flight.target_bias_m, y), 0.005))
+    tape.put(t.ESTIMATE, m.Estimate(header=tape.header(time_s, "team", "tracker"), entities=tuple(entities), epoch=1))
+
+
+def _plan(tape: Tape, flight: Flight, time_s: float) -> None:
+    solver = m.SolverReport("ok", 40, 0.010 if round(time_s * 10) % 50 else 0.030, 3, 1)
+    header = tape.header(time_s, "team", "tracker")
+    text = flight.topology(time_s)
+    plan = m.Plan(
+        header=header, topology=text, cost=0.01, controls=(), edges=(), alternatives=(), solver=solver, mode="x"
+    )
+    tape.put(t.PLAN, plan)
+
+
+def _statuses(tape: Tape, flight: Flight, time_s: float) -> None:
+    second = round(time_s)
+    for name, cpu in (("tracker", 0.4), ("sim_bridge", 0.5)):
+        header = tape.header(time_s, name, name)
+        status = m.ProcessStatus(
+            header=header,
+            state=m.Lifecycle.READY,
+            pid=1,
+            cpu=cpu,
+            ticks=50 * second,
+            overruns=flight.missed_per_s * second,
+        )
+        tape.put(t.PROCESS_STATUS, status)
+    header = tape.header(time_s, "sim_bridge", "sim_bridge")
+    late = flight.sim_late_per_s * second
+    tape.put(t.SIM_STATUS, m.SimStatus(header=header, ticks=500 * second, overruns=late))
+
+
+def _command(tape: Tape, time_s: float, verb: m.Verb) -> None:
+    header = tape.header(time_s, "team", "operator")
+    tape.put(t.COMMAND, m.Command(header=header, id="c", verb=verb, scope=(), issuer="operator"))
+    for drone in ("drone_1", "drone_2"):
+        header = tape.header(time_s, drone, drone)
+        tape.put(t.COMMAND_ACK, m.CommandAck(header=header, command_id="c", verb=verb, stage=m.AckStage.ACCEPTED))
+
+
+def test_figures_of_a_good_flight(tmp_path: Path) -> None:
+    report = build_report(fly(tmp_path, Flight()), plot=False)
+    figures = report.figures
+    assert report.passed, [criterion for criterion in report.criteria if not criterion.ok]
+    assert figures.tracked_s == pytest.approx(20.0)
+    assert figures.target_rmse_m == pytest.approx(0.1, abs=1e-3)
+    assert figures.target_lost_s == 0.0
+    assert figures.target is not None
+    assert figures.target.anees == pytest.approx(0.1**2 / 0.005 / 2, rel=0.05)
+    assert figures.robots["drone_1"].rmse_m == pytest.approx(0.05, abs=0.02)
+    assert figures.robots["drone_1"].yaw_rmse_rad == pytest.approx(2 * math.pi - 6.2, abs=1e-6)
+    assert figures.max_fence_violation_m == 0.0
+    assert figures.min_separation_m == pytest.approx(1.0)
+    assert figures.landed is True
+    assert figures.topology_seconds["flat"] == pytest.approx(10.0, abs=0.11)
+    assert figures.topology_seconds["string"] == pytest.approx(10.0, abs=0.11)
+    assert figures.topology_seconds[STRING] == figures.topology_seconds["string"]
+    assert figures.topology_switches == 1
+    assert figures.planner_p50_ms == pytest.approx(10.0)
+    assert figures.planner_p99_ms == pytest.approx(30.0)
+    assert figures.tracker_rate_hz == pytest.approx(50.0)
+    assert figures.mean_cpu_cores == pytest.approx(0.9)
+    assert figures.events == {"WARNING": 1}
+    assert figures.command_to_airborne_s is None
+
+
+def test_report_json_has_the_figures_at_its_top_level(tmp_path: Path) -> None:
+    build_report(fly(tmp_path, Flight()), plot=False)
+    content = json.loads((tmp_path / "report.json").read_bytes())
+    assert content["passed"] is True
+    assert content["schema_version"] == 1
+    for name in ("target_rmse_m", "target_lost_s", "max_fence_violation_m", "min_separation_m", "landed"):
+        assert content[name] is not None
+    assert {criterion["name"] for criterion in content["criteria"]} >= {"target_rmse_m", "mean_cpu_cores", "landed"}
+
+
+def _failed(folder: Path, flight: Flight) -> set[str]:
+    report = judge(gather(fly(folder, flight)), folder)
+    return {criterion.name for criterion in report.criteria if not criterion.ok}
+
+
+def test_a_missing_estimate_counts_one_metre(tmp_path: Path) -> None:
+    report = judge(gather(fly(tmp_path, Flight(target_missing=(15.0, 20.0)))), tmp_path)
+    # 0.5 s of the gap are still covered by the last estimate, which drifts away from the target meanwhile.
+    assert report.figures.target_lost_s == pytest.approx(4.5, abs=0.11)
+    assert report.figures.target_rmse_m == pytest.approx(math.sqrt((15.5 * 0.01 + 4.5) / 20), rel=0.05)
+    assert {criterion.name for criterion in report.criteria if not criterion.ok} == {"target_rmse_m", "target_lost_s"}
+
+
+def test_a_tracker_that_falls_silent_counts_as_lost(tmp_path: Path) -> None:
+    assert {"target_rmse_m", "target_lost_s"} <= _failed(tmp_path, Flight(estimator_stops_s=12.0))
+
+
+def test_a_breached_fence_fails_by_its_distance(tmp_path: Path) -> None:
+    report = judge(gather(fly(tmp_path, Flight(offset_2_m=(-1.0, 0.0, 1.7)))), tmp_path)
+    assert report.figures.max_fence_violation_m == pytest.approx(0.2)
+    assert not report.passed
+
+
+def test_too_close_fails(tmp_path: Path) -> None:
+    assert "min_separation_m" in _failed(tmp_path, Flight(offset_2_m=(-0.3, 0.0, 0.0)))
+
+
+def test_still_flying_at_the_end_fails(tmp_path: Path) -> None:
+    assert _failed(tmp_path, Flight(land_at_all=False)) == {"landed"}
+
+
+def test_one_topology_only_fails(tmp_path: Path) -> None:
+    assert _failed(tmp_path, Flight(topology=lambda _time_s: FLAT)) == {"topology_seconds.string"}
+
+
+def test_missed_deadlines_fail(tmp_path: Path) -> None:
+    assert _failed(tmp_path, Flight(missed_per_s=1)) == {"tracker_missed_percent"}
+
+
+def test_a_simulator_that_falls_behind_makes_the_run_invalid(tmp_path: Path) -> None:
+    report = judge(gather(fly(tmp_path, Flight(sim_late_per_s=6))), tmp_path)
+    assert (report.valid, report.passed) == (False, False)
+    assert report.figures.sim_overrun_percent == pytest.approx(1.2)
+
+
+def test_promises_of_the_command_are_judged(tmp_path: Path) -> None:
+    fly(tmp_path, Flight())
+    facts = RunFacts(mode="demo", seed=3, command_unix_ns=UNIX - 20 * S, tracking_s=60.0, warm_cache=True)
+    run_facts.write(tmp_path, facts)
+    report = judge(gather(tmp_path), tmp_path)
+    assert report.figures.command_to_airborne_s == pytest.approx(22.0, abs=0.05)
+    failed = {criterion.name for criterion in report.criteria if not criterion.ok}
+    assert failed == {"tracked_s", "command_to_airborne_s"}
+
+
+def test_a_run_that_never_tracked_fails_and_says_so(tmp_path: Path) -> None:
+    tape = Tape(tmp_path)
+    _statuses(tape, Flight(), 1.0)
+    tape.close()
+    report = build_report(tmp_path)
+    assert not report.passed
+    assert report.figures.target_rmse_m is None
+    assert (tmp_path / "trajectories.png").stat().st_size > 10_000
+
+
+def test_a_recording_cut_in_flight_still_reports(tmp_path: Path) -> None:
+    fly(tmp_path, Flight())
+    path = tmp_path / "state.mcap"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    report = judge(gather(tmp_path), tmp_path)
+    assert report.damage
+    assert not report.passed
+
+
+def test_an_empty_folder_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no state\.mcap in this folder"):
+        build_report(tmp_path)
+
+
+def test_the_picture_is_drawn_and_the_summary_names_what_failed(tmp_path: Path) -> None:
+    report = build_report(fly(tmp_path, Flight(target_missing=(15.0, 20.0))))
+    assert (tmp_path / "trajectories.png").read_bytes().startswith(b"\x89PNG")
+    console = Console(record=True, width=110, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console.print(summary(report))
+    text = console.export_text()
+    console.file.close()
+    assert "FAILED: target_rmse_m, target_lost_s" in text
+    assert "battery low" in text

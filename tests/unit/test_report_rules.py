@@ -1,0 +1,137 @@
+"""The rules of the report one by one: what counts as tracking, as a switch, as late, as CPU."""
+
+import numpy as np
+import pytest
+
+from groundstation.bus import messages as m
+from groundstation.report import load, topology_use
+from groundstation.report.accuracy import accuracy
+from groundstation.report.arena import Arena
+from groundstation.report.ellipse import semi_axes_95
+from groundstation.report.interval import tracking_interval
+from groundstation.report.run_facts import RunFacts
+from groundstation.report.safety import all_airborne_s, fence_violation_m
+from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Timed, TruthTrack
+
+HEADER = m.Header(0, "here", "team", "tester", 0)
+
+
+def _data(**content: object) -> RunData:
+    arena = Arena(drones={"a": b"{}", "b": b"{}"})  # type: ignore[dict-item]
+    return RunData(arena, RunFacts(), end_s=100.0, **content)  # type: ignore[arg-type]
+
+
+def _ack(time_s: float, verb: m.Verb, stage: m.AckStage) -> Timed[m.CommandAck]:
+    return Timed(time_s, m.CommandAck(header=HEADER, command_id="x", verb=verb, stage=stage))
+
+
+def _command(time_s: float, verb: m.Verb, *scope: str) -> Timed[m.Command]:
+    return Timed(time_s, m.Command(header=HEADER, id="x", verb=verb, scope=scope, issuer="me"))
+
+
+def _plan(time_s: float, text: str) -> Timed[m.Plan]:
+    solver = m.SolverReport("ok", 1, 0.01, 1, 1)
+    plan = m.Plan(
+        header=HEADER, topology=text, cost=1.0, controls=(), edges=(), alternatives=(), solver=solver, mode="certified"
+    )
+    return Timed(time_s, plan)
+
+
+def _truth(ground: list[bool], z: float = 1.0) -> TruthTrack:
+    count = len(ground)
+    position = np.tile([0.0, 0.0, z], (count, 1))
+    return TruthTrack(np.arange(count) * 1.0, position, np.zeros(count), np.array(ground))
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [("a,b", "flat"), ("a/b", "string"), ("a/b/c", "string"), ("a,b/c", "other"), ("a", "other"), ("", "other")],
+)
+def test_kinds_of_topology(text: str, kind: str) -> None:
+    assert topology_use.kind_of(text) == kind
+
+
+def test_a_refused_track_starts_nothing() -> None:
+    assert tracking_interval(_data(acks=[_ack(5.0, m.Verb.TRACK, m.AckStage.REFUSED)])) is None
+
+
+def test_tracking_begins_with_the_first_drone_and_ends_with_the_teams_landing() -> None:
+    acks = [_ack(time_s, m.Verb.TRACK, m.AckStage.ACCEPTED) for time_s in (5.0, 5.1)]
+    commands = [
+        _command(1.0, m.Verb.LAND),
+        _command(20.0, m.Verb.LAND, "a"),
+        _command(30.0, m.Verb.HOLD),
+        _command(40.0, m.Verb.LAND, "b", "a"),
+    ]
+    assert tracking_interval(_data(acks=acks, commands=commands)) == (5.0, 40.0)
+    assert tracking_interval(_data(acks=acks, commands=commands[:3])) == (5.0, 100.0)
+
+
+def test_a_robot_that_joins_is_no_switch() -> None:
+    data = _data(plans=[_plan(time_s, text) for time_s, text in ((0.0, "a"), (0.1, "a,b"), (0.2, "a/b"), (0.3, "b/a"))])
+    assert topology_use.switches(data, 0.0, 1.0) == 2
+
+
+def test_a_silent_planner_flies_no_topology() -> None:
+    seconds = topology_use.topology_seconds(_data(plans=[_plan(0.0, "a,b"), _plan(10.0, "a,b")]), 0.0, 20.0)
+    assert seconds == {"flat": 1.0, "string": 0.0, "other": 0.0, "a,b": 1.0}
+
+
+def test_counters_go_on_across_a_restart() -> None:
+    # columns: pid, ticks, overruns, overflowed
+    counters = np.array([[1, 50, 0, 0], [1, 100, 2, 0], [2, 10, 0, 0], [2, 60, 1, 0]], dtype=float)
+    data = _data(processes={"tracker": ProcessTrack(np.array([1.0, 2.0, 3.0, 4.0]), np.zeros(4), counters)})
+    ticks, missed, _rate = load.tracker_deadlines(data)
+    assert (ticks, missed) == (160, 3)
+
+
+def test_cpu_is_averaged_over_the_whole_run() -> None:
+    whole = ProcessTrack(np.arange(11.0), np.full(11, 0.5), np.zeros((11, 4)))
+    half = ProcessTrack(np.arange(6.0), np.full(6, 0.4), np.zeros((6, 4)))
+    cores = load.cpu_cores(_data(processes={"tracker": whole, "camera": half}))
+    assert cores == pytest.approx({"camera": 0.2, "tracker": 0.5})
+
+
+def test_the_fence_binds_flying_drones_only() -> None:
+    from groundstation.report.arena import Fence
+
+    fence = Fence((-1.0, 1.0), (-1.0, 1.0), (0.0, 0.7))
+    assert fence_violation_m(_truth([True, True]), fence) == 0.0
+    assert fence_violation_m(_truth([True, False]), fence) == pytest.approx(0.3)
+    assert fence_violation_m(_truth([False], z=-0.0005), fence) == 0.0
+
+
+def test_airborne_means_all_at_once() -> None:
+    apart = {"a": _truth([False, False, True, True]), "b": _truth([True, True, False, False])}
+    assert all_airborne_s(_data(truth=apart)) is None
+    together = {"a": _truth([True, False, False, True]), "b": _truth([True, True, False, False])}
+    assert all_airborne_s(_data(truth=together)) == 2.0
+
+
+def test_honest_covariance_gives_one() -> None:
+    generator = np.random.default_rng(3)
+    times = np.arange(4000) / 10
+    covariance = np.array([[0.04, 0.01], [0.01, 0.02]])
+    noise = generator.multivariate_normal([0.0, 0.0], covariance, len(times))
+    truth = TruthTrack(times, np.zeros((len(times), 3)), np.zeros(len(times)), np.ones(len(times), dtype=bool))
+    estimate = EstimateTrack("target", times, noise, np.tile(covariance, (len(times), 1, 1)))
+    figures = accuracy(times, truth, estimate, 2)
+    assert figures.anees == pytest.approx(1.0, abs=0.06)
+    assert figures.rmse_m == pytest.approx(np.sqrt(0.06), rel=0.05)
+    assert figures.covered == 1.0
+
+
+def test_a_singular_covariance_gives_no_ratio_and_no_crash() -> None:
+    times = np.arange(10) / 10
+    truth = TruthTrack(times, np.zeros((10, 3)), np.zeros(10), np.ones(10, dtype=bool))
+    estimate = EstimateTrack("target", times, np.zeros((10, 2)), np.zeros((10, 2, 2)))
+    assert accuracy(times, truth, estimate, 2).anees is None
+
+
+def test_ellipse_holds_95_percent() -> None:
+    major, minor, angle = semi_axes_95(np.array([[1.0, 0.0], [0.0, 4.0]]))
+    assert (major, minor) == (pytest.approx(2 * 2.4477, abs=1e-3), pytest.approx(2.4477, abs=1e-3))
+    assert abs(np.sin(angle)) == pytest.approx(1.0)
+    samples = np.random.default_rng(1).normal(size=(20000, 2)) * [1.0, 2.0]
+    inside = (samples[:, 1] / major) ** 2 + (samples[:, 0] / minor) ** 2 <= 1
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.006)

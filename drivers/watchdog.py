@@ -58,6 +58,10 @@ class Watchdog:
         """Take a lease; returns "" or why it is ignored."""
         return self.lease.accept(now_ns, lease)
 
+    def see(self, vehicle: VehicleView, upstream: Upstream) -> None:
+        """Remember the last word of the vehicle and of those above, by which commands are judged."""
+        self.vehicle, self.upstream = vehicle, upstream
+
     def accept_command(self, now_ns: int, command: Command) -> tuple[Ack, ...]:
         """Obey or refuse a command; returns the answers to publish. A repeated id is answered, not obeyed, again."""
         received = Ack(command.id, command.verb, AckStage.RECEIVED)
@@ -157,7 +161,7 @@ class Watchdog:
 
     def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> Decision:
         """Return what to do now; call it at the sender's rate, 30 Hz."""
-        self.vehicle, self.upstream = vehicle, upstream
+        self.see(vehicle, upstream)
         gap_s = 0.0 if self._last_step_ns is None else (now_ns - self._last_step_ns) / NS_PER_S
         self._last_step_ns = now_ns
         self._follow_vehicle(now_ns)

@@ -1,0 +1,156 @@
+"""Units and frames: what the drone's figures mean on the bus, and what our velocities mean to the drone.
+
+WIRE (AR.Drone sheet 4.5): body x forward, y right, z down; theta nose up, phi right side down, psi clockwise; mdeg,
+mm/s, mg, deg/s. Ours: x forward, y left, z up; roll right side down, pitch nose down, yaw counter-clockwise.
+"""
+
+import math
+from dataclasses import dataclass
+
+from drivers.ardrone.wire.errors import WireError
+from drivers.ardrone.wire.navdata import Navdata
+from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, Demo, PhysMeasures
+from drivers.ardrone.wire.state import ControlState, StateBit, split_control_state
+from groundstation.bus.messages import FlightState, Quaternion, Vector3
+from groundstation.geometry.angles import difference, wrap
+
+_RAD_FROM_MDEG = math.pi / 180_000
+_RAD_FROM_DEG = math.pi / 180
+_STANDARD_GRAVITY_M_S2 = 9.80665
+_M_S2_FROM_MG = _STANDARD_GRAVITY_M_S2 / 1000
+# Figures beyond these are no measurement of an AR.Drone.
+_MOST_MDEG = 360_000.0
+_MOST_MM_S = 30_000.0
+# A heading step is a jump when it exceeds what the gyro explains by this much.
+_JUMP_RAD = math.radians(8)
+_JUMP_RATE_RAD_S = math.radians(100)
+_GAP_S = 0.5
+_PHASES = {
+    ControlState.TRANS_TAKEOFF: FlightState.TAKING_OFF,
+    ControlState.TRANS_LANDING: FlightState.LANDING,
+    ControlState.HOVERING: FlightState.HOVERING,
+    ControlState.FLYING: FlightState.FLYING,
+    ControlState.TRANS_GOTOFIX: FlightState.FLYING,
+    ControlState.TRANS_LOOPING: FlightState.FLYING,
+    ControlState.LANDED: FlightState.TAKING_OFF,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What one packet says of the vehicle's motion, in our frames.
+
+    velocity_m_s [base_stabilized], as reported (no scale applied); rates and specific force [base], None in demo mode.
+    """
+
+    velocity_m_s: Vector3
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    height_m: float | None
+    rates_rad_s: Vector3 | None
+    specific_force_m_s2: Vector3 | None
+
+
+def motion_from_navdata(packet: Navdata) -> Motion | None:
+    """Return the motion in a packet, or None if it carries no DEMO option (a status packet).
+
+    Raises WireError (not_finite, implausible, option_size).
+    """
+    demo = packet.read(DEMO)
+    if demo is None:
+        return None
+    _require_sane(demo)
+    altitude = packet.read(ALTITUDE)
+    # WIRE: DEMO vz is 0 in every recording of a real drone; ALTITUDE's is the rate of the altitude, positive up.
+    climb_mm_s = -demo.vz_mm_s if altitude is None else altitude.vz_mm_s
+    if not -_MOST_MM_S <= climb_mm_s <= _MOST_MM_S:
+        raise WireError("not_finite" if climb_mm_s - climb_mm_s != 0.0 else "implausible", "climb rate")
+    phys = packet.read(PHYS_MEASURES)
+    rates, force = (None, None) if phys is None else _imu_from_phys(phys)
+    return Motion(
+        velocity_m_s=(demo.vx_mm_s / 1000, -demo.vy_mm_s / 1000, climb_mm_s / 1000),
+        roll_rad=demo.phi_mdeg * _RAD_FROM_MDEG,
+        pitch_rad=-demo.theta_mdeg * _RAD_FROM_MDEG,
+        yaw_rad=wrap(-demo.psi_mdeg * _RAD_FROM_MDEG),
+        height_m=_height(packet.state, demo),
+        rates_rad_s=rates,
+        specific_force_m_s2=force,
+    )
+
+
+def _require_sane(demo: Demo) -> None:
+    angles, speeds = demo[2:5], demo[6:9]
+    # Comparisons with a NaN are false, so one chained comparison refuses it together with what is too large.
+    if all(-_MOST_MDEG <= a <= _MOST_MDEG for a in angles) and all(-_MOST_MM_S <= v <= _MOST_MM_S for v in speeds):
+        return
+    finite = all(map(math.isfinite, angles + speeds))
+    raise WireError("implausible" if finite else "not_finite", f"DEMO {angles} {speeds}")
+
+
+def _height(state: int, demo: Demo) -> float | None:
+    # WIRE: DEMO's altitude is 0 on the ground and until shortly after lift-off.
+    return demo.altitude_mm / 1000 if state & StateBit.FLY and demo.altitude_mm > 0 else None
+
+
+def _imu_from_phys(phys: PhysMeasures) -> tuple[Vector3, Vector3]:
+    wx, wy, wz = phys.rates_deg_s
+    ax, ay, az = phys.accelerations_mg
+    if not math.isfinite(wx + wy + wz + ax + ay + az):
+        raise WireError("not_finite", "PHYS_MEASURES")
+    rates = (wx * _RAD_FROM_DEG, -wy * _RAD_FROM_DEG, -wz * _RAD_FROM_DEG)
+    return rates, (ax * _M_S2_FROM_MG, -ay * _M_S2_FROM_MG, -az * _M_S2_FROM_MG)
+
+
+def flight_state_from_navdata(state: int, control_state: int | None) -> FlightState:
+    """Return what the drone does: EMERGENCY and FLY bits decide, the control state names the phase.
+
+    WIRE: the two are not consistent within a packet. FLY with the phase LANDED is about to leave the ground.
+    """
+    if state & StateBit.EMERGENCY:
+        return FlightState.EMERGENCY
+    phase = None if control_state is None else split_control_state(control_state)[0]
+    if state & StateBit.FLY:
+        return FlightState.FLYING if phase is None else _PHASES.get(phase, FlightState.FLYING)
+    return FlightState.TAKING_OFF if phase is ControlState.TRANS_TAKEOFF else FlightState.LANDED
+
+
+def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
+    """Return wxyz of parent_from_body for intrinsic z-y-x angles."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+class HeadingWatch:
+    """Counts the jumps of the heading, across which its increments are void.
+
+    WIRE: at lift-off the magnetometer is fused in and psi jumps, 143 deg in one sample in a recorded flight.
+    """
+
+    def __init__(self) -> None:
+        self.resets = 0
+        self._yaw_rad: float | None = None
+        self._stamp_ns = 0
+        self._aloft = False
+
+    def update(self, stamp_ns: int, motion: Motion) -> int:
+        """Take the heading of a packet; returns the number of jumps so far."""
+        elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
+        aloft = motion.height_m is not None
+        void = self._yaw_rad is not None and (elapsed_s > _GAP_S or self._has_jumped(elapsed_s, motion))
+        self.resets += void or (aloft and not self._aloft)
+        self._yaw_rad, self._stamp_ns, self._aloft = motion.yaw_rad, stamp_ns, aloft
+        return self.resets
+
+    def _has_jumped(self, elapsed_s: float, motion: Motion) -> bool:
+        assert self._yaw_rad is not None
+        explained = 0.0 if motion.rates_rad_s is None else motion.rates_rad_s[2] * elapsed_s
+        step = difference(motion.yaw_rad, self._yaw_rad + explained)
+        return abs(step) > _JUMP_RAD + _JUMP_RATE_RAD_S * elapsed_s

@@ -1,0 +1,164 @@
+"""The AR.Drone driver: reader thread, sender, and the process entry `run`."""
+
+import logging
+import threading
+from collections import Counter
+from dataclasses import dataclass, replace
+
+from pydantic import ValidationError
+
+from drivers.ardrone import convert, velocity_loop
+from drivers.ardrone.link import ArDroneLink
+from drivers.ardrone.orders import orders_from_decision
+from drivers.ardrone.publisher import MotionPublisher
+from drivers.ardrone.session import Phase, Session, configuration, scale_from_settings
+from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.ardrone.velocity_loop import VelocityLoop
+from drivers.ardrone.wire.errors import WireError
+from drivers.ardrone.wire.navdata import Navdata
+from drivers.ardrone.wire.options import DEMO
+from drivers.ardrone.wire.state import StateBit, bit_names
+from drivers.authority import Action, Decision, VehicleView
+from drivers.base import Health, HostProcess
+from drivers.datagrams import DatagramLog
+from drivers.host import VehicleHost, run_hosts
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import FlightState, Vector3
+from groundstation.errors import SettingsError
+
+_FRESH_NS = 300_000_000
+_FAULTS = StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Telemetry:
+    """The newest word of the drone; heard_ns 0: never; velocity, of moved_ns, as reported [base_stabilized]."""
+
+    heard_ns: int = 0
+    moved_ns: int = 0
+    state: int = 0
+    control_state: int | None = None
+    flight_state: FlightState = FlightState.UNKNOWN
+    battery: float | None = None
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+
+
+class ArDrone:
+    """One AR.Drone behind its link; `drivers.base.Vehicle`.
+
+    The reader thread replaces `telemetry` as a whole; the sender loop only reads it.
+    """
+
+    def __init__(self, settings: ArDroneDriverSettings, bus: Bus) -> None:
+        self.name = settings.name
+        self.address = settings.address
+        self.telemetry = Telemetry()
+        self._settings = settings
+        self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
+        self._link = ArDroneLink(settings, self._log)
+        self._publisher = MotionPublisher(settings, bus)
+        self._session = Session(configuration(settings), settings.flight.flat_trim)
+        self._scale = scale_from_settings(settings)
+        self._loop = VelocityLoop(settings.limits)
+        self._applied_ns = 0
+        self._refused: Counter[str] = Counter()
+        self._closing = threading.Event()
+        self._reader = threading.Thread(target=self._read, name="navdata", daemon=True)
+        self._reader.start()
+
+    # -- reader thread ------------------------------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        while not self._closing.is_set():
+            received = self._link.receive()
+            if received is None:
+                continue
+            try:
+                self._hear(*received)
+            except WireError as error:
+                self._refused[error.reason] += 1
+            except Exception:  # noqa: BLE001 - the reader must outlive whatever a drone sends: count, log, go on
+                self._refused["internal"] += 1
+                _log.exception("%s: a packet could not be used", self.name)
+
+    def _hear(self, now_ns: int, packet: Navdata) -> None:
+        motion = convert.motion_from_navdata(packet)
+        telemetry = replace(self.telemetry, heard_ns=now_ns, state=packet.state)
+        demo = packet.read(DEMO)
+        if demo is not None and motion is not None:
+            telemetry = replace(
+                telemetry,
+                moved_ns=now_ns,
+                control_state=demo.control_state,
+                battery=min(demo.battery_percent, 100) / 100,
+                velocity_m_s=motion.velocity_m_s,
+            )
+        flight_state = convert.flight_state_from_navdata(telemetry.state, telemetry.control_state)
+        self.telemetry = replace(telemetry, flight_state=flight_state)
+        if motion is not None:
+            self._publisher.publish(now_ns, motion)
+
+    # -- sender loop --------------------------------------------------------------------------------------------------
+
+    def view(self, now_ns: int) -> VehicleView:
+        """Return what the drone last said."""
+        heard = self.telemetry
+        fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
+        return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard))
+
+    def _not_ready(self, heard: Telemetry) -> str:
+        if self._session.phase is not Phase.READY:
+            return self._session.detail
+        faults = bit_names(heard.state & _FAULTS)
+        return f"the drone reports {', '.join(faults)}" if faults else ""
+
+    def apply(self, now_ns: int, decision: Decision) -> None:
+        """Send one datagram with what the decision means to an AR.Drone, and what the session needs."""
+        heard = self.telemetry
+        silence_ns = now_ns - heard.heard_ns
+        if self._session.request_due(now_ns, silence_ns):
+            self._link.request_navdata()
+        attitude = self._attitude(now_ns, decision, heard)
+        commands = orders_from_decision(decision.action, attitude, heard.state, heard.flight_state, self._scale)
+        commands += self._session.step(heard.state, silence_ns)
+        self._link.send(commands, restart=self._session.phase is Phase.SEARCHING)
+
+    def _attitude(self, now_ns: int, decision: Decision, heard: Telemetry) -> velocity_loop.Attitude:
+        dt_s = (now_ns - self._applied_ns) * 1e-9
+        self._applied_ns = now_ns
+        if decision.action is not Action.FLY or now_ns - heard.moved_ns > _FRESH_NS:
+            self._loop.reset()
+            return velocity_loop.HOVER
+        vx, vy, vz = heard.velocity_m_s
+        scale = self._settings.odometry.velocity_scale
+        return self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, (vx * scale, vy * scale, vz), dt_s)
+
+    def health(self, now_ns: int) -> Health:
+        """Return rates, losses and refusals of the link."""
+        rate_hz, quality = self._link.rates(now_ns)
+        return Health(quality, rate_hz, dict(self._link.rejected + self._refused), self._session.detail)
+
+    def flush(self) -> None:
+        """Publish the raw datagrams that wait."""
+        self._log.flush()
+
+    def close(self) -> None:
+        """Stop the reader and close the sockets."""
+        self._closing.set()
+        self._reader.join(timeout=1.0)
+        self._link.close()
+        self._log.flush()
+
+
+def run(child: HostProcess) -> int:
+    """Fly one AR.Drone until told to stop; the process entry."""
+    try:
+        settings = ArDroneDriverSettings.model_validate_json(child.section)
+    except ValidationError as error:
+        raise SettingsError([str(error)]) from error
+    drone = ArDrone(settings, child.bus)
+    try:
+        return run_hosts(child, [VehicleHost(child, drone, settings.authority)])
+    finally:
+        drone.close()

@@ -1,0 +1,136 @@
+"""The two UDP links to one AR.Drone: who may speak to us, in which order, and with which number we speak."""
+
+import logging
+import socket
+import threading
+from collections import Counter, deque
+from collections.abc import Sequence
+
+from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.ardrone.wire import at, navdata
+from drivers.ardrone.wire.at import AtCommand
+from drivers.ardrone.wire.errors import WireError
+from drivers.ardrone.wire.navdata import Navdata
+from drivers.datagrams import DatagramLog
+from groundstation.bus import clock
+
+# After this silence a lower sequence number is a new session of the drone, before it a replay.
+_RESTART_NS = 300_000_000
+_WINDOW_NS = 1_000_000_000
+_POLL_S = 0.1
+_log = logging.getLogger(__name__)
+
+
+class SequenceFilter:
+    """Accepts rising navdata sequence numbers; counts what was missed in between.
+
+    WIRE: the drone restarts at 1 for a new session, which always begins with a pause; a lower number amid the stream is
+    a replay or a late duplicate.
+    """
+
+    def __init__(self) -> None:
+        self._last = -1
+        self._accepted_ns = 0
+        self._window: deque[tuple[int, int]] = deque()
+
+    def accept(self, now_ns: int, sequence: int) -> bool:
+        """Return whether a packet with this number is to be used."""
+        restarted = self._last < 0 or now_ns - self._accepted_ns > _RESTART_NS
+        if sequence <= self._last and not restarted:
+            return False
+        step = 1 if restarted else sequence - self._last
+        self._last, self._accepted_ns = sequence, now_ns
+        self._window.append((now_ns, step))
+        self._trim(now_ns)
+        return True
+
+    def rates(self, now_ns: int) -> tuple[float, float | None]:
+        """Return (packets per second, share of the numbers of the last second that arrived, or None)."""
+        self._trim(now_ns)
+        expected = sum(step for _, step in self._window)
+        return len(self._window) * 1e9 / _WINDOW_NS, len(self._window) / expected if expected else None
+
+    def _trim(self, now_ns: int) -> None:
+        while self._window and self._window[0][0] < now_ns - _WINDOW_NS:
+            self._window.popleft()
+
+
+class ArDroneLink:
+    """Sockets on ephemeral ports, so that many drones fit on one host. Nothing that arrives raises."""
+
+    def __init__(self, settings: ArDroneDriverSettings, log: DatagramLog) -> None:
+        self._settings = settings
+        self._log = log
+        self._lock = threading.Lock()
+        self._navdata_socket = _open(settings.local_address)
+        self._at_socket = _open(settings.local_address)
+        self._sequence = 1
+        self._filter = SequenceFilter()
+        self.rejected: Counter[str] = Counter()
+
+    def receive(self) -> tuple[int, Navdata] | None:
+        """Wait up to 0.1 s for a packet; returns (receipt_ns, packet), or None when nothing usable came."""
+        try:
+            datagram, source = self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1)
+            return self._judge(datagram, source)
+        except TimeoutError:
+            pass
+        except WireError as error:
+            self._reject(error.reason, str(error))
+        except OSError as error:
+            self._reject("receive_failed", str(error))
+        return None
+
+    def _judge(self, datagram: bytes, source: tuple[str, int]) -> tuple[int, Navdata]:
+        now_ns = clock.now_ns()
+        self._log.received(now_ns, datagram)
+        if source != (self._settings.address, self._settings.navdata_port):
+            raise WireError("foreign_address", f"{source[0]}:{source[1]}")
+        packet = navdata.decode(datagram, self._settings.strict_checksum)
+        with self._lock:
+            if not self._filter.accept(now_ns, packet.sequence):
+                raise WireError("replayed", str(packet.sequence))
+        return now_ns, packet
+
+    def _reject(self, reason: str, detail: str) -> None:
+        self.rejected[reason] += 1
+        _log.debug("%s: %s: %s", self._settings.name, reason, detail)
+
+    def request_navdata(self) -> None:
+        """Ask the drone to stream to our port."""
+        self._send_to(self._navdata_socket, navdata.REQUEST, self._settings.navdata_port)
+
+    def send(self, commands: Sequence[AtCommand], restart: bool) -> None:
+        """Send commands in one datagram, numbered onwards, or from 1 on restart.
+
+        WIRE: number 1 is always accepted, so a drone that was not heard yet is spoken to with 1 until it is.
+        """
+        if restart:
+            self._sequence = 1
+        datagram = at.encode_datagram(commands, self._sequence)
+        self._sequence += len(commands)
+        self._send_to(self._at_socket, datagram, self._settings.at_port)
+
+    def _send_to(self, channel: socket.socket, datagram: bytes, port: int) -> None:
+        try:
+            channel.sendto(datagram, (self._settings.address, port))
+        except OSError as error:
+            self._reject("send_failed", str(error))
+        self._log.sent(clock.now_ns(), datagram)
+
+    def rates(self, now_ns: int) -> tuple[float, float | None]:
+        """Return the navdata rate [Hz] and the share of its datagrams that arrived."""
+        with self._lock:
+            return self._filter.rates(now_ns)
+
+    def close(self) -> None:
+        """Close both sockets."""
+        self._navdata_socket.close()
+        self._at_socket.close()
+
+
+def _open(local_address: str) -> socket.socket:
+    channel = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    channel.bind((local_address, 0))
+    channel.settimeout(_POLL_S)
+    return channel

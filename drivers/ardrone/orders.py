@@ -1,0 +1,54 @@
+"""AT commands that a decision of the watchdog means to an AR.Drone. Pure.
+
+WIRE (AR.Drone sheet 2.4): REF bit 9 is a level (1 take off and stay up, 0 land), bit 8 toggles the emergency on its
+rising edge. PCMD flag 0 lets the drone hold its place. phi > 0 right, theta > 0 backward, gaz > 0 up, yaw > 0
+clockwise.
+"""
+
+from drivers.ardrone.session import Scale
+from drivers.ardrone.velocity_loop import Attitude
+from drivers.ardrone.wire import at
+from drivers.ardrone.wire.at import AtCommand
+from drivers.ardrone.wire.state import StateBit
+from drivers.authority import Action
+from groundstation.bus.messages import FlightState
+
+
+def orders_from_decision(
+    action: Action, attitude: Attitude, state: int, flight_state: FlightState, scale: Scale
+) -> list[AtCommand]:
+    """Return REF and PCMD for an action, and COMWDG where the drone missed us; no REF while waiting."""
+    motion = motion_from_attitude(attitude, scale) if action is Action.FLY else at.Motion()
+    orders = [at.pcmd(motion)]
+    if action is not Action.WAIT:
+        orders.insert(0, _reference(action, bool(state & StateBit.EMERGENCY), flight_state))
+    if action is Action.WAIT or state & StateBit.COM_WATCHDOG:
+        orders.insert(0, at.comwdg())
+    return orders
+
+
+def _reference(action: Action, emergency: bool, flight_state: FlightState) -> AtCommand:
+    match action:
+        case Action.TAKE_OFF:
+            # After an emergency the button must be pressed once more before the drone starts.
+            return at.ref(start=not emergency, select=emergency)
+        case Action.FLY | Action.HOVER:
+            # Stay up, but never take off: a drone that says it stands is told to stand.
+            return at.ref(start=flight_state is not FlightState.LANDED)
+        case Action.CUT:
+            return at.ref(start=False, select=not emergency)
+        case _:
+            return at.ref(start=False)
+
+
+def motion_from_attitude(attitude: Attitude, scale: Scale) -> at.Motion:
+    """Return the PCMD of an attitude: fractions of the configured limits, in the drone's signs."""
+    if attitude.hover:
+        return at.Motion()
+    return at.Motion(
+        at.PCMD_PROGRESSIVE,
+        phi=attitude.roll_rad / scale.tilt_rad,
+        theta=-attitude.pitch_rad / scale.tilt_rad,
+        gaz=attitude.climb_m_s / scale.climb_m_s,
+        yaw=-attitude.yaw_rate_rad_s / scale.yaw_rate_rad_s,
+    )

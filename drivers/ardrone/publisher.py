@@ -1,0 +1,65 @@
+"""Odometry and IMU samples on the bus, at most so often as the settings say."""
+
+from drivers.ardrone.convert import HeadingWatch, Motion, quaternion_from_euler
+from drivers.ardrone.settings import ArDroneDriverSettings
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import ImuSample, Odometry
+from groundstation.bus.topics import IMU, ODOMETRY
+
+# The climb rate is the derivative of an ultrasound altitude.
+_CLIMB_STD_M_S = 0.15
+
+
+class Decimator:
+    """Lets events through at a nominal rate, evenly on average."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = round(1e9 / rate_hz) if rate_hz > 0 else None
+        self._due_ns = 0
+
+    def is_due(self, now_ns: int) -> bool:
+        """Return whether this event goes through."""
+        # A quarter of a period early is on time: the source jitters, and half its rate must come out as half.
+        if self._period_ns is None or now_ns + self._period_ns // 4 < self._due_ns:
+            return False
+        self._due_ns = max(self._due_ns + self._period_ns, now_ns)
+        return True
+
+
+class MotionPublisher:
+    """Turns motions into messages stamped with their receipt; the estimator accounts for the delay."""
+
+    def __init__(self, settings: ArDroneDriverSettings, bus: Bus) -> None:
+        self._name = settings.name
+        self._bus = bus
+        self._heading = HeadingWatch()
+        self._odometry = Decimator(settings.odometry_hz)
+        self._imu = Decimator(settings.imu_hz)
+        horizontal, vertical = settings.odometry.velocity_std_m_s**2, _CLIMB_STD_M_S**2
+        self._covariance = (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical)
+
+    def publish(self, stamp_ns: int, motion: Motion) -> None:
+        """Publish what is due; every motion counts for the heading's jumps."""
+        reset = self._heading.update(stamp_ns, motion)
+        if self._odometry.is_due(stamp_ns):
+            self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset))
+        if motion.rates_rad_s is not None and motion.specific_force_m_s2 is not None and self._imu.is_due(stamp_ns):
+            sample = ImuSample(
+                header=self._bus.header(self._name, stamp_ns),
+                angular_velocity_rad_s=motion.rates_rad_s,
+                specific_force_m_s2=motion.specific_force_m_s2,
+                attitude=quaternion_from_euler(motion.roll_rad, motion.pitch_rad, motion.yaw_rad),
+            )
+            self._bus.publish(IMU, sample)
+
+    def _odometry_message(self, stamp_ns: int, motion: Motion, reset: int) -> Odometry:
+        return Odometry(
+            header=self._bus.header(self._name, stamp_ns),
+            velocity_m_s=motion.velocity_m_s,
+            velocity_covariance=self._covariance,
+            yaw_rad=motion.yaw_rad,
+            roll_rad=motion.roll_rad,
+            pitch_rad=motion.pitch_rad,
+            height_m=motion.height_m,
+            reset=reset,
+        )

@@ -1,0 +1,81 @@
+"""What a vehicle driver implements; the host does the rest."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from drivers.authority import Decision, VehicleView
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Severity
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What a driver knows of its link; rejected: datagrams dropped, by reason."""
+
+    link_quality: float | None = None
+    rate_hz: float = 0.0
+    rejected: dict[str, int] = field(default_factory=dict)
+    detail: str = ""
+
+
+class Vehicle(Protocol):
+    """One vehicle behind its protocol. All methods are called from the sender loop and never block.
+
+    A driver reads its link in a thread of its own and publishes ODOMETRY and IMU from there.
+    """
+
+    name: str
+    address: str
+
+    def view(self, now_ns: int) -> VehicleView:
+        """Return what the vehicle last said, and whether that is fresh."""
+
+    def apply(self, now_ns: int, decision: Decision) -> None:
+        """Tell the vehicle what to do; called 30 times a second, also while it is silent."""
+
+    def health(self, now_ns: int) -> Health:
+        """Return the state of the link for the status message."""
+
+    def flush(self) -> None:
+        """Publish what is sent in batches (raw datagrams); called 10 times a second."""
+
+    def close(self) -> None:
+        """Stop the reader and close the link."""
+
+
+class HostProcess(Protocol):
+    """What a driver needs of its process; `groundstation.process.child.Child` is one."""
+
+    name: str
+    section: str
+    bus: Bus
+
+    @property
+    def stop_requested(self) -> bool:
+        """SIGTERM came: land, then exit."""
+
+    @property
+    def supervisor_alive(self) -> bool:
+        """False: hover, land, exit."""
+
+    @property
+    def supervisor_fresh(self) -> bool:
+        """False while the supervisor is frozen."""
+
+    def beat(self) -> None:
+        """Say that the main loop turns."""
+
+    def ready(self, detail: str = "") -> None:
+        """Declare the start finished."""
+
+    def degrade(self, detail: str) -> None:
+        """Declare that something is missing."""
+
+    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
+        """Publish the process status when due."""
+
+    def sleep_until(self, deadline_ns: int) -> bool:
+        """Sleep until a monotonic time, or less when a stop is requested."""
+
+    def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
+        """Publish something that happened."""

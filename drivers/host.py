@@ -1,0 +1,184 @@
+"""What every vehicle driver shares: orders in, acknowledgements, status and events out, and the sender loop."""
+
+import itertools
+from collections import Counter
+from collections.abc import Sequence
+
+from drivers.authority import Ack, AuthorityLimits, Decision, Mode, Upstream, VehicleView
+from drivers.base import HostProcess, Vehicle
+from drivers.watchdog import Watchdog
+from groundstation.bus import clock
+from groundstation.bus.messages import (
+    Command,
+    CommandAck,
+    FlightState,
+    Lease,
+    Severity,
+    VehicleStatus,
+    VelocitySetpoint,
+)
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, SETPOINT, VEHICLE_STATUS
+
+RATE_HZ = 30.0
+_STATUS_PERIOD_NS = 200_000_000
+_FLUSH_PERIOD_NS = 100_000_000
+_UNANSWERED_NS = 5_000_000_000
+_SILENCE_EVENT_NS = 1_000_000_000
+# How long a driver that is to exit goes on for a vehicle it cannot hear.
+_GIVE_UP_NS = 10_000_000_000
+_LOUD = {Mode.CUT: Severity.ERROR, Mode.LANDING: Severity.WARNING}
+
+
+class VehicleHost:
+    """One vehicle on the bus: feeds its watchdog, applies the decisions, tells everybody."""
+
+    def __init__(self, child: HostProcess, vehicle: Vehicle, limits: AuthorityLimits) -> None:
+        self.vehicle = vehicle
+        self.watchdog = Watchdog(limits, clock.clock_id())
+        self._child = child
+        self._bus = child.bus
+        self._setpoints = self._bus.subscribe([SETPOINT], entity=vehicle.name, newest=True)
+        self._commands = self._bus.subscribe([COMMAND], capacity=256)
+        self._leases = self._bus.subscribe([LEASE], capacity=64)
+        self._ignored: Counter[str] = Counter()
+        self._started_ns = clock.now_ns()
+        self._next_status_ns = self._next_flush_ns = 0
+        self._heard_ns = self._started_ns
+        self._announced = (Mode.CONNECTING, "")
+        self._silent = False
+
+    def turn(self, now_ns: int) -> Decision:
+        """Run one cycle: orders, decision, command to the vehicle, reports."""
+        for received in self._leases.drain():
+            if isinstance(received.message, Lease):
+                self._count("lease", self.watchdog.accept_lease(now_ns, received.message))
+        view = self.vehicle.view(now_ns)
+        self.watchdog.see(view, self._upstream())
+        for received in self._commands.drain():
+            if isinstance(received.message, Command):
+                self._command(now_ns, received.message)
+        for received in self._setpoints.drain():
+            if isinstance(received.message, VelocitySetpoint):
+                self._count("setpoint", self.watchdog.accept_setpoint(now_ns, received.message))
+        decision = self.watchdog.step(now_ns, view, self._upstream())
+        self.vehicle.apply(now_ns, decision)
+        self._report(now_ns, view, decision)
+        return decision
+
+    def is_finished(self, now_ns: int) -> bool:
+        """Whether a driver that is to exit may: no motor turns any more, or the vehicle was silent too long."""
+        if not self._child.stop_requested and self._child.supervisor_alive:
+            return False
+        state, mode = self.watchdog.vehicle, self.watchdog.mode
+        if mode in (Mode.CONNECTING, Mode.LANDED):
+            return True
+        cut = mode is Mode.CUT and state.fresh and state.flight_state in (FlightState.EMERGENCY, FlightState.LANDED)
+        return cut or now_ns - self._heard_ns > _GIVE_UP_NS
+
+    def publish_status(self, now_ns: int) -> None:
+        """Publish the VehicleStatus now."""
+        health, view = self.vehicle.health(now_ns), self.watchdog.vehicle
+        lost = self.watchdog.mode is not Mode.CONNECTING and not view.fresh
+        status = VehicleStatus(
+            header=self._bus.header(self.vehicle.name),
+            flight_state=FlightState.LOST if lost else view.flight_state,
+            mode=self.watchdog.mode,
+            battery=view.battery,
+            link_quality=health.link_quality,
+            rate_hz=health.rate_hz,
+            rejected=health.rejected | self._ignored | self._refused(),
+            detail=health.detail or self.watchdog.reason,
+        )
+        self._bus.publish(VEHICLE_STATUS, status)
+
+    def _upstream(self) -> Upstream:
+        child = self._child
+        return Upstream(child.supervisor_alive, child.supervisor_fresh, child.stop_requested)
+
+    def _count(self, what: str, reason: str) -> None:
+        if reason:
+            self._ignored[f"{what}_{reason}"] += 1
+
+    def _refused(self) -> Counter[str]:
+        total: Counter[str] = Counter()
+        for name, subscription in (("setpoint", self._setpoints), ("command", self._commands), ("lease", self._leases)):
+            total.update({f"{name}_{reason}": n for reason, n in subscription.refused.items()})
+        return total
+
+    def _command(self, now_ns: int, command: Command) -> None:
+        if command.scope and self.vehicle.name not in command.scope:
+            return
+        for ack in self.watchdog.accept_command(now_ns, command):
+            self._answer(ack)
+
+    def _answer(self, ack: Ack) -> None:
+        header = self._bus.header(self.vehicle.name)
+        message = CommandAck(
+            header=header, command_id=ack.command_id, verb=ack.verb, stage=ack.stage, reason=ack.reason
+        )
+        self._bus.publish(COMMAND_ACK, message)
+
+    def _report(self, now_ns: int, view: VehicleView, decision: Decision) -> None:
+        for ack in decision.acks:
+            self._answer(ack)
+        self._announce_mode(decision)
+        self._announce_silence(now_ns, view, decision)
+        if now_ns >= self._next_flush_ns:
+            self._next_flush_ns = now_ns + _FLUSH_PERIOD_NS
+            self.vehicle.flush()
+        if now_ns >= self._next_status_ns:
+            self._next_status_ns = now_ns + _STATUS_PERIOD_NS
+            self.publish_status(now_ns)
+
+    def _announce_mode(self, decision: Decision) -> None:
+        if (decision.mode, decision.reason) == self._announced:
+            return
+        if decision.mode is not self._announced[0]:
+            # The status of a changed mode must not wait: the tracker learns from it who is airborne.
+            self._next_status_ns = 0
+        self._announced = (decision.mode, decision.reason)
+        severity = _LOUD.get(decision.mode, Severity.INFO)
+        self._event(severity, f"{self.vehicle.name} {decision.mode}: {decision.reason}")
+
+    def _announce_silence(self, now_ns: int, view: VehicleView, decision: Decision) -> None:
+        name, address = self.vehicle.name, self.vehicle.address
+        if view.fresh:
+            self._heard_ns = now_ns
+            if self._silent or decision.mode is not Mode.CONNECTING:
+                self._child.ready(f"{name} at {address}")
+            if self._silent:
+                self._event(Severity.INFO, f"{name} answers")
+            self._silent = False
+            return
+        limit_ns = _UNANSWERED_NS if decision.mode is Mode.CONNECTING else _SILENCE_EVENT_NS
+        if not self._silent and now_ns - self._heard_ns >= limit_ns:
+            self._silent = True
+            remedy = f"check that it is switched on and that this computer is in its network: ping {address}"
+            self._event(Severity.ERROR, f"{name} does not answer at {address}; trying on", remedy)
+            self._child.degrade(f"{name} does not answer at {address}")
+
+    def _event(self, severity: Severity, text: str, remedy: str = "") -> None:
+        self._child.event(severity, text, remedy, self.vehicle.name)
+
+
+def run_hosts(child: HostProcess, hosts: Sequence[VehicleHost], rate_hz: float = RATE_HZ) -> int:
+    """Turn all hosts at the sender's rate until each is finished; returns the exit code 0."""
+    period_ns = round(1e9 / rate_hz)
+    overruns = 0
+    deadline_ns = clock.now_ns()
+    for tick in itertools.count(1):
+        now_ns = clock.now_ns()
+        for host in hosts:
+            host.turn(now_ns)
+        child.beat()
+        child.tick_status(tick, overruns)
+        if all(host.is_finished(now_ns) for host in hosts):
+            break
+        deadline_ns += period_ns
+        if deadline_ns < clock.now_ns():
+            overruns += 1
+            deadline_ns = clock.now_ns()
+        child.sleep_until(deadline_ns)
+    for host in hosts:
+        host.publish_status(clock.now_ns())
+    return 0

@@ -1,0 +1,16 @@
+"""Kinds of drivers and where each begins. A new kind is a package with `driver.run(child)` and one line here."""
+
+from groundstation.errors import DriverError
+
+ENTRY_POINTS: dict[str, str] = {
+    "ardrone": "drivers.ardrone.driver:run",
+    "camera": "drivers.camera.driver:run",
+}
+
+
+def entry_point(kind: str) -> str:
+    """Return "module:function" of a kind of driver; raises DriverError naming the kinds there are."""
+    try:
+        return ENTRY_POINTS[kind]
+    except KeyError:
+        raise DriverError(f"no driver of kind {kind!r}; there are: {', '.join(sorted(ENTRY_POINTS))}") from None

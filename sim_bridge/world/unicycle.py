@@ -15,8 +15,9 @@ ACCELERATION_M_S2 = 0.5
 TURN_ACCELERATION_RAD_S2 = 3.5
 _SLIP_CORRELATION_S = 1.5
 
-# Kanayama's tracking law: gains along, across and about the path.
-_ALONG, _ACROSS, _ABOUT = 1.0, 4.0, 2.5
+# Path follower: aims at a point of the path's tangent this far ahead; gains along it [1/s] and on the heading [1/s].
+_LOOK_AHEAD_M = 0.4
+_ALONG, _ABOUT = 1.0, 2.5
 _LARGEST_ERROR_M = 0.5
 
 
@@ -81,15 +82,17 @@ class Unicycle:
     def _follow(self) -> tuple[float, float]:
         path = self._path
         assert path is not None
-        path.advance(path.speed_m_s * self._tick_s)
         goal = path.point()
         dx, dy = goal.x - self.x, goal.y - self.y
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        ahead = _clamp(c * dx + s * dy, _LARGEST_ERROR_M)
-        aside = _clamp(c * dy - s * dx, _LARGEST_ERROR_M)
-        turn = math.remainder(goal.heading - self.yaw, math.tau)
-        speed = path.speed_m_s * math.cos(turn) + _ALONG * ahead
-        return speed, path.speed_m_s * (goal.curvature + _ACROSS * aside) + _ABOUT * math.sin(turn)
+        c, s = math.cos(goal.heading), math.sin(goal.heading)
+        ahead, aside = _clamp(c * dx + s * dy, _LARGEST_ERROR_M), c * dy - s * dx
+        aim = goal.heading + math.atan2(aside, _LOOK_AHEAD_M)
+        turn = math.remainder(aim - self.yaw, math.tau)
+        # The running point waits for a robot that is far off.
+        patience = max(0.0, min(1.0, 1.5 - math.hypot(dx, dy) / _LARGEST_ERROR_M))
+        path.advance(path.speed_m_s * self._tick_s * patience)
+        speed = max(0.0, path.speed_m_s * math.cos(turn) + _ALONG * ahead)
+        return speed, path.speed_m_s * goal.curvature + _ABOUT * turn
 
 
 def _start(scenario: TargetScenario, path: EightPath | None) -> tuple[float, float, float]:

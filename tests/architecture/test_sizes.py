@@ -67,3 +67,17 @@ def test_nothing_flies_differently_in_simulation() -> None:
         text = path.read_text(encoding="utf-8")
         found += [f"{path.relative_to(ROOT)}: {word}" for word in words if word in text]
     assert not found, found
+
+
+def test_every_setting_is_explained() -> None:
+    """config/README.md names each key of a field file and of a calibration."""
+    from groundstation.settings.json_schema import field_file_schema
+
+    text = (ROOT / "config" / "README.md").read_text(encoding="utf-8")
+    schema = field_file_schema()
+    parts = [definition for definition in (schema, *schema["$defs"].values()) if "properties" in definition]
+    keys = {key for definition in parts for key in definition["properties"]}
+    sections = {"defaults", "types", "limits", "marker", "camera", "odometry", "fence"}
+    unexplained = [key for key in sorted(keys - sections) if f"{key}`" not in text and f"### {key}" not in text]
+    headings = text.replace(",", "").split()
+    assert not [key for key in unexplained if key not in headings], unexplained

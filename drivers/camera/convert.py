@@ -1,0 +1,58 @@
+"""Frames and messages: mounting and attitudes to `Gravity`, a sighting to a `RelativeObservation`."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.pipeline import Sighting
+from drivers.camera.pose import RelativePose
+from drivers.camera.settings import MountSettings
+from groundstation.bus.messages import Header, PoseHypothesis, RelativeObservation
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
+
+Array = NDArray[np.float64]
+
+# Picture x axis along world x, picture y axis along world -y, optical axis down.
+_WORLD_FROM_DOWNWARD_OPTICAL = np.diag([1.0, -1.0, -1.0])
+
+
+def parent_from_optical(mount: MountSettings) -> Array:
+    """Return base_from_camera_optical (3, 3) on a robot, world_from_camera_optical in the world."""
+    if mount.in_world:
+        return _WORLD_FROM_DOWNWARD_OPTICAL
+    return base_from_tilted_optical(math.radians(mount.tilt_down_deg), math.radians(mount.pan_deg))
+
+
+def stabilized_from_optical(mount: MountSettings, roll_rad: float, pitch_rad: float) -> Array:
+    """Return base_stabilized_from_camera_optical of a carrier with that attitude; the world's own when fixed in it."""
+    if mount.in_world:
+        return parent_from_optical(mount)
+    return np.asarray(rotation_from_euler(roll_rad, pitch_rad, 0.0) @ parent_from_optical(mount))
+
+
+def observation_from_sighting(
+    sighting: Sighting, header: Header, camera: str, observer_attitude: tuple[float, float]
+) -> RelativeObservation:
+    """Return the message for a sighting; header.entity is the observer, header.stamp_ns the exposure."""
+    best, other = sighting.choice.best, sighting.choice.alternative
+    return RelativeObservation(
+        header=header,
+        observer=header.entity,
+        subject=sighting.entity,
+        camera=camera,
+        position_m=_vector(best),
+        yaw_rad=best.yaw_rad,
+        covariance=tuple(best.covariance.ravel().tolist()),
+        alternative=None
+        if other is None
+        else PoseHypothesis(_vector(other), other.yaw_rad, tuple(other.covariance.ravel().tolist())),
+        margin=sighting.margin,
+        roll_rad=observer_attitude[0],
+        pitch_rad=observer_attitude[1],
+    )
+
+
+def _vector(pose: RelativePose) -> tuple[float, float, float]:
+    x, y, z = pose.position_m.tolist()
+    return x, y, z

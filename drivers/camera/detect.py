@@ -1,0 +1,166 @@
+"""Finds one checkerboard in one window of a picture, and puts its twelve corners into the marker's own order."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.geometry import board as marker
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+# Measured: the finder wants 10-12 px per square, 18 is safe and still cheap.
+_WANTED_PX_PER_SQUARE = 18.0
+_LEAST_ENLARGEMENT, _MOST_ENLARGEMENT = 0.4, 4.0
+_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+_REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005)
+_LEAST_CONTRAST = 20.0
+_MOST_WRONG_SQUARES = 1
+_GRID = marker.corner_grid()
+_CENTRES, _BLACK = marker.square_centres()
+# Five points around each centre: one sample alone would hang on a single noisy pixel.
+_SPREAD = np.array([[0.0, 0.0], [0.18, 0.18], [0.18, -0.18], [-0.18, 0.18], [-0.18, -0.18]])
+_SQUARE_SAMPLES = (_CENTRES[:, None] + _SPREAD).reshape(-1, 2)
+
+
+def _step_out(square: Array, side: int) -> tuple[float, float] | None:
+    """Return a point on the paper beside a border square, on one of the sides +x, -x, +y, -y; None if not there."""
+    x, y = float(square[0]), float(square[1])
+    sign = 1.0 if side % 2 == 0 else -1.0
+    if side < 2:
+        return (sign * 2.65, y) if x * sign == 2.0 else None
+    return (x, sign * 2.17) if y * sign == 1.5 else None
+
+
+# The paper just outside of the white squares of each border; blur darkens it beside the black ones.
+_RIM_SIDES = tuple(
+    np.array([outside for square in _CENTRES[~_BLACK] if (outside := _step_out(square, side)) is not None])
+    for side in range(4)
+)
+_LEAST_RIM_WHITENESS = 0.35
+
+
+class Window(NamedTuple):
+    """Part of a picture: left and top inclusive, right and bottom exclusive [px]."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    def holds(self, point: Array) -> bool:
+        """Return whether a pixel lies inside."""
+        return bool(self.left <= point[0] < self.right and self.top <= point[1] < self.bottom)
+
+
+@dataclass(frozen=True, slots=True)
+class Find:
+    """Corners (12, 2) [px] in marker order, and the grey levels of its white and black squares."""
+
+    corners: Array
+    white: float
+    black: float
+
+    @property
+    def centre(self) -> Array:
+        """Return the mean of the corners [px]."""
+        return np.asarray(self.corners.mean(axis=0))
+
+
+def spacing_px(corners: Array) -> float:
+    """Return the least distance of neighbouring corners [px]."""
+    grid = corners.reshape(marker.CORNERS_Y, marker.CORNERS_X, 2)
+    along, across = np.diff(grid, axis=1), np.diff(grid, axis=0)
+    return float(np.sqrt(min((along**2).sum(axis=-1).min(), (across**2).sum(axis=-1).min())))
+
+
+def window_around(points: Array, margin_px: float, shape: tuple[int, ...]) -> Window | None:
+    """Return the window that holds points (n, 2) and a margin, cut at the picture's border; None if none is left."""
+    low, high = points.min(axis=0) - margin_px, points.max(axis=0) + margin_px
+    left, top = max(0, int(low[0])), max(0, int(low[1]))
+    right, bottom = min(shape[1], int(high[0]) + 2), min(shape[0], int(high[1]) + 2)
+    return Window(left, top, right, bottom) if right - left >= 12 and bottom - top >= 12 else None
+
+
+def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
+    """Return the board in the window, whose squares are about `spacing` pixels wide, or None."""
+    part = picture[window.top : window.bottom, window.left : window.right]
+    scale = float(np.clip(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT))
+    if abs(scale - 1.0) > 0.1:
+        interpolation = cv2.INTER_LINEAR if scale > 1.0 else cv2.INTER_AREA
+        size = (max(12, round(part.shape[1] * scale)), max(12, round(part.shape[0] * scale)))
+        enlarged = cv2.resize(part, size, interpolation=interpolation)
+    else:
+        enlarged = part
+    found, raw = cv2.findChessboardCorners(enlarged, (marker.CORNERS_X, marker.CORNERS_Y), flags=_FLAGS)
+    if not found or raw is None:
+        return None
+    ratio = np.array([part.shape[1] / enlarged.shape[1], part.shape[0] / enlarged.shape[0]])
+    coarse = (np.asarray(raw, dtype=np.float64).reshape(-1, 2) + 0.5) * ratio - 0.5 + (window.left, window.top)
+    return ordered(picture, refined(picture, coarse))
+
+
+def refined(picture: Picture, corners: Array) -> Array:
+    """Return corners (12, 2) refined in the original picture; a window of 0.45 squares never sees a neighbour."""
+    half = int(np.clip(0.45 * spacing_px(corners), 1, 8))
+    fine = cv2.cornerSubPix(picture, corners.astype(np.float32).reshape(-1, 1, 2), (half, half), (-1, -1), _REFINE)
+    return np.asarray(fine, dtype=np.float64).reshape(-1, 2)
+
+
+def ordered(picture: Picture, corners: Array) -> Find | None:
+    """Return the corners in marker order, black end first; None when the squares between them are no checkerboard."""
+    grid = corners.reshape(marker.CORNERS_Y, marker.CORNERS_X, 2)
+    along, across = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    if along[0] * across[1] - along[1] * across[0] < 0.0:
+        grid = grid[:, ::-1]
+    corners = grid.reshape(-1, 2)
+    grey = sample(picture, _plane_to_pixels(corners, _SQUARE_SAMPLES)).reshape(-1, len(_SPREAD)).mean(axis=1)
+    if grey[_BLACK].mean() > grey[~_BLACK].mean():
+        # Turned by 180 degrees: one side of the board has black ends, the other white ones.
+        corners, grey = corners[::-1], grey[::-1]
+    white, black = float(np.median(grey[~_BLACK])), float(np.median(grey[_BLACK]))
+    wrong = int(((grey < 0.5 * (white + black)) != _BLACK).sum())
+    if white - black < _LEAST_CONTRAST or wrong > _MOST_WRONG_SQUARES:
+        return None
+    if not _has_white_rim(picture, corners, black + _LEAST_RIM_WHITENESS * (white - black)):
+        return None
+    return Find(np.ascontiguousarray(corners), white, black)
+
+
+def _has_white_rim(picture: Picture, corners: Array, least: float) -> bool:
+    """Return whether the board ends where it should: a lattice shifted by one square fits the colours just as well."""
+    for side in _RIM_SIDES:
+        rim = _plane_to_pixels(corners, side)
+        if rim.min() < 0.0 or rim[:, 0].max() > picture.shape[1] - 1 or rim[:, 1].max() > picture.shape[0] - 1:
+            return False
+        if sample(picture, rim).mean() < least:
+            return False
+    return True
+
+
+def sample(picture: Picture, points: Array) -> Array:
+    """Return grey levels (n) at points (n, 2) [px], interpolated; the border repeats outside the picture."""
+    columns, rows = points.T.astype(np.float32).reshape(2, 1, -1)
+    grey = cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(grey, dtype=np.float64).ravel()
+
+
+def _plane_to_pixels(corners: Array, points: Array) -> Array:
+    h = homography(_GRID, corners)
+    lifted = points @ h[:, :2].T + h[:, 2]
+    return np.asarray(lifted[:, :2] / lifted[:, 2:])
+
+
+def homography(plane: Array, image: Array) -> Array:
+    """Return the (3, 3) homography that maps plane points (n, 2) to image points (n, 2), least squares with h22 = 1."""
+    x, y = plane[:, 0], plane[:, 1]
+    u, v = image[:, 0], image[:, 1]
+    one, nil = np.ones_like(x), np.zeros_like(x)
+    rows_u = np.column_stack((x, y, one, nil, nil, nil, -u * x, -u * y))
+    rows_v = np.column_stack((nil, nil, nil, x, y, one, -v * x, -v * y))
+    system = np.vstack((rows_u, rows_v))
+    solution = np.linalg.solve(system.T @ system, system.T @ np.concatenate((u, v)))
+    return np.append(solution, 1.0).reshape(3, 3)

@@ -1,0 +1,90 @@
+"""JPEG frames out of a multipart/x-mixed-replace byte stream; pure bytes, bounded, never trusting the sender.
+
+WIRE: RFC 2046 section 5.1 and what IP cameras make of it: boundaries with and without leading dashes, parts with and
+without Content-Length, any number of blank lines between parts.
+"""
+
+import re
+
+MAX_FRAME_BYTES = 8 << 20
+_MAX_HEAD_BYTES = 4096
+_LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
+_BOUNDARY = re.compile(rb"multipart/[a-z-]+[^\r\n]*boundary=\"?([^\r\n\";]+)", re.IGNORECASE)
+_JPEG_START = b"\xff\xd8"
+
+
+def boundary_from_head(head: bytes) -> bytes | None:
+    """Return the boundary that a response head announces, without leading dashes, or None."""
+    match = _BOUNDARY.search(head)
+    return match[1].strip().lstrip(b"-") if match else None
+
+
+class MultipartParser:
+    """Feed it bytes as they come; it returns the complete JPEG frames in them.
+
+    `rejected` counts parts that are no JPEG, too long, or cut short.
+    """
+
+    def __init__(self, boundary: bytes) -> None:
+        self._mark = b"--" + boundary
+        self._buffer = bytearray()
+        self._needed = 0
+        self.rejected = 0
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take in bytes; return the frames that are now complete, oldest first."""
+        self._buffer += data
+        frames: list[bytes] = []
+        while len(self._buffer) >= self._needed and self._step(frames):
+            pass
+        if len(self._buffer) > MAX_FRAME_BYTES + _MAX_HEAD_BYTES:
+            self._reject(len(self._buffer) - len(self._mark))
+        return frames
+
+    def _step(self, frames: list[bytes]) -> bool:
+        """Consume one part; False when more bytes are needed."""
+        self._needed = 0
+        start = self._buffer.find(self._mark)
+        if start < 0:
+            # Noise between parts: keep only what may be the beginning of a boundary.
+            del self._buffer[: max(0, len(self._buffer) - len(self._mark) + 1)]
+            return False
+        head_start = start + len(self._mark)
+        head_end = self._buffer.find(b"\r\n\r\n", head_start, head_start + _MAX_HEAD_BYTES)
+        if head_end < 0:
+            if len(self._buffer) - head_start > _MAX_HEAD_BYTES:
+                self._reject(head_start)
+                return True
+            return False
+        return self._take_body(head_start, head_end, frames)
+
+    def _take_body(self, head_start: int, head_end: int, frames: list[bytes]) -> bool:
+        length = _LENGTH.search(bytes(self._buffer[head_start:head_end]).replace(b"\r\n", b"\n"))
+        body = head_end + 4
+        if length is None:
+            end = self._buffer.find(self._mark, body)
+            if end < 0:
+                return False
+            self._emit(bytes(self._buffer[body:end]).rstrip(b"\r\n-"), end, frames)
+            return True
+        end = body + int(length[1])
+        if end - body > MAX_FRAME_BYTES:
+            self._reject(head_start)
+            return True
+        if len(self._buffer) < end:
+            self._needed = end
+            return False
+        self._emit(bytes(self._buffer[body:end]), end, frames)
+        return True
+
+    def _emit(self, body: bytes, end: int, frames: list[bytes]) -> None:
+        if body.startswith(_JPEG_START):
+            frames.append(body)
+            del self._buffer[:end]
+        else:
+            self._reject(end)
+
+    def _reject(self, upto: int) -> None:
+        self.rejected += 1
+        self._needed = 0
+        del self._buffer[:upto]

@@ -1,0 +1,155 @@
+"""From twelve corners to a relative pose: both planar solutions, gravity to choose, covariance from the Jacobian."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.geometry.angles import difference
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.rotations import rotation_from_euler
+
+Array = NDArray[np.float64]
+
+# How far the measured roll and pitch of both vehicles may be off together, and how far assumed levelness may.
+_GRAVITY_STD_RAD = math.radians(3.0)
+_LEVEL_STD_RAD = math.radians(8.0)
+_REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 1e-9)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarPose:
+    """optical_from_marker of one solution, with the sum of squared reprojection errors [px^2]."""
+
+    rotation: Array
+    translation: Array
+    squared_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gravity:
+    """What is known of "down": stabilized_from_optical (3, 3) of the observer, the subject's roll and pitch.
+
+    For a world-fixed camera the stabilized frame is the world. known: both attitudes were measured, not assumed level.
+    """
+
+    stabilized_from_optical: Array
+    subject_roll_rad: float
+    subject_pitch_rad: float
+    known: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RelativePose:
+    """Marker position [m; camera_optical], yaw in the observer's stabilized frame, covariance (4, 4) of both."""
+
+    position_m: Array
+    yaw_rad: float
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True)
+class PoseChoice:
+    """The pose gravity prefers; the other one if it stands as well; residual rms per corner [px]."""
+
+    best: RelativePose
+    alternative: RelativePose | None
+    residual_px: float
+
+
+def planar_poses(corners: Array, points: Array, intrinsics: CameraIntrinsics) -> list[PlanarPose]:
+    """Return the one or two poses of a flat board (points (n, 3) [m; marker]), refined on the distorted pixels."""
+    rays = intrinsics.normalised_from_pixels(corners)
+    if not np.isfinite(rays).all():
+        return []
+    count, turns, shifts, _ = cv2.solvePnPGeneric(
+        points, rays.reshape(-1, 1, 2), np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+    )
+    poses = []
+    for turn, shift in zip(turns[:count], shifts[:count], strict=True):
+        pose = _refined(corners, points, intrinsics, np.asarray(turn), np.asarray(shift))
+        if pose is not None:
+            poses.append(pose)
+    return poses
+
+
+def _refined(
+    corners: Array, points: Array, intrinsics: CameraIntrinsics, turn: Array, shift: Array
+) -> PlanarPose | None:
+    turned, shifted = cv2.solvePnPRefineLM(
+        points,
+        corners.reshape(-1, 1, 2),
+        intrinsics.matrix,
+        np.array(intrinsics.distortion),
+        turn.reshape(3, 1),
+        shift.reshape(3, 1),
+        _REFINE,
+    )
+    rotation = np.asarray(cv2.Rodrigues(turned)[0], dtype=np.float64)
+    translation = np.asarray(shifted, dtype=np.float64).ravel()
+    errors = intrinsics.project(points @ rotation.T + translation) - corners
+    if not np.isfinite(errors).all() or translation[2] <= 0.0:
+        return None
+    return PlanarPose(rotation, translation, float((errors**2).sum()))
+
+
+def choose(
+    poses: list[PlanarPose],
+    points: Array,
+    intrinsics: CameraIntrinsics,
+    gravity: Gravity,
+    floor_px: float,
+    ambiguity_cost: float,
+) -> PoseChoice:
+    """Return the pose that fits corners and gravity best; keeps the other one if neither rules it out.
+
+    floor_px: least standard deviation believed of a corner. Costs are in chi-square units.
+    """
+    freedom = 2 * len(points) - 6
+    variance = min(pose.squared_error for pose in poses) / freedom + floor_px**2
+    ranked = sorted(poses, key=lambda pose: _cost(pose, variance, gravity))
+    best = relative_pose(ranked[0], points, intrinsics, gravity, floor_px)
+    residual = math.sqrt(ranked[0].squared_error / freedom)
+    if len(ranked) == 1:
+        return PoseChoice(best, None, residual)
+    gap = _cost(ranked[1], variance, gravity) - _cost(ranked[0], variance, gravity)
+    other = relative_pose(ranked[1], points, intrinsics, gravity, floor_px)
+    ambiguous = gap < ambiguity_cost and _differ(best, other)
+    return PoseChoice(best, other if ambiguous else None, residual)
+
+
+def _cost(pose: PlanarPose, variance: float, gravity: Gravity) -> float:
+    marker = gravity.stabilized_from_optical @ pose.rotation
+    yaw = math.atan2(marker[1, 0], marker[0, 0])
+    upright = rotation_from_euler(gravity.subject_roll_rad, gravity.subject_pitch_rad, yaw)[:, 2]
+    angle = math.acos(float(np.clip(marker[:, 2] @ upright, -1.0, 1.0)))
+    std = _GRAVITY_STD_RAD if gravity.known else _LEVEL_STD_RAD
+    return pose.squared_error / variance + (angle / std) ** 2
+
+
+def _differ(best: RelativePose, other: RelativePose) -> bool:
+    """Return whether two solutions are worth telling apart: seen face on, both say nearly the same."""
+    gap = np.append(other.position_m - best.position_m, difference(other.yaw_rad, best.yaw_rad))
+    return float(gap @ np.linalg.solve(best.covariance + other.covariance, gap)) > 1.0
+
+
+def relative_pose(
+    pose: PlanarPose, points: Array, intrinsics: CameraIntrinsics, gravity: Gravity, floor_px: float
+) -> RelativePose:
+    """Return position, yaw and their covariance s^2 (J^T J)^-1 with s^2 = squared error / (2n - 6) + floor^2."""
+    turned = points @ pose.rotation.T
+    by_point = intrinsics.project_jacobian(turned + pose.translation)
+    # A left rotation error w moves a point by w x p, so d(pixel)/dw = -J [p]x.
+    by_turn = np.cross(turned[:, None, :], by_point)
+    jacobian = np.concatenate((by_turn, by_point), axis=2).reshape(-1, 6)
+    variance = pose.squared_error / (len(jacobian) - 6) + floor_px**2
+    axis = gravity.stabilized_from_optical @ pose.rotation[:, 0]
+    level = max(axis[0] ** 2 + axis[1] ** 2, 1e-6)
+    yaw_by_turn = np.array([-axis[2] * axis[0] / level, -axis[2] * axis[1] / level, 1.0])
+    mapping = np.zeros((4, 6))
+    mapping[:3, 3:] = np.eye(3)
+    mapping[3, :3] = yaw_by_turn @ gravity.stabilized_from_optical
+    mapped = variance * mapping @ np.linalg.solve(jacobian.T @ jacobian, mapping.T)
+    return RelativePose(pose.translation, math.atan2(axis[1], axis[0]), 0.5 * (mapped + mapped.T))

@@ -1,0 +1,120 @@
+"""The full search: where in a whole picture could boards be? Saddle points, in clusters that look like a lattice.
+
+Inner corners of a checkerboard are saddle points of brightness, and direct neighbours are turned by 90 degrees against
+each other, which carpets, cables and furniture seldom imitate. Only the best clusters are worth the slow board finder.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.detect import Find, Window, find_board, window_around
+from groundstation.geometry import board as marker
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+_HALVE_ABOVE_PX = 800
+_SMOOTHING_PX = 1.2
+_MOST_SEEDS = 220
+_LEAST_STRENGTH = 250.0
+# Inner corners of one board are equally strong; the ends of its black squares have less than half of that.
+# A foreshortened board's squares may be twice as long one way; the next opposite neighbour is sqrt(5) away.
+_REACH = 2.1
+_LEAST_CLUSTER, _MOST_CLUSTER = 6, 40
+_MOST_WINDOWS = 4
+_MARGIN_SQUARES = 2.6
+
+
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """Saddle points: positions (n, 2) [px], strengths (n), double-angle directions (n, 2)."""
+
+    points: Array
+    strength: Array
+    direction: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """Saddle points (n, 2) [px] that may be one board's corners, and the side of its squares [px]."""
+
+    points: Array
+    spacing: float
+
+
+def search(picture: Picture, taken: list[Window]) -> list[Find]:
+    """Return the boards found in the whole picture but for the windows already taken; at most four are looked at."""
+    finds: list[Find] = []
+    for cluster in clusters(saddle_points(picture), taken)[:_MOST_WINDOWS]:
+        window = window_around(cluster.points, _MARGIN_SQUARES * cluster.spacing, picture.shape)
+        find = find_board(picture, window, cluster.spacing) if window else None
+        if find is not None and all(np.hypot(*(find.centre - other.centre)) > cluster.spacing for other in finds):
+            finds.append(find)
+    return finds
+
+
+def saddle_points(picture: Picture) -> Seeds:
+    """Return the strongest saddle points of a picture; large pictures are halved first."""
+    factor = 2 if picture.shape[1] > _HALVE_ABOVE_PX else 1
+    if factor == 2:
+        picture = np.asarray(
+            cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA), np.uint8
+        )
+    smooth = cv2.GaussianBlur(picture, (0, 0), _SMOOTHING_PX)
+    xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, dx, dy, ksize=3) for dx, dy in ((2, 0), (0, 2), (1, 1)))
+    strength = xy * xy - xx * yy
+    peak = (strength >= cv2.dilate(strength, np.ones((3, 3), np.uint8))) & (strength > _LEAST_STRENGTH)
+    rows, columns = np.nonzero(peak)
+    a, b, c, s = (image[rows, columns].astype(np.float64) for image in (xx, yy, xy, strength))
+    # Opposite curvatures of similar size; an edge has one only.
+    keep = np.flatnonzero((a + b) ** 2 < 1.4 * s)
+    keep = keep[np.argsort(-s[keep])[:_MOST_SEEDS]]
+    direction = np.column_stack((a - b, 2.0 * c))[keep]
+    direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+    points = np.column_stack((columns, rows))[keep].astype(np.float64) * factor + 0.5 * (factor - 1)
+    return Seeds(points, s[keep], direction)
+
+
+def clusters(seeds: Seeds, taken: list[Window]) -> list[Cluster]:
+    """Return lattice-like clusters of saddle points, the likeliest board first."""
+    free = np.array([not any(window.holds(point) for window in taken) for point in seeds.points], dtype=bool)
+    points, strength, direction = seeds.points[free], seeds.strength[free], seeds.direction[free]
+    if len(points) < _LEAST_CLUSTER:
+        return []
+    distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    ratio = strength[:, None] / strength[None]
+    opposite = (direction @ direction.T < -0.6) & (ratio > 0.55) & (ratio < 1.8)
+    reach = np.where(opposite, distance, np.inf).min(axis=1)
+    similar = (reach[:, None] < 2.0 * reach[None]) & (reach[None] < 2.0 * reach[:, None])
+    linked = opposite & similar & (distance < _REACH * np.minimum(reach[:, None], reach[None]))
+    label = _components(linked)
+    found = [_rated(points[label == k], reach[label == k], linked[label == k]) for k in np.unique(label)]
+    best = sorted((pair for pair in found if pair is not None), key=lambda pair: pair[0])
+    return [cluster for _, cluster in best]
+
+
+def _components(linked: NDArray[np.bool_]) -> NDArray[np.intp]:
+    label = np.arange(len(linked))
+    reachable = linked | np.eye(len(linked), dtype=bool)
+    for _ in range(len(linked)):
+        lowest = np.where(reachable, label[None], len(linked)).min(axis=1)
+        if (lowest == label).all():
+            break
+        label = lowest
+    return label
+
+
+def _rated(points: Array, reach: Array, linked: NDArray[np.bool_]) -> tuple[float, Cluster] | None:
+    """Return how unlike a board a cluster is, and the cluster; None when it cannot be one."""
+    count = len(points)
+    if not _LEAST_CLUSTER <= count <= _MOST_CLUSTER:
+        return None
+    spacing = float(np.median(reach))
+    if np.ptp(points, axis=0).max() > 9.0 * spacing * 2.0:
+        return None
+    # Seventeen links join the twelve corners of a 4 x 3 lattice: 34 ends, 2.8 for each corner.
+    links = float(linked.sum()) / count
+    return abs(count - marker.CORNERS) / marker.CORNERS + abs(links - 2.8) / 2.8, Cluster(points, spacing)

@@ -1,0 +1,132 @@
+"""Settings of one camera driver, as the composition hands them over (JSON of `CameraDriverSettings`)."""
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from groundstation.geometry.board import VALID_CODES
+from groundstation.geometry.calibration import intrinsics_from_mapping
+from groundstation.geometry.lens import CameraIntrinsics
+
+_Positive = Annotated[float, Field(gt=0)]
+_Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class CalibrationSettings(_Section):
+    """A calibration file, inlined."""
+
+    schema_version: Literal[1] = 1
+    model: Literal["plumb_bob"] = "plumb_bob"
+    width_px: Annotated[int, Field(gt=0, le=8192)]
+    height_px: Annotated[int, Field(gt=0, le=8192)]
+    fx_px: _Positive
+    fy_px: _Positive
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    residual_px: Annotated[float, Field(ge=0)] = 0.2
+    date: str = ""
+
+    def intrinsics(self) -> CameraIntrinsics:
+        """Return the lens model."""
+        return intrinsics_from_mapping(self.model_dump())
+
+
+class MarkerKind(StrEnum):
+    """What carries a marker."""
+
+    ROBOT = "robot"
+    TARGET = "target"
+
+
+class MarkerSettings(_Section):
+    """A marker that may come into view: whose it is, its code and size, its place on its carrier [m; base]."""
+
+    entity: _Name
+    code: Annotated[int, Field(ge=min(VALID_CODES), le=max(VALID_CODES))]
+    square_mm: Annotated[float, Field(gt=1, le=1000)]
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    kind: MarkerKind = MarkerKind.ROBOT
+
+
+class MountSettings(_Section):
+    """Where the camera is: `parent` "world", or the robot that carries it.
+
+    On a robot: position [m; base], tilted down and panned left. In the world: position [m; world] and `looking`
+    (down: picture x axis along world +x, picture y axis along world -y).
+    """
+
+    parent: str = "world"
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tilt_down_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
+    pan_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    looking: Literal["down"] | None = None
+
+    @property
+    def in_world(self) -> bool:
+        """Return whether the camera is fixed in the world."""
+        return self.parent == "world"
+
+
+class DetectorSettings(_Section):
+    """Figures of the detector; the defaults are measured (reference: vision).
+
+    corner_floor_px: least standard deviation believed of a corner; tracked_search_rate_hz: full searches while every
+    expected marker is tracked; ambiguity_cost: cost difference (chi-square units) below which both poses are reported.
+    """
+
+    corner_floor_px: Annotated[float, Field(ge=0.01, le=5)] = 0.1
+    identity_margin: Annotated[float, Field(ge=1, le=4)] = 1.0
+    tracked_search_rate_hz: Annotated[float, Field(gt=0, le=2)] = 0.5
+    max_residual_px: _Positive = 1.5
+    ambiguity_cost: _Positive = 6.0
+
+
+class CameraDriverSettings(_Section):
+    """All that `drivers.camera.driver.run` needs.
+
+    name: of the camera on the bus; observer: whom sightings are attributed to (the carrier, or the camera's own name
+    when it is fixed in the world; derived when empty); observes: entities to report (empty: all markers, but for a
+    world-fixed camera robots only); search_phase_s: staggers the full searches of several cameras.
+    """
+
+    name: _Name
+    source: Annotated[str, Field(min_length=1)]
+    calibration: CalibrationSettings
+    mount: MountSettings = MountSettings()
+    video_delay_ms: Annotated[float, Field(ge=0, le=2000)] = 120.0
+    markers: tuple[MarkerSettings, ...] = ()
+    observes: tuple[str, ...] = ()
+    image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
+    search_rate_hz: Annotated[float, Field(gt=0, le=2)] = 2.0
+    search_phase_s: Annotated[float, Field(ge=0)] = 0.0
+    stall_after_s: _Positive = 1.0
+    detector: DetectorSettings = DetectorSettings()
+
+    @property
+    def observer(self) -> str:
+        """Return whom the sightings are attributed to."""
+        return self.name if self.mount.in_world else self.mount.parent
+
+    @property
+    def expected_markers(self) -> tuple[MarkerSettings, ...]:
+        """Return the markers this camera reports: never its own carrier's; world-fixed ones report robots only."""
+        wanted = [m for m in self.markers if m.entity != self.observer]
+        if self.observes:
+            return tuple(m for m in wanted if m.entity in self.observes)
+        return tuple(m for m in wanted if not (self.mount.in_world and m.kind is MarkerKind.TARGET))
+
+    @model_validator(mode="after")
+    def _check(self) -> "CameraDriverSettings":
+        codes = [marker.code for marker in self.markers]
+        if len(set(codes)) != len(codes):
+            raise ValueError("markers: two markers share a code")
+        if self.mount.in_world and self.mount.looking is None:
+            raise ValueError("mount.looking: a camera fixed in the world needs it (down)")
+        self.calibration.intrinsics()
+        return self

@@ -1,0 +1,87 @@
+"""Boards followed from picture to picture: where to look next, and whose each one is between sure readings."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.detect import Find, Window, spacing_px, window_around
+from drivers.camera.markers import Reading
+
+Array = NDArray[np.float64]
+
+_NS = 1_000_000_000
+_MARGIN_SQUARES = 1.6
+# A window grows with the time since the last detection, for what constant velocity does not foresee.
+_UNREST_PX_S = 120.0
+_MOST_UNREST_PX = 45.0
+_LIFETIME_NS = 450_000_000
+_MOST_MISSES = 5
+# An identity outlives the last sure reading by this much of unbroken tracking.
+_IDENTITY_NS = 2 * _NS
+
+
+# Below this a new board's code has to be read twice: far away, one reading in seventy is wrong with margin > 1.
+_AT_ONCE_MARGIN = 2.0
+
+
+@dataclass(slots=True)
+class Track:
+    """One board: last corners (12, 2) [px] and their time, image velocity [px/s], identity if known."""
+
+    corners: Array
+    stamp_ns: int
+    velocity: Array = field(default_factory=lambda: np.zeros(2))
+    code: int | None = None
+    pending: int | None = None
+    margin: float = 0.0
+    read_ns: int = 0
+    misses: int = 0
+
+    def expected_corners(self, stamp_ns: int) -> Array:
+        """Return where the corners should be at a later time, at constant image velocity."""
+        return np.asarray(self.corners + self.velocity * ((stamp_ns - self.stamp_ns) / _NS))
+
+    def window(self, stamp_ns: int, shape: tuple[int, ...]) -> Window | None:
+        """Return where to look, or None when that has left the picture."""
+        unrest = min(_MOST_UNREST_PX, _UNREST_PX_S * (stamp_ns - self.stamp_ns) / _NS)
+        margin = _MARGIN_SQUARES * spacing_px(self.corners) + unrest
+        return window_around(self.expected_corners(stamp_ns), margin, shape)
+
+    def accepts(self, find: Find, stamp_ns: int) -> bool:
+        """Return whether a find may be this board: near where it should be and of about its size."""
+        shift = find.centre - self.expected_corners(stamp_ns).mean(axis=0)
+        own, other = spacing_px(self.corners), spacing_px(find.corners)
+        return float(np.hypot(*shift)) < 2.5 * own + _MOST_UNREST_PX and 0.6 < other / own < 1.7
+
+    def follow(self, find: Find, stamp_ns: int) -> None:
+        """Take over a new detection."""
+        seconds = (stamp_ns - self.stamp_ns) / _NS
+        if seconds > 0.0:
+            self.velocity = (find.corners - self.corners).mean(axis=0) / seconds
+        self.corners, self.stamp_ns, self.misses = find.corners, stamp_ns, 0
+
+    def miss(self) -> None:
+        """Remember that the board was not where it should be."""
+        self.misses += 1
+
+    def is_lost(self, now_ns: int) -> bool:
+        """Return whether it is no longer worth looking for."""
+        return self.misses > _MOST_MISSES or now_ns - self.stamp_ns > _LIFETIME_NS
+
+    def identify(self, reading: Reading | None, stamp_ns: int, least_margin: float) -> None:
+        """Take in a reading of the bar: a sure one decides, at once or confirmed by a second one.
+
+        A sure contradiction leaves the board unknown, and so does a long time without any sure reading.
+        """
+        if reading is None or not reading.is_sure(least_margin):
+            if self.code is not None and stamp_ns - self.read_ns > _IDENTITY_NS:
+                self.code, self.margin = None, 0.0
+            return
+        if self.code not in (None, reading.code):
+            self.code, self.margin, self.pending = None, 0.0, None
+            return
+        if self.code is None and reading.margin < _AT_ONCE_MARGIN and self.pending != reading.code:
+            self.pending = reading.code
+            return
+        self.code, self.margin, self.read_ns, self.pending = reading.code, reading.margin, stamp_ns, None

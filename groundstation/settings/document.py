@@ -50,6 +50,13 @@ class Node:
         """Return an entry of a mapping, None when there is none or this is no mapping."""
         return self.value.get(key) if isinstance(self.value, dict) else None
 
+    def at(self, path: KeyPath) -> "Node | None":
+        """Return the node at a path, None when there is none."""
+        node: Node | None = self
+        for key in path:
+            node = _entry(node.value, key) if node is not None else None
+        return node
+
     def origin_of(self, path: KeyPath) -> Origin:
         """Return where the value at a path was written; for one that is missing, where its parent was."""
         node = self

@@ -1,5 +1,6 @@
 """From a field file as written to a field as resolved: options, calibrations, then defaults < type < robot."""
 
+from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -7,18 +8,31 @@ from groundstation.errors import SettingsError
 from groundstation.settings.document import KeyPath, Node, Origin, dotted, parse, read
 from groundstation.settings.wording import problem
 
-_NAMED = ("drones", "cameras", "types")  # mappings of names: an option may change an entry, not invent one
+NAMED = ("drones", "cameras", "types")
 
 
-def with_option(tree: Node, option: str) -> Node:
-    """Return the tree with `a.b=c` set; c is YAML, null removes the key. Raises SettingsError naming the option."""
+def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:
+    """Return the tree with `a.b=c` set; c is YAML, null removes the key. Raises SettingsError naming the option.
+
+    named: top-level mappings of names, in which an option may change an entry, but not invent one.
+    """
     place = f"--set {option}"
     name, equals, text = option.partition("=")
     path = tuple(part.strip() for part in name.split("."))
     if not equals or not all(path):
         raise SettingsError([f"{place}: must look like path.to.key=value"])
     value = parse(text, place, line=0) if text.strip() else Node("", Origin(place, 0))
+    if len(path) > 1 and path[0] in named:
+        _require_entry(tree, path[0], path[1], place)
     return _placed(tree, path, value, (), place)
+
+
+def _require_entry(tree: Node, section: str, name: str, place: str) -> None:
+    holder = tree.get(section)
+    if holder is not None and isinstance(holder.value, dict) and name not in holder.value:
+        near = get_close_matches(name, holder.value, 1, 0.5)
+        meant = f"did you mean {section}.{near[0]}?" if near else f"there are {', '.join(holder.value)}"
+        raise SettingsError([f"{place}: there is no {section}.{name}, {meant}"])
 
 
 def _placed(tree: Node, path: KeyPath, value: Node, done: KeyPath, place: str) -> Node:
@@ -34,10 +48,6 @@ def _placed(tree: Node, path: KeyPath, value: Node, done: KeyPath, place: str) -
     if not isinstance(tree.value, dict):
         raise SettingsError([f"{place}: {dotted(done)} is a single value, nothing lies below it"])
     entries = dict(tree.value)
-    if len(done) == 1 and done[0] in _NAMED and key not in entries:
-        near = get_close_matches(str(key), entries, 1, 0.5)
-        meant = f"did you mean {dotted((*done, near[0]))}?" if near else f"there are {', '.join(entries)}"
-        raise SettingsError([f"{place}: there is no {dotted((*done, key))}, {meant}"])
     if not rest and value.value is None:
         entries.pop(str(key), None)
         return Node(entries, tree.origin)

@@ -11,9 +11,9 @@ from groundstation.errors import SettingsError
 from groundstation.settings.checks import Parts, findings
 from groundstation.settings.document import KeyPath, Node, Origin, read
 from groundstation.settings.drones import Drone
-from groundstation.settings.levels import Calibrations, Levels, with_option
+from groundstation.settings.levels import NAMED, Calibrations, Levels, with_option
 from groundstation.settings.schema import SCHEMA_VERSION, Field
-from groundstation.settings.wording import problem, problem_of_error
+from groundstation.settings.wording import ordered, problem, problem_of_error
 
 
 def load_field(path: Path | str, options: Sequence[str] = ()) -> Field:
@@ -31,7 +31,7 @@ def load_field(path: Path | str, options: Sequence[str] = ()) -> Field:
     parts = _sound_parts(levels.tree.plain(), [error["loc"] for error in errors])
     problems += [problem(levels.tree.origin_of(at), text) for at, text in findings(parts)]
     if problems:
-        raise SettingsError(_ordered(problems))
+        raise SettingsError(ordered(problems))
     field = Field.model_validate_json(json.dumps(levels.tree.plain()))
     flying = {name: drone for name, drone in field.drones.items() if drone.enabled}
     return field.model_copy(update={"drones": flying})
@@ -43,7 +43,7 @@ def _with_options(tree: Node, options: Iterable[str]) -> tuple[Node, list[str]]:
     problems: list[str] = []
     for option in options:
         try:
-            tree = with_option(tree, option)
+            tree = with_option(tree, option, NAMED)
         except SettingsError as error:
             problems += error.problems
     return tree, problems
@@ -131,14 +131,3 @@ def _without(entries: dict[str, Any], faults: Collection[KeyPath]) -> dict[str, 
         elif not below:
             kept[key] = value
     return kept
-
-
-def _ordered(problems: list[str]) -> list[str]:
-    """Return each problem once, in the order of the file's lines."""
-
-    def rank(text: str) -> tuple[str, int]:
-        place, _, rest = text.partition(":")
-        line = rest.split(":", 1)[0]
-        return place, int(line) if line.isdigit() else 0
-
-    return sorted(dict.fromkeys(problems), key=rank)

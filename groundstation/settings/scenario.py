@@ -1,26 +1,65 @@
-"""Scenario files: read here, understood by the simulator alone."""
+"""Scenario files: read here, for their lines; judged by the simulator alone, which runs as a process of its own."""
 
+import json
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from groundstation.errors import SettingsError
-from groundstation.settings.document import Node, read
+from groundstation.errors import GroundStationError, SettingsError
+from groundstation.settings.document import KeyPath, Node, read
 from groundstation.settings.levels import with_option
+from groundstation.settings.wording import closest, ordered, problem, text_of_error
 
-
-def read_scenario(path: Path, options: Sequence[str] = ()) -> Node:
-    """Return a scenario's tree with `a.b=c` options applied; raises SettingsError for what is not YAML."""
-    tree = read(path)
-    if not isinstance(tree.value, dict):
-        raise SettingsError([f"{tree.origin}: must be a mapping with schema_version, target, drones, ..."])
-    for option in options:
-        tree = with_option(tree, option)
-    return tree
+_CHECK_LIMIT_S = 30.0
 
 
 def load_scenario(path: Path, options: Sequence[str] = ()) -> dict[str, Any]:
-    """Return a scenario as plain values for the simulator, which is the one to judge them."""
-    plain = read_scenario(path, options).plain()
-    assert isinstance(plain, dict)
+    """Return a scenario as plain values with `a.b=c` options applied; raises SettingsError with all problems."""
+    tree = read(path)
+    if not isinstance(tree.value, dict):
+        raise SettingsError([f"{tree.origin}: must be a mapping with schema_version, target, drones, ..."])
+    problems: list[str] = []
+    for option in options:
+        try:
+            tree = with_option(tree, option)
+        except SettingsError as error:
+            problems += error.problems
+    plain: dict[str, Any] = tree.plain()
+    problems += [_worded(fault, tree) for fault in _faults(plain)]
+    if problems:
+        raise SettingsError(ordered(problems))
     return plain
+
+
+def _faults(plain: dict[str, Any]) -> list[dict[str, Any]]:
+    result = subprocess.run(
+        [sys.executable, "-m", "sim_bridge.check"],
+        input=json.dumps(plain).encode(),
+        capture_output=True,
+        timeout=_CHECK_LIMIT_S,
+        check=False,
+    )
+    if result.returncode not in (0, 2):
+        raise GroundStationError(f"the simulator cannot judge the scenario: {result.stderr.decode(errors='replace')}")
+    faults: list[dict[str, Any]] = json.loads(result.stdout)
+    return faults
+
+
+def _worded(fault: dict[str, Any], tree: Node) -> str:
+    path = _without_variants(fault["loc"], tree)
+    if fault["type"] == "extra_forbidden":
+        return problem(tree.origin_of(path), f"unknown key{closest(str(path[-1]), fault['known'])}")
+    return problem(tree.origin_of(path), text_of_error(fault))
+
+
+def _without_variants(location: Sequence[str | int], tree: Node) -> KeyPath:
+    """Return a path without the names of variants that pydantic puts into it: those are values in the file, no keys."""
+    path: KeyPath = ()
+    for key in location:
+        here = tree.at(path)
+        mapping = here.value if here is not None and isinstance(here.value, dict) else {}
+        is_variant = key not in mapping and any(entry.value == key for entry in mapping.values())
+        path = path if is_variant else (*path, key)
+    return path

@@ -1,7 +1,7 @@
 """What validation found, in the operator's words: place, path, allowed range, and what was probably meant."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
 from typing import Any, get_args
 
@@ -54,17 +54,21 @@ def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel
         origin = Origin(tree.origin_of(path[:2]).place, tree.origin_of(path[:2]).line, path)
     if error["type"] == "extra_forbidden":
         return problem(origin, f"unknown key{_meant(str(path[-1]), model, path[:-1])}")
-    return problem(origin, _text(error))
+    return problem(origin, text_of_error(error))
 
 
-def _text(error: Mapping[str, Any]) -> str:
+def text_of_error(error: Mapping[str, Any]) -> str:
+    """Return what is wrong, without where."""
     kind, context, got = error["type"], error.get("ctx", {}), _shown(error["input"])
     if kind == "missing":
         return _PLAIN[kind]
     if kind in _BOUNDS:
         sign, name = _BOUNDS[kind]
         return f"must be {sign} {context[name]:g} (got {got})"
-    if kind == "literal_error":
+    if kind == "union_tag_invalid":
+        key, expected = str(context["discriminator"]).strip("'"), context["expected_tags"]
+        return f"{key} must be one of {expected} (got {_shown(context['tag'])}){_close(context['tag'], expected)}"
+    if kind in ("literal_error", "enum"):
         return f"must be {context['expected']} (got {got}){_close(str(error['input']), context['expected'])}"
     if kind in ("too_short", "too_long"):
         return f"must hold {_count(context)} (got {context['actual_length']})"
@@ -95,14 +99,22 @@ def _meant(key: str, model: type[BaseModel], path: tuple[str | int, ...]) -> str
     if owner is None:
         return ""
     siblings = [*owner.model_fields, *_ONLY_IN_FILES.get(owner.__name__, ())]
-    near = get_close_matches(key, siblings, 1)
+    deeper = {inner.rsplit(".", 1)[-1]: inner for inner in _descendants(owner)}
+    return closest(key, siblings, deeper)
+
+
+def closest(key: str, known: Collection[str], deeper: Mapping[str, str] | None = None) -> str:
+    """Return the end of a sentence about an unknown key: what was probably meant, or what is known here.
+
+    deeper: keys further down, with their paths.
+    """
+    near = get_close_matches(key, known, 1)
     if near:
         return f", did you mean {near[0]}?"
-    deeper = {inner.rsplit(".", 1)[-1]: inner for inner in _descendants(owner)}
-    near = get_close_matches(key, deeper, 1, 0.75)
-    if near:
+    near = get_close_matches(key, deeper or (), 1, 0.75)
+    if deeper and near:
         return f", did you mean {deeper[near[0]]}?"
-    return f"; known here: {', '.join(siblings)}"
+    return f"; known here: {', '.join(known)}"
 
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -129,3 +141,14 @@ def _descendants(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         for inner in _models_in(info.annotation):
             yield from (f"{prefix}{name}.{key}" for key in inner.model_fields)
             yield from _descendants(inner, f"{prefix}{name}.")
+
+
+def ordered(problems: list[str]) -> list[str]:
+    """Return each problem once, in the order of the file's lines."""
+
+    def rank(text: str) -> tuple[str, int]:
+        place, _, rest = text.partition(":")
+        line = rest.split(":", 1)[0]
+        return place, int(line) if line.isdigit() else 0
+
+    return sorted(dict.fromkeys(problems), key=rank)

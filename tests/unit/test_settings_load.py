@@ -167,3 +167,40 @@ def test_scenarios_are_read_with_options() -> None:
     path = find_scenario("realistic", FIXTURE)
     assert load_scenario(path)["schema_version"] == 1
     assert load_scenario(path, ["seed=7", "cameras.fps=10"])["cameras"]["fps"] == 10
+
+
+WRONG_SCENARIO = """
+schema_version: 1
+target:
+  path: {shape: figure_eight, speed_m_s: 7,
+    half_lenght_m: 3}
+cameras:
+  fps: 90
+  corner_noise: 3
+faults:
+  - {kind: camera_ct, entity: ceiling, start_s: 1}
+"""
+
+
+def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(WRONG_SCENARIO.lstrip(), encoding="utf-8")
+    with pytest.raises(SettingsError) as caught:
+        load_scenario(path, ["cameras.blur_px=20", "seed"])
+    assert [problem.removeprefix(f"{path}") for problem in caught.value.problems] == [
+        "--set cameras.blur_px=20: cameras.blur_px: must be <= 10 (got 20)",
+        "--set seed: must look like path.to.key=value",
+        ":3: target.path.speed_m_s: must be <= 0.7 (got 7)",
+        ":4: target.path.half_lenght_m: unknown key, did you mean half_length_m?",
+        ":6: cameras.fps: must be <= 60 (got 90)",
+        ":7: cameras.corner_noise: unknown key, did you mean corner_noise_px?",
+        ":9: faults[0].kind: must be 'navdata_silent', 'at_deaf', 'camera_cut', 'camera_stall' or 'battery_drop'"
+        ' (got "camera_ct"), did you mean camera_cut?',
+    ]
+    path.write_text("schema_version: 1\ntarget:\n  path: {shape: figure_eigth}\n", encoding="utf-8")
+    with pytest.raises(SettingsError) as caught:
+        load_scenario(path)
+    assert caught.value.problems == [
+        f"{path}:3: target.path: shape must be one of 'figure_eight', 'none' (got \"figure_eigth\"),"
+        " did you mean figure_eight?"
+    ]

@@ -1,0 +1,33 @@
+"""The router process: it listens and forwards, and does nothing else, so that no stall here can stall the team."""
+
+import json
+import time
+from typing import Any
+
+from groundstation.bus.zenoh_bus import open_router
+from groundstation.process.child import Child
+
+_TURN_NS = 50_000_000
+# Longer than sim_bridge and drivers take to land without a supervisor; they still want to be heard meanwhile.
+_LINGER_NS = 25_000_000_000
+
+
+def run(child: Child) -> int:
+    """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
+    session = open_router(json.loads(child.section)["endpoint"])
+    child.ready()
+    orphaned_ns = 0
+    while not child.stop_requested:
+        now_ns = time.monotonic_ns()
+        if not child.supervisor_alive:
+            orphaned_ns = orphaned_ns or now_ns
+            if now_ns - orphaned_ns > _LINGER_NS or not _has_clients(session):
+                break
+        child.beat()
+        child.sleep_until(now_ns + _TURN_NS)
+    session.close()
+    return 0
+
+
+def _has_clients(session: Any) -> bool:
+    return bool(session.info.transports())

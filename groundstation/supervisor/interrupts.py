@@ -1,0 +1,46 @@
+"""Signals of the supervisor: Ctrl-C, SIGTERM and a closed terminal alike ask to land and stop; a second hurries."""
+
+import os
+import signal
+import time
+from contextlib import suppress
+from types import FrameType
+
+# `timeout` and some shells signal a process twice at once; a person needs longer for the second thought.
+_SAME_WISH_NS = 500_000_000
+
+
+class Interrupts:
+    """Counts the operator's wishes to stop; `descriptor` becomes readable when one arrives."""
+
+    def __init__(self) -> None:
+        self.descriptor, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._first_ns = 0
+        self.stop_requested = False
+        self.hurry = False
+
+    def install(self) -> None:
+        """Take over the signals of this process; main thread only."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+        signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        now_ns = time.monotonic_ns()
+        if not self.stop_requested:
+            self.stop_requested, self._first_ns = True, now_ns
+        # A closing terminal may hang up several times, and is never a second thought of the operator.
+        elif number != signal.SIGHUP and now_ns - self._first_ns > _SAME_WISH_NS:
+            self.hurry = True
+
+    def clear(self) -> None:
+        """Empty the descriptor after it woke a poll."""
+        with suppress(BlockingIOError):
+            os.read(self.descriptor, 512)
+
+    def close(self) -> None:
+        """Release the descriptors; signals stay counted so that none kills the last steps."""
+        signal.set_wakeup_fd(-1)
+        os.close(self.descriptor)
+        os.close(self._write)

@@ -1,0 +1,103 @@
+"""Starts one process of the table by exec of a fresh interpreter, in a session of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import BinaryIO
+
+from groundstation.errors import GroundStationError
+from groundstation.process.child import ChildSpec
+from groundstation.supervisor.table import ProcessSpec
+
+# 13 processes on 2 cores: a thread pool per process would only fight over them.
+_SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Launcher:
+    """Knows the run folder and the environment that children get; log files stay open across restarts."""
+
+    def __init__(self, run_dir: Path, endpoint: str, site: str, heartbeat: str) -> None:
+        self._run_dir = run_dir
+        self._endpoint = endpoint
+        self._site = site
+        self._heartbeat = heartbeat
+        self._logs: dict[str, BinaryIO] = {}
+
+    def log_path(self, name: str) -> Path:
+        """Return where a process's standard error goes."""
+        return self._run_dir / "log" / f"{name}.log"
+
+    def prepare(self, specs: tuple[ProcessSpec, ...]) -> None:
+        """Open all log files; raises GroundStationError when the run folder cannot be written."""
+        try:
+            (self._run_dir / "log").mkdir(parents=True, exist_ok=True)
+            for spec in specs:
+                # Unbuffered, and open from now on: a restart in flight must not need a free disk.
+                self._logs[spec.name] = self.log_path(spec.name).open("ab", buffering=0)
+        except OSError as error:
+            raise GroundStationError(f"cannot write to the run folder {self._run_dir}: {error.strerror}") from error
+
+    def launch(self, spec: ProcessSpec, slot: int, life: int) -> subprocess.Popen[bytes]:
+        """Start a process; `life` counts its starts and raises the epoch of a numbered one."""
+        section = json.loads(spec.section)
+        if spec.numbered:
+            section["epoch"] = section.get("epoch", 0) + life
+        child = asdict(
+            ChildSpec(
+                name=spec.name,
+                role=spec.role,
+                endpoint=self._endpoint if spec.on_bus else "",
+                site=self._site,
+                heartbeat=self._heartbeat,
+                heartbeat_index=slot,
+                section=json.dumps(section),
+                parent_pid=os.getpid(),
+            )
+        )
+        if spec.command:
+            command = self._command(spec, section | {"child": child})
+            return self._popen(spec, command, subprocess.DEVNULL)
+        with _memory_file(json.dumps(child).encode()) as specification:
+            command = [sys.executable, "-m", "groundstation.process.entry", spec.name, spec.entry]
+            return self._popen(spec, command, specification.fileno())
+
+    def _command(self, spec: ProcessSpec, document: dict[str, object]) -> list[str]:
+        path = self._run_dir / f"{spec.name}.json"
+        path.write_text(json.dumps(document))
+        return [part.replace("{spec}", str(path)) for part in spec.command]
+
+    def _popen(self, spec: ProcessSpec, command: list[str], stdin: int) -> subprocess.Popen[bytes]:
+        log = self._logs[spec.name]
+        return subprocess.Popen(
+            command,
+            stdin=stdin,
+            stdout=None if spec.on_terminal else log,
+            stderr=log,
+            start_new_session=True,
+            pass_fds=spec.keep_open,
+            env=os.environ | dict.fromkeys(_SINGLE_THREADED, "1"),
+        )
+
+    def log_tail(self, name: str, lines: int = 8) -> str:
+        """Return the last lines of a process's log, for an error message."""
+        with suppress(OSError):
+            return "\n".join(self.log_path(name).read_text(errors="replace").splitlines()[-lines:])
+        return ""
+
+    def close(self) -> None:
+        """Close the log files; idempotent."""
+        while self._logs:
+            self._logs.popitem()[1].close()
+
+
+def _memory_file(content: bytes) -> BinaryIO:
+    """Return a file with this content, positioned at its start, that needs no disk."""
+    file = os.fdopen(os.memfd_create("child"), "r+b")
+    file.write(content)
+    file.flush()
+    file.seek(0)
+    return file

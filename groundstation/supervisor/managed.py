@@ -1,0 +1,116 @@
+"""One process of the table while it lives: its handle, its lifecycle as the heartbeat block says, its restarts."""
+
+import os
+import signal
+import subprocess
+from contextlib import suppress
+
+from groundstation.process.heartbeat import HeartbeatBlock, SlotState
+from groundstation.supervisor.runtime_file import start_time
+from groundstation.supervisor.table import ProcessSpec
+
+NS_PER_S = 1_000_000_000
+_BACK_OFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)
+_FORGIVEN_AFTER_NS = 30 * NS_PER_S
+STORM_RESTARTS = 5
+
+
+class ManagedProcess:
+    """Everything that the supervisor remembers of one process."""
+
+    def __init__(self, spec: ProcessSpec, slot: int, block: HeartbeatBlock) -> None:
+        self.spec = spec
+        self.slot = slot
+        self._block = block
+        self._handle: subprocess.Popen[bytes] | None = None
+        self.pidfd = -1
+        self.pid = 0
+        self.start_time = 0
+        self.life = 0
+        self.started_ns = 0
+        self.ready_ns = 0
+        self.restart_due_ns: int | None = None
+        self.kill_reason = ""
+        self.detail = ""
+        self._failures = 0
+
+    @property
+    def running(self) -> bool:
+        """Whether it was started and its end has not been noticed yet."""
+        return self._handle is not None
+
+    @property
+    def state(self) -> SlotState:
+        """Lifecycle as the process itself recorded it."""
+        return self._block.state(self.slot) if self.running else SlotState.EMPTY
+
+    @property
+    def is_up(self) -> bool:
+        """Whether its start is finished and it still runs."""
+        return self.running and self.state in (SlotState.READY, SlotState.DEGRADED)
+
+    def adopt(self, handle: subprocess.Popen[bytes], now_ns: int) -> None:
+        """Take over a process that was just started."""
+        self._handle = handle
+        self.pid = handle.pid
+        self.pidfd = os.pidfd_open(handle.pid)
+        self.start_time = start_time(handle.pid) or 0
+        self.life += 1
+        self.started_ns, self.ready_ns = now_ns, 0
+        self.restart_due_ns = None
+        self.kill_reason = ""
+
+    def heartbeat_age_ns(self, now_ns: int) -> int:
+        """Return the time since its last beat [ns]."""
+        return self._block.age_ns(self.slot, now_ns)
+
+    def reap(self) -> int | None:
+        """Return the exit code if the process has ended (negative: by that signal), and forget its handle."""
+        if self._handle is None or not _has_ended(self.pid):
+            return None
+        if self.is_up and not self.ready_ns:
+            self.ready_ns = self.started_ns  # it was up, between two looks
+        self.signal_group(signal.SIGKILL)  # whatever it started ends with it; its pid is still reserved here
+        code = self._handle.wait()
+        os.close(self.pidfd)
+        self._handle, self.pidfd = None, -1
+        self._block.clear(self.slot)
+        return code
+
+    def signal(self, number: int) -> None:
+        """Signal the process, if it still runs."""
+        if self._handle is not None:
+            os.kill(self.pid, number)  # not reaped yet, so the pid is its own; Popen.send_signal would reap it
+
+    def signal_group(self, number: int) -> None:
+        """Signal the process and all that it started."""
+        if self._handle is not None:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.pid, number)
+
+    def schedule_restart(self, now_ns: int) -> float:
+        """Plan the next start, later after each failure in a row; returns the delay [s]."""
+        if self.ready_ns and now_ns - self.ready_ns > _FORGIVEN_AFTER_NS:
+            self._failures = 0
+        delay_s = _BACK_OFF_S[min(self._failures, len(_BACK_OFF_S) - 1)]
+        self._failures += 1
+        self.restart_due_ns = now_ns + int(delay_s * NS_PER_S)
+        return delay_s
+
+    @property
+    def storms(self) -> bool:
+        """Whether it has failed so often in a row that trying on is unlikely to help."""
+        return self._failures >= STORM_RESTARTS
+
+
+def _has_ended(pid: int) -> bool:
+    """Return whether a child of ours is a zombie, leaving it one so that its process group stays ours to signal."""
+    return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
+
+def exit_text(code: int) -> str:
+    """Return an exit code in words."""
+    if code < 0:
+        with suppress(ValueError):
+            return f"killed by {signal.Signals(-code).name}"
+    return f"ended with code {code}"

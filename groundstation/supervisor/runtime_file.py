@@ -1,0 +1,117 @@
+"""The runtime file: tells `groundstation land` and friends where a run's router and processes are.
+
+Lives in $XDG_RUNTIME_DIR, or /tmp/skein-<uid>, as SITE-PID.json, readable by its owner only. A pid counts only with
+its start time, so a file left by a crash never points at a stranger.
+"""
+
+import os
+import stat
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+
+from groundstation.errors import GroundStationError
+
+
+class ProcessRecord(msgspec.Struct, frozen=True):
+    """One process of a run; start_time in clock ticks since boot, as the kernel tells it."""
+
+    name: str
+    role: str
+    pid: int
+    start_time: int
+
+    @property
+    def alive(self) -> bool:
+        """Whether this very process (not another that got its pid) still runs."""
+        return self.pid > 0 and start_time(self.pid) == self.start_time
+
+
+class RuntimeRecord(msgspec.Struct, frozen=True):
+    """A run as others see it."""
+
+    site: str
+    field: str
+    endpoint: str
+    run_dir: str
+    heartbeat: str
+    drones: tuple[str, ...]
+    supervisor: ProcessRecord
+    processes: tuple[ProcessRecord, ...]
+
+    @property
+    def name(self) -> str:
+        """The name by which `--run` chooses this run."""
+        return f"{self.site}-{self.supervisor.pid}"
+
+    @property
+    def alive(self) -> bool:
+        """Whether any process of it still runs (drivers outlive a killed supervisor until they have landed)."""
+        return any(process.alive for process in (self.supervisor, *self.processes))
+
+
+def start_time(pid: int) -> int | None:
+    """Return when a process started [clock ticks since boot], or None if there is none or it is a zombie."""
+    try:
+        content = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return None
+    fields = content.rpartition(")")[2].split()  # the name in parentheses may hold spaces
+    return None if fields[0] in "ZX" else int(fields[19])
+
+
+def folder() -> Path:
+    """Return the folder of runtime files, made if needed; raises GroundStationError if it is someone else's."""
+    given = os.environ.get("XDG_RUNTIME_DIR", "")
+    if given and os.access(given, os.W_OK):
+        path = Path(given) / "skein"
+    else:
+        path = Path(tempfile.gettempdir()) / f"skein-{os.getuid()}"
+    try:
+        path.mkdir(mode=0o700, exist_ok=True)
+        status = path.lstat()
+    except OSError as error:
+        raise GroundStationError(f"cannot use {path} for the runtime file: {error.strerror}") from error
+    # /tmp is shared: a folder planted by another user could point our stop commands at his processes.
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
+        raise GroundStationError(f"{path} is not a folder of yours: remove it, or set XDG_RUNTIME_DIR")
+    return path
+
+
+def write(record: RuntimeRecord) -> Path:
+    """Write a record in one step, so that no reader sees half of it; returns its path."""
+    path = folder() / f"{record.name}.json"
+    draft = path.with_suffix(".draft")
+    draft.write_bytes(msgspec.json.encode(record))
+    draft.chmod(0o600)
+    draft.replace(path)
+    return path
+
+
+def live_records() -> list[RuntimeRecord]:
+    """Return the runs that still have a process, and remove what dead ones left behind."""
+    records = []
+    for path in sorted(folder().glob("*.json")):
+        try:
+            record = msgspec.json.decode(path.read_bytes(), type=RuntimeRecord)
+        except FileNotFoundError:
+            continue
+        except (OSError, msgspec.DecodeError):
+            path.unlink(missing_ok=True)
+            continue
+        if record.alive:
+            records.append(record)
+        else:
+            remove(record)
+    return records
+
+
+def remove(record: RuntimeRecord) -> None:
+    """Remove a record, and the heartbeat block that a killed supervisor could not remove."""
+    (folder() / f"{record.name}.json").unlink(missing_ok=True)
+    block = Path(record.heartbeat)
+    if block.name.startswith("skein-"):
+        with suppress(OSError):
+            block.unlink(missing_ok=True)

@@ -1,0 +1,287 @@
+"""Starts the process table, watches it, restarts what dies or hangs, and stops it in order."""
+
+import logging
+import os
+import select
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.bus.api import Subscription
+from groundstation.bus.messages import Event, ProcessStatus, Severity
+from groundstation.bus.topics import EVENT, PROCESS_STATUS
+from groundstation.bus.zenoh_bus import ZenohBus, open_bus
+from groundstation.errors import GroundStationError
+from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
+from groundstation.supervisor import runtime_file
+from groundstation.supervisor.interrupts import Interrupts
+from groundstation.supervisor.last_words import LastWordsSender
+from groundstation.supervisor.launcher import Launcher
+from groundstation.supervisor.managed import NS_PER_S, ManagedProcess, exit_text
+from groundstation.supervisor.status import StatusPublisher
+from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder
+from groundstation.supervisor.terminal import Terminal
+
+SOURCE = "supervisor"
+_TURN_S = 0.05
+_OWN_DELAY_NS = 200_000_000
+_OPTIONAL_GRACE_S = 5.0
+_log = logging.getLogger(__name__)
+
+
+class Interrupted(GroundStationError):
+    """The operator asked to stop while the run was starting."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a run is called and where it happens."""
+
+    site: str
+    field: str
+    endpoint: str
+    run_dir: Path
+    drones: tuple[str, ...]
+
+
+class Supervisor:
+    """Owns all processes of a run. `step` must be called 10 times a second or more; it sleeps by itself."""
+
+    def __init__(self, run: Run, table: tuple[ProcessSpec, ...], terminal: Terminal) -> None:
+        self.run = run
+        self._terminal = terminal
+        self.interrupts = Interrupts()
+        self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
+        self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path))
+        self.processes = [ManagedProcess(spec, slot + 1, self._block) for slot, spec in enumerate(table)]
+        self._last_words = LastWordsSender()
+        self.bus: ZenohBus | None = None
+        self._statuses: Subscription | None = None
+        self._publisher: StatusPublisher | None = None
+        self.failure = ""
+        self._record: runtime_file.RuntimeRecord | None = None
+        self._turn_ns = self._awake_since_ns = time.monotonic_ns()
+        self._stopping = False
+
+    # --- start ---------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the router, then everything else at once; returns when the run can begin.
+
+        Raises GroundStationError when a required process fails or is late, Interrupted when the operator stops it.
+        """
+        self.interrupts.install()
+        self._launcher.prepare(tuple(process.spec for process in self.processes))
+        self._block.set_state(SUPERVISOR_SLOT, SlotState.READY)
+        routers = [p for p in self.processes if p.spec.stop_order is StopOrder.CONNECTS]
+        for process in routers:
+            self._launch(process)
+        self._wait_for(routers)
+        self.bus = open_bus(self.run.endpoint, self.run.site, SOURCE)
+        self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
+        self._publisher = StatusPublisher(self.bus)
+        for process in self.processes:
+            if process not in routers:
+                self._launch(process)
+        self._write_runtime_file()
+        self._wait_for([p for p in self.processes if p.spec.required])
+        self._wait_for([p for p in self.processes if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
+
+    def _wait_for(self, processes: list[ManagedProcess], limit_s: float | None = None) -> None:
+        began = time.monotonic()
+        waiting = list(processes)
+        next_note = began + 2.0
+        while waiting:
+            self.step()
+            now = time.monotonic()
+            for process in [p for p in waiting if p.is_up]:
+                waiting.remove(process)
+                self._terminal.say(f"  {process.spec.name:<12} {process.state.name.lower()}  {process.detail}".rstrip())
+            if self.failure:
+                raise GroundStationError(self.failure)
+            if self.interrupts.stop_requested:
+                raise Interrupted("stopped while starting")
+            if limit_s is not None and now > began + limit_s:
+                for process in waiting:
+                    self._event(Severity.WARNING, process, "is not ready; going on without it", "see its log")
+                return
+            if now > next_note and waiting:
+                next_note = now + 2.0
+                waits = ", ".join(f"{p.spec.name} ({p.detail or p.state.name.lower()})" for p in waiting)
+                self._terminal.say(f"  waiting for {waits}")
+
+    def _launch(self, process: ManagedProcess) -> None:
+        try:
+            handle = self._launcher.launch(process.spec, process.slot, process.life)
+        except OSError as error:
+            process.schedule_restart(time.monotonic_ns())
+            self._event(Severity.ERROR, process, f"cannot be started: {error.strerror}")
+            return
+        process.adopt(handle, time.monotonic_ns())
+
+    # --- watch ---------------------------------------------------------------------------------------------------
+
+    def step(self, timeout_s: float = _TURN_S) -> None:
+        """Sleep until something happens or the time-out, then look after every process once."""
+        self._block.beat(SUPERVISOR_SLOT)
+        self._sleep(timeout_s)
+        self._block.beat(SUPERVISOR_SLOT)
+        now_ns = time.monotonic_ns()
+        if now_ns - self._turn_ns > _OWN_DELAY_NS + int(timeout_s * NS_PER_S):
+            self._awake_since_ns = now_ns  # it was frozen itself: nobody's silence before now counts
+        self._turn_ns = now_ns
+        self._read_statuses()
+        for process in self.processes:
+            self._watch(process, now_ns)
+        self._last_words.send_due(now_ns)
+        if self._publisher is not None:
+            self._publisher.publish_due(now_ns, self.processes)
+
+    def _sleep(self, timeout_s: float) -> None:
+        poll = select.poll()
+        poll.register(self.interrupts.descriptor, select.POLLIN)
+        for process in self.processes:
+            if process.running:
+                poll.register(process.pidfd, select.POLLIN)
+        ready = poll.poll(timeout_s * 1000)
+        if any(descriptor == self.interrupts.descriptor for descriptor, _ in ready):
+            self.interrupts.clear()
+
+    def _read_statuses(self) -> None:
+        if self._statuses is None:
+            return
+        details = {r.key.entity: r.message for r in self._statuses.drain() if r.key.source == r.key.entity}
+        for process in self.processes:
+            status = details.get(process.spec.name)
+            if isinstance(status, ProcessStatus):
+                process.detail = status.detail
+
+    def _watch(self, process: ManagedProcess, now_ns: int) -> None:
+        if not process.running:
+            if process.restart_due_ns is not None and now_ns >= process.restart_due_ns and not self._stopping:
+                self._launch(process)
+                self._write_runtime_file()
+            return
+        code = process.reap()
+        if code is not None:
+            self._ended(process, code, now_ns)
+        elif self._stopping:
+            return  # the stop has its own deadlines
+        elif process.is_up:
+            self._watch_heartbeat(process, now_ns)
+        elif process.state is SlotState.STOPPING:
+            late = process.heartbeat_age_ns(now_ns) > process.spec.stop_limit_s * NS_PER_S
+            self._kill(process, "hung while ending by itself", late)
+        else:
+            late = now_ns - process.started_ns > process.spec.start_limit_s * NS_PER_S
+            self._kill(process, f"not ready {process.spec.start_limit_s:.0f} s after its start", late)
+
+    def _watch_heartbeat(self, process: ManagedProcess, now_ns: int) -> None:
+        process.ready_ns = process.ready_ns or now_ns
+        # Silence counts only while this loop was awake to hear.
+        silent_s = min(process.heartbeat_age_ns(now_ns), now_ns - self._awake_since_ns) / NS_PER_S
+        if silent_s < process.spec.silence_limit_s:
+            if self._last_words.end(process.spec.name):
+                self._event(Severity.INFO, process, "has the word again")
+            return
+        self._speak_for(process, f"silent for {silent_s:.2f} s", now_ns)
+        self._kill(process, f"hung: no heartbeat for {silent_s:.2f} s", silent_s >= process.spec.hang_limit_s)
+
+    def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
+        words = process.spec.last_words
+        if words is not None and not self._stopping and self._last_words.begin(process.spec.name, words, now_ns):
+            self._event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
+
+    def _kill(self, process: ManagedProcess, reason: str, due: bool) -> None:
+        if due and not process.kill_reason:
+            process.kill_reason = reason
+            process.signal_group(signal.SIGKILL)
+
+    def _ended(self, process: ManagedProcess, code: int, now_ns: int) -> None:
+        if self._stopping:
+            return
+        why = process.kill_reason or exit_text(code)
+        self._speak_for(process, why, now_ns)
+        never_up = not process.ready_ns and process.life == 1
+        if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):
+            tail = self._launcher.log_tail(process.spec.name)
+            self.failure = (
+                f"{process.spec.name} {why}; its log {self._launcher.log_path(process.spec.name)} ends:\n{tail}"
+            )
+            self._event(Severity.ERROR, process, why, "the run ends; see its log")
+            return
+        delay_s = process.schedule_restart(now_ns)
+        process.ready_ns = 0
+        severity = Severity.ERROR if process.storms else Severity.WARNING
+        self._event(
+            severity, process, f"{why}; restarting" + (f" in {delay_s:.1f} s" if delay_s else ""), "see its log"
+        )
+
+    # --- stop ----------------------------------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """Stop everything in order, each with its deadline; a hurrying operator gets all of it at once."""
+        self._stopping = True
+        for order in StopOrder:
+            group = [p for p in self.processes if p.spec.stop_order is order and p.running]
+            if self.interrupts.hurry:
+                group = [p for p in self.processes if p.running]
+            self._stop_group(group)
+        self._last_words.close()
+
+    def _stop_group(self, group: list[ManagedProcess]) -> None:
+        for process in group:
+            process.signal(signal.SIGTERM)
+            process.signal(signal.SIGCONT)  # a frozen one could not hear it
+        began = time.monotonic()
+        while alive := [p for p in group if p.running]:
+            self.step()
+            limit_s = 1.0 if self.interrupts.hurry else None
+            for process in alive:
+                late = time.monotonic() - began > (limit_s or process.spec.stop_limit_s)
+                self._kill(process, "did not stop in time", late)
+                if late and process.running:
+                    _log.warning("%s did not stop in time: killed", process.spec.name)
+
+    def close(self) -> None:
+        """Leave nothing behind: bus, runtime file, heartbeat block, log files; idempotent."""
+        self.stop()
+        if self.bus is not None:
+            self.bus.close()
+            self.bus = self._statuses = self._publisher = None
+        if self._record is not None:
+            runtime_file.remove(self._record)
+            self._record = None
+        self._launcher.close()
+        self._block.path.unlink(missing_ok=True)
+
+    # --- words ---------------------------------------------------------------------------------------------------
+
+    def _event(self, severity: Severity, process: ManagedProcess, text: str, remedy: str = "") -> None:
+        _log.warning("%s %s %s", severity, process.spec.name, text)
+        if severity is not Severity.INFO:
+            self._terminal.say(f"  {process.spec.name}: {text}")
+        if self.bus is not None:
+            header = self.bus.header(process.spec.name)
+            self.bus.publish(EVENT, Event(header=header, severity=severity, text=text, remedy=remedy))
+
+    def _write_runtime_file(self) -> None:
+        def record(process: ManagedProcess) -> runtime_file.ProcessRecord:
+            return runtime_file.ProcessRecord(process.spec.name, process.spec.role, process.pid, process.start_time)
+
+        own = runtime_file.ProcessRecord(SOURCE, SOURCE, os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+        self._record = runtime_file.RuntimeRecord(
+            site=self.run.site,
+            field=self.run.field,
+            endpoint=self.run.endpoint,
+            run_dir=str(self.run.run_dir),
+            heartbeat=str(self._block.path),
+            drones=self.run.drones,
+            supervisor=own,
+            processes=tuple(record(process) for process in self.processes if process.running),
+        )
+        try:
+            runtime_file.write(self._record)
+        except OSError as error:  # the run is worth more than its signpost
+            _log.error("cannot write the runtime file: %s", error)

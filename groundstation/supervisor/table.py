@@ -1,0 +1,64 @@
+"""One line per process: what to start, how long to trust its silence, and when it stops in the shut-down."""
+
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+
+class Restart(StrEnum):
+    """What the end of a process means to the run."""
+
+    ALWAYS = "ALWAYS"
+    ENDS_RUN = "ENDS_RUN"
+
+
+class StopOrder(IntEnum):
+    """Shut-down goes through these in order; within one, processes stop together."""
+
+    DECIDES = 0
+    DRIVES = 1
+    EMULATES = 2
+    RECORDS = 3
+    CONNECTS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class LastWords:
+    """What the supervisor tells a drone for a driver that died or hangs, in the drone's own protocol.
+
+    hover is repeated until the driver is READY again; after land_after_s it is land instead.
+    """
+
+    address: str
+    port: int
+    hover: bytes
+    land: bytes
+    land_after_s: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessSpec:
+    """One process of the table.
+
+    entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of
+    a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
+    silence_limit_s: heartbeat older than this starts the last words; hang_limit_s: it is killed (both after READY).
+    required: the run cannot start without it. on_terminal: it writes to the operator's terminal.
+    """
+
+    name: str
+    role: str
+    entry: str = ""
+    command: tuple[str, ...] = ()
+    section: str = "{}"
+    numbered: bool = False
+    restart: Restart = Restart.ALWAYS
+    required: bool = True
+    silence_limit_s: float = 0.4
+    hang_limit_s: float = 0.8
+    start_limit_s: float = 60.0
+    stop_order: StopOrder = StopOrder.DRIVES
+    stop_limit_s: float = 3.0
+    last_words: LastWords | None = None
+    on_bus: bool = True
+    on_terminal: bool = False
+    keep_open: tuple[int, ...] = ()

@@ -1,0 +1,206 @@
+"""The state as a rich renderable; pure: the same state and time give the same picture."""
+
+import math
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
+from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.state import MonitorState, Seen
+
+_SEEN_S = 0.6
+_EVENTS = 6
+_ALARMS = 5
+_COMMAND_SHOWN_S = 10.0
+_CHI2_95_2D = -2.0 * math.log(0.05)
+_MODE_STYLES = {
+    "TRACK": "bold green",
+    "HOVER": "cyan",
+    "HOLD": "yellow",
+    "TAKING_OFF": "cyan",
+    "LANDING": "yellow",
+    "LANDED": "dim",
+    "CONNECTING": "dim",
+    "CUT": "bold red",
+}
+_STATE_STYLES = {
+    Lifecycle.STARTING: "cyan",
+    Lifecycle.READY: "green",
+    Lifecycle.DEGRADED: "yellow",
+    Lifecycle.STOPPING: "dim",
+}
+
+
+def render(state: MonitorState, now_ns: int) -> RenderableType:
+    """Return the whole picture."""
+    parts: list[RenderableType] = [_title(state, now_ns)]
+    for alarm in alarms_of(state, now_ns)[:_ALARMS]:
+        parts.append(Text(f" {alarm.text} ", style="bold white on red" if alarm.grave else "black on yellow"))
+    parts += [Text(), _entities(state, now_ns), Text(), _plan(state, now_ns)]
+    if state.cameras:
+        parts.append(_cameras(state, now_ns))
+    if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
+        parts.append(_command(state))
+    parts += [_processes(state, now_ns), Text(), *_events(state, now_ns)]
+    return Group(*parts)
+
+
+def _title(state: MonitorState, now_ns: int) -> Text:
+    text = Text(f"skein  {state.cast.site}", style="bold")
+    if state.started_ns:
+        text.append(f"  {(now_ns - state.started_ns) / 1e9:.0f} s", style="not bold")
+    if state.lease is not None and state.lease.message.expires_ns > now_ns:
+        text.append(f"  operator {state.lease.message.holder}", style="not bold dim")
+    text.append("  Ctrl-C lands all", style="not bold dim")
+    return text
+
+
+def _entities(state: MonitorState, now_ns: int) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 2, 0, 0))
+    for title in ("", "mode", "vehicle"):
+        table.add_column(title, no_wrap=True)
+    for title in ("battery", "link", "age", "position [m]", "95 % ellipse [m]"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("seen by", no_wrap=True)
+    names = dict.fromkeys([*state.cast.drones, *state.vehicles])
+    for name in names:
+        table.add_row(name, *_vehicle(state, name, now_ns), *_belief(state, name, now_ns))
+    if state.cast.target:
+        name = state.cast.target
+        table.add_row(Text(name, style="bold"), "", "target", "", "", *_belief(state, name, now_ns))
+    return table
+
+
+def _vehicle(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Text, Text]:
+    seen = state.vehicles.get(name)
+    if seen is None:
+        return Text("no word yet", style="dim"), Text(), Text(), Text()
+    status, stale = seen.message, seen.age_s(now_ns) > 1.0
+    battery = (
+        Text("?", style="dim") if status.battery is None else Text(f"{status.battery:.0%}", style=_battery(state, name))
+    )
+    dim = "dim" if stale else ""
+    return (
+        Text(status.mode, style="dim" if stale else _MODE_STYLES.get(status.mode, "")),
+        Text(str(status.flight_state).lower(), style=dim),
+        battery,
+        Text(f"{status.rate_hz:.0f} Hz", style="red" if stale or status.rate_hz < 1 else ""),
+    )
+
+
+def _battery(state: MonitorState, name: str) -> str:
+    battery = state.vehicles[name].message.battery or 0.0
+    limit = state.cast.drones.get(name, 0.15)
+    return "bold red" if battery < limit + 0.05 else "yellow" if battery < limit + 0.15 else ""
+
+
+def _belief(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Text, Text]:
+    entity = state.entity(name)
+    sight = _seen_by(state, name, now_ns)
+    if entity is None or state.estimate is None:
+        return Text(), Text("unknown", style="dim"), Text(), sight
+    age = entity.age_s + state.estimate.age_s(now_ns)
+    position = " ".join(f"{value:6.2f}" for value in entity.mean[: 3 if entity.kind == "robot" else 2])
+    style = "" if entity.converged else "yellow"
+    return (
+        Text(f"{age:.1f} s", style="red" if age > 3 else "yellow" if age > 1 else ""),
+        Text(position, style=style),
+        Text(_ellipse(entity), style=style),
+        sight,
+    )
+
+
+def _ellipse(entity: EntityEstimate) -> str:
+    size = len(entity.mean)
+    a, b, c = entity.covariance[0], entity.covariance[1], entity.covariance[size + 1]
+    middle, spread = (a + c) / 2, math.hypot((a - c) / 2, b)
+    axes = (math.sqrt(max(0.0, value) * _CHI2_95_2D) for value in (middle + spread, middle - spread))
+    return " x ".join(f"{axis:.2f}" for axis in axes)
+
+
+def _seen_by(state: MonitorState, name: str, now_ns: int) -> Text:
+    observers = sorted(
+        observer
+        for (observer, subject), stamp_ns in state.sightings.items()
+        if subject == name and now_ns - stamp_ns < _SEEN_S * 1e9
+    )
+    return Text(", ".join(observers) or "nobody", style="" if observers else "dim")
+
+
+def _plan(state: MonitorState, now_ns: int) -> Text:
+    if state.plan is None:
+        return Text("no plan yet", style="dim")
+    plan = state.plan.message
+    stale = state.plan.age_s(now_ns) > 1.0
+    text = Text("topology ", style="dim")
+    text.append(plan.topology.replace("/", " / ") or "none", style="dim" if stale else "bold magenta")
+    text.append(f"   cost {_cost(plan.cost)}   planner {plan.solver.seconds * 1000:.0f} ms ({plan.solver.status})")
+    others = sorted((a for a in plan.alternatives if a.topology != plan.topology), key=lambda a: a.cost)[:3]
+    if others:
+        text.append("   instead of " + ", ".join(f"{a.topology} {_cost(a.cost)}" for a in others), style="dim")
+    return text
+
+
+def _cost(square_metres: float) -> str:
+    return f"{square_metres * 1e4:.0f} cm2" if square_metres < 1 else f"{square_metres:.2f} m2"
+
+
+def _cameras(state: MonitorState, now_ns: int) -> Text:
+    text = Text("cameras  ", style="dim")
+    for name, seen in sorted(state.cameras.items()):
+        status = seen.message
+        bad = not status.connected or seen.age_s(now_ns) > 2.0
+        text.append(f"{name} ", style="red" if bad else "")
+        text.append(f"{status.fps:.0f} fps {status.age_ms:.0f} ms   " if status.connected else "no pictures   ")
+    return text
+
+
+def _command(state: MonitorState) -> Text:
+    assert state.command is not None
+    text = Text("command  ", style="dim")
+    text.append(str(state.command.message.verb), style="bold")
+    answers = state.answers.get(state.command.message.id, {})
+    names = state.command.message.scope or tuple(state.cast.drones)
+    for name in names:
+        answer = answers.get(name)
+        if answer is None:
+            text.append(f"  {name} NOT CONFIRMED", style="bold red")
+        elif answer.stage is AckStage.REFUSED:
+            text.append(f"  {name} refused: {answer.reason}", style="bold red")
+        else:
+            text.append(
+                f"  {name} {str(answer.stage).lower()}", style="green" if answer.stage is AckStage.EFFECTIVE else ""
+            )
+    return text
+
+
+def _processes(state: MonitorState, now_ns: int) -> Text:
+    text = Text("processes  ", style="dim")
+    total = 0.0
+    for name, seen in sorted(state.processes.items()):
+        status = seen.message
+        silent = seen.age_s(now_ns) > 3.0
+        total += 0.0 if silent else status.cpu
+        text.append(name, style="red" if silent else _STATE_STYLES[status.state])
+        text.append(f" {status.cpu:.0%}", style="dim")
+        if status.overruns:
+            text.append(f" {status.overruns} late", style="yellow")
+        text.append("  ")
+    text.append(f"together {total:.2f} cores", style="dim")
+    return text
+
+
+def _events(state: MonitorState, now_ns: int) -> list[Text]:
+    styles = {Severity.INFO: "", Severity.WARNING: "yellow", Severity.ERROR: "bold red"}
+    return [_event(seen, now_ns, styles[seen.message.severity]) for seen in list(state.events)[-_EVENTS:]]
+
+
+def _event(seen: Seen[Event], now_ns: int, style: str) -> Text:
+    event = seen.message
+    text = Text(f"{seen.age_s(now_ns):4.0f} s ago  ", style="dim", no_wrap=True, overflow="ellipsis")
+    text.append(f"{event.header.entity}: {event.text}", style=f"not dim {style}".strip())
+    if event.remedy:
+        text.append(f"  ({event.remedy})", style="dim")
+    return text

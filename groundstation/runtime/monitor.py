@@ -1,0 +1,39 @@
+"""The monitor process of a run: draws on the supervisor's terminal, which it inherits.
+
+Started as `groundstation.runtime.monitor:run`. `groundstation monitor` draws the same from another terminal.
+"""
+
+import msgspec
+
+from groundstation.bus import clock
+from groundstation.bus.clock import NS_PER_MS
+from groundstation.monitor.screen import Screen
+from groundstation.monitor.state import cast_from_field
+from groundstation.process.child import Child
+
+# A third of the drawing period: the heartbeat wants 10 turns a second, the eye four pictures.
+_PERIOD_NS = 84 * NS_PER_MS
+
+
+class MonitorSection(msgspec.Struct, frozen=True):
+    """What the supervisor hands to the monitor: the resolved field as JSON (and what the recorder needs)."""
+
+    field: msgspec.Raw
+    run_dir: str = ""
+    epoch: int = 0
+
+
+def run(child: Child) -> int:
+    """Draw until asked to stop or until the supervisor is gone; always gives the terminal back."""
+    section = msgspec.json.decode(child.section, type=MonitorSection)
+    with Screen(child.bus, cast_from_field(section.field), clock.now_ns()) as screen:
+        child.ready()
+        ticks, due_ns = 0, clock.now_ns()
+        while not child.stop_requested and child.supervisor_alive:
+            screen.turn(clock.now_ns())
+            ticks += 1
+            child.beat()
+            child.tick_status(ticks=ticks)
+            due_ns = max(due_ns + _PERIOD_NS, clock.now_ns())
+            child.sleep_until(due_ns)
+    return 0

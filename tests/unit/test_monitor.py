@@ -1,0 +1,206 @@
+"""The monitor's picture of a given state."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.screen import DRAW_PERIOD_NS, Screen, line
+from groundstation.monitor.state import Cast, MonitorState, cast_from_field
+from groundstation.monitor.table import render
+
+S = 1_000_000_000
+NOW = 100 * S
+CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, "turtlebot", ("ceiling",))
+
+
+class World:
+    """A bus with a screen on it, and shorthands to speak as the other processes."""
+
+    def __init__(self) -> None:
+        exchange = MemoryExchange()
+        self._exchange = exchange
+        self.output = io.StringIO()
+        console = Console(file=self.output, force_terminal=True, width=140, height=40)
+        self.screen = Screen(MemoryBus(exchange, "lab", "monitor"), CAST, 0, console)
+
+    @property
+    def state(self) -> MonitorState:
+        return self.screen.state
+
+    def header(self, entity: str, age_s: float = 0.0) -> m.Header:
+        return m.Header(NOW - round(age_s * S), "here", entity, entity, 1)
+
+    def say(self, topic: t.Topic, message: m.Message) -> None:
+        MemoryBus(self._exchange, "lab", message.header.source).publish(topic, message)
+
+    def vehicle(self, name: str, mode: str = "TRACK", battery: float | None = 0.8, age_s: float = 0.0) -> None:
+        header = self.header(name, age_s)
+        state = m.FlightState.FLYING
+        self.say(
+            t.VEHICLE_STATUS,
+            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7),
+        )
+
+    def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0) -> None:
+        wide = (0.04, 0.0, 0.0, 0.01)
+        robot = tuple(0.01 if index % 5 == 0 else 0.0 for index in range(16))
+        entities = (
+            m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, 0.2),
+            m.EntityEstimate("turtlebot", "target", (0.75, 0.25), wide, (0.0, 0.0), True, target_age_s),
+        )
+        self.say(t.ESTIMATE, m.Estimate(header=self.header("team", age_s), entities=entities, epoch=1))
+
+    def status(self, name: str, state: m.Lifecycle = m.Lifecycle.READY, age_s: float = 0.0, detail: str = "") -> None:
+        header = self.header(name, age_s)
+        self.say(
+            t.PROCESS_STATUS,
+            m.ProcessStatus(header=header, state=state, pid=1, cpu=0.34, overruns=2, detail=detail),
+        )
+
+    def text(self) -> str:
+        self.screen._due_ns = 0
+        self.screen.turn(NOW)
+        console = Console(record=True, width=140, file=io.StringIO())
+        console.print(render(self.state, NOW))
+        return console.export_text()
+
+
+@pytest.fixture
+def world() -> World:
+    return World()
+
+
+def test_an_empty_state_is_drawn(world: World) -> None:
+    text = world.text()
+    assert "no word yet" in text and "no plan yet" in text
+
+
+def test_the_table_shows_mode_battery_link_position_and_ellipse(world: World) -> None:
+    world.vehicle("drone_1")
+    world.estimate()
+    world.say(
+        t.OBSERVATION,
+        m.RelativeObservation(
+            header=world.header("drone_1", 0.1), observer="drone_1", subject="turtlebot", camera="drone_1_camera",
+            position_m=(0.0, 0.0, 1.0), yaw_rad=None, covariance=(0.0,) * 9,
+        ),
+    )  # fmt: skip
+    text = world.text()
+    (row,) = (line for line in text.splitlines() if line.startswith("drone_1 "))
+    for part in ("TRACK", "80%", "200 Hz", "0.2 s", "1.25  -0.50   1.30", "0.24 x 0.24", "nobody"):
+        assert part in row
+    (row,) = (line for line in text.splitlines() if line.startswith("turtlebot"))
+    for part in ("0.75   0.25", "0.49 x 0.24", "drone_1"):
+        assert part in row
+
+
+def test_the_plan_is_shown_beside_its_alternatives(world: World) -> None:
+    plan = m.Plan(
+        header=world.header("team"), topology="drone_1/drone_2", cost=0.0123, controls=(), edges=(),
+        alternatives=(m.Alternative("drone_1,drone_2", 0.0150), m.Alternative("drone_1/drone_2", 0.0123)),
+        solver=m.SolverReport("converged", 40, 0.012, 2, 1), mode="certified",
+    )  # fmt: skip
+    world.say(t.PLAN, plan)
+    text = world.text()
+    assert "drone_1 / drone_2" in text and "123 cm2" in text and "12 ms" in text
+    assert "instead of drone_1,drone_2 150 cm2" in text
+
+
+def test_a_command_is_not_confirmed_until_each_drone_has_answered(world: World) -> None:
+    answer = m.CommandAck(header=world.header("drone_1"), command_id="7", verb=m.Verb.LAND, stage=m.AckStage.EFFECTIVE)
+    world.say(t.COMMAND_ACK, answer)  # overtakes its command
+    world.say(t.COMMAND, m.Command(header=world.header("team"), id="7", verb=m.Verb.LAND, scope=(), issuer="me"))
+    text = world.text()
+    assert "drone_1 effective" in text
+    assert "drone_2 NOT CONFIRMED" in text
+
+
+def test_processes_and_events_are_listed(world: World) -> None:
+    world.status("tracker")
+    event = m.Event(header=world.header("drone_2", 3.0), severity=m.Severity.WARNING, text="wind", remedy="land")
+    world.say(t.EVENT, event)
+    text = world.text()
+    assert "tracker 34% 2 late" in text and "together 0.34 cores" in text
+    assert "3 s ago  drone_2: wind  (land)" in text
+
+
+def _alarms(world: World) -> list[str]:
+    world.text()
+    return [alarm.text for alarm in alarms_of(world.state, NOW)]
+
+
+def test_nothing_wrong_raises_no_alarm(world: World) -> None:
+    world.vehicle("drone_1")
+    world.estimate()
+    world.status("tracker")
+    assert _alarms(world) == []
+
+
+def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> None:
+    world.vehicle("drone_1", battery=0.18)
+    world.vehicle("drone_2", age_s=4.0)
+    world.estimate(target_age_s=6.0, age_s=0.5)
+    world.status("recorder", m.Lifecycle.DEGRADED, detail="disk full")
+    world.status("ceiling", age_s=5.0)
+    assert _alarms(world) == [
+        "drone_2: nothing heard for 4 s",
+        "tracker: no estimate for 0.5 s",
+        "process ceiling: silent for 5 s",
+        "drone_1: battery 18% (lands at 15%)",
+        "turtlebot: not seen for 6 s",
+        "process recorder: disk full",
+    ]
+    assert "nothing heard for 4 s" in world.text()
+
+
+def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
+    header = world.header("ceiling")
+    status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
+    world.say(t.CAMERA_STATUS, status)
+    assert _alarms(world) == ["ceiling: no pictures"]
+
+
+def test_the_screen_draws_four_times_a_second_and_gives_the_terminal_back(world: World) -> None:
+    with world.screen as screen:
+        for step in range(100):
+            screen.turn(NOW + step * DRAW_PERIOD_NS // 10)
+        drawn = world.output.getvalue().count("skein")
+    assert 9 <= drawn <= 12
+    assert world.output.getvalue().startswith("\x1b[?1049h")
+    assert "\x1b[?1049l" in world.output.getvalue()
+
+
+def test_a_closed_terminal_does_not_end_the_process(world: World) -> None:
+    with world.screen as screen:
+
+        def broken(_text: str) -> int:
+            raise OSError(5, "Input/output error")
+
+        world.output.write = broken  # type: ignore[method-assign]
+        screen.turn(NOW)
+        screen.turn(NOW + S)
+
+
+def test_without_a_terminal_it_prints_a_line_now_and_then() -> None:
+    output = io.StringIO()
+    bus = MemoryBus(MemoryExchange(), "lab", "monitor")
+    with Screen(bus, CAST, NOW, Console(file=output, force_terminal=False)) as screen:
+        for second in range(11):
+            screen.turn(NOW + second * S)
+    assert len(output.getvalue().splitlines()) == 3
+
+
+def test_the_line_names_modes_and_alarms(world: World) -> None:
+    world.vehicle("drone_1", mode="HOLD", battery=0.1)
+    world.text()
+    assert line(world.state, NOW) == "  100 s  drone_1 HOLD; ! drone_1: battery 10% (lands at 15%)"
+
+
+def test_the_cast_comes_from_the_resolved_field() -> None:
+    field = b'{"site":"lab","drones":{"d":{"limits":{"battery_min":0.2}}},"cameras":{"c":{}},"target":{"name":"t"}}'
+    assert cast_from_field(field) == Cast("lab", {"d": 0.2}, "t", ("c",))

@@ -281,20 +281,21 @@ def test_killed_supervisor_leaves_no_orphan(tmp_path: Path, monkeypatch: pytest.
                         section=json.dumps(dict(endpoint=endpoint)), stop_order=StopOrder.CONNECTS),
             ProcessSpec("drone_1", "driver", entry="dummies:obedient"),
         )
-        supervisor = Supervisor(Run("lab", "lab", endpoint, Path("{tmp_path}/run"), ()), table, Terminal())
+        terminal = Terminal()
+        supervisor = Supervisor(Run("lab", "lab", endpoint, Path("{tmp_path}/run"), ()), table, terminal)
         supervisor.start()
-        print("up", flush=True)
+        terminal.say("up")
         while True:
             supervisor.step()
     """
     command = [sys.executable, "-c", textwrap.dedent(script)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if line == b"up\n":
-                break
-        (record,) = runtime_file.live_records()
-        process.kill()
+        try:
+            assert process.stdout is not None
+            assert b"up\n" in process.stdout
+            (record,) = runtime_file.live_records()
+        finally:
+            process.kill()
     deadline = time.monotonic() + 10
     while record.alive:
         assert time.monotonic() < deadline, "orphans remain"

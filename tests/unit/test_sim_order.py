@@ -1,0 +1,190 @@
+"""The start order of the bridge: what is checked, what each render process is told, how time and faults run."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.errors import GroundStationError, SettingsError
+from sim_bridge.cameras import render_specs
+from sim_bridge.clockwork import Clockwork
+from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.faults import FaultSchedule
+from sim_bridge.order import read_order
+from sim_bridge.render.spec import BodyShape, OutageKind
+from sim_bridge.scenario import Fault, FaultKind, Scenario
+from sim_bridge.world.world import TICK_NS, World
+
+LENS = {
+    "model": "plumb_bob",
+    "width_px": 640,
+    "height_px": 360,
+    "fx_px": 460.0,
+    "fy_px": 461.0,
+    "cx_px": 319.5,
+    "cy_px": 179.5,
+    "distortion": [-0.3, 0.08, 0.0, 0.0, 0.0],
+}
+MARKER = {"code": 1, "square_mm": 44, "position_m": [0.0, 0.0, 0.08]}
+CAMERA = {"calibration": LENS, "position_m": [0.09, 0.0, 0.0], "tilt_down_deg": 45.0}
+
+
+def order() -> dict[str, Any]:
+    return {
+        "child": {"name": "sim_bridge", "role": "sim_bridge", "endpoint": "", "site": "lab"},
+        "field": {
+            "site": "lab",
+            "room": {"size_m": [8, 6, 4.5], "fence": "not for the simulator"},
+            "cameras": {"ceiling": {"calibration": LENS, "position_m": [0.5, 0.0, 4.2]}},
+            "drones": {
+                "drone_1": {
+                    "kind": "ardrone",
+                    "pad_m": [-1, 0.5],
+                    "pad_yaw_deg": 90,
+                    "marker": MARKER,
+                    "camera": CAMERA,
+                },
+                "drone_2": {"kind": "ardrone", "pad_m": [-1, -0.5], "marker": MARKER | {"code": 2}, "camera": CAMERA},
+            },
+            "target": {"name": "turtlebot", "marker": {"code": 5, "height_m": 0.4, "square_mm": 44}},
+            "planner": {"of": "no interest"},
+        },
+        "scenario": {"seed": 4},
+        "addresses": {"drone_1": "127.1.2.11", "drone_2": "127.1.2.12"},
+        "streams": {"ceiling": ["127.1.2.50", 8080], "drone_1": ["127.1.2.51", 8080]},
+        "seed": 9,
+    }
+
+
+def write(path: Path, content: dict[str, Any]) -> Path:
+    file = path / "spec.json"
+    file.write_text(json.dumps(content))
+    return file
+
+
+def test_a_good_order_is_read(tmp_path: Path) -> None:
+    read = read_order(write(tmp_path, order()))
+    assert read.site.bodies == ("drone_1", "drone_2", "turtlebot")
+    assert read.seed == 9
+    assert read.streams["ceiling"] == ("127.1.2.50", 8080)
+    assert read.scenario.seed == 4
+
+
+def test_without_a_seed_the_scenario_decides(tmp_path: Path) -> None:
+    content = order()
+    del content["seed"]
+    assert read_order(write(tmp_path, content)).seed == 4
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda o: o.pop("field"), "field"),
+        (lambda o: o["field"]["drones"]["drone_1"].pop("pad_m"), "drones.drone_1.pad_m"),
+        (lambda o: o["addresses"].pop("drone_2"), "addresses: none for drone_2"),
+        (lambda o: o["scenario"].update(cameras={"fsp": 3}), "cameras.fsp"),
+        (
+            lambda o: o["scenario"].update(faults=[{"kind": "camera_cut", "entity": "celing", "start_s": 1}]),
+            "'celing' is none of ceiling, drone_1",
+        ),
+        (
+            lambda o: o["scenario"].update(faults=[{"kind": "navdata_silent", "entity": "ceiling", "start_s": 1}]),
+            "'ceiling' is none of drone_1, drone_2",
+        ),
+    ],
+)
+def test_wrong_orders_are_refused_by_name(tmp_path: Path, change: Any, named: str) -> None:
+    content = order()
+    change(content)
+    with pytest.raises(SettingsError, match=named):
+        read_order(write(tmp_path, content))
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"nowhere\.json"):
+        read_order(tmp_path / "nowhere.json")
+
+
+def test_render_specs_follow_field_and_scenario(tmp_path: Path) -> None:
+    content = order()
+    content["scenario"] = {
+        "cameras": {"frame_loss": 0.1},
+        "faults": [{"kind": "camera_stall", "entity": "ceiling", "start_s": 3, "end_s": 4}],
+    }
+    read = read_order(write(tmp_path, content))
+    ceiling, onboard = render_specs(read.site, read.scenario, read.streams, "board", read.seed)
+    assert (ceiling.camera, ceiling.address, ceiling.port) == ("ceiling", "127.1.2.50", 8080)
+    assert ceiling.mount.body == ""
+    point = ceiling.mount.parent_from_optical.apply(np.array([1.0, 2.0, 4.2]))
+    np.testing.assert_allclose(point, [1.5, -2.0, 0.0], atol=1e-12)
+    assert [outage.kind for outage in ceiling.scenario.outages] == [OutageKind.STALL]
+    assert ceiling.scenario.frame_loss == 0.1
+    assert onboard.mount.body == "drone_1"
+    assert onboard.scenario.outages == ()
+    ahead = onboard.mount.parent_from_optical.apply(np.array([0.0, 0.0, np.sqrt(2.0)]))
+    np.testing.assert_allclose(ahead, [1.09, 0.0, -1.0], atol=1e-12)
+    assert [(board.body, board.code) for board in onboard.boards] == [("drone_1", 1), ("drone_2", 2), ("turtlebot", 5)]
+    assert onboard.boards[2].shape is BodyShape.TURTLEBOT
+    assert onboard.boards[2].position_m == (0.0, 0.0, 0.4)
+
+
+def test_a_stream_of_no_camera_is_named(tmp_path: Path) -> None:
+    content = order()
+    content["streams"]["attic"] = ["127.1.2.53", 8080]
+    read = read_order(write(tmp_path, content))
+    with pytest.raises(GroundStationError, match="attic"):
+        render_specs(read.site, read.scenario, read.streams, "board", 1)
+
+
+def test_clockwork_counts_late_ticks_and_gives_up_on_lost_time() -> None:
+    clock = Clockwork(0)
+    assert [clock.next_deadline() for _ in range(3)] == [TICK_NS, 2 * TICK_NS, 3 * TICK_NS]
+    clock.begin(clock.deadline_ns + 9_000_000)
+    assert clock.overruns == 0
+    clock.begin(clock.deadline_ns + 11_000_000)
+    assert clock.overruns == 1
+    assert clock.next_deadline() == 4 * TICK_NS, "it catches up"
+    clock.begin(5_000_000_000)
+    assert clock.next_deadline() == 5_000_000_000 + TICK_NS, "after a freeze it starts anew"
+
+
+def test_more_than_one_percent_late_invalidates_the_run() -> None:
+    clock = Clockwork(0)
+    for tick in range(1000):
+        deadline = clock.next_deadline()
+        clock.begin(deadline + (20_000_000 if tick < 10 else 0))
+    assert clock.keeps_time
+    clock.begin(clock.next_deadline() + 20_000_000)
+    assert not clock.keeps_time
+
+
+def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
+    read = read_order(write(tmp_path, order()))
+    world = World(read.site, Scenario(), 1)
+    emulators = {
+        name: ArDroneEmulator(name, "127.90.1.1" if name == "drone_1" else "127.90.1.2", drone, world.onboard[name])
+        for name, drone in world.drones.items()
+    }
+    schedule = FaultSchedule(
+        [
+            Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_1", start_s=2, end_s=3),
+            Fault(kind=FaultKind.AT_DEAF, entity="drone_2", start_s=1),
+            Fault(kind=FaultKind.BATTERY_DROP, entity="drone_1", start_s=1.5, value=0.1),
+            Fault(kind=FaultKind.CAMERA_CUT, entity="ceiling", start_s=0),
+        ],
+        world,
+        emulators,
+    )
+    assert schedule.apply(0.5) == []
+    assert len(schedule.apply(1.6)) == 2
+    assert emulators["drone_2"].deaf
+    assert world.drones["drone_1"].battery == 0.1
+    assert not emulators["drone_1"].silent
+    schedule.apply(2.0)
+    assert emulators["drone_1"].silent
+    assert schedule.apply(3.1) == ["fault navdata_silent of drone_1 ends"]
+    assert not emulators["drone_1"].silent
+    for emulator in emulators.values():
+        emulator.close()

@@ -32,8 +32,8 @@ _LINE_PERIOD_NS = 5_000_000_000
 class Screen:
     """Context manager around the terminal. Call `turn` often: it draws four times a second."""
 
-    def __init__(self, bus: Bus, cast: Cast, now_ns: int, console: Console | None = None) -> None:
-        self.state = MonitorState(cast=cast, started_ns=now_ns)
+    def __init__(self, bus: Bus, cast: Cast, now_ns: int, console: Console | None = None, hint: str = "") -> None:
+        self.state = MonitorState(cast=cast, hint=hint, started_ns=now_ns)
         self._console = console or Console()
         self._newest = bus.subscribe(
             (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS), newest=True
@@ -58,12 +58,16 @@ class Screen:
         with suppress(OSError):
             self._stack.close()  # gives the terminal its former content back
 
+    def listen(self) -> None:
+        """Take in what has arrived, without drawing."""
+        self.state.ingest(self._newest.drain())
+        self.state.ingest(self._each.drain())
+
     def turn(self, now_ns: int) -> None:
         """Take in what has arrived and draw, if it is time."""
         if now_ns < self._due_ns:
             return
-        self.state.ingest(self._newest.drain())
-        self.state.ingest(self._each.drain())
+        self.listen()
         try:
             self._draw(now_ns)
         except OSError:

@@ -1,9 +1,9 @@
 """What an observer of the bus remembers: the newest of everything, and when it was."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -65,9 +65,10 @@ class Seen(Generic[T]):
 
 @dataclass(slots=True)
 class MonitorState:
-    """The newest message of each kind and entity."""
+    """The newest message of each kind and entity; `hint` is what Ctrl-C does here."""
 
     cast: Cast = field(default_factory=Cast)
+    hint: str = ""
     started_ns: int = 0
     vehicles: dict[str, Seen[m.VehicleStatus]] = field(default_factory=dict)
     cameras: dict[str, Seen[m.CameraStatus]] = field(default_factory=dict)
@@ -91,6 +92,22 @@ class MonitorState:
         """Return what is believed of an entity."""
         entities = self.estimate.message.entities if self.estimate else ()
         return next((entity for entity in entities if entity.name == name), None)
+
+    def as_json(self, now_ns: int) -> bytes:
+        """Return the newest messages by kind and entity, each with its age."""
+
+        def by_name(group: Mapping[str, Seen[Any]]) -> dict[str, Any]:
+            return {name: {"age_s": seen.age_s(now_ns), "message": seen.message} for name, seen in group.items()}
+
+        single = {"estimate": self.estimate, "plan": self.plan, "lease": self.lease, "sim": self.sim}
+        content = {
+            "vehicles": by_name(self.vehicles),
+            "cameras": by_name(self.cameras),
+            "processes": by_name(self.processes),
+            "events": [seen.message for seen in self.events],
+            **by_name({name: seen for name, seen in single.items() if seen is not None}),
+        }
+        return msgspec.json.encode(content)
 
     def _take(self, entity: str, stamp_ns: int, message: m.Message) -> None:
         match message:

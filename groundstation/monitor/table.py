@@ -53,7 +53,7 @@ def _title(state: MonitorState, now_ns: int) -> Text:
         text.append(f"  {(now_ns - state.started_ns) / 1e9:.0f} s", style="not bold")
     if state.lease is not None and state.lease.message.expires_ns > now_ns:
         text.append(f"  operator {state.lease.message.holder}", style="not bold dim")
-    text.append("  Ctrl-C lands all", style="not bold dim")
+    text.append(f"  {state.hint}", style="not bold dim")
     return text
 
 

@@ -26,7 +26,8 @@ class MonitorSection(msgspec.Struct, frozen=True):
 def run(child: Child) -> int:
     """Draw until asked to stop or until the supervisor is gone; always gives the terminal back."""
     section = msgspec.json.decode(child.section, type=MonitorSection)
-    with Screen(child.bus, cast_from_field(section.field), clock.now_ns()) as screen:
+    cast = cast_from_field(section.field)
+    with Screen(child.bus, cast, clock.now_ns(), hint="Ctrl-C lands all") as screen:
         child.ready()
         ticks, due_ns = 0, clock.now_ns()
         while not child.stop_requested and child.supervisor_alive:

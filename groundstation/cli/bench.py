@@ -1,0 +1,38 @@
+"""`groundstation bench`: long measurements, each a sub-command imported only when it is called."""
+
+import importlib
+
+import click
+
+# name -> (module:function, line in the help); a new bench is one row here and one module beside this one.
+BENCHES = {
+    "demo": ("groundstation.cli.bench_demo:demo", "Fly many seeds of the demo and judge each."),
+}
+
+
+class BenchGroup(click.Group):
+    """Sub-commands from the table above."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order of the table."""
+        return list(BENCHES)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a bench, importing its module now; None for an unknown name."""
+        row = BENCHES.get(cmd_name)
+        if row is None:
+            return None
+        module, _, function = row[0].partition(":")
+        command = getattr(importlib.import_module(module), function)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the table without importing any bench."""
+        with formatter.section("Benches"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in BENCHES.items()])
+
+
+@click.group(cls=BenchGroup, epilog="Example: groundstation bench demo --seeds 10")
+def bench() -> None:
+    """Measure again and again, and judge each time."""

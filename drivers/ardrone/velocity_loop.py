@@ -20,10 +20,10 @@ class Gains:
     rad/s], settle_s: after so long at zero the drone holds its place by itself.
     """
 
-    proportional: float = 2.4
-    integral: float = 0.8
-    drag: float = 0.45
-    reference_s: float = 0.42
+    proportional: float = 1.8
+    integral: float = 1.0
+    drag: float = 0.35
+    reference_s: float = 0.5
     integral_m_s2: float = 0.8
     still: float = 0.02
     settle_s: float = 1.0

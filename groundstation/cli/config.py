@@ -13,7 +13,7 @@ _OPTION = click.option(
 )
 
 
-@click.group()
+@click.group(epilog="\b\nExamples:\n  groundstation config check lab.yaml\n  groundstation config init my_lab")
 def config() -> None:
     """Check, show, describe or start a field file."""
 

@@ -181,7 +181,9 @@ class _Reader:
             line = key.start_mark.line
             name = key.value if key.id == "scalar" else "?"
             origin = self._origin(key, (*path, name))
-            if key.id != "scalar" or key.tag.endswith(":merge"):
+            if not name.isprintable():
+                self.problems.append(f"{origin}: {name!a}: holds a character that cannot be printed")
+            elif key.id != "scalar" or key.tag.endswith(":merge"):
                 self.problems.append(f"{origin}: {dotted((*path, name))}: must be a plain key (use defaults and types)")
             elif name in seen:
                 first = self._origin(key, path, seen[name])
@@ -196,6 +198,8 @@ class _Reader:
             self.problems.append(f"{origin}: {dotted(origin.path)}: tag {source.tag} is not understood here")
             return None
         if kind in ("str", "timestamp"):
+            if not source.value.isprintable():
+                self.problems.append(f"{origin}: {dotted(origin.path)}: holds a character that cannot be printed")
             return source.value
         try:
             return self._constructor.construct_object(source)

@@ -1,5 +1,6 @@
 """From a field file as written to a field as resolved: options, calibrations, then defaults < type < robot."""
 
+import json
 from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,7 +17,7 @@ def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:
 
     named: top-level mappings of names, in which an option may change an entry, but not invent one.
     """
-    place = f"--set {option}"
+    place = f"--set {' '.join(option.split())}"
     name, equals, text = option.partition("=")
     path = tuple(part.strip() for part in name.split("."))
     if not equals or not all(path):
@@ -148,11 +149,11 @@ class Levels:
         entries = dict(drone.value)
         kind = entries.pop("type", None)
         base = self.defaults
-        if kind is not None and kind.value in self.types:
+        if kind is not None and isinstance(kind.value, str) and kind.value in self.types:
             base = merged(base, self.types[kind.value])
         elif kind is not None:
             self.untyped.add(name)
             near = get_close_matches(str(kind.value), self.types, 1, 0.5)
             meant = f", did you mean {near[0]}?" if near else f"; there are: {', '.join(self.types) or 'none'}"
-            self.problems.append(problem(kind.origin, f"there is no type {kind.value}{meant}"))
+            self.problems.append(problem(kind.origin, f"there is no type {json.dumps(kind.plain())}{meant}"))
         return merged(base, Node(entries, drone.origin))

@@ -49,6 +49,15 @@ def test_each_verb_is_where_the_table_says() -> None:
             assert command is not None, f"{name}: {function}"
 
 
+@pytest.mark.parametrize("name", sorted(cli.VERBS))
+def test_each_verb_has_examples_in_its_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    module = cli.VERBS[name].target.partition(":")[0]
+    if not (Path(cli.__file__).parents[2] / (module.replace(".", "/") + ".py")).is_file():
+        pytest.skip(f"{module} is not there")
+    assert cli.run([name, "--help"]) == 0
+    assert f"groundstation {name}" in capsys.readouterr().out.partition("\n\n")[2]
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [

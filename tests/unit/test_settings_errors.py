@@ -136,6 +136,8 @@ def test_a_wrong_type_is_wrong_although_no_drone_uses_it() -> None:
         (b"a: !!python/object:os.system x\n", None),
         (b"a: &x [*x]\n", None),
         (b"a: \x00\n", None),
+        (b'a: "b\\nc"\n', "lab.yaml:1: a: holds a character that cannot be printed"),
+        (b'"a\\e": 1\n', "lab.yaml:1: 'a\\x1b': holds a character that cannot be printed"),
         (b"site: lab\n", "lab.yaml:1: schema_version: is required, 1 here"),
         (
             b"schema_version: 2\nwings: 4\n",

@@ -185,8 +185,8 @@ def _processes(state: MonitorState, now_ns: int) -> Text:
         total += 0.0 if silent else status.cpu
         text.append(name, style="red" if silent else _STATE_STYLES[status.state])
         text.append(f" {status.cpu:.0%}", style="dim")
-        if status.overruns:
-            text.append(f" {status.overruns} late", style="yellow")
+        if status.overruns > 0.01 * status.ticks:
+            text.append(f" {status.overruns / max(status.ticks, 1):.0%} late", style="yellow")
         text.append("  ")
     text.append(f"together {total:.2f} cores", style="dim")
     return text

@@ -59,7 +59,7 @@ class World:
         header = self.header(name, age_s)
         self.say(
             t.PROCESS_STATUS,
-            m.ProcessStatus(header=header, state=state, pid=1, cpu=0.34, overruns=2, detail=detail),
+            m.ProcessStatus(header=header, state=state, pid=1, cpu=0.34, ticks=100, overruns=2, detail=detail),
         )
 
     def text(self) -> str:
@@ -125,7 +125,7 @@ def test_processes_and_events_are_listed(world: World) -> None:
     event = m.Event(header=world.header("drone_2", 3.0), severity=m.Severity.WARNING, text="wind", remedy="land")
     world.say(t.EVENT, event)
     text = world.text()
-    assert "tracker 34% 2 late" in text and "together 0.34 cores" in text
+    assert "tracker 34% 2% late" in text and "together 0.34 cores" in text
     assert "3 s ago  drone_2: wind  (land)" in text
 
 

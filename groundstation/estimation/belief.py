@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimation.layout import CORE_SIZE, Layout
+from groundstation.estimation.layout import CORE_SIZE, EntityKind, Layout
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -40,8 +40,9 @@ class JointBelief:
 
     def core(self) -> "JointBelief":
         """Return the belief of robots' (x, y, z, yaw) and targets' (x, y, vx, vy) alone, the rest marginalised."""
-        kept = [block.start + i for block in self.layout.blocks for i in range(CORE_SIZE)]
+        blocks = [block for block in self.layout.blocks if block.kind is not EntityKind.CAMERA]
+        kept = [block.start + i for block in blocks for i in range(CORE_SIZE)]
         layout = Layout()
-        for block in self.layout.blocks:
+        for block in blocks:
             layout = layout.with_entity(block.name, block.kind, block.labels[:CORE_SIZE])
         return JointBelief(self.mean[kept], self.covariance[np.ix_(kept, kept)], layout, self.stamp_ns)

@@ -48,14 +48,10 @@ def linearise(
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
     start = entities[subject, s.ENTITY_START]
     size = entities[subject, s.ENTITY_SIZE]
-    nobody = np.zeros(s.MAX_BLOCK)
-    seen_from, start_o, size_o = nobody, 0, 0
-    if observer >= 0:
-        start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
-        seen_from = mean[start_o : start_o + size_o]
+    start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
     h = np.zeros(4)
     relative_pose(
-        seen_from,
+        mean[start_o : start_o + size_o],
         mean[start : start + size],
         parameters[subject],
         entities[subject, s.ENTITY_MODEL],
@@ -91,9 +87,7 @@ def correct(
     """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
     start, size = entities[subject, s.ENTITY_START], entities[subject, s.ENTITY_SIZE]
-    start_o, size_o = 0, 0
-    if observer >= 0:
-        start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
+    start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
     if factor > 1.0:
         inflate(work[2], R, rows, factor)
         surprise(work[2], R, y, rows, work[3])
@@ -124,7 +118,7 @@ def write_outcome(out: Array, nis: float, rows: int, y: Array, work: Array) -> N
 def refusal(entities: IntArray, aux: Array, event: Array) -> int:
     """Return why an observation cannot be used whatever it says, or PENDING."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    if observer >= 0 and aux[observer, s.ACTIVE] == 0.0:
+    if aux[observer, s.ACTIVE] == 0.0:
         return s.OBSERVER_UNKNOWN
     is_robot = entities[subject, s.ENTITY_MODEL] == s.ODOMETRY_ROBOT
     if is_robot and aux[subject, s.AIRBORNE] == 0.0:
@@ -196,10 +190,8 @@ def enter(
 ) -> None:
     """Let the subject join (again) where the measurement puts it, diffuse until the correction that follows."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    seen_from, pose = np.zeros(s.MAX_BLOCK), np.zeros(4)
-    if observer >= 0:
-        start = entities[observer, s.ENTITY_START]
-        seen_from = mean[start : start + entities[observer, s.ENTITY_SIZE]].copy()
+    start = entities[observer, s.ENTITY_START]
+    seen_from, pose = mean[start : start + entities[observer, s.ENTITY_SIZE]].copy(), np.zeros(4)
     model, p = entities[subject, s.ENTITY_MODEL], parameters[subject]
     pose_from_observation(seen_from, p, model, camera, event[s.EVENT_ROLL], event[s.EVENT_PITCH], z, pose)
     join(mean, P, entities[subject], p, pose)

@@ -16,7 +16,7 @@ from groundstation.estimation.event_log import EventLog, observation_columns
 from groundstation.estimation.gating import gate
 from groundstation.estimation.layout import EntityKind, Layout
 from groundstation.estimation.measurement import Correction, Measurement, Motion
-from groundstation.estimation.models import OdometryRobot
+from groundstation.estimation.models import FixedMount, OdometryRobot
 from groundstation.estimation.parameters import EstimatorParameters
 from groundstation.estimation.replay import replay
 
@@ -91,10 +91,10 @@ class FixedLagFilter:
         if verdict is not Verdict.ACCEPTED:
             return verdict
         step = self._mark(m.stamp_ns)
-        observer = s.WORLD if mount.carrier is None else self._index[mount.carrier]
+        observer = self._index[mount.carrier]
         columns = observation_columns(m, self._seconds(m.stamp_ns), step, observer, subject, camera)
         row = self._log.add(m.stamp_ns, tie, columns)
-        self._fresh[row] = (mount.carrier or m.camera, m.subject, (now_ns - m.stamp_ns) / 1e6)
+        self._fresh[row] = (mount.carrier, m.subject, (now_ns - m.stamp_ns) / 1e6)
         return None
 
     def set_airborne(self, robot: str, airborne: bool, stamp_ns: int, now_ns: int) -> Verdict:
@@ -196,6 +196,12 @@ class FixedLagFilter:
         self._fresh: dict[int, tuple[str, str, float]] = {}
         self._mean, self._P = np.zeros(n), np.zeros((n, n))
         self._aux = np.zeros((entities, s.AUXILIARY_COLUMNS))
+        for model, entity, aux in zip(self._models, self._entities, self._auxiliaries[0], strict=True):
+            if isinstance(model, FixedMount):
+                part = slice(entity[s.ENTITY_START], entity[s.ENTITY_START] + entity[s.ENTITY_SIZE])
+                self._means[0, part], variances = model.prior()
+                self._covariances[0, part, part] = np.diag(variances)
+                aux[s.ACTIVE] = 1.0
         self._started = False
         self._origin_ns = self._now_ns = self._last = self._dirty = 0
 

@@ -9,6 +9,7 @@ class EntityKind(StrEnum):
 
     ROBOT = "robot"
     TARGET = "target"
+    CAMERA = "camera"
 
 
 ROBOT_CORE = ("x", "y", "z", "yaw")
@@ -18,7 +19,7 @@ CORE_SIZE = 4
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One entity's entries: robots begin with x, y, z, yaw; targets with x, y, vx, vy [m, rad, m/s; world]."""
+    """One entity's entries: robots and cameras begin with x, y, z, yaw; targets with x, y, vx, vy [world]."""
 
     name: str
     kind: EntityKind

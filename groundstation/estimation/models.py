@@ -14,6 +14,7 @@ from groundstation.estimation.belief import Array
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind
 
 Vector3 = tuple[float, float, float]
+CARRIER_LABELS = (*ROBOT_CORE, "roll_error", "pitch_error")
 
 
 class MotionModel(Protocol):
@@ -38,14 +39,7 @@ class OdometryRobot:
 
     number: ClassVar[int] = s.ODOMETRY_ROBOT
     kind: ClassVar[EntityKind] = EntityKind.ROBOT
-    labels: ClassVar[tuple[str, ...]] = (
-        *ROBOT_CORE,
-        "climb",
-        "velocity_scale",
-        "roll_error",
-        "pitch_error",
-        "height_error",
-    )
+    labels: ClassVar[tuple[str, ...]] = (*CARRIER_LABELS, "climb", "velocity_scale", "height_error")
 
     marker_position_m: Vector3 = (0.0, 0.0, 0.08)
     velocity_scale: float = 1.0
@@ -108,16 +102,46 @@ class ConstantVelocityTarget:
 
 
 @dataclass(frozen=True, slots=True)
-class MountedCamera:
-    """A camera on a robot (`carrier`) or fixed in the world (no carrier): extrinsics and how well they are known.
+class FixedMount:
+    """Where a world-fixed camera hangs [m; world], and how well that is known.
 
-    rotation (3, 3), translation (3): base_from_camera, or world_from_camera [m]. A mounting error is the same in
-    every picture, so it enters R `repeats` times over: it must not average out.
+    Its errors are the same in every picture: as states they do not average out, and what robots learn from each other
+    about them is kept. Over `creep_s` the mounting may change by as much as its first uncertainty.
     """
 
-    carrier: str | None
+    number: ClassVar[int] = s.FIXED_MOUNT
+    kind: ClassVar[EntityKind] = EntityKind.CAMERA
+    labels: ClassVar[tuple[str, ...]] = CARRIER_LABELS
+
+    position_m: Vector3
+    attitude_std_rad: float
+    position_std_m: float
+    creep_s: float = 3600.0
+
+    def row(self) -> Array:
+        """Return the parameters in the columns that the kernel reads."""
+        row = np.zeros(s.PARAMETER_COLUMNS)
+        row[s.POSITION_DRIFT] = self.position_std_m**2 / self.creep_s
+        row[s.ANGLE_DRIFT] = self.attitude_std_rad**2 / self.creep_s
+        return row
+
+    def prior(self) -> tuple[Array, Array]:
+        """Return mean and variances (6) of its states."""
+        mean = np.array([*self.position_m, 0.0, 0.0, 0.0])
+        return mean, np.array([self.position_std_m**2] * 3 + [self.attitude_std_rad**2] * 3)
+
+
+@dataclass(frozen=True, slots=True)
+class MountedCamera:
+    """A camera on a carrier (a robot or a fixed mount): extrinsics, and how well they are known on the carrier.
+
+    rotation (3, 3), translation (3): carrier_from_camera [m]. A mounting error is the same in every picture, so it
+    enters R `repeats` times over: it must not average out.
+    """
+
+    carrier: str
     rotation: Array
-    translation: Vector3
+    translation: Vector3 = (0.0, 0.0, 0.0)
     attitude_std_rad: float = 0.0
     position_std_m: float = 0.0
     observes_targets: bool = True

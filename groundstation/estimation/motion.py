@@ -121,6 +121,14 @@ def predict_constant_velocity(mean: Array, P: Array, start: int, p: Array, dt: f
     mirror(P, start, 4)
 
 
+@kernel("void(float64[:,::1], int64, float64[::1], float64)")
+def predict_fixed_mount(P: Array, start: int, p: Array, dt: float) -> None:
+    """Let what is known of a fixed camera's mounting fade very slowly: mountings creep."""
+    for i in range(3):
+        P[start + i, start + i] += p[s.POSITION_DRIFT] * dt
+        P[start + 3 + i, start + 3 + i] += p[s.ANGLE_DRIFT] * dt
+
+
 @kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64)")
 def predict(mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, dt: float) -> None:
     """Predict all active entities; the one place where motion models are told apart."""
@@ -129,8 +137,10 @@ def predict(mean: Array, P: Array, entities: IntArray, parameters: Array, aux: A
             continue
         if entities[e, s.ENTITY_MODEL] == s.ODOMETRY_ROBOT:
             predict_odometry_robot(mean, P, entities[e, s.ENTITY_START], parameters[e], aux[e], dt)
-        else:
+        elif entities[e, s.ENTITY_MODEL] == s.CONSTANT_VELOCITY:
             predict_constant_velocity(mean, P, entities[e, s.ENTITY_START], parameters[e], dt)
+        else:
+            predict_fixed_mount(P, entities[e, s.ENTITY_START], parameters[e], dt)
 
 
 @kernel("void(float64[::1], float64[:,::1], int64[::1])")

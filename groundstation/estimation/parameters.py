@@ -7,11 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.estimation.models import ConstantVelocityTarget, MotionModel, MountedCamera, OdometryRobot
+from groundstation.estimation.models import (
+    ConstantVelocityTarget,
+    FixedMount,
+    MotionModel,
+    MountedCamera,
+    OdometryRobot,
+)
 from groundstation.geometry.rotations import base_from_tilted_optical
 
 # `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
-_WORLD_FROM_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
+WORLD_FROM_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +48,8 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
     entities[target["name"]] = ConstantVelocityTarget(
         marker_height_m=target["marker"]["height_m"], acceleration_std_m_s2=target["acceleration_std_m_s2"]
     )
-    cameras = {name: _world_camera(camera) for name, camera in resolved["cameras"].items()}
+    entities |= {name: _mount(camera) for name, camera in resolved["cameras"].items()}
+    cameras = {name: _world_camera(name, camera) for name, camera in resolved["cameras"].items()}
     cameras |= {name: _onboard_camera(name, drone["camera"]) for name, drone in drones.items()}
     return EstimatorParameters(
         entities,
@@ -68,13 +75,18 @@ def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
     )
 
 
-def _world_camera(camera: Mapping[str, Any]) -> MountedCamera:
-    return MountedCamera(
-        carrier=None,
-        rotation=_WORLD_FROM_DOWN,
-        translation=tuple(camera["position_m"]),
+def _mount(camera: Mapping[str, Any]) -> FixedMount:
+    return FixedMount(
+        position_m=tuple(camera["position_m"]),
         attitude_std_rad=math.radians(camera["attitude_std_deg"]),
         position_std_m=camera["position_std_m"],
+    )
+
+
+def _world_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
+    return MountedCamera(
+        carrier=name,
+        rotation=WORLD_FROM_DOWN,
         observes_targets="targets" in camera.get("observes", ("robots",)),
     )
 

@@ -1,4 +1,4 @@
-"""Observation model: a camera on a robot or in the world measures where a marker is, and which way it points.
+"""Observation model: a camera on a robot or on a fixed mount measures where a marker is, and which way it points.
 
 z = (marker centre [camera_optical], heading of the subject relative to the observer's heading). Extrinsics are
 parameters: camera on its carrier, marker on the subject.
@@ -62,7 +62,7 @@ def relative_pose(
     H_observer: Array,
     H_subject: Array,
 ) -> None:
-    """Write h(x) (4) and its Jacobians by observer and subject (4, MAX_BLOCK); an observer of zeros is the world."""
+    """Write h(x) (4) and its Jacobians by observer and subject block (4, MAX_BLOCK)."""
     work = np.empty((6, 3))
     cs = np.empty(6)
     point, slope, e, f, b = work[0], work[1], work[2], work[3], work[4]

@@ -1,7 +1,7 @@
 """Columns of the flat arrays that the compiled filter works on; plain ints, so that they compile to constants."""
 
-# Blocks of the state. Robots: position, yaw, then slow states; targets: position and velocity.
-X, Y, Z, YAW, CLIMB, SCALE, ROLL_ERROR, PITCH_ERROR, HEIGHT_ERROR = range(9)
+# Blocks of the state. Robots: position, yaw, then slow states; fixed cameras: the first six; targets: VX, VY at 2, 3.
+X, Y, Z, YAW, ROLL_ERROR, PITCH_ERROR, CLIMB, SCALE, HEIGHT_ERROR = range(9)
 VX, VY = 2, 3
 MAX_BLOCK = 9
 
@@ -10,7 +10,7 @@ ENTITY_MODEL, ENTITY_START, ENTITY_SIZE = range(3)
 ENTITY_COLUMNS = 3
 
 # Motion model numbers; one each per file that implements one (see models.py).
-ODOMETRY_ROBOT, CONSTANT_VELOCITY = 0, 1
+ODOMETRY_ROBOT, CONSTANT_VELOCITY, FIXED_MOUNT = 0, 1, 2
 
 # Parameters of any entity: where its marker is [base], then what its motion model needs.
 MARKER_X, MARKER_Y, MARKER_Z = range(3)
@@ -31,9 +31,10 @@ MARKER_X, MARKER_Y, MARKER_Z = range(3)
     HOLD_S,
 ) = range(3, 17)
 ACCELERATION_DENSITY, SPEED_STD = 3, 4
+POSITION_DRIFT, ANGLE_DRIFT = 3, 4
 PARAMETER_COLUMNS = 17
 
-# Camera table: rotation (9) and translation (3) base_from_camera or world_from_camera, mounting variances.
+# Camera table: rotation (9) and translation (3) carrier_from_camera, mounting variances.
 CAMERA_ROTATION, CAMERA_TRANSLATION, CAMERA_ATTITUDE_VARIANCE, CAMERA_POSITION_VARIANCE = 0, 9, 12, 13
 CAMERA_COLUMNS = 14
 
@@ -77,7 +78,6 @@ EVENT_SIZE = 29  # rows of the measurement: 3 or 4
 EVENT_OTHER = 30  # the alternative hypothesis, laid out as at EVENT_Z
 EVENT_COLUMNS = 50
 KIND_OBSERVATION, KIND_AIRBORNE, KIND_GROUNDED = 0, 1, 2
-WORLD = -1  # observer of a world-fixed camera
 
 # What became of an event: verdict, NIS, rows, residual (4), its covariance (16), flags.
 OUT_VERDICT, OUT_NIS, OUT_SIZE, OUT_RESIDUAL, OUT_COVARIANCE, OUT_OTHER_CHOSEN, OUT_JOINED = 0, 1, 2, 3, 7, 23, 24

@@ -1,0 +1,78 @@
+"""`python -m sim_bridge.study demo --seed 1 --duration 60`: a flight at message level, faster than real time."""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from groundstation.process import numba_cache
+from sim_bridge.scenario import Scenario, parse_scenario
+
+_EXAMPLES = """examples:
+  python -m sim_bridge.study demo --seed 3 --duration 60
+  python -m sim_bridge.study demo --seeds 10 --set planner.hysteresis=0.1 --json
+  python -m sim_bridge.study demo --field my_lab.yaml --outliers 0.02"""
+
+
+def resolved_field(path: str, overrides: list[str]) -> dict[str, Any]:
+    """Return a field file resolved by the ground station's command line: nothing else here reads YAML."""
+    command = [sys.executable, "-m", "groundstation.cli.main", "config", "show", path, "--resolved", "--json"]
+    for override in overrides:
+        command += ["--set", override]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        sys.stderr.write(result.stderr or result.stdout)
+        raise SystemExit(result.returncode)
+    field: dict[str, Any] = json.loads(result.stdout)
+    return field
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m sim_bridge.study", epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("study", choices=["demo"], help="demo: all drones of the field track the target")
+    default = Path(__file__).parents[2] / "config" / "lab.yaml"
+    parser.add_argument("--field", default=str(default), help="field file (default: %(default)s)")
+    parser.add_argument("--scenario", help="scenario as JSON file (default: the honest one)")
+    parser.add_argument("--set", action="append", default=[], metavar="A.B=C", help="override one setting of the field")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="run N seeds from --seed on")
+    parser.add_argument("--duration", type=float, default=60.0, help="seconds of tracking after take-off")
+    parser.add_argument("--outliers", type=float, default=0.0, help="share of grossly wrong sightings")
+    parser.add_argument("--start-phase", type=float, help="where on its path the target starts, in turns")
+    parser.add_argument("--hover", action="store_true", help="no planner: drones hover where they took off")
+    parser.add_argument("--json", action="store_true", help="one JSON object per run")
+    return parser
+
+
+def main() -> int:
+    """Run the studies that the arguments ask for; exit code 0, or that of the settings error."""
+    arguments = _parser().parse_args()
+    field = resolved_field(arguments.field, arguments.set)
+    scenario = parse_scenario(Path(arguments.scenario).read_bytes()) if arguments.scenario else Scenario()
+    if arguments.start_phase is not None:
+        path = scenario.target.path.model_copy(update={"start_phase": arguments.start_phase})
+        scenario = scenario.model_copy(update={"target": scenario.target.model_copy(update={"path": path})})
+    numba_cache.activate()
+    from sim_bridge.study.runner import Study, StudyOptions
+
+    for seed in range(arguments.seed, arguments.seed + arguments.seeds):
+        options = StudyOptions(seed, arguments.duration, arguments.outliers, not arguments.hover)
+        report = Study(field, scenario, options).run()
+        print(json.dumps(report) if arguments.json else _page(report), flush=True)
+    return 0
+
+
+def _page(report: dict[str, Any]) -> str:
+    lines = []
+    for name, value in report.items():
+        shown = "  ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
+        lines.append(f"{name:22s} {shown}")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,168 @@
+"""A camera without pictures: geometry in, relative observations out, with the errors a detector would have."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus.messages import Header, RelativeObservation
+from groundstation.geometry.board import Board
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
+from sim_bridge.scenario import CameraScenario
+from sim_bridge.site import Lens, Site, SiteDrone
+from sim_bridge.world.world import World
+
+Array = NDArray[np.float64]
+
+_WORLD_FROM_DOWN = np.diag([1.0, -1.0, -1.0])
+_BORDER_PX = 6.0
+# Pixels per square that the detector needs: with a window predicted from the last sighting, and without (vision.md).
+_TRACKED_PX, _SEARCH_PX = 5.5, 8.5
+_SEARCH_SHARE = 2.0 / 15.0  # full searches run at 2 Hz
+_FORGET_S = 0.4
+_STEEPEST_COS = math.cos(math.radians(72.0))
+_DETECTOR_FLOOR_PX = 0.1  # what the detector adds to its residual when it reports a covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A board on a body: where its centre is [base]."""
+
+    body: str
+    board: Board
+    position: Array
+
+
+def boards_of(site: Site) -> tuple[Carried, ...]:
+    """Return all boards of a site: drones' and target's."""
+    drones = [
+        Carried(name, Board(drone.marker.code, drone.marker.square_mm), np.array(drone.marker.position_m))
+        for name, drone in site.drones.items()
+    ]
+    marker = site.target.marker
+    return (*drones, Carried(site.target.name, Board(marker.code, marker.square_mm), np.array([0, 0, marker.height_m])))
+
+
+class Eye:
+    """One camera, on a drone or in the world: looks at all boards but its carrier's own.
+
+    outliers: share of sightings with a gross error, beside what the scenario says; mounting_std: error of a fixed
+    camera's attitude [rad] and position [m] that the ground station does not know.
+    """
+
+    def __init__(
+        self, name: str, lens: Lens, mount: SiteDrone | tuple[float, float, float], site: Site, cameras: CameraScenario,
+        outliers: float, rng: np.random.Generator, mounting_std: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
+        self.name = name
+        self.period_s = 1.0 / cameras.fps
+        self._lens = CameraIntrinsics(**lens.model_dump())
+        self._carrier = name if isinstance(mount, SiteDrone) else None
+        if isinstance(mount, SiteDrone):
+            assert mount.camera is not None
+            tilt, pan = math.radians(mount.camera.tilt_down_deg), math.radians(mount.camera.pan_left_deg)
+            self._rotation, self._position = base_from_tilted_optical(tilt, pan), np.array(mount.camera.position_m)
+        else:
+            turn, shift = mounting_std
+            error = rotation_from_euler(*(turn * rng.standard_normal(3)))
+            self._rotation, self._position = error @ _WORLD_FROM_DOWN, mount + shift * rng.standard_normal(3)
+        self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
+        self._robots = frozenset(site.drones)
+        self._scenario, self._outliers, self._rng = cameras, outliers, rng
+        self._last_seen = {b.body: -math.inf for b in self._boards}
+        self._seq = 0
+
+    def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
+        """Return what one exposure shows; stamps carry the error of a delay that is known as a mean only."""
+        if self._rng.random() < self._scenario.frame_loss:
+            return []
+        states = dict(zip(world.bodies, world.states(), strict=True))
+        rotation, position, reported = self._rotation, self._position, (0.0, 0.0)
+        if self._carrier is not None:
+            own = states[self._carrier]
+            base = rotation_from_euler(own[6], own[7], own[8])
+            rotation, position = base @ rotation, own[:3] + base @ position
+            onboard = world.onboard[self._carrier]
+            reported = (onboard.roll, onboard.pitch)
+        jitter = self._rng.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
+        seen = []
+        for carried in self._boards:
+            if self._carrier is None and carried.body not in self._robots:
+                continue
+            sighting = self._sight(carried, states[carried.body], rotation, position, world.time_s)
+            if sighting is not None:
+                yaw_o = states[self._carrier][8] if self._carrier is not None else 0.0
+                yaw = math.remainder(states[carried.body][8] - yaw_o, math.tau)
+                stamp = stamp_ns + round(jitter * 1e6)
+                seen.append(self._message(carried.body, sighting, yaw, stamp, clock, reported))
+        return seen
+
+    def _sight(
+        self, carried: Carried, state: Array, rotation: Array, position: Array, now_s: float
+    ) -> tuple[Array, Array] | None:
+        """Return the board's centre [optical] and the covariance of (centre, heading) at one pixel, if it is seen."""
+        base = rotation_from_euler(state[6], state[7], state[8])
+        centre = rotation.T @ (state[:3] + base @ carried.position - position)
+        if centre[2] < 0.2:
+            return None
+        facing = rotation.T @ base
+        normal = facing[:, 2]
+        if -float(normal @ centre) < _STEEPEST_COS * float(np.linalg.norm(centre)):
+            return None
+        corners = carried.board.corners() @ facing.T
+        outline = self._lens.project(carried.board.outline() @ facing.T + centre)
+        size = (self._lens.width_px - _BORDER_PX, self._lens.height_px - _BORDER_PX)
+        if not bool(np.all((outline > _BORDER_PX) & (outline < size))):  # NaN is outside too
+            return None
+        tracked = now_s - self._last_seen[carried.body] < _FORGET_S
+        pixels = self._lens.fx_px * carried.board.square_m / float(np.linalg.norm(centre))
+        if pixels < (_TRACKED_PX if tracked else _SEARCH_PX):
+            return None
+        if not tracked and self._rng.random() > 3.0 * _SEARCH_SHARE:
+            return None
+        self._last_seen[carried.body] = now_s
+        return centre, self._covariance(corners, centre, rotation.T[:, 2])
+
+    def _covariance(self, corners: Array, centre: Array, up: Array) -> Array:
+        """Return the covariance (4, 4) of (centre, heading) for corners known to one pixel."""
+        points = corners + centre
+        f, z = self._lens.fx_px, points[:, 2]
+        by_point = np.zeros((len(points), 2, 3))
+        by_point[:, 0, 0] = by_point[:, 1, 1] = f / z
+        by_point[:, 0, 2], by_point[:, 1, 2] = -f * points[:, 0] / z**2, -f * points[:, 1] / z**2
+        turn = np.zeros((len(points), 3, 3))  # d(point) / d(rotation) = -[corner]x
+        turn[:, 0, 1], turn[:, 0, 2] = corners[:, 2], -corners[:, 1]
+        turn[:, 1, 0], turn[:, 1, 2] = -corners[:, 2], corners[:, 0]
+        turn[:, 2, 0], turn[:, 2, 1] = corners[:, 1], -corners[:, 0]
+        J = np.concatenate((by_point, by_point @ turn), axis=2).reshape(-1, 6)
+        full = np.linalg.solve(J.T @ J, np.eye(6))
+        T = np.zeros((4, 6))
+        T[:3, :3] = np.eye(3)
+        T[3, 3:] = up
+        return np.asarray(T @ full @ T.T)
+
+    def _message(
+        self, subject: str, sighting: tuple[Array, Array], yaw: float, stamp_ns: int, clock: str,
+        reported: tuple[float, float],
+    ) -> RelativeObservation:  # fmt: skip
+        centre, unit = sighting
+        noise = self._scenario.corner_noise_px
+        error = noise * np.linalg.cholesky(unit) @ self._rng.standard_normal(4)
+        if self._rng.random() < self._outliers:
+            error = error + self._rng.normal(0.0, (0.5, 0.5, 0.5, 1.0))
+        covariance = (noise**2 + _DETECTOR_FLOOR_PX**2) * unit
+        self._seq += 1
+        return RelativeObservation(
+            header=Header(stamp_ns, clock, self.name, f"{self.name}_camera", self._seq),
+            observer=self.name,
+            subject=subject,
+            camera=f"{self.name}_camera",
+            position_m=tuple((centre + error[:3]).tolist()),
+            yaw_rad=math.remainder(yaw + float(error[3]), math.tau),
+            covariance=tuple(covariance.ravel().tolist()),
+            margin=2.0,
+            roll_rad=reported[0],
+            pitch_rad=reported[1],
+        )

@@ -1,0 +1,181 @@
+"""One flight at message level: world, sensors, delays, tracker and pilots in one thread under a manual clock."""
+
+import heapq
+import itertools
+import math
+import time
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from groundstation.bus.messages import Message
+from groundstation.tracker import Tracker, tracker_from_field
+from sim_bridge.scenario import Scenario
+from sim_bridge.site import parse_site
+from sim_bridge.study.eye import Eye
+from sim_bridge.study.pilot import Pilot
+from sim_bridge.study.score import Score
+from sim_bridge.study.telemetry import Telemetry
+from sim_bridge.world.noise import generator_of
+from sim_bridge.world.world import TICK_NS, World
+
+CLOCK = "study"
+_START_NS = 1_000_000_000_000
+_ODOMETRY_LATENCY_NS = 4_000_000
+_TAKE_OFF_S = 6.5  # after this much of simulated time the drones hover and tracking begins
+_PILOT_TICKS = 6
+_STATUS_TICKS = 40
+_SCORE_TICKS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class StudyOptions:
+    """duration_s: tracking after take-off; outliers: share of grossly wrong sightings; plan: False leaves the drones
+    hovering; detector_ms: what the camera process adds to the video delay."""
+
+    seed: int = 1
+    duration_s: float = 60.0
+    outliers: float = 0.0
+    plan: bool = True
+    detector_ms: tuple[float, float] = (10.0, 50.0)
+
+
+class Study:
+    """A run in progress; `run` flies it to its end and returns the figures."""
+
+    def __init__(self, field: Mapping[str, Any], scenario: Scenario, options: StudyOptions) -> None:
+        self.options = options
+        self.site = parse_site(field)
+        self.world = World(self.site, scenario, options.seed)
+        self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
+        self.score = Score(_SCORE_TICKS * TICK_NS / 1e9)
+        self.cpu_s: defaultdict[str, float] = defaultdict(float)
+        self._rng = generator_of(options.seed, "study")
+        self._scenario = scenario
+        self._queue: list[tuple[int, int, str, Message]] = []
+        self._order = itertools.count()
+        self._tick_every = round(1e9 / field["estimator"]["rate_hz"]) // TICK_NS
+        self._plan_every = round(1e9 / field["planner"]["rate_hz"]) // TICK_NS
+        world = self.world
+        self._telemetry = {n: Telemetry(n, d, world.onboard[n], CLOCK) for n, d in world.drones.items()}
+        lifetime = field["safety"]["setpoint_lifetime_ms"] / 1000
+        self._pilots = {
+            name: Pilot(drone, world.onboard[name], field["drones"][name]["odometry"]["velocity_scale"], lifetime)
+            for name, drone in world.drones.items()
+        }
+        self._eyes = self._build_eyes(field)
+        fence = field["room"]["fence"]
+        self._fence = np.array([fence["x_m"], fence["y_m"], fence["z_m"]])
+        self.fence_violation_m = 0.0
+
+    def _build_eyes(self, field: Mapping[str, Any]) -> list[Eye]:
+        site, cameras, outliers = self.site, self._scenario.cameras, self.options.outliers
+        seed = self.options.seed
+        eyes = [
+            Eye(
+                name,
+                c.calibration,
+                c.position_m,
+                site,
+                cameras,
+                outliers,
+                generator_of(seed, f"{name}/eye"),
+                (math.radians(known["attitude_std_deg"]), known["position_std_m"]),
+            )
+            for name, c in site.cameras.items()
+            for known in [field["cameras"][name]]
+        ]
+        eyes += [
+            Eye(name, d.camera.calibration, d, site, cameras, outliers, generator_of(seed, f"{name}/eye"))
+            for name, d in site.drones.items()
+            if d.camera is not None
+        ]
+        return eyes
+
+    @property
+    def now_ns(self) -> int:
+        """Return the manual clock."""
+        return _START_NS + self.world.ticks * TICK_NS
+
+    def run(self) -> dict[str, Any]:
+        """Fly until the duration is over; returns the figures, with the CPU time of each part."""
+        started = time.process_time()
+        for drone in self.world.drones.values():
+            drone.autopilot.take_off()
+        ticks = round((_TAKE_OFF_S + self.options.duration_s) * 1e9) // TICK_NS
+        for _ in range(ticks):
+            self.step()
+        report = self.score.report()
+        report["max_fence_violation_m"] = round(self.fence_violation_m, 3)
+        self.cpu_s["total"] = time.process_time() - started
+        report["cpu_s"] = {name: round(value, 2) for name, value in self.cpu_s.items()}
+        return {"seed": self.options.seed, "duration_s": self.options.duration_s, **report}
+
+    def step(self) -> None:
+        """Advance the world by one tick, and everything that is due."""
+        world = self.world
+        mark = time.process_time()
+        world.step()
+        self._sense()
+        self.cpu_s["world"] += time.process_time() - mark
+        tracking = world.time_s >= _TAKE_OFF_S
+        if world.ticks % self._tick_every == 0:
+            self._tick(tracking)
+        if world.ticks % _PILOT_TICKS == 0:
+            for pilot in self._pilots.values():
+                pilot.step(world.time_s)
+        if tracking and world.ticks % _SCORE_TICKS == 0:
+            self._judge()
+
+    def _sense(self) -> None:
+        world, now_ns = self.world, self.now_ns
+        for name, telemetry in self._telemetry.items():
+            self._send(now_ns + _ODOMETRY_LATENCY_NS, f"odometry/{name}", telemetry.odometry(now_ns))
+            if world.ticks % _STATUS_TICKS == 0:
+                self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
+        for index, eye in enumerate(self._eyes):
+            phase = eye.period_s * index / len(self._eyes)
+            frame, before = (int((t - phase) / eye.period_s) for t in (world.time_s, world.time_s - TICK_NS / 1e9))
+            if frame == before:
+                continue
+            delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
+            for sighting in eye.look(world, now_ns, CLOCK):
+                # A later frame arrives with the delay that its stamp was corrupted by.
+                self._send(sighting.header.stamp_ns + round(delay_ms * 1e6), f"observation/{eye.name}", sighting)
+
+    def _send(self, arrival_ns: int, key: str, message: Message) -> None:
+        heapq.heappush(self._queue, (arrival_ns, next(self._order), key, message))
+
+    def _tick(self, tracking: bool) -> None:
+        now_ns, tracker = self.now_ns, self.tracker
+        mark = time.process_time()
+        while self._queue and self._queue[0][0] <= now_ns:
+            _, _, key, message = heapq.heappop(self._queue)
+            tracker.ingest(key, message, now_ns)
+        tracker.advance(now_ns)
+        self.cpu_s["filter"] += time.process_time() - mark
+        for correction in tracker.take_corrections():
+            self.score.note(correction)
+        tracker.take_notices()
+        if not (tracking and self.options.plan):
+            return
+        mark = time.process_time()
+        if self.world.ticks % self._plan_every == 0:
+            tracker.plan(now_ns)
+        self.cpu_s["planner"] += time.process_time() - mark
+        mark = time.process_time()
+        for name, limited in tracker.setpoints(now_ns).items():
+            setpoint = limited.setpoint
+            self._pilots[name].obey(setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.world.time_s)
+        self.cpu_s["setpoints"] += time.process_time() - mark
+
+    def _judge(self) -> None:
+        states = self.world.states().copy()
+        truth = dict(zip(self.world.bodies, states, strict=True))
+        self.score.take(self.tracker.belief, truth, self.world.target_name, str(self.tracker.topology))
+        drones = states[:-1, :3]
+        outside = np.maximum(self._fence[:, 0] - drones, drones - self._fence[:, 1])
+        self.fence_violation_m = max(self.fence_violation_m, float(outside.max()))

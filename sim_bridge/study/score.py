@@ -1,0 +1,80 @@
+"""How a run is judged: the figures of report.json, and the consistency of the belief."""
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.measurement import Correction
+
+Array = NDArray[np.float64]
+_MISSING_M, _LOST_M = 1.0, 0.5
+
+
+@dataclass
+class Score:
+    """Collects errors at 10 Hz and corrections as they come; `report` turns them into figures."""
+
+    period_s: float
+    errors: list[float] = field(default_factory=list)
+    nees: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    squares: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    nis: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    verdicts: defaultdict[str, int] = field(default_factory=lambda: defaultdict(int))
+    topologies: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    switches: int = 0
+    separation_m: float = math.inf
+    _last: str = ""
+
+    def take(self, belief: JointBelief, truth: dict[str, Array], target: str, topology: str) -> None:
+        """Compare a belief with the truth (rows of the truth board) at one time."""
+        for block in belief.layout.blocks:
+            if block.kind is EntityKind.CAMERA:
+                continue
+            state, part = truth[block.name], belief.mean_of(block.name)
+            covariance = belief.covariance_of(block.name)
+            true = state[[0, 1, 2, 8]] if block.kind is EntityKind.ROBOT else state[[0, 1, 3, 4]]
+            error = true - part[:4]
+            if block.kind is EntityKind.ROBOT:
+                error[3] = math.remainder(error[3], math.tau)
+            self.nees[block.name].append(float(error @ np.linalg.solve(covariance[:4, :4], error)) / 4)
+            self.nees[f"{block.name} xy"].append(float(error[:2] @ np.linalg.solve(covariance[:2, :2], error[:2])) / 2)
+            self.squares[block.name].append(float(error[:2] @ error[:2]))
+        self.errors.append(math.sqrt(self.squares[target][-1]) if target in belief.layout else _MISSING_M)
+        self.topologies[topology] += self.period_s
+        self.switches += bool(self._last) and topology != self._last
+        self._last = topology
+        drones = [row[:3] for name, row in truth.items() if name != target]
+        for a, b in combinations(drones, 2):
+            self.separation_m = min(self.separation_m, float(np.linalg.norm(a - b)))
+
+    def note(self, correction: Correction) -> None:
+        """Count what became of an observation."""
+        self.verdicts[str(correction.verdict)] += 1
+        if correction.nis is not None:
+            edge = f"{correction.observer}>{correction.subject}"
+            self.nis[edge].append(correction.nis / max(len(correction.residual), 1))
+
+    def report(self) -> dict[str, Any]:
+        """Return all figures, rounded for reading."""
+        errors = np.array(self.errors or [_MISSING_M])
+        flat = sum(s for t, s in self.topologies.items() if t and "/" not in t)
+        string = sum(s for t, s in self.topologies.items() if "/" in t)
+        return {
+            "target_rmse_m": round(float(np.sqrt(np.mean(errors**2))), 4),
+            "target_lost_s": round(float(np.sum(errors > _LOST_M)) * self.period_s, 2),
+            "target_max_m": round(float(errors.max()), 3),
+            "robot_rmse_m": {k: round(math.sqrt(float(np.mean(v))), 4) for k, v in self.squares.items()},
+            "topology_seconds": {"flat": round(flat, 1), "string": round(string, 1)},
+            "topology_switches": self.switches,
+            "min_separation_m": round(self.separation_m, 3),
+            "anees": {k: round(float(np.mean(v)), 3) for k, v in self.nees.items()},
+            "nis": {k: round(float(np.mean(v)), 3) for k, v in sorted(self.nis.items())},
+            "verdicts": dict(sorted(self.verdicts.items())),
+        }

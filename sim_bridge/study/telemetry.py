@@ -1,0 +1,54 @@
+"""What a driver publishes of one drone, from the readings of its onboard sensors."""
+
+import math
+
+from groundstation.bus.messages import FlightState, Header, Odometry, VehicleStatus
+from sim_bridge.world.autopilot import Phase
+from sim_bridge.world.onboard import Onboard
+from sim_bridge.world.quadrotor import Quadrotor
+
+_STATES = {
+    Phase.LANDED: FlightState.LANDED,
+    Phase.TAKING_OFF: FlightState.TAKING_OFF,
+    Phase.HOVERING: FlightState.HOVERING,
+    Phase.FLYING: FlightState.FLYING,
+    Phase.BRAKING: FlightState.FLYING,
+    Phase.LANDING: FlightState.LANDING,
+    Phase.CUT: FlightState.EMERGENCY,
+}
+_JUMP_RAD = math.radians(20.0)
+_COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.01)
+
+
+class Telemetry:
+    """Builds odometry and status messages of one drone; counts heading jumps as resets, as a driver does."""
+
+    def __init__(self, name: str, drone: Quadrotor, onboard: Onboard, clock: str) -> None:
+        self._name, self._drone, self._onboard, self._clock = name, drone, onboard, clock
+        self._yaw, self._reset, self._seq = onboard.yaw, 0, 0
+
+    def odometry(self, stamp_ns: int) -> Odometry:
+        """Return the reading of this tick."""
+        onboard = self._onboard
+        if abs(math.remainder(onboard.yaw - self._yaw, math.tau)) > _JUMP_RAD:
+            self._reset += 1
+        self._yaw = onboard.yaw
+        return Odometry(
+            header=self._header(stamp_ns),
+            velocity_m_s=(onboard.vx, onboard.vy, 0.0),
+            velocity_covariance=_COVARIANCE,
+            yaw_rad=onboard.yaw,
+            roll_rad=onboard.roll,
+            pitch_rad=onboard.pitch,
+            height_m=onboard.height if onboard.height > 0.0 else None,
+            reset=self._reset,
+        )
+
+    def status(self, stamp_ns: int) -> VehicleStatus:
+        """Return the vehicle's state."""
+        state = _STATES[self._drone.autopilot.phase]
+        return VehicleStatus(header=self._header(stamp_ns), flight_state=state, mode="TRACK")
+
+    def _header(self, stamp_ns: int) -> Header:
+        self._seq += 1
+        return Header(stamp_ns, self._clock, self._name, self._name, self._seq)

@@ -1,0 +1,77 @@
+"""How far one command has come at each drone: sent, received, accepted, effective, refused, or not confirmed."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from groundstation.bus.messages import AckStage, Command, CommandAck
+
+_ORDER = (AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE)
+NOT_CONFIRMED = "NOT CONFIRMED"
+
+
+@dataclass(slots=True)
+class Progress:
+    """One drone's answers to one command; `stage` is the furthest, None before the first."""
+
+    stage: AckStage | None = None
+    reason: str = ""
+
+    @property
+    def settled(self) -> bool:
+        """Whether no further answer is to be expected."""
+        return self.stage in (AckStage.EFFECTIVE, AckStage.REFUSED)
+
+    def text(self, final: bool = False) -> str:
+        """Return the answers in words; a final text names what was never confirmed."""
+        if self.stage is AckStage.REFUSED:
+            return f"sent / received / refused: {self.reason}"
+        reached = _ORDER[: _ORDER.index(self.stage) + 1] if self.stage else ()
+        words = ["sent", *(stage.lower() for stage in reached)]
+        if final and not self.settled:
+            words.append(NOT_CONFIRMED)
+        return " / ".join(words)
+
+
+@dataclass(slots=True)
+class AckBook:
+    """Collects the answers to one command from the drones that were addressed."""
+
+    command: Command
+    drones: tuple[str, ...]
+    progress: dict[str, Progress] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.progress = {name: Progress() for name in self.drones}
+
+    def note(self, ack: CommandAck) -> bool:
+        """Take an answer; returns whether it is news. Answers to other commands and of strangers are ignored."""
+        progress = self.progress.get(ack.header.entity)
+        if progress is None or ack.command_id != self.command.id or progress.settled:
+            return False
+        known = -1 if progress.stage is None else _ORDER.index(progress.stage)
+        if ack.stage is not AckStage.REFUSED and _ORDER.index(ack.stage) <= known:
+            return False
+        progress.stage, progress.reason = ack.stage, ack.reason
+        return True
+
+    @property
+    def unheard(self) -> tuple[str, ...]:
+        """Drones that have not answered at all."""
+        return tuple(name for name, progress in self.progress.items() if progress.stage is None)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all answers are final."""
+        return all(progress.settled for progress in self.progress.values())
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the command took effect on every drone."""
+        return all(progress.stage is AckStage.EFFECTIVE for progress in self.progress.values())
+
+    def reached(self, stage: AckStage) -> Iterable[str]:
+        """Return the drones that came at least this far and did not refuse."""
+        wanted = _ORDER.index(stage)
+        for name, progress in self.progress.items():
+            if progress.stage in _ORDER and _ORDER.index(progress.stage) >= wanted:
+                yield name

@@ -1,0 +1,250 @@
+"""The operator's hands: holds the lease, gives orders, and follows each of them until it is confirmed or is not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import AckStage, Command, CommandAck, Event, Lease, Severity, Verb
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
+from groundstation.runtime.acknowledgements import AckBook
+from groundstation.runtime.take_off import Order, TakeOff, TakeOffLimits
+from groundstation.runtime.team import Team
+
+OPERATOR = "operator"
+_TEAM = "team"
+_LEASE_PERIOD_NS = 500_000_000
+_LEASE_LIFE_NS = 1_500_000_000
+_EXPIRY_NS = 5_000_000_000
+_REPEAT_NS = 300_000_000
+_CONFIRM_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 20_000_000_000}
+_CONFIRM_DEFAULT_NS = 6_000_000_000
+_STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
+
+
+class Phase(StrEnum):
+    """What the team is asked to do."""
+
+    GROUND = "GROUND"
+    TAKING_OFF = "TAKING_OFF"
+    UP = "UP"
+    TRACKING = "TRACKING"
+    HELD = "HELD"
+    LANDING = "LANDING"
+
+
+@dataclass(slots=True)
+class _Dialogue:
+    """An order that is still followed, and the request from another shell that it answers."""
+
+    book: AckBook
+    given_ns: int
+    repeated_ns: int
+    request: Command | None = None
+
+
+class Operator:
+    """Call `step` 10 times a second or more. `say` gets lines for the person."""
+
+    def __init__(self, bus: Bus, drones: tuple[str, ...], limits: TakeOffLimits, say: Callable[[str], None]) -> None:
+        self._bus = bus
+        self._say = say
+        self._limits = limits
+        self.team = Team(bus, drones)
+        self.phase = Phase.GROUND
+        self.tracking_since_ns = 0
+        self._inbox = bus.subscribe([COMMAND, COMMAND_ACK])
+        self._dialogues: list[_Dialogue] = []
+        self._sequence: TakeOff | None = None
+        self._sequence_request: Command | None = None
+        self._take_off_book: AckBook | None = None
+        self._then_track = False
+        self._next_lease_ns = 0
+        self._count = 0
+
+    # --- orders --------------------------------------------------------------------------------------------------
+
+    def take_off(self, now_ns: int, drones: tuple[str, ...] = (), then_track: bool = True) -> None:
+        """Begin the take-off sequence of the given drones (none given: all)."""
+        self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns)
+        self._then_track = then_track
+        self.phase = Phase.TAKING_OFF
+
+    def track(self, now_ns: int, drones: tuple[str, ...] = (), request: Command | None = None) -> None:
+        """Let the tracker move the given drones (none given: all that are up)."""
+        up = tuple(name for name, member in self.team.members.items() if member.up)
+        self._give(Verb.TRACK, drones or up, now_ns, request)
+        self.phase = Phase.TRACKING
+
+    def land(self, now_ns: int) -> None:
+        """Land everybody; whatever else was going on ends."""
+        self._abandon()
+        if self.phase is not Phase.LANDING:
+            self.phase = Phase.LANDING
+            self._give(Verb.LAND, (), now_ns)
+
+    def landed(self, now_ns: int) -> bool:
+        """Whether no drone is in the air, as far as they say."""
+        return not self.team.airborne(now_ns)
+
+    def _abandon(self) -> None:
+        self._sequence, self._sequence_request = None, None
+        self._dialogues = [d for d in self._dialogues if d.book.command.verb in _STOPS]
+
+    def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AckBook:
+        self._count += 1
+        header = self._bus.header(_TEAM)
+        expires_ns = 0 if verb in _STOPS else header.stamp_ns + _EXPIRY_NS
+        identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
+        command = Command(header=header, id=identity, verb=verb, scope=scope, issuer=OPERATOR, expires_ns=expires_ns)
+        met = tuple(name for name, member in self.team.members.items() if member.heard_ns)
+        book = AckBook(command, scope or met)
+        self._dialogues.append(_Dialogue(book, now_ns, now_ns, request))
+        self._bus.publish(COMMAND, command)
+        return book
+
+    # --- turn ----------------------------------------------------------------------------------------------------
+
+    def step(self, now_ns: int) -> None:
+        """Renew the lease, hear everybody, go on with what is under way."""
+        if now_ns >= self._next_lease_ns:
+            self._next_lease_ns = now_ns + _LEASE_PERIOD_NS
+            header = self._bus.header(_TEAM)
+            self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=header.stamp_ns + _LEASE_LIFE_NS))
+        self.team.update(now_ns)
+        for received in self._inbox.drain():
+            match received.message:
+                case CommandAck() as ack:
+                    self._hear_ack(ack, now_ns)
+                case Command(issuer=issuer) as command if issuer != OPERATOR:
+                    self._hear_command(command, now_ns)
+        self._follow(now_ns)
+        if self._sequence is not None:
+            self._go_on(self._sequence, now_ns)
+
+    def _hear_ack(self, ack: CommandAck, now_ns: int) -> None:
+        for dialogue in self._dialogues:
+            if not dialogue.book.note(ack):
+                continue
+            progress = dialogue.book.progress[ack.header.entity]
+            if ack.verb is Verb.TRACK and ack.stage in (AckStage.ACCEPTED, AckStage.EFFECTIVE):
+                self.tracking_since_ns = self.tracking_since_ns or now_ns
+            if progress.settled:
+                self._say(f"{ack.header.entity}: {ack.verb} {progress.text()}")
+
+    def _hear_command(self, command: Command, now_ns: int) -> None:
+        if OPERATOR in command.scope:
+            self._serve(command, now_ns)
+        elif command.verb in _STOPS and not self._is_partial(command):
+            if self.phase is not Phase.LANDING:
+                self._abandon()
+                self.phase = Phase.HELD if command.verb is Verb.HOLD else Phase.LANDING
+                self._say(f"{command.verb} by {command.issuer}")
+        elif command.verb in _STOPS and self._sequence is not None:
+            self._abandon()
+            self.phase = Phase.HELD
+            self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}: take-off abandoned")
+
+    def _is_partial(self, command: Command) -> bool:
+        return bool(command.scope) and not set(command.scope) >= set(self.team.members)
+
+    # --- requests of other shells --------------------------------------------------------------------------------
+
+    def _serve(self, request: Command, now_ns: int) -> None:
+        names = tuple(name for name in request.scope if name != OPERATOR)
+        strangers = [name for name in names if name not in self.team.members]
+        if any(d.request is not None and d.request.id == request.id for d in self._dialogues) or (
+            self._sequence_request is not None and self._sequence_request.id == request.id
+        ):
+            return  # a repetition
+        self._answer(request, AckStage.RECEIVED)
+        if strangers:
+            self._answer(request, AckStage.REFUSED, f"there is no drone {', '.join(strangers)}")
+        elif self._sequence is not None:
+            self._answer(request, AckStage.REFUSED, f"{self._sequence.current} is taking off")
+        else:
+            self._answer(request, AckStage.ACCEPTED)
+            self._obey(request, names, now_ns)
+
+    def _obey(self, request: Command, names: tuple[str, ...], now_ns: int) -> None:
+        match request.verb:
+            case Verb.TAKEOFF:
+                self.take_off(now_ns, names, then_track=False)
+                self._sequence_request = request
+            case Verb.TRACK:
+                self.track(now_ns, names, request)
+            case verb:
+                self._give(verb, names, now_ns, request)
+                if verb is Verb.RESUME:
+                    self.phase = Phase.TRACKING
+
+    def _answer(self, request: Command, stage: AckStage, reason: str = "") -> None:
+        header = self._bus.header(OPERATOR)
+        ack = CommandAck(header=header, command_id=request.id, verb=request.verb, stage=stage, reason=reason)
+        self._bus.publish(COMMAND_ACK, ack)
+
+    # --- what is under way ---------------------------------------------------------------------------------------
+
+    def _follow(self, now_ns: int) -> None:
+        """Repeat orders that were not heard; close those that are settled or out of time."""
+        for dialogue in list(self._dialogues):
+            book, verb = dialogue.book, dialogue.book.command.verb
+            late = now_ns - dialogue.given_ns > _CONFIRM_NS.get(verb, _CONFIRM_DEFAULT_NS)
+            if book.settled or late:
+                self._dialogues.remove(dialogue)
+                self._close(dialogue)
+            elif book.unheard and now_ns - dialogue.repeated_ns > _REPEAT_NS:
+                dialogue.repeated_ns = now_ns
+                self._bus.publish(COMMAND, book.command)
+
+    def _close(self, dialogue: _Dialogue) -> None:
+        book = dialogue.book
+        open_ends = {name: p.text(final=True) for name, p in book.progress.items() if not p.settled}
+        for name, text in open_ends.items():
+            self._say(f"{name}: {book.command.verb} {text}")
+        if dialogue.request is None:
+            return
+        if book.confirmed:
+            self._answer(dialogue.request, AckStage.EFFECTIVE)
+        else:
+            failed = [
+                f"{n}: {p.text(final=True)}" for n, p in book.progress.items() if p.stage is not AckStage.EFFECTIVE
+            ]
+            self._answer(dialogue.request, AckStage.REFUSED, "; ".join(failed) or "no drone is up")
+
+    def _go_on(self, sequence: TakeOff, now_ns: int) -> None:
+        progress = self._take_off_book.progress.get(sequence.current) if self._take_off_book else None
+        before = (len(sequence.up), len(sequence.left_out))
+        order = sequence.step(now_ns, self.team, progress)
+        if order is not None:
+            self._order(order, now_ns)
+        if (len(sequence.up), len(sequence.left_out)) != before:
+            self._report_member(sequence, before[0])
+        if sequence.finished:
+            self._finish(sequence, now_ns)
+
+    def _order(self, order: Order, now_ns: int) -> None:
+        book = self._give(order.verb, (order.drone,), now_ns)
+        if order.verb is Verb.TAKEOFF:
+            self._take_off_book = book
+
+    def _report_member(self, sequence: TakeOff, up_before: int) -> None:
+        if len(sequence.up) > up_before:
+            self._say(f"{sequence.up[-1]}: in the air, seen by a camera")
+            return
+        name, reason = list(sequence.left_out.items())[-1]
+        self._say(f"{name}: left out, {reason}")
+        header = self._bus.header(name)
+        event = Event(
+            header=header, severity=Severity.ERROR, text=f"{name} does not fly: {reason}", remedy="see its log"
+        )
+        self._bus.publish(EVENT, event)
+
+    def _finish(self, sequence: TakeOff, now_ns: int) -> None:
+        request, self._sequence, self._sequence_request = self._sequence_request, None, None
+        self.phase = Phase.UP if sequence.up else Phase.GROUND
+        if request is not None:
+            missing = "; ".join(f"{name}: {reason}" for name, reason in sequence.left_out.items())
+            self._answer(request, AckStage.REFUSED if missing else AckStage.EFFECTIVE, missing)
+        if self._then_track and sequence.up:
+            self.track(now_ns, tuple(sequence.up))

@@ -1,0 +1,245 @@
+"""The operator over a bus in memory: lease, take-off one by one, stops from elsewhere, requests of other shells."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import (
+    AckStage,
+    Command,
+    CommandAck,
+    FlightState,
+    Lease,
+    RelativeObservation,
+    VehicleStatus,
+    Verb,
+)
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, OBSERVATION, VEHICLE_STATUS
+from groundstation.errors import GroundStationError
+from groundstation.runtime.acknowledgements import AckBook
+from groundstation.runtime.operator import Operator, Phase
+from groundstation.runtime.take_off import TakeOffLimits, require_separation
+
+MS = 1_000_000
+LIMITS = TakeOffLimits(connect_s=5, lift_off_s=15, unseen_s=10)
+
+
+class Drone:
+    """A driver with its drone: takes off in half a second, answers every order."""
+
+    def __init__(self, exchange: MemoryExchange, name: str, seen: bool = True, refusal: str = "") -> None:
+        self.bus = MemoryBus(exchange, "lab", name)
+        self.camera = MemoryBus(exchange, "lab", "ceiling")
+        self.name, self.seen, self.refusal = name, seen, refusal
+        self.state = FlightState.LANDED
+        self.commands = self.bus.subscribe([COMMAND])
+        self.heard: list[Verb] = []
+        self.change: tuple[int, FlightState, Command] | None = None
+
+    def turn(self, now_ns: int) -> None:
+        for received in self.commands.drain():
+            command = received.message
+            assert isinstance(command, Command)
+            if not command.scope or self.name in command.scope:
+                self.obey(command, now_ns)
+        if self.change and now_ns >= self.change[0]:
+            self.state = self.change[1]
+            self.answer(self.change[2], AckStage.EFFECTIVE)
+            self.change = None
+        header = self.bus.header(self.name)
+        self.bus.publish(VEHICLE_STATUS, VehicleStatus(header=header, flight_state=self.state, mode="HOVER"))
+        if self.seen:
+            self.observe()
+
+    def obey(self, command: Command, now_ns: int) -> None:
+        self.heard.append(command.verb)
+        self.answer(command, AckStage.RECEIVED)
+        if self.refusal and command.verb is Verb.TAKEOFF:
+            self.answer(command, AckStage.REFUSED, self.refusal)
+            return
+        self.answer(command, AckStage.ACCEPTED)
+        after = {Verb.TAKEOFF: FlightState.HOVERING, Verb.LAND: FlightState.LANDED}.get(command.verb, self.state)
+        self.change = (now_ns + 500 * MS, after, command)
+
+    def answer(self, command: Command, stage: AckStage, reason: str = "") -> None:
+        header = self.bus.header(self.name)
+        ack = CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
+        self.bus.publish(COMMAND_ACK, ack)
+
+    def observe(self) -> None:
+        observation = RelativeObservation(
+            header=self.camera.header("ceiling"),
+            observer="ceiling",
+            subject=self.name,
+            camera="ceiling",
+            position_m=(0.0, 0.0, 2.0),
+            yaw_rad=None,
+            covariance=(1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0),
+        )
+        self.camera.publish(OBSERVATION, observation)
+
+
+class Scene:
+    def __init__(self) -> None:
+        self.exchange = MemoryExchange()
+        self.said: list[str] = []
+        self.bus = MemoryBus(self.exchange, "lab", "supervisor")
+        self.operator = Operator(self.bus, ("drone_1", "drone_2"), LIMITS, self.said.append)
+        self.drones: dict[str, Drone] = {}
+        self.now_ns = 10**12
+
+    def add(self, name: str, **options: object) -> Drone:
+        self.drones[name] = Drone(self.exchange, name, **options)  # type: ignore[arg-type]
+        return self.drones[name]
+
+    def run(self, seconds: float) -> Iterator[float]:
+        for _ in range(round(seconds * 20)):
+            self.now_ns += 50 * MS
+            for drone in self.drones.values():
+                drone.turn(self.now_ns)
+            self.operator.step(self.now_ns)
+            yield self.now_ns / 1e9
+
+    def pass_(self, seconds: float) -> None:
+        for _ in self.run(seconds):
+            pass
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene()
+
+
+def test_lease_is_renewed_twice_a_second(scene: Scene) -> None:
+    leases = scene.bus.subscribe([LEASE])
+    scene.pass_(2.0)
+    heard = [r.message for r in leases.drain()]
+    assert 4 <= len(heard) <= 5
+    assert all(isinstance(lease, Lease) and lease.holder == "operator" for lease in heard)
+
+
+def test_one_by_one_then_track(scene: Scene) -> None:
+    one, two = scene.add("drone_1"), scene.add("drone_2")
+    scene.pass_(0.2)
+    scene.operator.take_off(scene.now_ns)
+    for _ in scene.run(5.0):
+        if Verb.TAKEOFF in two.heard:
+            assert one.state is FlightState.HOVERING
+    assert one.heard == two.heard == [Verb.TAKEOFF, Verb.TRACK]
+    assert scene.operator.phase is Phase.TRACKING and scene.operator.tracking_since_ns
+    assert "drone_1: TAKEOFF sent / received / accepted / effective" in scene.said
+
+
+def test_missing_drone_is_named_and_the_rest_flies_on(scene: Scene) -> None:
+    two = scene.add("drone_2")
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(4.5)
+    assert two.heard == []
+    scene.pass_(5.0)
+    assert two.heard == [Verb.TAKEOFF, Verb.TRACK]
+    assert any(line.startswith("drone_1: left out") for line in scene.said)
+
+
+def test_unseen_drone_lands(scene: Scene) -> None:
+    one = scene.add("drone_1", seen=False)
+    two = scene.add("drone_2")
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(16.0)
+    assert one.heard == [Verb.TAKEOFF, Verb.LAND] and one.state is FlightState.LANDED
+    assert two.heard == [Verb.TAKEOFF, Verb.TRACK]
+
+
+def test_refusal_is_retried_then_reported_with_its_reason(scene: Scene) -> None:
+    one, two = scene.add("drone_1", refusal="battery"), scene.add("drone_2")
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(9.0)
+    assert one.heard.count(Verb.TAKEOFF) > 2
+    assert "drone_1: left out, refused: battery" in scene.said
+    assert two.state is FlightState.HOVERING
+
+
+@pytest.mark.parametrize("verb", [Verb.LAND, Verb.HOLD, Verb.CUT_MOTORS])
+def test_a_stop_by_anyone_ends_the_take_off(scene: Scene, verb: Verb) -> None:
+    scene.add("drone_1", seen=False)
+    two = scene.add("drone_2")
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(2.0)
+    other = MemoryBus(scene.exchange, "lab", "cli_1")
+    other.publish(COMMAND, Command(header=other.header("team"), id="x", verb=verb, scope=(), issuer="cli_1"))
+    scene.pass_(20.0)
+    assert two.heard == [verb]
+
+
+def test_unheard_order_is_repeated_with_the_same_id(scene: Scene) -> None:
+    scene.add("drone_1")
+    scene.pass_(0.2)
+    del scene.drones["drone_1"]
+    spy = scene.bus.subscribe([COMMAND])
+    scene.operator.land(scene.now_ns)
+    scene.pass_(1.0)
+    commands = [r.message for r in spy.drain()]
+    assert len(commands) >= 3
+    assert len({command.id for command in commands if isinstance(command, Command)}) == 1
+    scene.pass_(25.0)
+    assert "drone_1: LAND sent / NOT CONFIRMED" in scene.said
+
+
+def test_another_shell_may_ask_for_take_off(scene: Scene) -> None:
+    scene.add("drone_1")
+    scene.add("drone_2")
+    other = MemoryBus(scene.exchange, "lab", "cli_1")
+    acks = other.subscribe([COMMAND_ACK], entity="operator")
+    request = Command(
+        header=other.header("operator"), id="r1", verb=Verb.TAKEOFF, scope=("operator",), issuer="cli_1", expires_ns=1
+    )
+    scene.pass_(0.2)
+    other.publish(COMMAND, request)
+    scene.pass_(5.0)
+    stages = [r.message.stage for r in acks.drain() if isinstance(r.message, CommandAck)]
+    assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]
+    assert scene.operator.phase is Phase.UP
+    other.publish(COMMAND, Command(header=other.header("operator"), id="r2", verb=Verb.TRACK, scope=("operator",),
+                                   issuer="cli_1", expires_ns=1))  # fmt: skip
+    scene.pass_(2.0)
+    stages = [r.message.stage for r in acks.drain() if isinstance(r.message, CommandAck)]
+    assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]
+    assert scene.operator.phase is Phase.TRACKING
+
+
+def test_landed_means_all_say_so(scene: Scene) -> None:
+    scene.add("drone_1")
+    two = scene.add("drone_2")
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(4.0)
+    assert not scene.operator.landed(scene.now_ns)
+    scene.operator.land(scene.now_ns)
+    scene.pass_(1.5)
+    assert scene.operator.landed(scene.now_ns)
+    two.state = FlightState.LOST
+    scene.pass_(0.2)
+    assert not scene.operator.landed(scene.now_ns), "a lost drone is not known to stand"
+
+
+def test_pads_too_close_are_all_named() -> None:
+    pads = {"a": (0.0, 0.0), "b": (0.3, 0.0), "c": (2.0, 0.0), "d": (2.1, 0.0)}
+    with pytest.raises(GroundStationError, match=r"a and b stand 0.30 m apart; c and d stand 0.10 m"):
+        require_separation(pads, 0.6)
+    require_separation({"a": (0.0, 0.0), "b": (0.7, 0.0)}, 0.6)
+
+
+def test_ack_book_takes_only_news_from_who_was_asked() -> None:
+    bus = MemoryBus(MemoryExchange(), "lab", "x")
+    command = Command(header=bus.header("team"), id="1", verb=Verb.LAND, scope=(), issuer="x")
+    book = AckBook(command, ("drone_1",))
+
+    def ack(entity: str, stage: AckStage, command_id: str = "1") -> CommandAck:
+        return CommandAck(header=bus.header(entity), command_id=command_id, verb=Verb.LAND, stage=stage)
+
+    assert not book.note(ack("stranger", AckStage.RECEIVED))
+    assert not book.note(ack("drone_1", AckStage.RECEIVED, "2"))
+    assert book.note(ack("drone_1", AckStage.ACCEPTED))
+    assert not book.note(ack("drone_1", AckStage.RECEIVED)), "out of order"
+    assert book.progress["drone_1"].text(final=True) == "sent / received / accepted / NOT CONFIRMED"
+    assert book.note(ack("drone_1", AckStage.EFFECTIVE)) and book.confirmed and book.settled
+    assert not book.note(ack("drone_1", AckStage.REFUSED)), "nothing after the end"

@@ -72,7 +72,8 @@ def test_a_demo_that_never_ends_is_asked_to_land(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(bench_demo, "demo_command", lambda *_arguments: [sys.executable, "-c", script])
     monkeypatch.setattr(bench_demo, "_OVERHEAD_S", -58.5)
     outcome, interrupted = bench_demo.fly_one(1, None, tmp_path)
-    assert (outcome.exit_code, interrupted, outcome.passed) == (3, False, False)
+    assert outcome.exit_code in (3, -signal.SIGTERM)  # the latter if it had not installed its handler yet
+    assert (interrupted, outcome.passed) == (False, False)
 
 
 def test_the_command_passes_seed_duration_and_folder(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ class Harness:
 
     def run(self) -> None:
         """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""
-        self._child.ready(f"{len(self.emulators)} drones, {len(self._order.streams)} cameras")
+        self._child.ready(self._inventory)
         gc.collect()
         gc.freeze()  # the start's objects live as long as the process: never look at them again
         self._clock = Clockwork(time.monotonic_ns())
@@ -86,6 +86,7 @@ class Harness:
             self._child.tick_status(self._clock.ticks, self._clock.overruns)
         if ticks % _STATUS_TICKS == 0:
             self._publish_status()
+            self._judge()
 
     def close(self) -> None:
         """Stop the cameras, close the ports, remove the truth; idempotent."""
@@ -111,6 +112,10 @@ class Harness:
             ):
                 self._poll.register(udp, select.POLLIN)
                 self._readers[udp.fileno()] = reader
+
+    @property
+    def _inventory(self) -> str:
+        return f"{len(self.emulators)} drones, {len(self._order.streams)} cameras"
 
     def _all_landed(self) -> bool:
         return not any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())
@@ -139,15 +144,22 @@ class Harness:
             airborne=self.world.airborne,
         )
         bus.publish(SIM_STATUS, status)
-        if not clock.keeps_time:
-            self._child.degrade(f"{clock.overruns} of {clock.ticks} ticks late by > 10 ms: this run is invalid")
-        if self._cameras is not None and (ended := self._cameras.ended()):
-            self._child.degrade(f"render process of {', '.join(ended)} ended")
+
+    def _judge(self) -> None:
+        """Say once what spoils this run, and when it no longer does."""
+        faults = [] if self._clock.keeps_time else ["more than 1 % of the ticks late by > 10 ms: this run is invalid"]
+        ended = self._cameras.ended() if self._cameras is not None else []
+        faults += [f"the render process of {name} ended" for name in ended]
+        if faults:
+            self._child.degrade("; ".join(faults))
+        else:
+            self._child.ready(self._inventory)
 
     def _obey(self) -> None:
         for received in self._commands.drain():
-            if isinstance(received.message, SimCommand):
-                steer(self.world, received.message)
+            command = received.message
+            if isinstance(command, SimCommand) and not steer(self.world, command):
+                self._child.event(Severity.WARNING, f"order {command.action!r} to {received.key.entity} not understood")
 
     def _break_things(self) -> None:
         for line in self._faults.apply(self.world.time_s):

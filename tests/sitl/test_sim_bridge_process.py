@@ -183,6 +183,20 @@ def test_without_its_supervisor_it_stays_until_the_drone_has_landed(site: Site) 
                 os.kill(pid, signal.SIGKILL)
 
 
+def test_a_killed_bridge_leaves_nobody(site: Site) -> None:
+    site.write(streams={"ceiling": [f"{site.net}.50", 8080]})
+    process = site.start()
+    site.await_ready()
+    family = children(process.pid)
+    assert family
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 5
+    while any(map(alive, family)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [pid for pid in family if alive(pid)]
+
+
 def children(pid: int) -> list[int]:
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):

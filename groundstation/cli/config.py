@@ -1,4 +1,4 @@
-"""`groundstation config`: check, show, describe or start a field file."""
+"""`groundstation config`: check, show, draw, describe or start a field file."""
 
 import json
 import shutil
@@ -15,7 +15,7 @@ _OPTION = click.option(
 
 @click.group(epilog="\b\nExamples:\n  groundstation config check lab.yaml\n  groundstation config init my_lab")
 def config() -> None:
-    """Check, show, describe or start a field file."""
+    """Check, show, draw, describe or start a field file."""
 
 
 @config.command(
@@ -96,6 +96,29 @@ def schema() -> None:
     from groundstation.settings.json_schema import field_file_schema
 
     click.echo(json.dumps(field_file_schema(), indent=2))
+
+
+@config.command(epilog="\b\nExample:\n  groundstation config draw lab.yaml --scenario realistic --output room.png")
+@click.argument("field")
+@_OPTION
+@click.option("--scenario", metavar="S", help="Draw the target's path of a scenario (a name or a path) as well.")
+@click.option(
+    "--output", type=click.Path(path_type=Path, dir_okay=False), default=Path("room.png"), help="PNG, SVG or PDF."
+)
+def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Path) -> None:
+    """Draw the room to scale: fence, pads, height slots, and what the fixed cameras see of drones in each slot."""
+    from groundstation.settings import drawing
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.load import load_field
+    from groundstation.settings.scenario import load_scenario
+
+    if output.suffix not in (".png", ".svg", ".pdf"):
+        raise click.UsageError(f"--output {output}: must end in .png, .svg or .pdf")
+    path = find_field(field)
+    settings = load_field(path, options)
+    target_path = drawing.path_of(load_scenario(find_scenario(scenario, path))) if scenario else []
+    drawing.draw(settings, output, target_path)
+    click.echo(f"wrote {output}")
 
 
 @config.command(epilog="\b\nExample:\n  groundstation config init my_lab && groundstation sitl my_lab/lab.yaml")

@@ -190,7 +190,10 @@ def test_wire_packages_need_the_standard_library_alone() -> None:
         ("cv2", ("drivers.camera", "sim_bridge.render")),
         ("av", ("drivers.camera", "drivers.ardrone", "sim_bridge.devices")),
         ("click", ("groundstation.cli",)),
-        ("matplotlib", ("groundstation.report", "groundstation.experiments", "sim_bridge.study")),
+        (
+            "matplotlib",
+            ("groundstation.settings.drawing", "groundstation.report", "groundstation.experiments", "sim_bridge.study"),
+        ),
         ("rich", ("groundstation.cli", "groundstation.monitor", "groundstation.runtime", "groundstation.report")),
     ],
 )

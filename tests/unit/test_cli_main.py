@@ -183,3 +183,11 @@ def test_config_init_starts_a_field_and_overwrites_nothing(tmp_path: Path, capsy
     assert cli.run(["config", "init", str(folder)]) == 2
     assert "is there already; nothing was written" in capsys.readouterr().err
     assert (folder / "lab.yaml").read_text(encoding="utf-8") == "mine"
+
+
+def test_config_draw(lab: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["config", "draw", "lab.yaml", "--scenario", "realistic", "--output", "room.svg"]) == 0
+    text = (lab / "room.svg").read_text(encoding="utf-8")
+    assert text.count("<path") > 20
+    assert cli.run(["config", "draw", "lab.yaml", "--output", "room.txt"]) == 2
+    assert "must end in .png, .svg or .pdf" in capsys.readouterr().err

@@ -10,6 +10,7 @@ import pytest
 from groundstation.errors import SettingsError
 from groundstation.geometry.board import VALID_CODES
 from groundstation.settings.document import Origin, dotted, parse
+from groundstation.settings.drawing import footprint, marker_height, path_of, slots
 from groundstation.settings.files import SHIPPED, find_field, find_scenario
 from groundstation.settings.json_schema import field_file_schema
 from groundstation.settings.levels import merged
@@ -204,3 +205,14 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
         f"{path}:3: target.path: shape must be one of 'figure_eight', 'none' (got \"figure_eigth\"),"
         " did you mean figure_eight?"
     ]
+
+
+def test_the_drawing_is_to_scale(field: Field) -> None:
+    ceiling = field.cameras["ceiling"]
+    assert slots(field) == [2.2, 1.3]
+    assert marker_height(field, 2.2) == pytest.approx(2.28)
+    assert footprint(ceiling, 2.2) == pytest.approx((2.0 * 640 / 1179, 2.0 * 360 / 1179))
+    assert footprint(ceiling, 9.0) == (0, 0)
+    eight = path_of({"target": {"path": {"shape": "figure_eight", "half_length_m": 3, "half_width_m": 1}}})
+    assert max(eight) == pytest.approx((3, 0))
+    assert path_of({}) == []

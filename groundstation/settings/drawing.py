@@ -1,0 +1,124 @@
+"""A field to scale, from above and from the side: what fixed cameras see at each height slot, and how drones look."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from groundstation.settings.room import WorldCamera
+from groundstation.settings.schema import Field
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SLOT_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown")
+_TARGET_COLOUR = "tab:red"
+
+
+def draw(field: Field, output: Path, target_path: list[tuple[float, float]] | None = None) -> None:
+    """Write a picture of the field (PNG, SVG or PDF by the file's ending); target_path: points on the floor [world]."""
+    from matplotlib.figure import Figure
+
+    width, depth, height = field.room.size_m
+    figure = Figure(figsize=(width * 1.15 + 0.6, (depth + height) * 1.15 + 1.6), layout="constrained")
+    top, side = figure.subplots(2, 1, sharex=True, height_ratios=(depth, height))
+    _draw_top(top, field, target_path or [])
+    _draw_side(side, field, target_path or [])
+    for axes, (low, high), label in ((top, (-depth / 2, depth / 2), "y [m]"), (side, (0.0, height), "z [m]")):
+        axes.set(xlim=(-width / 2, width / 2), ylim=(low, high), ylabel=label, aspect="equal")
+        axes.grid(alpha=0.25)
+    side.set_xlabel("x [m]")
+    figure.suptitle(f"{field.site}: {width:g} x {depth:g} x {height:g} m")
+    figure.savefig(output, dpi=110)
+
+
+def path_of(scenario: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """Return points of a scenario's target path [m; world]: a figure eight, or none for a target that waits."""
+    path = scenario.get("target", {}).get("path", {})
+    if path.get("shape") != "figure_eight":
+        return []
+    phases = [math.tau * n / 200 for n in range(201)]
+    x, y = path.get("centre_m", (0.0, 0.0))
+    length, width = path.get("half_length_m", 0.0), path.get("half_width_m", 0.0)
+    return [(x + length * math.sin(phase), y + width * math.sin(2 * phase)) for phase in phases]
+
+
+def slots(field: Field) -> list[float]:
+    """Return the height slots of the whole team's topologies, highest first [m]."""
+    rows = field.planner.level_heights_m[: len(field.drones)]
+    return sorted({height for row in rows for height in row}, reverse=True)
+
+
+def footprint(camera: WorldCamera, height_m: float) -> tuple[float, float]:
+    """Return half the length (x) and width (y) of what a camera that looks down sees at a height, undistorted [m]."""
+    distance = max(0.0, camera.position_m[2] - height_m)
+    lens = camera.calibration
+    return (
+        distance * math.tan(lens.horizontal_view_rad / 2),
+        distance * math.tan(lens.vertical_view_rad / 2),
+    )
+
+
+def marker_height(field: Field, slot_m: float) -> float:
+    """Return how high a drone's marker is when the drone flies in a slot [m; world], the highest of the team."""
+    return slot_m + max(drone.marker.position_m[2] for drone in field.drones.values())
+
+
+def _draw_top(axes: "Axes", field: Field, target_path: list[tuple[float, float]]) -> None:
+    fence = field.room.fence
+    _box(axes, fence.x_m, fence.y_m, linestyle="--", edgecolor="grey", label="fence")
+    for name, camera in field.cameras.items():
+        x, y, _ = camera.position_m
+        axes.plot(x, y, "k^", label=f"camera {name}")
+        for slot, colour in zip(slots(field), _SLOT_COLOURS, strict=False):
+            length, width = footprint(camera, marker_height(field, slot))
+            label = f"a drone at {slot:g} m is seen by {name}"
+            _box(axes, (x - length, x + length), (y - width, y + width), edgecolor=colour, label=label)
+    for name, drone in field.drones.items():
+        heading = drone.pad_yaw_rad
+        axes.plot(*drone.pad_m, "ko", markerfacecolor="none")
+        axes.annotate(name, drone.pad_m, textcoords="offset points", xytext=(6, 6))
+        axes.arrow(*drone.pad_m, 0.3 * math.cos(heading), 0.3 * math.sin(heading), head_width=0.08, color="black")
+    if target_path:
+        axes.plot(*zip(*target_path, strict=True), color=_TARGET_COLOUR, label=f"path of {field.target.name}")
+    axes.legend(loc="upper right", fontsize="small")
+
+
+def _draw_side(axes: "Axes", field: Field, target_path: list[tuple[float, float]]) -> None:
+    fence = field.room.fence
+    _box(axes, fence.x_m, fence.z_m, linestyle="--", edgecolor="grey")
+    for camera in field.cameras.values():
+        x, _, z = camera.position_m
+        length, _ = footprint(camera, 0.0)
+        axes.fill([x, x - length, x + length], [z, 0.0, 0.0], color="grey", alpha=0.12)
+        axes.plot(x, z, "k^")
+    board = field.target.marker.height_m
+    reach = max((abs(x) for x, _ in target_path), default=0.0)
+    axes.plot((-reach, reach), (board, board), color=_TARGET_COLOUR, marker="s", markersize=4)
+    for slot, colour in zip(slots(field), _SLOT_COLOURS, strict=False):
+        axes.axhline(slot, color=colour, linewidth=0.8)
+        axes.annotate(f"slot {slot:g} m", (fence.x_m[0], slot), textcoords="offset points", xytext=(3, 3))
+    _draw_view(axes, field, board)
+
+
+def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
+    """Draw the first drone in its lowest slot, looking at the target: as far behind as its tilt asks for."""
+    drone = next(iter(field.drones.values()))
+    camera, slot = drone.camera, slots(field)[-1]
+    height = slot + camera.position_m[2] - board_m
+    tilt = camera.tilt_down_rad
+    if height <= 0 or not 0 < tilt < math.pi / 2:
+        return
+    x = -height / math.tan(tilt)
+    half = camera.calibration.vertical_view_rad / 2
+    edges = [min(max(tilt + side * half, 0.05), math.pi - 0.05) for side in (-1, 1)]
+    ends = [x + height / math.tan(edge) for edge in edges]
+    axes.fill([x, *ends], [slot + camera.position_m[2], board_m, board_m], color="tab:cyan", alpha=0.25)
+    axes.plot(x, slot, "ko", markerfacecolor="none")
+    axes.plot(0.0, board_m, color=_TARGET_COLOUR, marker="s")
+
+
+def _box(axes: "Axes", x: tuple[float, float], y: tuple[float, float], label: str | None = None, **style: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    axes.add_patch(Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fill=False, label=label, **style))  # type: ignore[arg-type]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from groundstation.sensing.models import Rectangle
 
@@ -32,7 +32,7 @@ class ProcessNoise:
 class Weights:
     """Weights beside the uncertainty [m^2]: see planning/README.md. PAPER: the forms are ours."""
 
-    repulsion: float = 0.05
+    repulsion: float = 0.1
     fence: float = 1.0
     effort: float = 2e-4
 
@@ -77,3 +77,42 @@ class PlannerParameters:
     def slots(self, levels: int) -> tuple[float, ...] | None:
         """Return the heights of a topology with so many levels [m], or None when it has no slots."""
         return self.level_heights_m[levels - 1] if 0 < levels <= len(self.level_heights_m) else None
+
+
+def limits_from_field(resolved: Mapping[str, Any]) -> dict[str, MotionLimits]:
+    """Return each drone's motion limits of a resolved field (decoded JSON)."""
+    return {
+        name: MotionLimits(
+            drone["limits"]["max_speed_m_s"],
+            drone["limits"]["max_climb_m_s"],
+            math.radians(drone["limits"]["max_yaw_rate_deg_s"]),
+        )
+        for name, drone in resolved["drones"].items()
+    }
+
+
+def parameters_from_field(resolved: Mapping[str, Any]) -> PlannerParameters:
+    """Return the planner's settings of a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
+    planner, fence = resolved["planner"], resolved["room"]["fence"]
+    return PlannerParameters(
+        level_heights_m=tuple(tuple(row) for row in planner["level_heights_m"]),
+        horizon_steps=planner["horizon_steps"],
+        step_s=planner["step_s"],
+        discount=planner["discount"],
+        hysteresis=planner["hysteresis"],
+        separation_m=planner["separation_m"],
+        fence=Rectangle(tuple(fence["x_m"]), tuple(fence["y_m"])),
+        limits=limits_from_field(resolved),
+        noise=_noise(resolved),
+        mode=planner["mode"],
+    )
+
+
+def _noise(resolved: Mapping[str, Any]) -> ProcessNoise:
+    """Return densities for the worst of the drones; velocity errors last for some 0.8 s, manoeuvres for 0.5 s."""
+    odometry = [drone["odometry"] for drone in resolved["drones"].values()]
+    return ProcessNoise(
+        robot_position=0.8 * max(o["velocity_std_m_s"] for o in odometry) ** 2,
+        robot_yaw=max(math.radians(o["yaw_rate_std_deg_s"]) for o in odometry) ** 2,
+        target_acceleration=0.5 * resolved["target"]["acceleration_std_m_s2"] ** 2,
+    )

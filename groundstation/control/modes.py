@@ -1,0 +1,38 @@
+"""The tracker's flight-mode table: what one robot is flown by, decided anew on every tick."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Phase(StrEnum):
+    """What a robot is flown by."""
+
+    GROUNDED = "GROUNDED"  # not airborne: no setpoint is published
+    UNKNOWN = "UNKNOWN"  # airborne, not in the belief: hover until a camera has seen it
+    RETURN = "RETURN"  # badly localised and outside the world-fixed cameras' view: back to its middle
+    SEARCH = "SEARCH"  # localised, but no target: look around
+    TRACK = "TRACK"  # obey the plan
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the table reads of one robot; target_fresh: seen within lost_after_s; planned: the plan holds controls."""
+
+    airborne: bool
+    in_belief: bool
+    lost: bool = False
+    target_fresh: bool = False
+    planned: bool = False
+
+
+def phase_of(situation: Situation) -> Phase:
+    """Return the phase; the first row that fits, from the most careful to the boldest."""
+    if not situation.airborne:
+        return Phase.GROUNDED
+    if not situation.in_belief:
+        return Phase.UNKNOWN
+    if situation.lost:
+        return Phase.RETURN
+    if not (situation.target_fresh and situation.planned):
+        return Phase.SEARCH
+    return Phase.TRACK

@@ -1,0 +1,79 @@
+"""What setpoints and safety are told once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from groundstation.planning.parameters import MotionLimits, limits_from_field
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ControlParameters:
+    """Settings of the setpoints.
+
+    search_height_m: slot while searching or returning; column_m: horizontal distance within which nobody changes
+    height; return_std_m: a robot outside the world-fixed views that is known worse than this flies back;
+    hint_std_m: up to this uncertainty the predicted target is where the search looks.
+    """
+
+    search_height_m: float
+    limits: Mapping[str, MotionLimits] = field(default_factory=dict)
+    lost_after_s: float = 3.0
+    height_gain_per_s: float = 1.2
+    height_tolerance_m: float = 0.15
+    column_m: float = 1.0
+    side_step_m_s: float = 0.25
+    return_std_m: float = 0.35
+    search_speed_m_s: float = 0.35
+    search_yaw_rate_rad_s: float = 0.5
+    search_stand_off_m: float = 0.9
+    hint_std_m: float = 1.5
+
+    def limits_of(self, robot: str) -> MotionLimits:
+        """Return a robot's motion limits."""
+        return self.limits.get(robot, MotionLimits())
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyParameters:
+    """Settings of the last word.
+
+    fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity;
+    margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief.
+    """
+
+    fence: tuple[Interval, Interval, Interval]
+    min_separation_m: float = 0.6
+    max_position_std_m: float = 0.6
+    max_belief_age_s: float = 0.3
+    reaction_s: float = 0.5
+    margin_m: float = 0.15
+    sigmas: float = 2.0
+    limits: Mapping[str, MotionLimits] = field(default_factory=dict)
+
+    def limits_of(self, robot: str) -> MotionLimits:
+        """Return a robot's motion limits."""
+        return self.limits.get(robot, MotionLimits())
+
+
+def control_from_field(resolved: Mapping[str, Any]) -> ControlParameters:
+    """Return the setpoints' settings of a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
+    return ControlParameters(
+        search_height_m=resolved["planner"]["level_heights_m"][0][0],
+        limits=limits_from_field(resolved),
+        lost_after_s=resolved["estimator"]["lost_after_s"],
+        return_std_m=0.6 * resolved["safety"]["max_position_std_m"],
+    )
+
+
+def safety_from_field(resolved: Mapping[str, Any]) -> SafetyParameters:
+    """Return the last word's settings of a resolved field (decoded JSON)."""
+    fence, safety = resolved["room"]["fence"], resolved["safety"]
+    return SafetyParameters(
+        fence=(tuple(fence["x_m"]), tuple(fence["y_m"]), tuple(fence["z_m"])),
+        min_separation_m=safety["min_separation_m"],
+        max_position_std_m=safety["max_position_std_m"],
+        limits=limits_from_field(resolved),
+    )

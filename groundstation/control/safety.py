@@ -1,0 +1,164 @@
+"""The last word on every setpoint: it may only shrink a velocity or hover, never add to it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.control.frames import stabilized_from_world, world_from_stabilized
+from groundstation.control.parameters import SafetyParameters
+from groundstation.control.setpoints import Setpoint
+from groundstation.estimation.belief import JointBelief
+
+Array = NDArray[np.float64]
+
+PASSES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Limited:
+    """A setpoint that may be sent, and the names of what changed it."""
+
+    setpoint: Setpoint
+    limited_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Wall:
+    """Velocity along the unit vector `normal` must not exceed `most` [m/s; world]."""
+
+    name: str
+    normal: Array
+    most: float
+
+
+def limit_setpoint(
+    robot: str,
+    setpoint: Setpoint,
+    belief: JointBelief,
+    now_ns: int,
+    parameters: SafetyParameters,
+    velocities: Mapping[str, Array] | None = None,
+) -> Limited:
+    """Return what of a setpoint is safe to send.
+
+    velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. Each of two
+    robots may use half of the closing speed between them, so that every robot is limited on its own.
+    """
+    reason = _unfit(robot, setpoint, belief, now_ns, parameters)
+    if reason:
+        return _hover(setpoint, reason)
+    yaw = float(belief.mean_of(robot)[3])
+    clipped, rate, names = _clip(robot, setpoint, parameters)
+    velocity = world_from_stabilized(clipped, yaw)
+    known = velocities or {}
+    walls = _fence(robot, belief, parameters, known) + _others(robot, belief, parameters, known)
+    for _ in range(PASSES):
+        exceeded = [wall for wall in walls if float(velocity @ wall.normal) > wall.most + 1e-9]
+        if not exceeded:
+            break
+        for wall in exceeded:
+            velocity = velocity - max(0.0, float(velocity @ wall.normal) - wall.most) * wall.normal
+            names.append(wall.name)
+    else:
+        velocity = np.zeros(3)
+    body = stabilized_from_world(velocity, yaw)
+    limited = replace(
+        setpoint, velocity_m_s=(float(body[0]), float(body[1]), float(body[2])), yaw_rate_rad_s=float(rate)
+    )
+    return Limited(limited, tuple(dict.fromkeys(names)))
+
+
+def _hover(setpoint: Setpoint, reason: str) -> Limited:
+    return Limited(replace(setpoint, velocity_m_s=(0.0, 0.0, 0.0), yaw_rate_rad_s=0.0), (reason,))
+
+
+def _unfit(robot: str, setpoint: Setpoint, belief: JointBelief, now_ns: int, parameters: SafetyParameters) -> str:
+    """Return why the robot must hover, or nothing."""
+    if robot not in belief.layout:
+        return "unknown"
+    if not all(math.isfinite(value) for value in (*setpoint.velocity_m_s, setpoint.yaw_rate_rad_s)):
+        return "not finite"
+    if not -0.1 <= (now_ns - belief.stamp_ns) * 1e-9 <= parameters.max_belief_age_s:
+        return "stale"
+    variances = np.diag(belief.covariance_of(robot))[:3]
+    if not float(variances.max()) <= parameters.max_position_std_m**2 or float(variances.min()) < 0:
+        return "uncertain"
+    return ""
+
+
+def _clip(robot: str, setpoint: Setpoint, parameters: SafetyParameters) -> tuple[Array, float, list[str]]:
+    """Return velocity and yaw rate within the robot's motion limits, and which were exceeded."""
+    limits, names = parameters.limits_of(robot), []
+    velocity = np.array(setpoint.velocity_m_s)
+    speed = math.hypot(velocity[0], velocity[1])
+    if speed > limits.max_speed_m_s:
+        velocity[:2] *= limits.max_speed_m_s / speed
+        names.append("speed")
+    if abs(velocity[2]) > limits.max_climb_m_s:
+        velocity[2] = math.copysign(limits.max_climb_m_s, velocity[2])
+        names.append("climb")
+    rate = setpoint.yaw_rate_rad_s
+    if abs(rate) > limits.max_yaw_rate_rad_s:
+        rate = math.copysign(limits.max_yaw_rate_rad_s, rate)
+        names.append("yaw rate")
+    return velocity, rate, names
+
+
+def _braking(
+    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
+) -> tuple[Array, float]:
+    """Return where the robot would come to rest (its place if the velocity is unknown), and the time to shed slack in.
+
+    A vehicle that follows a velocity c with lag T obeys d/dt (x + T v) = c: the point of rest is an integrator of the
+    command. Without v the loop x' = v, v' = (slack / time - v) / T overshoots by 0.4 % of the slack at time = 3 T.
+    """
+    place = belief.mean_of(robot)[:3]
+    velocity = velocities.get(robot)
+    if velocity is None:
+        return place, 3.0 * parameters.reaction_s
+    return place + parameters.reaction_s * velocity, 2.0 * parameters.reaction_s
+
+
+def _fence(
+    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
+) -> list[_Wall]:
+    rest, time = _braking(robot, belief, parameters, velocities)
+    spread = np.sqrt(np.diag(belief.covariance_of(robot))[:3])
+    walls = []
+    for axis, (low, high) in enumerate(parameters.fence):
+        keep = parameters.margin_m + parameters.sigmas * float(spread[axis])
+        normal = np.eye(3)[axis]
+        walls.append(_Wall("fence", normal, max(0.0, high - keep - float(rest[axis])) / time))
+        walls.append(_Wall("fence", -normal, max(0.0, float(rest[axis]) - low - keep) / time))
+    return walls
+
+
+def _others(
+    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
+) -> list[_Wall]:
+    """Return one wall towards each other robot; half of the closing speed is this robot's share."""
+    rest, time = _braking(robot, belief, parameters, velocities)
+    place = belief.mean_of(robot)[:3]
+    walls = []
+    for other in belief.layout.robots:
+        if other == robot:
+            continue
+        there, other_time = _braking(other, belief, parameters, velocities)
+        for gap in (there - rest, belief.mean_of(other)[:3] - place):
+            distance = float(np.linalg.norm(gap))
+            normal = gap / distance if distance > 1e-6 else np.zeros(3)
+            keep = parameters.min_separation_m + parameters.margin_m
+            keep += parameters.sigmas * _relative_spread(robot, other, normal, belief)
+            walls.append(_Wall("separation", normal, max(0.0, distance - keep) / (2.0 * max(time, other_time))))
+    return walls
+
+
+def _relative_spread(robot: str, other: str, normal: Array, belief: JointBelief) -> float:
+    """Return the standard deviation of the distance between two robots along a direction [m]."""
+    a, b = belief.layout.block(robot).start, belief.layout.block(other).start
+    P = belief.covariance
+    own, its, cross = P[a : a + 3, a : a + 3], P[b : b + 3, b : b + 3], P[a : a + 3, b : b + 3]
+    return math.sqrt(max(0.0, float(normal @ (own + its - cross - cross.T) @ normal)))

@@ -1,0 +1,150 @@
+"""Setpoints of all robots from a plan: held velocities, height slots, and the way back or around when needed."""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus.messages import Vector3
+from groundstation.control.frames import stabilized_from_world, world_from_stabilized
+from groundstation.control.modes import Phase, Situation, phase_of
+from groundstation.control.parameters import ControlParameters
+from groundstation.control.seeking import Stand, return_stand, search_stands
+from groundstation.estimation.belief import JointBelief
+from groundstation.geometry.angles import difference
+from groundstation.planning.plan import PlanResult
+from groundstation.sensing.models import SensorSuite
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """Velocity [m/s; base_stabilized] and yaw rate [rad/s] wanted of a robot, before safety; `blocked`: by whom a
+    change of height is held up."""
+
+    velocity_m_s: Vector3
+    yaw_rate_rad_s: float
+    phase: Phase
+    blocked: str = ""
+
+
+HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, Phase.UNKNOWN)
+
+
+def setpoints_from_plan(
+    plan: PlanResult | None,
+    belief: JointBelief,
+    airborne: Collection[str],
+    target_age_s: float | None,
+    parameters: ControlParameters,
+    sensors: SensorSuite,
+) -> dict[str, Setpoint]:
+    """Return a setpoint for every airborne robot.
+
+    plan: the last valid one, or None; target_age_s: since any target was last observed, None if never.
+    """
+    fresh = target_age_s is not None and target_age_s <= parameters.lost_after_s and bool(belief.layout.targets)
+    robots = [name for name in belief.layout.robots if name in airborne]
+    phases = {
+        name: phase_of(
+            Situation(
+                airborne=True,
+                in_belief=name in robots,
+                lost=name in robots and is_lost(name, belief, parameters, sensors),
+                target_fresh=fresh,
+                planned=plan is not None and name in plan.controls,
+            )
+        )
+        for name in airborne
+    }
+    stands = search_stands(belief, robots, parameters, sensors)
+    wanted: dict[str, Setpoint] = {}
+    for name, phase in phases.items():
+        if phase is Phase.UNKNOWN:
+            wanted[name] = HOVER
+        elif phase is Phase.TRACK and plan is not None:
+            vx, vy, rate = (float(value) for value in plan.controls[name])
+            wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
+        else:
+            stand = stands[name] if phase is Phase.SEARCH else return_stand(belief.mean_of(name), parameters, sensors)
+            wanted[name] = _towards(name, stand, phase, belief, robots, parameters)
+    return wanted
+
+
+def is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite) -> bool:
+    """Return whether a robot is badly localised and believed outside every world-fixed camera's view."""
+    spread = math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
+    if spread <= parameters.return_std_m:
+        return False
+    marker = sensors.marker(name, belief.mean_of(name), is_robot=True)
+    return not any(sensors.world_in_view(camera, marker) for camera in sensors.world)
+
+
+def _towards(
+    name: str,
+    stand: Stand,
+    phase: Phase,
+    belief: JointBelief,
+    robots: list[str],
+    parameters: ControlParameters,
+) -> Setpoint:
+    """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots."""
+    mean = belief.mean_of(name)
+    velocity = 0.6 * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
+    speed = float(np.linalg.norm(velocity))
+    velocity *= min(1.0, parameters.search_speed_m_s / max(speed, 1e-9))
+    for other in robots:
+        away = mean[:2] - belief.mean_of(other)[:2]
+        distance = float(np.linalg.norm(away))
+        if other != name and distance < parameters.column_m:
+            nearness = 1.0 - distance / parameters.column_m
+            velocity[:2] += parameters.search_speed_m_s * 2 * nearness * away / max(distance, 0.05)
+    rate = 1.0 * difference(stand.yaw, float(mean[3])) + stand.yaw_rate
+    limit = parameters.search_yaw_rate_rad_s
+    body = stabilized_from_world(velocity, float(mean[3]))
+    rate = min(max(rate, -limit), limit)
+    return _with_height(
+        name, (float(body[0]), float(body[1])), rate, parameters.search_height_m, phase, belief, robots, parameters
+    )
+
+
+def _with_height(
+    name: str,
+    velocity: tuple[float, float],
+    rate: float,
+    slot: float,
+    phase: Phase,
+    belief: JointBelief,
+    robots: list[str],
+    parameters: ControlParameters,
+) -> Setpoint:
+    """Return the setpoint with the climb towards its slot; near another robot it side-steps first."""
+    mean = belief.mean_of(name)
+    climb = parameters.limits_of(name).max_climb_m_s
+    way = slot - float(mean[2])
+    vz = min(max(parameters.height_gain_per_s * way, -climb), climb)
+    if abs(way) <= parameters.height_tolerance_m:
+        return Setpoint((*velocity, vz), rate, phase)
+    near = _nearest(name, belief, robots)
+    if near is None or near[1] >= parameters.column_m:
+        return Setpoint((*velocity, vz), rate, phase)
+    other, distance = near
+    away = np.append((mean[:2] - belief.mean_of(other)[:2]) / max(distance, 0.05), 0.0)
+    if distance < 0.05:
+        away = world_from_stabilized(np.array([-1.0, 0.0, 0.0]), float(mean[3]))
+    outward = stabilized_from_world(away, float(mean[3]))[:2]
+    held = np.array(velocity)
+    held += max(0.0, parameters.side_step_m_s - float(held @ outward)) * outward
+    return Setpoint((float(held[0]), float(held[1]), 0.0), rate, phase, blocked=other)
+
+
+def _nearest(name: str, belief: JointBelief, robots: list[str]) -> tuple[str, float] | None:
+    """Return the other robot that is horizontally closest, with its distance."""
+    mean = belief.mean_of(name)
+    distances: Mapping[str, float] = {
+        other: float(np.hypot(*(belief.mean_of(other)[:2] - mean[:2]))) for other in robots if other != name
+    }
+    return min(distances.items(), key=lambda entry: entry[1]) if distances else None

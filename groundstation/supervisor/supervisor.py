@@ -81,12 +81,19 @@ class Supervisor:
         self.bus = open_bus(self.run.endpoint, self.run.site, SOURCE)
         self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
         self._publisher = StatusPublisher(self.bus)
-        for process in self.processes:
-            if process not in routers:
-                self._launch(process)
+        others = [p for p in self.processes if p not in routers and not p.spec.on_terminal]
+        for process in others:
+            self._launch(process)
         self._write_runtime_file()
-        self._wait_for([p for p in self.processes if p.spec.required])
-        self._wait_for([p for p in self.processes if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
+        self._wait_for([p for p in others if p.spec.required])
+        self._wait_for([p for p in others if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
+
+    def show_screen(self) -> None:
+        """Hand the terminal to the process that draws on it, if the table has one."""
+        for process in self.processes:
+            if process.spec.on_terminal and not process.life:
+                self._terminal.muted = True
+                self._launch(process)
 
     def _wait_for(self, processes: list[ManagedProcess], limit_s: float | None = None) -> None:
         began = time.monotonic()

@@ -1,0 +1,159 @@
+"""One flight from start to landing: supervisor and operator in one loop, until the time is up or someone stops it."""
+
+import os
+import select
+import time
+from dataclasses import dataclass
+
+from groundstation.errors import GroundStationError
+from groundstation.runtime.operator import Operator, Phase
+from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.supervisor.supervisor import Interrupted, Supervisor
+from groundstation.supervisor.terminal import Terminal
+
+_NS_PER_S = 1_000_000_000
+_STDIN = 0
+_FAILED_LANDING_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """What is asked of a flight.
+
+    duration_s: tracking time, None = until stopped; asks: take off only when the operator says so at the prompt or
+    from another shell; landing_limit_s: how long a landing may take before the processes are stopped anyway.
+    """
+
+    duration_s: float | None
+    asks: bool
+    limits: TakeOffLimits
+    start_tracking_limit_s: float = 90.0
+    landing_limit_s: float = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a flight ended. failure: why it could not go on, or ""; interrupted: by the operator; landed: all said so."""
+
+    failure: str
+    interrupted: bool
+    landed: bool
+
+
+class Flight:
+    """Runs one flight; call `run` once."""
+
+    def __init__(self, supervisor: Supervisor, plan: FlightPlan, terminal: Terminal) -> None:
+        self._supervisor = supervisor
+        self._plan = plan
+        self._terminal = terminal
+        self._began_ns = time.monotonic_ns()
+        self._prompting = False
+
+    def run(self) -> Outcome:
+        """Start, fly, land, stop. Raises GroundStationError when the start failed; everything is stopped then too."""
+        supervisor = self._supervisor
+        try:
+            supervisor.start()
+            assert supervisor.bus is not None
+            operator = Operator(supervisor.bus, supervisor.run.drones, self._plan.limits, self._say)
+            failure = self._fly(operator)
+            landed = self._land(operator)
+            return Outcome(failure, supervisor.interrupts.stop_requested, landed)
+        except Interrupted:
+            return Outcome("", interrupted=True, landed=True)
+        finally:
+            supervisor.close()
+            self._terminal.unmute()
+
+    def _say(self, text: str) -> None:
+        elapsed_s = (time.monotonic_ns() - self._began_ns) / _NS_PER_S
+        self._terminal.say(f"{elapsed_s:6.1f} s  {text}")
+
+    def _turn(self, operator: Operator) -> int:
+        self._supervisor.step()
+        now_ns = time.monotonic_ns()
+        operator.step(now_ns)
+        return now_ns
+
+    # --- fly -----------------------------------------------------------------------------------------------------
+
+    def _fly(self, operator: Operator) -> str:
+        """Go on until there is a reason to land; returns the reason if it is a failure."""
+        now_ns = self._turn(operator)
+        if self._plan.asks:
+            self._prompting = True
+            self._say("ready. Press Enter to take off and track (Ctrl-C ends), or use: groundstation takeoff")
+        else:
+            self._say("all processes are ready; taking off")
+            operator.take_off(now_ns)
+            self._supervisor.show_screen()
+        began_ns = now_ns
+        while True:
+            now_ns = self._turn(operator)
+            if self._prompting:
+                self._prompt(operator, now_ns)
+            if self._supervisor.failure:
+                return self._supervisor.failure
+            if self._supervisor.interrupts.stop_requested:
+                return ""
+            ended, failure = self._is_over(operator, now_ns, began_ns)
+            if ended:
+                return failure
+
+    def _is_over(self, operator: Operator, now_ns: int, began_ns: int) -> tuple[bool, str]:
+        if self._plan.asks:
+            return False, ""
+        if operator.phase is Phase.GROUND:
+            return True, "no drone took off"
+        if operator.phase is Phase.LANDING and operator.landed(now_ns):
+            return True, ""  # landed by someone else's order
+        duration_s = self._plan.duration_s
+        if duration_s is None:
+            return False, ""
+        since_ns = operator.tracking_since_ns
+        if since_ns:
+            return now_ns - since_ns >= duration_s * _NS_PER_S, ""
+        late = now_ns - began_ns > self._plan.start_tracking_limit_s * _NS_PER_S
+        return late, "tracking did not begin" if late else ""
+
+    def _prompt(self, operator: Operator, now_ns: int) -> None:
+        if operator.phase is not Phase.GROUND:
+            self._prompting = False  # another shell was faster
+        elif select.select([_STDIN], [], [], 0)[0]:
+            # os.read and not input(): nothing here may block the watch over the processes.
+            line = os.read(_STDIN, 4096)
+            self._prompting = bool(line) and b"\n" not in line
+            if not line:
+                self._say("no keyboard here: waiting for groundstation takeoff")
+            elif not self._prompting:
+                operator.take_off(now_ns)
+        if not self._prompting:
+            self._supervisor.show_screen()
+
+    # --- land ----------------------------------------------------------------------------------------------------
+
+    def _land(self, operator: Operator) -> bool:
+        """Land everybody and wait; returns whether all said that they have landed."""
+        supervisor = self._supervisor
+        now_ns = time.monotonic_ns()
+        if not operator.landed(now_ns):
+            self._say("landing")
+        operator.land(now_ns)
+        # When the simulator is gone there is nobody left to report a landing.
+        limit_s = _FAILED_LANDING_S if supervisor.failure else self._plan.landing_limit_s
+        deadline_ns = now_ns + int(limit_s * _NS_PER_S)
+        while now_ns < deadline_ns and not supervisor.interrupts.hurry:
+            now_ns = self._turn(operator)
+            if operator.landed(now_ns):
+                self._say("all drones have landed")
+                return True
+        aloft = ", ".join(operator.team.airborne(now_ns))
+        self._say(f"stopping, though {aloft or 'nobody'} did not report a landing")
+        return not aloft
+
+
+def require_outcome(outcome: Outcome) -> None:
+    """Raise GroundStationError for a flight that failed."""
+    if outcome.failure:
+        raise GroundStationError(outcome.failure)

@@ -1,0 +1,193 @@
+"""`sitl` and `fly`: the same processes and the same flight, against emulated or real devices."""
+
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+Option = Callable[[Callable[..., Any]], Callable[..., Any]]
+_SETTINGS = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
+_HEADLESS = click.option("--headless", is_flag=True, help="Plain lines instead of the live table.")
+_SIMULATED: tuple[Option, ...] = (
+    click.option(
+        "--scenario", default="realistic", show_default=True, help="A scenario file, or a shipped one's name."
+    ),
+    click.option("--duration", type=click.FloatRange(1, 86_400), help="Seconds of tracking (default: until Ctrl-C)."),
+    click.option("--seed", type=click.IntRange(0), help="Seed of all noise (default: the scenario's)."),
+    click.option(
+        "--report", type=click.Path(file_okay=False, path_type=Path), help="Folder for the run (default: in runs/)."
+    ),
+    _HEADLESS,
+    _SETTINGS,
+)
+
+
+def simulated_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that `sitl` and `demo` share."""
+    for option in reversed(_SIMULATED):
+        command = option(command)
+    return command
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation sitl config/lab.yaml --duration 60\n"
+    "  groundstation sitl lab --seed 3 --headless --set planner.mode=paper\n\n"
+    "Exit codes: 0 passed, 1 failed its criteria, 2 wrong settings, 4 a process failed, 130 interrupted."
+)
+@click.argument("field")
+@simulated_options
+def sitl(field: str, **arguments: Any) -> int:
+    """Fly a field file against emulated drones and cameras. Ctrl-C lands; a second one stops at once."""
+    return run_simulated("sitl", field, **arguments)
+
+
+@click.command(epilog="\b\nExamples:\n  groundstation fly lab.yaml\n  groundstation takeoff   (from another terminal)")
+@click.argument("field")
+@_HEADLESS
+@_SETTINGS
+def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
+    """Fly a field file with the real drones. Nobody takes off before Enter, or `groundstation takeoff`."""
+    from groundstation.cli.composition import FLY_ENDPOINT
+    from groundstation.cli.flight import FlightPlan
+    from groundstation.settings.files import find_field
+    from groundstation.settings.load import load_field
+    from groundstation.supervisor.network import require_free
+
+    path = find_field(field)
+    loaded = load_field(path, options)
+    limits = _limits(loaded)
+    require_free(FLY_ENDPOINT)
+    return _run("fly", path, loaded, FlightPlan(None, asks=True, limits=limits), headless=headless)
+
+
+def run_simulated(
+    mode: str,
+    field: str,
+    *,
+    scenario: str,
+    duration: float | None,
+    seed: int | None,
+    report: Path | None,
+    headless: bool,
+    options: tuple[str, ...],
+) -> int:
+    """Fly a field in the simulator, judge the run, and return the exit code."""
+    from groundstation.cli.composition import Simulation, simulated
+    from groundstation.cli.flight import FlightPlan
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.load import load_field
+    from groundstation.settings.scenario import load_scenario
+    from groundstation.supervisor import network, runtime_file
+
+    path = find_field(field)
+    loaded = load_field(path, options)
+    limits = _limits(loaded)
+    chosen = load_scenario(find_scenario(scenario, path))
+    if seed is None:
+        seed = int(chosen.get("seed", 1))
+    net = network.claim(runtime_file.folder())
+    try:
+        plan = FlightPlan(duration, asks=False, limits=limits)
+        simulation = Simulation(net, chosen, seed)
+        facts = {"scenario": scenario, "seed": seed, "tracking_s": duration}
+        field_there = simulated(loaded, net)
+        return _run(mode, path, field_there, plan, headless=headless, simulation=simulation, report=report, facts=facts)
+    finally:
+        net.release()
+
+
+def _limits(field: Any) -> Any:
+    from groundstation.runtime.take_off import TakeOffLimits, require_separation
+
+    require_separation({name: drone.pad_m for name, drone in field.drones.items()}, field.safety.min_separation_m)
+    return TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
+
+
+def _run(
+    mode: str,
+    path: Path,
+    field: Any,
+    plan: Any,
+    *,
+    headless: bool,
+    simulation: Any = None,
+    report: Path | None = None,
+    facts: dict[str, Any] | None = None,
+) -> int:
+    from groundstation.cli.composition import FLY_ENDPOINT, make_run_dir, process_table
+    from groundstation.cli.flight import Flight, require_outcome
+    from groundstation.settings.resolved import yaml_of
+    from groundstation.supervisor.supervisor import Run, Supervisor
+    from groundstation.supervisor.terminal import Terminal
+
+    run_dir = make_run_dir(report or Path(field.recording.directory), path.stem)
+    (run_dir / "resolved.yaml").write_text(yaml_of(field))
+    _write_facts(run_dir, mode, path, facts or {})
+    _log_to(run_dir)
+    endpoint = simulation.network.endpoint if simulation else FLY_ENDPOINT
+    monitor = not headless and sys.stdout.isatty()
+    table = process_table(field, endpoint, run_dir, simulation=simulation, monitor=monitor)
+    terminal = Terminal()
+    terminal.say(f"{mode} {path}: {len(table)} processes, run folder {run_dir}")
+    run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones))
+    outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()
+    terminal.flush()
+    passed = _judge(run_dir, report) if field.recording.enabled else None
+    require_outcome(outcome)
+    if passed is None:
+        return ExitCode.OK if outcome.landed else ExitCode.FAILED
+    if outcome.interrupted and plan.duration_s is not None:
+        return ExitCode.INTERRUPTED
+    if mode == "fly" or plan.duration_s is None:
+        return ExitCode.OK if outcome.landed else ExitCode.FAILED
+    return ExitCode.OK if passed else ExitCode.FAILED
+
+
+def _write_facts(run_dir: Path, mode: str, path: Path, facts: dict[str, Any]) -> None:
+    from groundstation.report import run_facts
+
+    now_ns = time.time_ns()
+    run_facts.write(run_dir, run_facts.RunFacts(mode=mode, field=str(path), command_unix_ns=now_ns, **facts))
+
+
+def _log_to(run_dir: Path) -> None:
+    import logging
+
+    (run_dir / "log").mkdir(exist_ok=True)
+    handler = logging.FileHandler(run_dir / "log" / "supervisor.log")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logging.getLogger().addHandler(handler)
+    logging.getLogger().setLevel(logging.INFO)
+
+
+def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
+    """Write and print the report; None when there is nothing to judge. Never lets a closed terminal hide it."""
+    from groundstation.errors import GroundStationError
+    from groundstation.report.build import JSON_NAME, PLOT_NAME, build_report
+
+    try:
+        built = build_report(run_dir)
+    except GroundStationError as error:
+        click.echo(f"no report: {error}", err=True)
+        return False
+    for name in (JSON_NAME, PLOT_NAME) if copy_to is not None else ():
+        with suppress(OSError):
+            shutil.copy(run_dir / name, copy_to or run_dir)
+    try:
+        from rich.console import Console
+
+        from groundstation.report.summary import summary
+
+        Console().print(summary(built))
+    except OSError:
+        # The terminal was closed; the interpreter would fail once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return built.passed

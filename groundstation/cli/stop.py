@@ -1,0 +1,152 @@
+"""`hold`, `land`, `cut-motors`, and the operator's `takeoff`, `track`, `resume`, to a ground station that runs.
+
+These must act within 0.3 s of their start: nothing but click, msgspec and zenoh may be imported here.
+"""
+
+import json
+import os
+import signal
+import time
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from groundstation.bus.messages import AckStage, Command, CommandAck, Verb
+from groundstation.bus.topics import COMMAND, COMMAND_ACK
+from groundstation.bus.zenoh_bus import ZenohBus, open_bus
+from groundstation.cli.exits import ExitCode, UnreachableError
+from groundstation.errors import GroundStationError
+from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AckBook
+from groundstation.supervisor import runtime_file
+from groundstation.supervisor.runtime_file import RuntimeRecord
+
+_OPERATOR = "operator"
+_STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
+_PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
+_PATIENCE_DEFAULT_S = 5.0
+_REPEAT_S = 0.2
+_CONNECT_S = 0.5
+
+
+def choose_run(name: str | None) -> RuntimeRecord:
+    """Return the running ground station, or the named one of several; raises UnreachableError."""
+    records = runtime_file.live_records()
+    if name is not None:
+        records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
+    if not records:
+        which = f" called {name}" if name else ""
+        raise UnreachableError(f"no ground station{which} is running here (start one with: groundstation fly FIELD)")
+    if len(records) > 1:
+        lines = "\n".join(f"  --run {r.name}  {r.field}, {', '.join(r.drones)}" for r in records)
+        raise UnreachableError(f"several ground stations are running, choose one:\n{lines}")
+    return records[0]
+
+
+def deliver(bus: ZenohBus, book: AckBook, patience_s: float, on_news: Callable[[str], None]) -> None:
+    """Send the book's command, again to whoever does not answer, until all answers are final or patience ends."""
+    answers = bus.subscribe([COMMAND_ACK])
+    bus.publish(COMMAND, book.command)
+    began = repeated = time.monotonic()
+    while not book.settled and time.monotonic() - began < patience_s:
+        answers.wait(0.05)
+        for received in answers.drain():
+            if isinstance(received.message, CommandAck) and book.note(received.message):
+                entity = received.message.header.entity
+                on_news(f"{entity:<12} {book.progress[entity].text()}")
+        if book.unheard and time.monotonic() - repeated > _REPEAT_S:
+            repeated = time.monotonic()
+            bus.publish(COMMAND, book.command)
+
+
+def signal_drivers(record: RuntimeRecord) -> list[str]:
+    """Ask the drivers of a run whose router is silent to land and exit, by SIGTERM; returns their names."""
+    told = []
+    for process in record.processes:
+        if process.role == "driver" and process.alive:
+            os.kill(process.pid, signal.SIGTERM)
+            told.append(process.name)
+    return told
+
+
+def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -> int:
+    """Carry out one verb; returns the exit code."""
+    record = choose_run(run)
+    strangers = [name for name in drones if name not in record.drones]
+    if strangers:
+        raise GroundStationError(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
+    source = f"cli_{os.getpid()}"
+    try:
+        bus = open_bus(record.endpoint, record.site, source, timeout_s=_CONNECT_S)
+    except GroundStationError as error:
+        return _without_router(verb, record, as_json, error)
+    try:
+        book = _book(bus, verb, drones, record, source)
+        say: Callable[[str], None] = (lambda _: None) if as_json else click.echo
+        deliver(bus, book, _PATIENCE_S.get(verb, _PATIENCE_DEFAULT_S), say)
+    finally:
+        bus.close()
+    return _report(book, as_json)
+
+
+def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, source: str) -> AckBook:
+    header = bus.header("team" if verb in _STOPS else _OPERATOR)
+    # A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease.
+    scope = drones if verb in _STOPS else (_OPERATOR, *drones)
+    expires_ns = 0 if verb in _STOPS else header.stamp_ns + 5_000_000_000
+    identity = f"{source}-{header.stamp_ns}"
+    command = Command(header=header, id=identity, verb=verb, scope=scope, issuer=source, expires_ns=expires_ns)
+    return AckBook(command, (drones or record.drones) if verb in _STOPS else (_OPERATOR,))
+
+
+def _report(book: AckBook, as_json: bool) -> int:
+    if as_json:
+        answers = {
+            name: {"stage": progress.stage or NOT_CONFIRMED, "reason": progress.reason}
+            for name, progress in book.progress.items()
+        }
+        document = {"command": book.command.verb, "confirmed": book.confirmed, "drones": answers}
+        click.echo(json.dumps(document))
+    elif not book.confirmed:
+        for name, progress in book.progress.items():
+            if progress.stage is not AckStage.EFFECTIVE:
+                click.echo(f"{name:<12} {progress.text(final=True)}")
+    return ExitCode.OK if book.confirmed else ExitCode.FAULT
+
+
+def _without_router(verb: Verb, record: RuntimeRecord, as_json: bool, error: GroundStationError) -> int:
+    told = signal_drivers(record) if verb in _STOPS else []
+    if not told:
+        raise UnreachableError(str(error)) from error
+    if as_json:
+        answers = {name: {"stage": NOT_CONFIRMED, "reason": "signalled to land"} for name in told}
+        click.echo(json.dumps({"command": verb, "confirmed": False, "router": False, "drones": answers}))
+    else:
+        click.echo(f"no router answers at {record.endpoint}: told {', '.join(told)} to land and exit (SIGTERM)")
+        click.echo(f"{NOT_CONFIRMED}: watch the drones")
+    return ExitCode.FAULT
+
+
+def _verb(verb: Verb, text: str) -> click.Command:
+    @click.argument("drones", nargs=-1)
+    @click.option("--run", metavar="NAME", help="Which ground station, if several run here.")
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
+    def callback(drones: tuple[str, ...], run: str | None, as_json: bool, **more: Any) -> int:
+        if verb is Verb.CUT_MOTORS and not more["yes"]:
+            click.confirm("Cut the motors? The drones fall from where they are.", abort=True)
+        return order(verb, drones, run, as_json)
+
+    name = verb.lower().replace("_", "-")
+    if verb is Verb.CUT_MOTORS:
+        callback = click.option("--yes", is_flag=True, help="Do not ask.")(callback)
+    example = f"\n\n\b\nExample:\n  groundstation {name}\n  groundstation {name} drone_1 --json"
+    codes = "\n\nExit codes: 0 confirmed, 3 nothing is running, 4 not confirmed."
+    return click.command(name=name, help=text + example + codes)(callback)
+
+
+hold = _verb(Verb.HOLD, "Hover where they are: all drones, or the named ones.")
+land = _verb(Verb.LAND, "Land all drones, or the named ones. Without a router, the drivers are signalled to land.")
+cut_motors = _verb(Verb.CUT_MOTORS, "Stop the motors at once: the drones fall.")
+takeoff = _verb(Verb.TAKEOFF, "Take off, one drone after the other, each seen by a camera before the next.")
+track = _verb(Verb.TRACK, "Let the tracker move the drones that are up.")
+resume = _verb(Verb.RESUME, "Go on after a hold or a restarted tracker.")

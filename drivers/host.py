@@ -44,7 +44,7 @@ class VehicleHost:
         self._started_ns = clock.now_ns()
         self._next_status_ns = self._next_flush_ns = 0
         self._heard_ns = self._started_ns
-        self._announced = (Mode.CONNECTING, "")
+        self._announced = (self.watchdog.mode, self.watchdog.reason)
         self._silent = False
 
     def turn(self, now_ns: int) -> Decision:

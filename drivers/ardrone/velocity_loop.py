@@ -20,9 +20,9 @@ class Gains:
     rad/s], settle_s: after so long at zero the drone holds its place by itself.
     """
 
-    proportional: float = 1.8
-    integral: float = 1.0
-    drag: float = 0.35
+    proportional: float = 2.0
+    integral: float = 1.1
+    drag: float = 0.2
     reference_s: float = 0.5
     integral_m_s2: float = 0.8
     still: float = 0.02

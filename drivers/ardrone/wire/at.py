@@ -133,7 +133,8 @@ def pcmd_mag(motion: Motion) -> AtCommand:
 
 
 def _fraction(value: float) -> int:
-    return bits_from_float(value if -1.0 <= value <= 1.0 or value != value else math.copysign(1.0, value))
+    clamped = value if -1.0 <= value <= 1.0 or value != value else math.copysign(1.0, value)
+    return bits_from_float(clamped + 0.0)  # minus zero would be printed as -2147483648
 
 
 def ftrim() -> AtCommand:

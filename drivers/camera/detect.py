@@ -104,10 +104,16 @@ def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
 
 
 def refined(picture: Picture, corners: Array) -> Array:
-    """Return corners (12, 2) refined in the original picture; a window of 0.45 squares never sees a neighbour."""
-    half = int(np.clip(0.45 * spacing_px(corners), 1, 8))
-    fine = cv2.cornerSubPix(picture, corners.astype(np.float32).reshape(-1, 1, 2), (half, half), (-1, -1), _REFINE)
-    return np.asarray(fine, dtype=np.float64).reshape(-1, 2)
+    """Return corners (12, 2) refined in the original picture; a window of 0.45 squares never sees a neighbour.
+
+    A corner that would slip away by a good part of a square stays where the finder put it.
+    """
+    spacing = spacing_px(corners)
+    half = int(np.clip(0.45 * spacing, 1, 8))
+    start = corners.astype(np.float32).reshape(-1, 1, 2)
+    fine = np.asarray(cv2.cornerSubPix(picture, start, (half, half), (-1, -1), _REFINE), np.float64).reshape(-1, 2)
+    slipped = np.hypot(*(fine - corners).T) > max(1.5, 0.3 * spacing)
+    return np.where(slipped[:, None], corners, fine)
 
 
 def ordered(picture: Picture, corners: Array) -> Find | None:

@@ -92,7 +92,8 @@ class CameraDriverSettings(_Section):
 
     name: of the camera on the bus; observer: whom sightings are attributed to (the carrier, or the camera's own name
     when it is fixed in the world; derived when empty); observes: entities to report (empty: all markers, but for a
-    world-fixed camera robots only); search_phase_s: staggers the full searches of several cameras.
+    world-fixed camera robots only); search_phase_s: staggers the full searches of several cameras; start_within_s,
+    stall_after_s: how long the first picture, and any later one, may take before the operator is warned.
     """
 
     name: _Name
@@ -105,6 +106,7 @@ class CameraDriverSettings(_Section):
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
     search_rate_hz: Annotated[float, Field(gt=0, le=2)] = 2.0
     search_phase_s: Annotated[float, Field(ge=0)] = 0.0
+    start_within_s: _Positive = 5.0
     stall_after_s: _Positive = 1.0
     detector: DetectorSettings = DetectorSettings()
 

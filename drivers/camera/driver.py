@@ -1,0 +1,204 @@
+"""The camera process: newest picture in; observations, status and a few pictures out."""
+
+import logging
+from collections import Counter
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from drivers.camera import convert
+from drivers.camera.attitudes import AttitudeHistory
+from drivers.camera.pipeline import Pipeline
+from drivers.camera.pose import Gravity
+from drivers.camera.settings import CameraDriverSettings, MarkerKind
+from drivers.camera.source import FrameSource, Packet, open_source
+from drivers.camera.stream_watch import StreamState, StreamWatch
+from groundstation.bus import clock
+from groundstation.bus.messages import CameraStatus, Odometry, Severity
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY
+from groundstation.errors import SettingsError
+from groundstation.process.child import Child
+
+_log = logging.getLogger(__name__)
+_POLL_S = 0.02
+_STATUS_PERIOD_NS = 500_000_000
+_JPEG_END = b"\xff\xd9"
+_LEVEL = (0.0, 0.0)
+
+
+def run(child: Child) -> int:
+    """Serve one camera until told to stop; returns the exit code."""
+    try:
+        settings = CameraDriverSettings.model_validate_json(child.section)
+    except ValidationError as error:
+        problems = [f"camera: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
+        raise SettingsError(problems) from None
+    cv2.setNumThreads(1)
+    source = open_source(settings.source)
+    try:
+        driver = CameraDriver(child, settings, source)
+        while not child.stop_requested and child.supervisor_alive:
+            driver.turn()
+    finally:
+        source.close()
+    return 0
+
+
+class CameraDriver:
+    """Turns pictures of one source into messages; `turn` is one pass of its loop (at most 20 ms of waiting).
+
+    `counts` holds what was refused, by reason.
+    """
+
+    def __init__(self, child: Child, settings: CameraDriverSettings, source: FrameSource) -> None:
+        self._child, self._settings, self._source = child, settings, source
+        self._intrinsics = settings.calibration.intrinsics()
+        self._pipeline = Pipeline(
+            self._intrinsics,
+            settings.expected_markers,
+            settings.detector,
+            settings.search_rate_hz,
+            settings.search_phase_s,
+        )
+        robots = {marker.entity for marker in settings.expected_markers if marker.kind is MarkerKind.ROBOT}
+        self._targets = {marker.entity for marker in settings.expected_markers} - robots
+        if not settings.mount.in_world:
+            robots.add(settings.observer)
+        # Roll and pitch only; the newest sample per poll is a history fine enough.
+        self._odometry = [child.bus.subscribe([ODOMETRY], entity=name, newest=True) for name in sorted(robots)]
+        self._attitudes = AttitudeHistory()
+        self._watch = StreamWatch(settings.start_within_s, settings.stall_after_s, clock.now_ns())
+        self._processed = self._detections = self._processed_then = 0
+        self._exposure_ns = 0
+        self._silence_s = settings.start_within_s
+        self._next_image_ns = 0
+        self._status_ns = clock.now_ns()
+        self.counts: Counter[str] = Counter()
+
+    def turn(self) -> None:
+        """Wait shortly for a picture, handle it, and keep up heartbeat, status and stream watch."""
+        packet = self._source.take_newest(_POLL_S)
+        self._read_attitudes()
+        if packet is not None:
+            self._handle(packet)
+        now_ns = clock.now_ns()
+        patience_s = self._watch.patience_s
+        if self._watch.look(now_ns):
+            self._silence_s = patience_s
+            self._announce()
+        if now_ns - self._status_ns >= _STATUS_PERIOD_NS:
+            self._publish_status(now_ns)
+        self._child.beat()
+        self._child.tick_status(ticks=self._processed, overruns=self._skipped)
+
+    @property
+    def _skipped(self) -> int:
+        return max(0, self._source.received - self._processed - sum(self.counts.values()))
+
+    def _read_attitudes(self) -> None:
+        for subscription in self._odometry:
+            for received in subscription.drain():
+                message = received.message
+                if isinstance(message, Odometry) and message.header.clock == clock.clock_id():
+                    header = message.header
+                    self._attitudes.add(header.entity, header.stamp_ns, message.roll_rad, message.pitch_rad)
+
+    def _handle(self, packet: Packet) -> None:
+        exposure_ns = packet.arrival_ns - round(self._settings.video_delay_ms * clock.NS_PER_MS)
+        picture = self._decoded(packet)
+        if picture is None:
+            return
+        if self._watch.usable(packet.arrival_ns):
+            self._announce()
+        self._exposure_ns = exposure_ns
+        self._publish_image(packet, exposure_ns)
+        try:
+            self._observe(picture, exposure_ns)
+        except (cv2.error, np.linalg.LinAlgError, ValueError) as error:
+            self.counts["detector"] += 1
+            _log.warning("picture %d cannot be measured: %s", packet.number, error)
+            return
+        self._processed += 1
+
+    def _decoded(self, packet: Packet) -> NDArray[np.uint8] | None:
+        """Return the grey picture, or None when it is damaged or not of the calibrated size."""
+        whole = packet.data.rstrip(b"\r\n\x00").endswith(_JPEG_END)
+        picture = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if whole else None
+        if picture is None:
+            self.counts["jpeg"] += 1
+            return None
+        height, width = picture.shape
+        wanted = self._intrinsics
+        if (width, height) != (wanted.width_px, wanted.height_px):
+            self.counts["size"] += 1
+            reason = f"its pictures are {width}x{height}, its calibration is for {wanted.width_px}x{wanted.height_px}"
+            if self._watch.refused(reason, packet.arrival_ns):
+                self._announce()
+            return None
+        return np.asarray(picture, dtype=np.uint8)
+
+    def _observe(self, picture: NDArray[np.uint8], exposure_ns: int) -> None:
+        settings = self._settings
+        measured = _LEVEL if settings.mount.in_world else self._attitudes.at(settings.observer, exposure_ns)
+        attitude = measured or _LEVEL
+        rotation = convert.stabilized_from_optical(settings.mount, *attitude)
+
+        def gravity_of(entity: str) -> Gravity:
+            subject = _LEVEL if entity in self._targets else self._attitudes.at(entity, exposure_ns)
+            return Gravity(rotation, *(subject or _LEVEL), known=measured is not None and subject is not None)
+
+        for sighting in self._pipeline.process(picture, exposure_ns, gravity_of):
+            header = self._child.bus.header(settings.observer, exposure_ns)
+            observation = convert.observation_from_sighting(sighting, header, settings.name, attitude)
+            self._child.bus.publish(OBSERVATION, observation)
+            self._detections += 1
+
+    def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
+        """Pass the JPEG on as it came, at most `image_fps` times a second."""
+        if self._settings.image_fps <= 0.0 or exposure_ns < self._next_image_ns:
+            return
+        period_ns = round(clock.NS_PER_S / self._settings.image_fps)
+        # On the grid of the rate, so that 15 fps thin out to 5 and not to every fourth; anew after a pause.
+        on_grid = exposure_ns - self._next_image_ns < period_ns
+        self._next_image_ns = (self._next_image_ns if on_grid else exposure_ns) + period_ns
+        self._child.bus.publish_bytes(IMAGE, self._child.bus.header(self._settings.name, exposure_ns), packet.data)
+
+    def _announce(self) -> None:
+        """Tell lifecycle and operator what the stream does now."""
+        name = self._settings.name
+        if self._watch.state is StreamState.FLOWING:
+            self._child.ready(f"pictures from {self._settings.source}")
+            self._child.event(Severity.INFO, f"camera {name}: pictures arrive", entity=name)
+            return
+        detail = self._trouble()
+        self._child.degrade(detail)
+        self._child.event(Severity.WARNING, f"camera {name}: {detail}", self._remedy(), entity=name)
+
+    def _trouble(self) -> str:
+        if self._watch.state is StreamState.REFUSED:
+            return self._watch.reason
+        why = "connected, but nothing comes" if self._source.connected else self._source.detail
+        return f"no picture for {self._silence_s:g} s ({why})"
+
+    def _remedy(self) -> str:
+        if self._watch.state is StreamState.REFUSED:
+            return "set the camera to the calibrated size, or calibrate it at this one"
+        return f"check the camera and its address {self._settings.source}"
+
+    def _publish_status(self, now_ns: int) -> None:
+        elapsed_s = (now_ns - self._status_ns) / clock.NS_PER_S
+        flowing = self._watch.state is StreamState.FLOWING
+        status = CameraStatus(
+            header=self._child.bus.header(self._settings.name),
+            connected=flowing,
+            fps=(self._processed - self._processed_then) / elapsed_s,
+            age_ms=(now_ns - (self._exposure_ns or self._watch.since_ns)) / clock.NS_PER_MS,
+            frames=self._processed,
+            skipped=self._skipped,
+            detections=self._detections,
+            detail="" if flowing or self._watch.state is StreamState.WAITING else self._trouble(),
+        )
+        self._child.bus.publish(CAMERA_STATUS, status)
+        self._status_ns, self._processed_then = now_ns, self._processed

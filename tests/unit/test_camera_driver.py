@@ -1,0 +1,274 @@
+"""The camera driver's loop against a fake source and a bus in memory: what it says when pictures are bad or absent."""
+
+import json
+import math
+from collections import deque
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.camera import driver
+from drivers.camera.attitudes import AttitudeHistory
+from drivers.camera.settings import CameraDriverSettings
+from drivers.camera.source import Packet
+from drivers.camera.stream_watch import StreamState, StreamWatch
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import Odometry
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY
+from groundstation.errors import SettingsError
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+from groundstation.geometry.rotations import base_from_tilted_optical
+from sim_bridge.render.renderer import Renderer
+from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+
+SECTION = {
+    "name": "drone_1_camera",
+    "source": "http://127.0.0.1:9/video.mjpg",
+    "calibration": {
+        "width_px": 640,
+        "height_px": 360,
+        "fx_px": 460,
+        "fy_px": 460,
+        "cx_px": 319.5,
+        "cy_px": 179.5,
+        "distortion": [-0.30, 0.08, 0, 0, 0],
+    },
+    "mount": {"parent": "drone_1", "position_m": [0.09, 0, 0], "tilt_down_deg": 45},
+    "video_delay_ms": 120,
+    "markers": [
+        {"entity": "drone_1", "code": 1, "square_mm": 44, "position_m": [0, 0, 0.08]},
+        {"entity": "bot", "code": 5, "square_mm": 44, "position_m": [0, 0, 0.4], "kind": "target"},
+    ],
+    "start_within_s": 0.05,
+    "stall_after_s": 0.05,
+}
+
+
+def settings(**changes):
+    return CameraDriverSettings.model_validate_json(json.dumps({**SECTION, **changes}))
+
+
+class FakeSource:
+    def __init__(self):
+        self.packets, self.received, self.connected, self.detail = deque(), 0, True, ""
+
+    def push(self, data, arrival_ns=None):
+        self.received += 1
+        self.packets.append(Packet(data, arrival_ns or clock.now_ns(), self.received))
+
+    def take_newest(self, timeout_s):
+        return self.packets.popleft() if self.packets else None
+
+    def close(self):
+        pass
+
+
+class FakeChild:
+    stop_requested, supervisor_alive = False, True
+
+    def __init__(self, bus):
+        self.bus, self.name = bus, "drone_1_camera"
+        self.states, self.events, self.beats = [], [], 0
+
+    def ready(self, detail=""):
+        self.states.append(("READY", detail))
+
+    def degrade(self, detail):
+        self.states.append(("DEGRADED", detail))
+
+    def event(self, severity, text, remedy="", entity=None):
+        self.events.append((str(severity), text, remedy))
+
+    def beat(self):
+        self.beats += 1
+
+    def tick_status(self, **_counters):
+        pass
+
+
+@pytest.fixture
+def rig():
+    exchange = MemoryExchange()
+    child, source = FakeChild(MemoryBus(exchange, "lab", "drone_1_camera")), FakeSource()
+    listener = MemoryBus(exchange, "lab", "test")
+    subscription = listener.subscribe([OBSERVATION, CAMERA_STATUS, IMAGE])
+
+    class Rig:
+        pass
+
+    rig = Rig()
+    rig.child, rig.source, rig.bus, rig.heard = child, source, listener, subscription
+    rig.camera = driver.CameraDriver(child, settings(), source)
+    return rig
+
+
+@pytest.fixture(scope="module")
+def jpeg():
+    lens = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
+    mount = Mount(Pose(base_from_tilted_optical(math.radians(45)), np.array([0.09, 0.0, 0.0])), "drone_1")
+    boards = (BoardSpec("bot", 5, 44.0, (0, 0, 0.4), BodyShape.TURTLEBOT),)
+    spec = RenderSpec("c", mount, lens, boards, "t", ("drone_1", "bot"), "127.0.0.1", 0, CameraScenario(exposure_ms=0))
+    states = np.zeros((2, 13))
+    states[0, 2], states[0, 6], states[1, 0], states[1, 8] = 1.8, 0.1, 1.4, 0.5
+    return encoded(Renderer(spec).render(states))
+
+
+def encoded(picture):
+    return cv2.imencode(".jpg", picture)[1].tobytes()
+
+
+def spend(rig, seconds):
+    end_ns = clock.now_ns() + round(seconds * 1e9)
+    while clock.now_ns() < end_ns:
+        rig.camera.turn()
+
+
+def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
+    now_ns = clock.now_ns()
+    attitude = Odometry(
+        header=rig.bus.header("drone_1", now_ns - 120_000_000),
+        velocity_m_s=(0.0, 0.0, 0.0),
+        velocity_covariance=(0.0,) * 9,
+        yaw_rad=0.3,
+        roll_rad=0.1,
+        pitch_rad=0.0,
+    )
+    rig.bus.publish(ODOMETRY, attitude)
+    rig.source.push(jpeg, now_ns)
+    rig.camera.turn()
+    heard = rig.heard.drain()
+    (observation,) = [r.message for r in heard if r.key.topic is OBSERVATION]
+    assert observation.header.stamp_ns == now_ns - 120_000_000
+    assert (observation.observer, observation.subject, observation.camera) == ("drone_1", "bot", "drone_1_camera")
+    assert observation.header.entity == "drone_1"
+    assert observation.roll_rad == pytest.approx(0.1)
+    assert observation.yaw_rad == pytest.approx(0.5, abs=0.02)
+    assert len(observation.covariance) == 16
+    assert observation.margin > 1.0
+    (image,) = [r for r in heard if r.key.topic is IMAGE]
+    assert image.payload == jpeg
+    assert (image.header.entity, image.header.stamp_ns) == ("drone_1_camera", now_ns - 120_000_000)
+    assert rig.child.states[-1][0] == "READY"
+
+
+def test_pictures_are_passed_on_at_most_five_times_a_second(rig, jpeg):
+    start_ns = clock.now_ns()
+    for k in range(16):
+        rig.source.push(jpeg, start_ns + k * 66_000_000)
+        rig.camera.turn()
+    assert sum(r.key.topic is IMAGE for r in rig.heard.drain()) in (5, 6)
+
+
+def test_garbage_is_counted_and_never_published(rig, jpeg):
+    for data in (b"", b"\xff\xd8\xff\xd9", b"\xff\xd8" + b"\x00" * 500, jpeg[: len(jpeg) // 2], jpeg[:-2]):
+        rig.source.push(data)
+        rig.camera.turn()
+    assert rig.camera.counts["jpeg"] == 5
+    assert rig.heard.drain() == []
+    rig.source.push(jpeg)
+    rig.camera.turn()
+    assert any(r.key.topic is OBSERVATION for r in rig.heard.drain())
+
+
+def test_another_picture_size_is_refused_by_name(rig):
+    for _ in range(3):
+        rig.source.push(encoded(np.full((240, 320), 128, np.uint8)))
+        rig.camera.turn()
+    assert rig.camera.counts["size"] == 3
+    assert [e for e in rig.child.events if "320x240" in e[1] and "640x360" in e[1]] == rig.child.events
+    assert len(rig.child.events) == 1
+    assert rig.child.states[-1][0] == "DEGRADED"
+    assert not any(r.key.topic is OBSERVATION for r in rig.heard.drain())
+
+
+def test_a_stall_is_named_once_and_ends_by_itself(rig, jpeg):
+    rig.source.push(jpeg)
+    rig.camera.turn()
+    spend(rig, 0.15)
+    assert rig.child.states[-1] == ("DEGRADED", "no picture for 0.05 s (connected, but nothing comes)")
+    assert [e[0] for e in rig.child.events] == ["INFO", "WARNING"]
+    assert "drone_1_camera" in rig.child.events[-1][1]
+    assert "127.0.0.1:9" in rig.child.events[-1][2]
+    rig.source.push(jpeg)
+    rig.camera.turn()
+    assert rig.child.states[-1][0] == "READY"
+
+
+def test_a_camera_that_never_answers_is_named(rig):
+    rig.source.connected, rig.source.detail = False, "127.0.0.1:9: Connection refused"
+    spend(rig, 0.1)
+    assert rig.child.states == [("DEGRADED", "no picture for 0.05 s (127.0.0.1:9: Connection refused)")]
+
+
+def test_status_tells_connection_age_and_skipped_frames(rig, jpeg):
+    rig.source.received = 4
+    rig.source.push(jpeg)
+    rig.camera.turn()
+    spend(rig, 0.55)
+    status = [r.message for r in rig.heard.drain() if r.key.topic is CAMERA_STATUS][-1]
+    assert not status.connected
+    assert (status.frames, status.skipped, status.detections) == (1, 4, 1)
+    assert status.age_ms > 500
+
+
+def test_a_detector_that_fails_does_not_end_the_process(rig, jpeg, monkeypatch):
+    def fail(*_arguments):
+        raise cv2.error("singular")
+
+    monkeypatch.setattr(rig.camera._pipeline, "process", fail)
+    rig.source.push(jpeg)
+    rig.camera.turn()
+    assert rig.camera.counts["detector"] == 1
+
+
+def test_attitudes_are_read_at_the_exposure():
+    history = AttitudeHistory()
+    for k in range(20):
+        history.add("drone_1", k * 10_000_000, 0.01 * k, -0.02 * k)
+    assert history.at("drone_1", 55_000_000) == pytest.approx((0.055, -0.11))
+    assert history.at("drone_1", 190_000_000 + 150_000_000) == pytest.approx((0.19, -0.38))
+    assert history.at("drone_1", 190_000_000 + 250_000_000) is None
+    assert history.at("drone_2", 0) is None
+
+
+def test_stream_watch():
+    watch = StreamWatch(5.0, 1.0, 0)
+    assert not watch.look(4_000_000_000)
+    assert watch.look(5_000_000_000)
+    assert not watch.look(6_000_000_000)
+    assert watch.usable(7_000_000_000)
+    assert not watch.usable(7_100_000_000)
+    assert watch.look(8_200_000_000)
+    assert watch.state is StreamState.SILENT
+    assert watch.refused("too small", 9_000_000_000)
+    assert not watch.refused("too small", 9_100_000_000)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"video_delay_ms": -1}, "video_delay_ms"),
+        ({"search_rate_hz": 5}, "search_rate_hz"),
+        ({"image_fps": 9}, "image_fps"),
+        ({"unheard": 1}, "unheard"),
+        ({"mount": {"parent": "world"}}, "looking"),
+        ({"markers": [dict(SECTION["markers"][0]), {**SECTION["markers"][1], "code": 1}]}, "share a code"),
+    ],
+)
+def test_wrong_sections_are_named(change, named):
+    child = FakeChild(None)
+    child.section = json.dumps({**SECTION, **change})
+    with pytest.raises(SettingsError, match=named):
+        driver.run(child)
+
+
+def test_whom_a_camera_reports():
+    ceiling = {"name": "ceiling", "mount": {"parent": "world", "looking": "down"}}
+    assert [m.entity for m in settings().expected_markers] == ["bot"]
+    assert [m.entity for m in settings(**ceiling).expected_markers] == ["drone_1"]
+    both = settings(**ceiling, observes=["bot", "drone_1"])
+    assert [m.entity for m in both.expected_markers] == ["drone_1", "bot"]
+    assert (settings().observer, both.observer) == ("drone_1", "ceiling")

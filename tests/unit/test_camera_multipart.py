@@ -1,0 +1,74 @@
+"""The multipart reader on hand-made bytes of several kinds of cameras, and on what no camera should send."""
+
+from drivers.camera.multipart import MAX_FRAME_BYTES, MultipartParser, boundary_from_head
+
+JPEG = b"\xff\xd8 first picture \xff\xd9"
+OTHER = b"\xff\xd8 second\r\n--picture \xff\xd9"
+
+
+def sized(jpeg, boundary=b"frame"):
+    return b"--%s\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n%s\r\n" % (boundary, len(jpeg), jpeg)
+
+
+def test_parts_with_content_length():
+    assert MultipartParser(b"frame").feed(sized(JPEG) + sized(OTHER)) == [JPEG, OTHER]
+
+
+def test_parts_without_content_length():
+    stream = b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + JPEG + b"\r\n--frame\r\nContent-Type: image/jpeg\r\n\r\n"
+    assert MultipartParser(b"frame").feed(stream) == [JPEG]
+
+
+def test_byte_by_byte():
+    parser, frames = MultipartParser(b"frame"), []
+    for byte in sized(JPEG) + sized(OTHER):
+        frames += parser.feed(bytes([byte]))
+    assert frames == [JPEG, OTHER]
+
+
+def test_lower_case_headers_and_noise_between_parts():
+    stream = b"junk\r\n\r\n--frame\r\ncontent-length:%d\r\n\r\n" % len(JPEG) + JPEG + b"\r\n\r\n\r\n" + sized(OTHER)
+    assert MultipartParser(b"frame").feed(stream) == [JPEG, OTHER]
+
+
+def test_what_is_no_jpeg_is_rejected_and_the_next_one_found():
+    parser = MultipartParser(b"frame")
+    assert parser.feed(sized(b"<html>no</html>") + sized(JPEG)) == [JPEG]
+    assert parser.rejected == 1
+
+
+def test_an_absurd_length_does_not_swallow_the_stream():
+    parser = MultipartParser(b"frame")
+    absurd = b"--frame\r\nContent-Length: %d\r\n\r\n" % (MAX_FRAME_BYTES + 1)
+    assert parser.feed(absurd + sized(JPEG)) == [JPEG]
+    assert parser.rejected == 1
+
+
+def test_an_endless_header_does_not_swallow_the_stream():
+    parser = MultipartParser(b"frame")
+    parser.feed(b"--frame\r\n" + b"X-Long: y\r\n" * 1000)
+    assert parser.feed(sized(JPEG)) == [JPEG]
+
+
+def test_memory_stays_bounded_without_any_boundary():
+    parser = MultipartParser(b"frame")
+    for _ in range(40):
+        assert parser.feed(b"\x00" * (1 << 20)) == []
+    assert len(parser._buffer) < 100
+
+
+def test_memory_stays_bounded_in_a_part_without_end():
+    parser = MultipartParser(b"frame")
+    parser.feed(b"--frame\r\nContent-Type: image/jpeg\r\n\r\n")
+    for _ in range(20):
+        parser.feed(b"\xff" * (1 << 20))
+    assert len(parser._buffer) <= MAX_FRAME_BYTES + (2 << 20)
+    assert parser.feed(b"\r\n" + sized(JPEG))[-1:] == [JPEG]
+
+
+def test_boundaries_in_response_heads():
+    head = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=%s\r\n"
+    assert boundary_from_head(head % b"frame") == b"frame"
+    assert boundary_from_head(head % b'"--frame"') == b"frame"
+    assert boundary_from_head(head % b"--myboundary") == b"myboundary"
+    assert boundary_from_head(b"HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n") is None

@@ -1,0 +1,69 @@
+"""Corners in real photographs (OpenCV's calibration pictures): found, and refined to the print's own error."""
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.camera.detect import spacing_px
+from drivers.camera.search import saddle_points, search
+from groundstation.geometry.lens import CameraIntrinsics
+
+DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).resolve().parents[2].parent / "shared" / "data"))
+FOLDER = DATA / "camera_calibration"
+LENS = CameraIntrinsics(
+    640,
+    480,
+    535.91573396163199,
+    535.91573396163199,
+    342.28315473308373,
+    235.57082909788173,
+    (-0.26637260909660682, -0.038588898922304653, 0.0017831947042852964, -0.00028122100441115472, 0.23839153080878486),
+)
+
+pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no photographs in {FOLDER}")
+
+
+def photographs():
+    return sorted(FOLDER.glob("*.jpg"))
+
+
+def found_corners(picture):
+    found, corners = cv2.findChessboardCorners(picture, (9, 6))
+    assert found
+    corners = np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2)
+    fine = cv2.cornerSubPix(picture, corners, (5, 5), (-1, -1), (3, 30, 0.005))
+    return np.asarray(fine, dtype=np.float64).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("name", ["left01.jpg", "left03.jpg", "left05.jpg", "left12.jpg"])
+def test_our_lens_explains_real_corners(name):
+    """A flat board seen through the published calibration: a homography of undistorted corners leaves little over."""
+    corners = found_corners(cv2.imread(str(FOLDER / name), cv2.IMREAD_GRAYSCALE))
+    rays = LENS.normalised_from_pixels(corners)
+    plane = np.array([[x, y] for y in range(6) for x in range(9)], dtype=np.float64)
+    h, _ = cv2.findHomography(plane, rays)
+    lifted = np.column_stack((plane, np.ones(len(plane)))) @ h.T
+    errors = LENS.pixels_from_normalised(lifted[:, :2] / lifted[:, 2:]) - corners
+    assert np.sqrt((errors**2).sum(axis=1).mean()) < 0.35
+
+
+def test_nearly_all_real_corners_are_seeds_of_the_search():
+    shares = []
+    for path in photographs():
+        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        seeds = saddle_points(picture).points
+        corners = found_corners(picture) if path.name != "left09.jpg" else np.zeros((0, 2))
+        if len(corners):
+            near = np.linalg.norm(corners[:, None] - seeds[None], axis=-1).min(axis=1)
+            shares.append(float((near < 0.3 * np.linalg.norm(corners[1] - corners[0])).mean()))
+    assert len(shares) >= 10
+    assert np.mean(shares) > 0.95
+
+
+def test_a_larger_board_is_not_taken_for_a_marker():
+    for path in photographs():
+        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        assert [spacing_px(find.corners) for find in search(picture, [])] == []

@@ -1,0 +1,185 @@
+"""The whole ground station as real processes: it flies, lands on request, and survives what breaks."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import pytest
+
+from groundstation.bus.messages import VelocitySetpoint
+from groundstation.bus.topics import SETPOINT
+
+pytestmark = [pytest.mark.sitl, pytest.mark.timeout(240)]
+Start = Callable[..., "SitlRun"]  # type: ignore[name-defined]  # noqa: F821 - the class lives in conftest.py
+
+FAULTS = pytest.mark.slow
+
+
+def cli(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "groundstation.cli.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_short_flight_lands_and_leaves_nothing(sitl: Start) -> None:
+    run = sitl("--duration", "5")
+    run.until_tracking()
+    assert all(run.height(name) > 0.3 for name in run.record.drones)
+    run.wait(120)
+    assert all(run.on_ground(name) for name in run.record.drones)
+    run.until_gone(5)
+    report = json.loads((run.run_dir / "report.json").read_text())
+    assert report["landed"] is True
+    assert report["tracked_s"] >= 4.5
+    for name in ("state.mcap", "raw.mcap", "resolved.yaml", "trajectories.png"):
+        assert (run.run_dir / name).is_file()
+
+
+@FAULTS
+def test_land_from_another_shell(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    result = cli("land", "--run", run.record.name, "--json")
+    assert result.returncode == 0, result.stdout + result.stderr
+    answers = json.loads(result.stdout)
+    assert answers["confirmed"] and set(answers["drones"]) == set(run.record.drones)
+    run.until_landed(5)
+    assert run.wait(30) == 0
+
+
+@FAULTS
+def test_hold_stops_the_motion_and_resume_goes_on(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    assert cli("hold", "--run", run.record.name).returncode == 0
+    run.until(lambda: all(run.mode(name) == "HOLD" for name in run.record.drones), 2, "all in HOLD")
+    assert cli("resume", "--run", run.record.name).returncode == 0
+    run.until_tracking(5)
+
+
+@FAULTS
+def test_ctrl_c_lands_first(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    run.process.send_signal(signal.SIGINT)
+    run.until_landed(20)
+    run.wait(30)
+    run.until_gone(5)
+
+
+@FAULTS
+def test_second_ctrl_c_stops_at_once(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    run.process.send_signal(signal.SIGINT)
+    time.sleep(0.8)
+    run.process.send_signal(signal.SIGINT)
+    run.wait(10)
+    run.until_gone(5)
+
+
+@FAULTS
+def test_closed_terminal_does_not_kill_the_landing(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    for _ in range(3):
+        run.process.send_signal(signal.SIGHUP)
+        time.sleep(0.7)
+    run.until_landed(20)
+    run.wait(30)
+    run.until_gone(5)
+
+
+@FAULTS
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+def test_broken_tracker_drones_hover_then_land(sitl: Start, number: int) -> None:
+    run = sitl()
+    run.until_tracking()
+    epochs_before = {m.epoch for _, m in run.history[SETPOINT.name, "drone_1"] if isinstance(m, VelocitySetpoint)}
+    pid = run.pid("tracker")
+    os.kill(pid, number)
+    broken = time.monotonic()
+    run.until(lambda: all(run.mode(n) != "TRACK" for n in run.record.drones), 1.5, "setpoints no longer obeyed")
+    run.until(lambda: run.restarted("tracker", pid), 40, "tracker back")
+    run.until_landed(30)
+    for name in run.record.drones:
+        assert "TRACK" not in run.modes_since(name, broken + 1.5), "motion resumed by itself"
+        assert run.speed_between(name, broken + 2.5, broken + 3.0) < 0.3
+    epochs = {m.epoch for _, m in run.history[SETPOINT.name, "drone_1"] if isinstance(m, VelocitySetpoint)}
+    assert all(epoch > max(epochs_before) for epoch in epochs - epochs_before)
+
+
+@FAULTS
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+def test_broken_driver_its_drone_stops_and_lands(sitl: Start, number: int) -> None:
+    run = sitl()
+    run.until_tracking()
+    pid = run.pid("drone_1")
+    os.kill(pid, number)
+    broken = time.monotonic()
+    run.until(lambda: run.restarted("drone_1", pid), 15, "driver back")
+    run.until(lambda: run.on_ground("drone_1"), 20, "drone_1 on the ground")
+    assert "TRACK" not in run.modes_since("drone_1", broken + 1.0)
+    assert run.speed_between("drone_1", broken + 2.0, broken + 2.5) < 0.4
+
+
+@FAULTS
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+def test_broken_router_comes_back(sitl: Start, number: int) -> None:
+    run = sitl()
+    run.until_tracking()
+    pid = run.pid("router")
+    os.kill(pid, number)
+    run.until(lambda: run.pid("router") != pid, 5, "router back")
+    heard = time.monotonic() + 1.0
+    run.until(lambda: bool(run.modes_since("drone_1", heard)), 10, "drivers reconnected")
+    assert cli("land", "--run", run.record.name).returncode == 0
+    run.until_landed(10)
+
+
+@FAULTS
+def test_killed_supervisor_drones_land_and_no_orphan_remains(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    run.process.kill()
+    run.process.wait()
+    deadline = time.monotonic() + 25
+    while not all(run.on_ground(name) for name in run.record.drones) and time.monotonic() < deadline:
+        run.listen()
+        time.sleep(0.05)
+    assert all(run.on_ground(name) for name in run.record.drones)
+    run.until_gone(30)
+
+
+@FAULTS
+def test_frozen_supervisor_drones_hover_and_land(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    os.kill(run.process.pid, signal.SIGSTOP)
+    run.until_landed(25)
+    os.kill(run.process.pid, signal.SIGCONT)
+
+
+@FAULTS
+def test_two_runs_at_once(sitl: Start) -> None:
+    first = sitl("--duration", "3")
+    second = sitl("--duration", "3")
+    assert first.record.endpoint != second.record.endpoint
+    first.until_tracking(120)
+    second.until_tracking(120)
+    assert "several ground stations" in cli("land").stderr
+    first.wait(120)
+    second.wait(120)
+
+
+@FAULTS
+def test_end_of_the_simulator_ends_the_run_with_its_name(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    os.kill(run.pid("sim_bridge"), signal.SIGKILL)
+    assert run.wait(40) == 4
+    assert "sim_bridge killed by SIGKILL" in run.text
+    run.until_gone(5)

@@ -1,0 +1,94 @@
+"""A watchdog with a vehicle that obeys, under a clock of our own."""
+
+import itertools
+
+import pytest
+
+from drivers.authority import Action, AuthorityLimits, Upstream, VehicleView
+from drivers.watchdog import Watchdog
+from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
+
+MS = 1_000_000
+S = 1_000_000_000
+STEP = 33 * MS
+
+
+class Bench:
+    """A watchdog with a vehicle that obeys, driven step by step under a clock of our own."""
+
+    def __init__(self, state=FlightState.LANDED, **limits):
+        self.watchdog = Watchdog(AuthorityLimits(**limits), "clock")
+        self.now = 100 * S
+        self.state = state
+        self.fresh = True
+        self.battery = 0.9
+        self.not_ready = ""
+        self.upstream = Upstream()
+        self.epoch = 1
+        self.ids = itertools.count()
+        self.numbers = itertools.count()
+        self.tracker_speaks = False
+        self.converged = True
+        self.lease_alive = True
+        self.decision = self.step()
+
+    def header(self, stamp=None, seq=0, clock="clock"):
+        return Header(self.now if stamp is None else stamp, clock, "drone_1", "tester", seq)
+
+    def step(self, dt=STEP):
+        self.now += dt
+        if self.lease_alive:
+            self.watchdog.accept_lease(self.now, Lease(header=self.header(), holder="op", expires_ns=self.now + 2 * S))
+        if self.tracker_speaks:
+            self.setpoint()
+        view = VehicleView(self.state, self.fresh, self.battery, self.not_ready)
+        self.decision = self.watchdog.step(self.now, view, self.upstream)
+        return self.decision
+
+    def run(self, seconds):
+        decisions = [self.step() for _ in range(round(seconds * S / STEP))]
+        return [decision.action for decision in decisions]
+
+    def setpoint(self, velocity=(0.3, 0.0, 0.0), **changes):
+        fields = {"seq": next(self.numbers), "epoch": self.epoch, "lifetime": 300, "stamp": self.now, "clock": "clock"}
+        fields |= changes
+        message = VelocitySetpoint(
+            header=self.header(fields["stamp"], fields["seq"], fields["clock"]),
+            velocity_m_s=velocity,
+            yaw_rate_rad_s=0.1,
+            lifetime_ms=fields["lifetime"],
+            epoch=fields["epoch"],
+            converged=self.converged,
+        )
+        return self.watchdog.accept_setpoint(self.now, message)
+
+    def order(self, verb, issuer="op", expires=None, id=None, clock="clock"):
+        stopping = verb in (Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS)
+        expires_ns = expires if expires is not None else (0 if stopping else self.now + 5 * S)
+        command = Command(
+            header=self.header(clock=clock),
+            id=id or f"c{next(self.ids)}",
+            verb=verb,
+            scope=(),
+            issuer=issuer,
+            expires_ns=expires_ns,
+        )
+        return self.watchdog.accept_command(self.now, command)[-1]
+
+    def fly(self):
+        """Take off and track."""
+        assert self.order(Verb.TAKEOFF).stage is AckStage.ACCEPTED
+        self.state = FlightState.TAKING_OFF
+        self.step()
+        self.state = FlightState.HOVERING
+        self.tracker_speaks = True
+        self.step()
+        assert self.order(Verb.TRACK).stage is AckStage.ACCEPTED
+        assert self.step().action is Action.FLY
+        return self
+
+
+@pytest.fixture
+def new_bench():
+    """Build a bench; takes the vehicle's state and the limits that differ."""
+    return Bench

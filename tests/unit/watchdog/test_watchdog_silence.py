@@ -1,0 +1,160 @@
+"""What silence, of tracker, vehicle or supervisor, does to a flying vehicle."""
+
+import pytest
+
+from drivers.authority import Action, Upstream
+from groundstation.bus.messages import AckStage, FlightState, Verb
+
+MS = 1_000_000
+S = 1_000_000_000
+
+
+def test_lost_setpoints_hover_after_300_ms_and_land_after_3_s(new_bench):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    began = bench.now
+    times = {}
+    while bench.now - began < 5 * S:
+        times.setdefault(bench.step().action, (bench.now - began) / S)
+    assert times[Action.HOVER] == pytest.approx(0.3, abs=0.04)
+    assert times[Action.LAND] == pytest.approx(3.0, abs=0.04)
+
+
+def test_the_same_epoch_may_resume_before_the_landing(new_bench):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    assert bench.run(2.5)[-1] is Action.HOVER
+    bench.tracker_speaks = True
+    assert bench.step().action is Action.FLY
+
+
+def test_landing_latches_whatever_is_sent(new_bench):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    bench.run(3.2)
+    bench.tracker_speaks = True
+    for verb in (Verb.TRACK, Verb.RESUME, Verb.HOLD, Verb.TAKEOFF):
+        assert bench.order(verb).stage is AckStage.REFUSED
+    assert set(bench.run(2)) == {Action.LAND}
+
+
+def test_a_new_epoch_moves_nothing_until_resume(new_bench):
+    bench = new_bench().fly()
+    bench.epoch = 2
+    actions = bench.run(1)
+    assert actions[-1] is Action.HOVER
+    assert "RESUME" in bench.order(Verb.TRACK).reason
+    bench.converged = False
+    bench.step()
+    assert "converged" in bench.order(Verb.RESUME).reason
+    bench.converged = True
+    bench.step()
+    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.FLY
+    assert bench.setpoint(epoch=1, seq=10**6) == "old_epoch"
+
+
+def test_a_new_epoch_does_not_stop_the_land_timer(new_bench):
+    bench = new_bench().fly()
+    bench.epoch = 2
+    actions = bench.run(3.2)
+    assert Action.FLY not in actions and actions[-1] is Action.LAND
+
+
+def test_a_belief_that_is_not_converged_hovers_but_is_no_silence(new_bench):
+    bench = new_bench().fly()
+    bench.converged = False
+    assert set(bench.run(5)) == {Action.HOVER}
+    bench.converged = True
+    assert bench.step().action is Action.FLY
+
+
+def test_setpoints_expire_by_receipt_and_by_stamp(new_bench):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    bench.run(0.5)
+    assert bench.setpoint(stamp=bench.now - 400 * MS) == "expired"
+    assert bench.setpoint(lifetime=0) == "expired"
+    assert bench.setpoint(stamp=bench.now + 10 * S, lifetime=10_000) == ""
+    assert bench.run(0.26)[-1] is Action.FLY
+    assert bench.run(0.1)[-1] is Action.HOVER, "a stamp of the future, or a long lifetime, buys nothing"
+    assert bench.setpoint(stamp=0, clock="elsewhere") == "", "another host's stamp says nothing here"
+
+
+def test_replayed_setpoints_are_ignored(new_bench):
+    bench = new_bench().fly()
+    assert bench.setpoint(seq=0) == "old_sequence"
+    number = next(bench.numbers)
+    assert bench.setpoint(seq=number) == ""
+    assert bench.setpoint(seq=number) == "old_sequence"
+
+
+def test_an_unseen_drone_lands_after_10_s(new_bench):
+    bench = new_bench()
+    bench.order(Verb.TAKEOFF)
+    bench.step()
+    bench.state = FlightState.HOVERING
+    assert set(bench.run(9.9)) == {Action.HOVER}
+    assert bench.run(0.3)[-1] is Action.LAND
+
+
+@pytest.mark.parametrize("mode", [Verb.TRACK, Verb.HOLD])
+def test_low_battery_lands_after_3_s(new_bench, mode):
+    bench = new_bench().fly()
+    bench.order(mode)
+    bench.battery = 0.1
+    assert Action.LAND not in bench.run(2.9)
+    bench.battery = 0.2
+    bench.step()
+    bench.battery = 0.1
+    assert Action.LAND not in bench.run(2.9)
+    assert bench.run(0.3)[-1] is Action.LAND
+
+
+def test_a_dead_supervisor_hovers_then_lands(new_bench):
+    bench = new_bench().fly()
+    bench.upstream = Upstream(supervisor_alive=False)
+    assert bench.step().action is Action.HOVER
+    assert bench.run(1.1)[-1] is Action.LAND
+
+
+def test_a_frozen_supervisor_hovers_then_lands_and_only_a_short_one_is_forgiven(new_bench):
+    bench = new_bench().fly()
+    bench.upstream = Upstream(supervisor_fresh=False)
+    assert set(bench.run(0.5)) == {Action.HOVER}
+    bench.upstream = Upstream()
+    assert bench.step().action is Action.FLY
+    bench.upstream = Upstream(supervisor_fresh=False)
+    bench.run(1.2)
+    bench.upstream = Upstream()
+    assert set(bench.run(2)) == {Action.HOVER}
+    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.FLY
+    bench.upstream = Upstream(supervisor_fresh=False)
+    assert bench.run(3.2)[-1] is Action.LAND
+
+
+def test_sigterm_lands_at_once(new_bench):
+    bench = new_bench().fly()
+    bench.upstream = Upstream(stop_requested=True)
+    assert bench.step().action is Action.LAND
+
+
+def test_silent_telemetry_hovers_needs_resume_and_lands(new_bench):
+    bench = new_bench().fly()
+    bench.fresh = False
+    assert set(bench.run(1.2)) == {Action.HOVER}
+    bench.fresh = True
+    assert set(bench.run(1)) == {Action.HOVER}
+    bench.order(Verb.RESUME)
+    assert bench.step().action is Action.FLY
+    bench.fresh = False
+    assert bench.run(3.2)[-1] is Action.LAND
+
+
+def test_a_driver_that_was_frozen_does_not_move_by_itself(new_bench):
+    bench = new_bench().fly()
+    assert bench.step(dt=700 * MS).action is Action.HOVER
+    assert set(bench.run(2)) == {Action.HOVER}
+    bench.order(Verb.TRACK)
+    assert bench.step().action is Action.FLY

@@ -1,0 +1,62 @@
+"""PaVE frames: a real capture, frames assembled by hand, and damage."""
+
+import os
+import random
+import struct
+from pathlib import Path
+
+import pytest
+
+from drivers.ardrone.wire.pave import Frame, FrameReader, FrameType
+
+DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "ardrone"
+
+
+def frame(payload, number=7, header_size=64, kind=1):
+    head = struct.pack(
+        "<4sBBHIHHHHIIBBBB", b"PaVE", 2, 4, header_size, len(payload), 640, 368, 640, 360, number, 1234, 1, 0, kind, 0
+    )
+    return head.ljust(header_size, b"\0") + payload
+
+
+def test_real_capture_has_five_h264_frames():
+    path = DATA / "pave68-node-24971.bin"
+    if not path.exists():
+        pytest.skip(f"no capture at {path}; set GROUNDSTATION_DATA")
+    reader = FrameReader()
+    frames = reader.feed(path.read_bytes())
+    assert reader.skipped == 0 and len(frames) >= 4
+    assert [f.kind for f in frames].count(FrameType.IDR) == 1
+    assert {(f.codec, f.width, f.height) for f in frames} == {(4, 640, 360)}
+    assert all(f.payload.startswith(b"\0\0\0\1") for f in frames)
+    assert [f.number for f in frames] == sorted(f.number for f in frames)
+
+
+@pytest.mark.parametrize("size", [64, 68, 76])
+def test_the_payload_begins_where_the_header_says(size):
+    (found,) = FrameReader().feed(frame(b"\0\0\0\1gpicture", header_size=size))
+    assert found == Frame(4, 640, 360, 7, 1234, FrameType.IDR, b"\0\0\0\1gpicture")
+
+
+def test_frames_come_whole_from_any_cutting():
+    stream = b"".join(frame(bytes([i]) * (i * 50), i, kind=3) for i in range(6))
+    for step in (1, 7, 64, 1000):
+        reader, frames = FrameReader(), []
+        for i in range(0, len(stream), step):
+            frames += reader.feed(stream[i : i + step])
+        assert [f.number for f in frames] == list(range(6)) and reader.skipped == 0
+
+
+def test_it_finds_the_next_frame_after_damage():
+    torn = frame(b"x" * 10, header_size=64).replace(struct.pack("<H", 64), struct.pack("<H", 9), 1)
+    reader = FrameReader()
+    frames = reader.feed(b"noise Pa" + torn + frame(b"good", 8, kind=99))
+    assert [(f.number, f.kind) for f in frames] == [(8, FrameType.UNKNOWN)]
+    assert reader.skipped == 8 + len(torn)
+
+
+def test_random_bytes_neither_raise_nor_pile_up():
+    rng, reader = random.Random(3), FrameReader()
+    for _ in range(300):
+        reader.feed(rng.choice((b"PaVE", b"")) + rng.randbytes(rng.randrange(200)))
+    assert len(reader._buffer) < 4_100_000

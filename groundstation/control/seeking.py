@@ -17,6 +17,7 @@ VIEW_INSET_M = 0.3
 FAN_RAD = math.radians(70)
 SWEEP_RAD = 0.6
 SWEEP_PERIOD_S = 8.0
+CIRCUIT_S = 40.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ def search_stands(
     """Return where each robot searches: all within the world-fixed view, looking different ways.
 
     While the prediction of the first target is any good they fan out around it and sweep over it; later each
-    stands on its part of an ellipse and turns slowly.
+    goes slowly round an ellipse, opposite to the others, and turns.
     """
     hint = _hint(belief, parameters)
     seconds = belief.stamp_ns * 1e-9
@@ -105,7 +106,7 @@ def _on_ellipse(
     yaw = math.tau * share + math.fmod(rate * seconds, math.tau)
     if view is None:
         return Stand(*at, yaw, rate)
-    angle = math.tau * share + math.pi / 2
+    angle = math.tau * (share + 0.25 + math.fmod(seconds / CIRCUIT_S, 1.0))
     half_x, half_y = (view.x_m[1] - view.x_m[0]) / 2, (view.y_m[1] - view.y_m[0]) / 2
     x, y = view.center
-    return Stand(x + 0.7 * half_x * math.cos(angle), y + 0.9 * half_y * math.sin(angle), yaw, rate)
+    return Stand(x + half_x * math.cos(angle), y + half_y * math.sin(angle), yaw, rate)

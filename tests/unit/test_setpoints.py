@@ -1,0 +1,155 @@
+"""Setpoints from plans: slots, columns, the search, the way back, and the flight-mode table."""
+
+import json
+import math
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import SolverReport
+from groundstation.control.modes import Phase, Situation, phase_of
+from groundstation.control.parameters import control_from_field
+from groundstation.control.setpoints import Setpoint, setpoints_from_plan
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, Layout
+from groundstation.planning.plan import PlanResult
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.topology import Topology
+from groundstation.settings.load import load_field
+
+LAB = json.loads(load_field(Path(__file__).parents[2] / "config/lab.yaml").model_dump_json())
+SENSORS, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
+NAMES = ("drone_1", "drone_2")
+
+
+def belief(
+    first: tuple[float, ...],
+    second: tuple[float, ...],
+    target: tuple[float, ...] | None = (0.5, 0.0, 0.0, 0.0),
+    robot_std: float = 0.03,
+    target_std: float = 0.05,
+    stamp_s: float = 0.0,
+) -> JointBelief:
+    layout = Layout()
+    for name in NAMES:
+        layout = layout.with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
+    mean, variances = [*first, *second], [robot_std**2] * 8
+    if target:
+        layout = layout.with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+        mean, variances = [*mean, *target], [*variances, *[target_std**2] * 4]
+    return JointBelief(np.array(mean), np.diag(variances), layout, round(stamp_s * 1e9))
+
+
+def plan(heights: tuple[float, float], topology: str = "drone_1/drone_2") -> PlanResult:
+    return PlanResult(
+        topology=Topology.parse(topology),
+        cost=0.1,
+        uncertainty=0.1,
+        controls={"drone_1": np.array([0.2, -0.1, 0.3]), "drone_2": np.array([0.0, 0.1, -0.2])},
+        heights=dict(zip(NAMES, heights, strict=True)),
+        edges=(),
+        alternatives=(),
+        solver=SolverReport("complete", 1, 0.0, 1, 1),
+        mode="certified",
+        stamp_ns=0,
+    )
+
+
+def setpoints(
+    at: JointBelief, plan: PlanResult | None, age: float | None = 0.1, airborne: tuple[str, ...] = NAMES
+) -> dict[str, Setpoint]:
+    return setpoints_from_plan(plan, at, airborne, age, CONTROL, SENSORS)
+
+
+def test_a_plan_is_flown_as_it_is_and_heights_are_held() -> None:
+    out = setpoints(belief((0, 0.8, 2.0, 0), (0, -0.8, 1.25, 0)), plan((2.1, 1.2)))
+    assert out["drone_1"].velocity_m_s[:2] == pytest.approx((0.2, -0.1))
+    assert out["drone_1"].yaw_rate_rad_s == pytest.approx(0.3)
+    assert out["drone_1"].velocity_m_s[2] > 0 > out["drone_2"].velocity_m_s[2]
+    assert {s.phase for s in out.values()} == {Phase.TRACK}
+
+
+def test_climbing_is_bounded_by_the_limit() -> None:
+    out = setpoints(belief((0, 2, 0.5, 0), (0, -2, 1.2, 0)), plan((2.1, 1.2)))
+    assert out["drone_1"].velocity_m_s[2] == pytest.approx(0.4)
+
+
+def test_nobody_changes_height_within_anothers_column_but_steps_aside() -> None:
+    out = setpoints(belief((0.3, 0.3, 2.1, 1.0), (0.3, -0.3, 1.2, 0)), plan((1.5, 1.5), "drone_1,drone_2"))
+    for name, side in (("drone_1", 1.0), ("drone_2", -1.0)):
+        one = out[name]
+        assert one.velocity_m_s[2] == 0.0
+        assert one.blocked in NAMES and one.blocked != name
+        yaw = 1.0 if name == "drone_1" else 0.0
+        vy = math.sin(yaw) * one.velocity_m_s[0] + math.cos(yaw) * one.velocity_m_s[1]
+        assert side * vy >= CONTROL.side_step_m_s - 1e-9
+
+
+def test_small_corrections_of_height_go_on_within_a_column() -> None:
+    out = setpoints(belief((0.3, 0.3, 2.05, 0), (0.3, -0.3, 1.2, 0)), plan((2.1, 1.2)))
+    assert out["drone_1"].velocity_m_s[2] == pytest.approx(0.05 * CONTROL.height_gain_per_s)
+    assert out["drone_1"].blocked == ""
+
+
+@pytest.mark.parametrize("age", [None, 5.0])
+def test_without_a_fresh_target_they_search_and_look_different_ways(age: float | None) -> None:
+    target = None if age is None else (0.5, 0.0, 0.0, 0.0)
+    at = [np.array([-0.5, 0.5, 1.3, 0.0]), np.array([-0.5, -0.5, 1.3, 0.0])]
+    headings, nearest = [], math.inf
+    for tick in range(1500):
+        now = belief(tuple(at[0]), tuple(at[1]), target, target_std=9.0, stamp_s=0.05 * tick)
+        out = setpoints(now, plan((1.5, 1.5)), age)
+        for pose, name in zip(at, NAMES, strict=True):
+            assert out[name].phase is Phase.SEARCH
+            vx, vy, vz = out[name].velocity_m_s
+            c, s = math.cos(pose[3]), math.sin(pose[3])
+            pose += 0.05 * np.array([c * vx - s * vy, s * vx + c * vy, vz, out[name].yaw_rate_rad_s])
+        headings.append([at[0][3], at[1][3]])
+        nearest = min(nearest, float(np.hypot(*(at[0][:2] - at[1][:2]))))
+        if tick > 200:
+            assert all(SENSORS.world_in_view("ceiling", np.add(pose[:3], (0, 0, 0.08))) for pose in at)
+    late = np.array(headings[600:])
+    apart = np.abs(np.mod(late[:, 0] - late[:, 1] + math.pi, math.tau) - math.pi)
+    assert apart.mean() > 2.5
+    assert np.ptp(late[:, 0]) > math.tau  # a full turn
+    assert nearest > 0.8
+    assert at[0][2] == pytest.approx(CONTROL.search_height_m, abs=0.05)
+
+
+def test_a_fair_prediction_of_the_target_is_searched_around() -> None:
+    at = belief((-1.0, 0.4, 1.5, 0.0), (-1.0, -0.4, 1.5, 0.0), (2.5, 0.0, 0.0, 0.0), target_std=0.5)
+    out = setpoints(at, plan((1.5, 1.5)), age=4.0)
+    assert all(one.phase is Phase.SEARCH and one.velocity_m_s[0] > 0.1 for one in out.values())
+
+
+def test_a_lost_robot_flies_back_towards_the_middle_of_the_view() -> None:
+    out = setpoints(belief((3.0, 1.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0), robot_std=0.4), plan((1.5, 1.5)))
+    assert out["drone_1"].phase is Phase.RETURN
+    assert out["drone_1"].velocity_m_s[0] < 0 and out["drone_1"].velocity_m_s[1] < 0
+    assert out["drone_2"].phase is Phase.TRACK  # as uncertain, but in view: the camera will see it
+
+
+def test_an_airborne_drone_that_was_never_seen_hovers_and_a_grounded_one_gets_nothing() -> None:
+    out = setpoints(belief((0, 1, 1.5, 0), (0, -1, 1.5, 0)), plan((1.5, 1.5)), airborne=("drone_1", "drone_9"))
+    assert set(out) == {"drone_1", "drone_9"}
+    assert out["drone_9"] == Setpoint((0.0, 0.0, 0.0), 0.0, Phase.UNKNOWN)
+
+
+def test_without_a_plan_they_search() -> None:
+    out = setpoints(belief((0, 1, 1.5, 0), (0, -1, 1.5, 0)), None)
+    assert {one.phase for one in out.values()} == {Phase.SEARCH}
+
+
+def test_the_flight_mode_table() -> None:
+    table = {
+        (False, False): Phase.GROUNDED,
+        (False, True): Phase.GROUNDED,
+        (True, False): Phase.UNKNOWN,
+    }
+    for airborne, known, lost, fresh, planned in product((False, True), repeat=5):
+        expected = table.get((airborne, known))
+        if expected is None:
+            expected = Phase.RETURN if lost else Phase.TRACK if fresh and planned else Phase.SEARCH
+        assert phase_of(Situation(airborne, known, lost, fresh, planned)) is expected

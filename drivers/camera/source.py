@@ -16,7 +16,7 @@ from groundstation.bus import clock
 from groundstation.errors import DriverError
 
 _FIRST_BACK_OFF_S = 0.2
-_LAST_BACK_OFF_S = 2.0
+_LAST_BACK_OFF_S = 1.0
 _READ_BYTES = 1 << 16
 _READ_TIMEOUT_S = 2.0
 _CONNECT_TIMEOUT_S = 2.0

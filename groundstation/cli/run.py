@@ -154,8 +154,16 @@ def _run(
 def _write_facts(run_dir: Path, mode: str, path: Path, facts: dict[str, Any]) -> None:
     from groundstation.report import run_facts
 
-    now_ns = time.time_ns()
-    run_facts.write(run_dir, run_facts.RunFacts(mode=mode, field=str(path), command_unix_ns=now_ns, **facts))
+    command_ns = time.time_ns() - _age_ns()
+    run_facts.write(run_dir, run_facts.RunFacts(mode=mode, field=str(path), command_unix_ns=command_ns, **facts))
+
+
+def _age_ns() -> int:
+    """Return how long ago this process was started: the operator waits from then on."""
+    from groundstation.supervisor.runtime_file import start_time
+
+    started_s = (start_time(os.getpid()) or 0) / os.sysconf("SC_CLK_TCK")
+    return max(0, time.clock_gettime_ns(time.CLOCK_BOOTTIME) - int(started_s * 1e9))
 
 
 def _log_to(run_dir: Path) -> None:

@@ -59,6 +59,7 @@ class Operator:
         self._sequence_request: Command | None = None
         self._take_off_book: AckBook | None = None
         self._then_track = False
+        self._said: dict[str, str] = {}
         self._next_lease_ns = 0
         self._count = 0
 
@@ -129,8 +130,10 @@ class Operator:
             progress = dialogue.book.progress[ack.header.entity]
             if ack.verb is Verb.TRACK and ack.stage in (AckStage.ACCEPTED, AckStage.EFFECTIVE):
                 self.tracking_since_ns = self.tracking_since_ns or now_ns
-            if progress.settled:
-                self._say(f"{ack.header.entity}: {ack.verb} {progress.text()}")
+            line = f"{ack.header.entity}: {ack.verb} {progress.text()}"
+            if progress.settled and line != self._said.get(ack.header.entity):
+                self._said[ack.header.entity] = line  # a refusal is asked again several times a second
+                self._say(line)
 
     def _hear_command(self, command: Command, now_ns: int) -> None:
         if OPERATOR in command.scope:

@@ -22,7 +22,7 @@ class TakeOffLimits:
     """How long each step may take [s]; a drone that never connects, lifts off or is seen does not hold the others."""
 
     connect_s: float = 5.0
-    retry_s: float = 1.0
+    retry_s: float = 0.3
     lift_off_s: float = 15.0
     unseen_s: float = 10.0
 

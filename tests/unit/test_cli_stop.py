@@ -1,0 +1,173 @@
+"""`hold`, `land`, `cut-motors` against fake drivers over real Zenoh, and without a router."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from groundstation.bus.messages import AckStage, Command, CommandAck
+from groundstation.bus.topics import COMMAND, COMMAND_ACK
+from groundstation.bus.zenoh_bus import open_bus, open_router
+from groundstation.supervisor import runtime_file
+from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
+
+
+class FakeTeam:
+    """A router and drones that answer as far as they are told to."""
+
+    def __init__(self, answers: dict[str, list[tuple[AckStage, str]]]) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        self.router = open_router(self.endpoint)
+        self.answers = answers
+        self.heard: list[Command] = []
+        self.buses = {name: open_bus(self.endpoint, "lab", name) for name in answers}
+        self.commands = {name: bus.subscribe([COMMAND]) for name, bus in self.buses.items()}
+        self.stop = threading.Event()
+        self.thread = threading.Thread(target=self.serve)
+        self.thread.start()
+
+    def serve(self) -> None:
+        while not self.stop.wait(0.01):
+            for name, commands in self.commands.items():
+                for received in commands.drain():
+                    assert isinstance(received.message, Command)
+                    self.answer(name, received.message)
+
+    def answer(self, name: str, command: Command) -> None:
+        self.heard.append(command)
+        bus = self.buses[name]
+        for stage, reason in self.answers[name]:
+            header = bus.header(name)
+            ack = CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
+            bus.publish(COMMAND_ACK, ack)
+
+    def close(self) -> None:
+        self.stop.set()
+        self.thread.join()
+        for bus in self.buses.values():
+            bus.close()
+        self.router.close()
+
+
+FULL = [(AckStage.RECEIVED, ""), (AckStage.ACCEPTED, ""), (AckStage.EFFECTIVE, "")]
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def team(runtime: Path) -> Iterator[FakeTeam]:
+    made = FakeTeam({"drone_1": FULL, "drone_2": FULL})
+    announce(made.endpoint)
+    yield made
+    made.close()
+
+
+def announce(endpoint: str, site: str = "lab", processes: tuple[ProcessRecord, ...] = ()) -> None:
+    pid = os.getpid()
+    supervisor = ProcessRecord("supervisor", "supervisor", pid, runtime_file.start_time(pid) or 0)
+    drones = ("drone_1", "drone_2")
+    runtime_file.write(RuntimeRecord(site, "lab.yaml", endpoint, "runs/x", "", drones, supervisor, processes))
+
+
+def cli(*arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "groundstation.cli.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, input=given, check=False)
+
+
+def answers_of(result: subprocess.CompletedProcess[str]) -> Any:
+    return json.loads(result.stdout)["drones"]
+
+
+def test_confirmed_stop_says_how_far_each_drone_came(team: FakeTeam) -> None:
+    result = cli("land")
+    assert result.returncode == 0, result.stderr
+    for name in ("drone_1", "drone_2"):
+        assert f"{name:<12} sent / received / accepted / effective" in result.stdout
+    assert team.heard[0].expires_ns == 0 and team.heard[0].scope == ()
+
+
+def test_refused_and_silent_drones_are_not_confirmed(team: FakeTeam) -> None:
+    team.answers["drone_1"] = [(AckStage.RECEIVED, ""), (AckStage.REFUSED, "on the ground")]
+    team.answers["drone_2"] = []
+    result = cli("hold", "--json")
+    assert result.returncode == 4
+    document = json.loads(result.stdout)
+    assert document["confirmed"] is False
+    assert document["drones"]["drone_1"] == {"stage": "REFUSED", "reason": "on the ground"}
+    assert document["drones"]["drone_2"]["stage"] == "NOT CONFIRMED"
+    assert len({command.id for command in team.heard}) == 1 and len(team.heard) > 3, "repeated under the same id"
+
+
+def test_named_drone_only(team: FakeTeam) -> None:
+    assert set(answers_of(cli("land", "drone_2", "--json"))) == {"drone_2"}
+    assert all(command.scope == ("drone_2",) for command in team.heard)
+    result = cli("land", "drone_9")
+    assert result.returncode == 4 and "there is no drone drone_9" in result.stderr
+
+
+def test_cutting_the_motors_asks(team: FakeTeam) -> None:
+    assert cli("cut-motors", given="n\n").returncode == 130
+    assert team.heard == []
+    assert cli("cut-motors", "--yes").returncode == 0
+
+
+def test_take_off_is_asked_of_the_operator_alone(team: FakeTeam) -> None:
+    team.answers["drone_1"] = team.answers["drone_2"] = []
+    team.buses["operator"] = open_bus(team.endpoint, "lab", "operator")
+    team.answers["operator"] = FULL
+    team.commands["operator"] = team.buses["operator"].subscribe([COMMAND])
+    result = cli("takeoff", "--json")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert all(command.scope == ("operator",) for command in team.heard)
+
+
+def test_nothing_runs(runtime: Path) -> None:
+    result = cli("land")
+    assert result.returncode == 3 and "no ground station is running" in result.stderr
+
+
+def test_several_runs_must_be_told_apart(team: FakeTeam) -> None:
+    announce(team.endpoint, site="hall")
+    result = cli("land")
+    assert result.returncode == 3 and f"--run hall-{os.getpid()}" in result.stderr
+    assert cli("land", "--run", "lab").returncode == 0
+
+
+def test_silent_router_signals_the_drivers_and_no_stranger(runtime: Path) -> None:
+    with subprocess.Popen(["sleep", "30"]) as driver, subprocess.Popen(["sleep", "30"]) as stranger:
+        started = runtime_file.start_time(driver.pid) or 0
+        other = runtime_file.start_time(stranger.pid) or 0
+        processes = (
+            ProcessRecord("drone_1", "driver", driver.pid, started),
+            ProcessRecord("drone_2", "driver", stranger.pid, other - 1),
+        )
+        announce("tcp/127.0.0.1:9", processes=processes)
+        result = cli("land")
+        assert result.returncode == 4
+        assert "no router answers" in result.stdout and "told drone_1 to land" in result.stdout
+        assert driver.wait(5) == -signal.SIGTERM
+        assert stranger.poll() is None
+        stranger.kill()
+
+
+def test_stop_verbs_import_nothing_heavy() -> None:
+    script = (
+        "import sys, groundstation.cli.stop, groundstation.cli.main;"
+        "print([m for m in ('numpy', 'cv2', 'pydantic', 'rich', 'ruamel', 'scipy', 'numba') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"

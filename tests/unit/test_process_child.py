@@ -1,0 +1,104 @@
+"""Heartbeat block, sleep and signals of a child."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from groundstation.process.child import Child, ChildSpec
+from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
+from groundstation.process.parent import ParentWatch
+from groundstation.process.signals import StopSignal
+
+MS = 1_000_000
+
+
+@pytest.fixture
+def block() -> Iterator[HeartbeatBlock]:
+    made = HeartbeatBlock.create(f"skein-test-{os.getpid()}-{time.monotonic_ns()}", 4)
+    yield made
+    made.close(remove=True)
+
+
+def test_beat_is_seen_by_another_mapping(block: HeartbeatBlock) -> None:
+    other = HeartbeatBlock.attach(str(block.path))
+    assert other.state(2) is SlotState.EMPTY
+    assert other.age_ns(2, time.monotonic_ns()) > 10**9, "a slot that never beat is old"
+    block.set_state(2, SlotState.READY)
+    block.beat(2)
+    assert other.state(2) is SlotState.READY
+    assert 0 <= other.age_ns(2, time.monotonic_ns()) < 10**9
+    assert other.state(1) is SlotState.EMPTY and other.state(3) is SlotState.EMPTY
+    other.clear(2)
+    assert block.state(2) is SlotState.EMPTY
+    other.close()
+
+
+def test_attaching_to_a_block_that_is_gone_fails(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        HeartbeatBlock.attach(str(tmp_path / "gone"))
+
+
+def test_death_of_the_parent_wakes_the_sleep_once() -> None:
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        parent = ParentWatch(os.getppid())
+        assert parent.alive
+        parent.descriptor = os.pidfd_open(process.pid)  # stand-in for a parent that can be ended here
+        parent._poll.register(parent.descriptor)
+        stop = StopSignal(parent)
+        process.communicate(b"\n")
+        assert stop.sleep_until(time.monotonic_ns() + 5000 * MS) is False
+        assert not parent.alive
+        began = time.monotonic_ns()
+        assert stop.sleep_until(began + 30 * MS) is True
+        assert time.monotonic_ns() - began >= 30 * MS, "an orphan that still lands keeps its loop rate"
+        stop.close()
+        parent.close()
+
+
+def test_stranger_as_parent_counts_as_dead() -> None:
+    watch = ParentWatch(1 if os.getppid() != 1 else 2)
+    assert not watch.alive
+    watch.close()
+
+
+def test_stop_wakes_one_sleep_only() -> None:
+    kept = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    parent = ParentWatch()
+    stop = StopSignal(parent)
+    stop.install()
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert not stop.requested
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert stop.requested
+        assert stop.sleep_until(time.monotonic_ns() + 5000 * MS) is False
+        assert stop.sleep_until(time.monotonic_ns() + 5 * MS) is True
+    finally:
+        stop.close()
+        parent.close()
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
+def test_supervisor_is_fresh_only_while_it_beats(block: HeartbeatBlock) -> None:
+    child = Child(ChildSpec("x", "test", "", "lab", str(block.path), 1))
+    child._block = block
+    assert not child.supervisor_fresh
+    block.beat(SUPERVISOR_SLOT)
+    assert child.supervisor_fresh
+    assert Child(ChildSpec("x", "test", "", "lab")).supervisor_fresh, "without a supervisor nobody is missed"
+
+
+def test_process_package_imports_nothing_heavy() -> None:
+    script = (
+        "import sys, groundstation.process.entry, groundstation.bus.zenoh_bus;"
+        "print([m for m in ('numpy', 'cv2', 'pydantic', 'scipy', 'numba', 'multiprocessing') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"

@@ -1,0 +1,190 @@
+"""Runtime file, network, terminal, interrupts, last words: each alone."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from groundstation.errors import GroundStationError
+from groundstation.supervisor import network, runtime_file
+from groundstation.supervisor.interrupts import Interrupts
+from groundstation.supervisor.last_words import LastWordsSender
+from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
+from groundstation.supervisor.table import LastWords
+from groundstation.supervisor.terminal import Terminal
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path / "skein"
+
+
+def record(pid: int, started: int, heartbeat: str = "") -> RuntimeRecord:
+    supervisor = ProcessRecord("supervisor", "supervisor", pid, started)
+    return RuntimeRecord("lab", "lab.yaml", "tcp/127.0.0.1:1", "runs/x", heartbeat, ("drone_1",), supervisor, ())
+
+
+def test_live_run_is_found(runtime: Path) -> None:
+    started = runtime_file.start_time(os.getpid())
+    assert started is not None
+    path = runtime_file.write(record(os.getpid(), started))
+    assert path.stat().st_mode & 0o77 == 0
+    assert [r.name for r in runtime_file.live_records()] == [f"lab-{os.getpid()}"]
+
+
+def test_pid_of_a_stranger_does_not_count(runtime: Path, tmp_path: Path) -> None:
+    block = tmp_path / "skein-lab-1"
+    block.write_bytes(b"")
+    started = runtime_file.start_time(os.getpid()) or 0
+    path = runtime_file.write(record(os.getpid(), started - 1, str(block)))
+    assert runtime_file.live_records() == []
+    assert not path.exists() and not block.exists()
+
+
+def test_only_our_own_kind_of_file_is_removed_with_a_stale_record(runtime: Path, tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    precious.write_bytes(b"")
+    runtime_file.write(record(2**22 - 1, 1, str(precious)))
+    assert runtime_file.live_records() == []
+    assert precious.exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"site": 3}'])
+def test_damaged_runtime_file_is_removed(runtime: Path, content: bytes) -> None:
+    path = runtime_file.folder() / "lab-1.json"
+    path.write_bytes(content)
+    assert runtime_file.live_records() == []
+    assert not path.exists()
+
+
+def test_zombie_is_not_alive() -> None:
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        assert runtime_file.start_time(process.pid) is None
+
+
+def test_folder_of_someone_else_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "skein").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(GroundStationError, match="not a folder of yours"):
+        runtime_file.folder()
+
+
+def test_networks_never_meet_and_the_lock_follows_a_child(tmp_path: Path) -> None:
+    first = network.claim(tmp_path)
+    second = network.claim(tmp_path)
+    assert first.prefix != second.prefix
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(first.lock,)) as child:
+        first.release()
+        third = network.claim(tmp_path)
+        assert third.prefix != first.prefix, "an emulator that still lands keeps its addresses"
+        child.communicate(b"\n")
+    again = network.claim(tmp_path)
+    assert again.prefix == first.prefix
+    for held in (second, third, again):
+        held.release()
+
+
+def test_port_in_use_is_a_clear_error() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(GroundStationError, match=f"port {port} on 127.0.0.1 is in use"):
+            network.require_free(f"tcp/127.0.0.1:{port}")
+    network.require_free(f"tcp/127.0.0.1:{port}")
+
+
+def test_closed_terminal_is_survived() -> None:
+    read, write = os.pipe()
+    terminal = Terminal(write)
+    os.close(read)
+    for _ in range(5):
+        terminal.say("is anyone there?")
+    terminal.flush()
+    terminal.say("still here")
+    terminal.flush()
+    os.close(write)
+
+
+def test_stopped_terminal_blocks_nobody() -> None:
+    read, write = os.pipe()
+    terminal = Terminal(write)
+    for _ in range(3000):
+        terminal.say("x" * 100)
+    terminal.flush(0.05)
+    os.close(read)
+    terminal.flush()
+    os.close(write)
+
+
+def test_muted_lines_come_later() -> None:
+    read, write = os.pipe()
+    terminal = Terminal(write)
+    terminal.muted = True
+    terminal.say("meanwhile")
+    terminal.unmute()
+    terminal.say("now")
+    terminal.flush()
+    assert os.read(read, 100) == b"meanwhile\nnow\n"
+    os.close(read)
+    os.close(write)
+
+
+@pytest.fixture
+def interrupts() -> Iterator[Interrupts]:
+    kept = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)}
+    made = Interrupts()
+    made.install()
+    yield made
+    made.close()
+    for number, handler in kept.items():
+        signal.signal(number, handler)
+
+
+def test_first_wish_lands_second_hurries(interrupts: Interrupts) -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+    assert interrupts.stop_requested and not interrupts.hurry
+    os.kill(os.getpid(), signal.SIGTERM)
+    assert not interrupts.hurry, "the same wish, said twice at once"
+    time.sleep(0.6)
+    os.kill(os.getpid(), signal.SIGINT)
+    assert interrupts.hurry
+
+
+def test_closing_terminal_never_hurries(interrupts: Interrupts) -> None:
+    os.kill(os.getpid(), signal.SIGHUP)
+    time.sleep(0.6)
+    os.kill(os.getpid(), signal.SIGHUP)
+    assert interrupts.stop_requested and not interrupts.hurry
+
+
+def test_last_words_repeat_and_then_land() -> None:
+    sender = LastWordsSender()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+        drone.bind(("127.0.0.1", 0))
+        drone.settimeout(2)
+        words = LastWords("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=3.0)
+        assert sender.begin("drone_1", words, 0)
+        assert not sender.begin("drone_1", words, 10)
+        sent = {}
+        for ms in range(0, 4000, 50):
+            sender.send_due(ms * 1_000_000)
+            drone.setblocking(False)
+            try:
+                sent[ms] = drone.recv(100)
+            except BlockingIOError:
+                continue
+        assert sorted(sent) == list(range(0, 4000, 100))
+        assert {sent[ms] for ms in range(0, 3000, 100)} == {b"hover"}
+        assert {sent[ms] for ms in range(3000, 4000, 100)} == {b"land"}
+        assert sender.end("drone_1") and not sender.end("drone_1")
+    sender.close()

@@ -20,9 +20,9 @@ class Gains:
     rad/s], settle_s: after so long at zero the drone holds its place by itself.
     """
 
-    proportional: float = 2.0
+    proportional: float = 2.4
     integral: float = 1.1
-    drag: float = 0.2
+    drag: float = 0.1
     reference_s: float = 0.5
     integral_m_s2: float = 0.8
     still: float = 0.02

@@ -89,7 +89,7 @@ def test_saturation_does_not_wind_up():
     for _ in range(300):
         loop.step((0.6, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 1 / 30)
     pitch = loop.step((0.6, 0.0, 0.0), 0.0, (0.6, 0.0, 0.0), 1 / 30).pitch_rad
-    assert 9.81 * math.tan(pitch) <= 0.8 + 0.2 * 0.6 + 0.01
+    assert 9.81 * math.tan(pitch) <= 0.8 + 0.1 * 0.6 + 0.01
 
 
 def test_zero_hands_over_to_the_drones_own_hover_after_a_while():

@@ -116,7 +116,9 @@ def evaluate(
     )  # fmt: skip
     report[0] = uncertainty
     for e in range(m):
-        report[1 + e] = entries[:, e, 0].mean()
+        report[1 + e] = 0.0
+        for i in range(h):
+            report[1 + e] += entries[i, e, W] / h
     effort = 0.0
     for j in range(3 * n):
         effort += options[12] * (u[j] / scale[j]) ** 2
@@ -128,7 +130,9 @@ def evaluate(
             for x in range(3 * n, d, 4):
                 A[x, x] += discount
                 A[x + 1, x + 1] += discount
-            state += discount * penalties[i]
+            for r in range(n):
+                for axis in range(2):
+                    state[r, axis] += discount * penalties[i, r, axis]
             undo_edges(A, edges, n, entries[i], gains[i], yaw_rows[i], state, work)
             predict_adjoint(A, motion[i], yaw_columns[i], options[0], back)
             undo_move(state, motion[i], back, options[0], gradient)

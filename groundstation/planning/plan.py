@@ -1,5 +1,6 @@
 """One planning step: optimise the current topology and its neighbours, choose one, say why."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.bus.messages import Alternative, Edge, SolverReport
+from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.problem import Problem, ProblemBuilder, Scene, Solution, scene_from_belief
@@ -140,6 +142,8 @@ class Planner:
     ) -> PlanResult:
         costs = {topology: solution.cost for topology, solution in search.solutions.items()}
         best = search.solutions[choose(current, costs, self._required_gain(current, stamp_ns))]
+        if not math.isfinite(best.cost):
+            raise EstimatorFault("the expected uncertainty is not finite")
         slots = self.parameters.slots(len(best.topology.levels)) or ()
         status = "stopped" if search.stopped else "complete"
         report = SolverReport(status, search.evaluations, 0.0, len(problems), len(costs))

@@ -245,14 +245,9 @@ def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -
     assert (levels[settled & (away < 1.0)] == 1).mean() > 0.9
     assert (levels[settled & (away > 3.0)] == 2).mean() > 0.6
     assert trace.separation_m() >= 0.6
-
-
-def test_drones_stay_in_the_fence_on_the_whole_way() -> None:
-    trace, fence = flight(3, duration_s=40.0), lab()["room"]["fence"]
-    places = np.array(trace.truth)
+    places, fence = np.array(trace.truth), lab()["room"]["fence"]
     for axis, name in enumerate(("x_m", "y_m", "z_m")):
-        assert places[:, :, axis].min() >= fence[name][0]
-        assert places[:, :, axis].max() <= fence[name][1]
+        assert fence[name][0] <= places[:, :, axis].min() and places[:, :, axis].max() <= fence[name][1]
 
 
 def test_a_target_that_jumps_away_is_found_again() -> None:

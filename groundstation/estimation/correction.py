@@ -49,6 +49,17 @@ def project_columns(
             B[i, j] = value
 
 
+# Double precision cannot tell a measurement that is this much better than what was known from an exact one.
+RESOLUTION = 1e-10
+
+
+@kernel("void(float64[:,::1], float64[:,::1], int64)")
+def bound_precision(HPH: Array, R: Array, rows: int) -> None:
+    """Raise R to what double precision resolves beside H P H^T, so that P stays positive definite."""
+    for i in range(rows):
+        R[i, i] += RESOLUTION * abs(HPH[i, i])
+
+
 @kernel("float64(float64[:,::1], float64[:,::1], float64[::1], int64, float64[:,::1])")
 def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
     """Return the NIS of a residual and leave the Cholesky factor of S = H P H^T + R; -1 if S is not PD."""

@@ -4,9 +4,17 @@ import numpy as np
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.correction import apply, inflate, log_determinant, project, project_columns, surprise
+from groundstation.estimation.correction import (
+    apply,
+    bound_precision,
+    inflate,
+    log_determinant,
+    project,
+    project_columns,
+    surprise,
+)
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import cholesky, wrap
+from groundstation.estimation.linear import cholesky, copy_matrix, wrap
 from groundstation.estimation.motion import clear, join
 from groundstation.estimation.relative_pose import add_mounting_noise, pose_from_observation, relative_pose
 
@@ -74,6 +82,7 @@ def linearise(
     for i in range(rows):
         for j in range(rows):
             work[2, i, j] = HPH[i, j]
+    bound_precision(work[2], R, rows)
     return surprise(work[2], R, y, rows, work[3])
 
 
@@ -173,10 +182,10 @@ def prefer_other(
         return nis
     if nis_other + log_determinant(work_other[3], rows) >= nis + log_determinant(work[3], rows):
         return nis
-    z[:] = z_other
-    y[:] = y_other
-    R[:, :] = R_other
-    work[:, :, :] = work_other
+    for i in range(4):
+        z[i], y[i] = z_other[i], y_other[i]
+        copy_matrix(R_other, R)
+        copy_matrix(work_other[i], work[i])
     out[s.OUT_OTHER_CHOSEN] = 1.0
     return nis_other
 
@@ -191,7 +200,7 @@ def enter(
     """Let the subject join (again) where the measurement puts it, diffuse until the correction that follows."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
     start = entities[observer, s.ENTITY_START]
-    seen_from, pose = mean[start : start + entities[observer, s.ENTITY_SIZE]].copy(), np.zeros(4)
+    seen_from, pose = mean[start : start + entities[observer, s.ENTITY_SIZE]], np.zeros(4)
     model, p = entities[subject, s.ENTITY_MODEL], parameters[subject]
     pose_from_observation(seen_from, p, model, camera, event[s.EVENT_ROLL], event[s.EVENT_PITCH], z, pose)
     join(mean, P, entities[subject], p, pose)

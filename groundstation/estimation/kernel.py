@@ -12,8 +12,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(signature: str) -> Callable[[Function], Function]:
-    """Compile a function for one signature; IEEE arithmetic (no fastmath), so that replays agree to the bit."""
-    return cast(
-        Callable[[Function], Function],
-        numba.njit(signature, cache=True, nogil=True, error_model="numpy", fastmath=False),
-    )
+    """Compile a function for one signature; IEEE arithmetic (no fastmath), so that replays agree to the bit.
+
+    Cached only in a directory that the process has chosen by the state of all sources (process/numba_cache.py): beside
+    the source, numba would not notice an edited callee or constant of another module.
+    """
+    cached = bool(getattr(numba.config, "CACHE_DIR", ""))
+    compiled = numba.njit(signature, cache=cached, nogil=True, error_model="numpy", fastmath=False)
+    return cast(Callable[[Function], Function], compiled)

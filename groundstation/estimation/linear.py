@@ -12,6 +12,14 @@ def wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
+@kernel("void(float64[:,::1], float64[:,::1])")
+def copy_matrix(source: Array, to: Array) -> None:
+    """Copy one matrix into another of its shape; written out, since slice assignment takes seconds to compile."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            to[i, j] = source[i, j]
+
+
 @kernel("boolean(float64[:,::1], int64)")
 def cholesky(matrix: Array, size: int) -> bool:
     """Overwrite the lower triangle of the leading block with its Cholesky factor; False if it is not PD."""

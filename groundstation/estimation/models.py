@@ -46,7 +46,7 @@ class OdometryRobot:
     scale_std: float = 0.10
     scale_drift: float = 0.003
     velocity_std_m_s: float = 0.05
-    velocity_correlation_s: float = 0.4
+    velocity_correlation_s: float = 0.25
     velocity_delay_s: float = 0.03
     yaw_std_rad: float = math.radians(1.0)
     attitude_std_rad: float = math.radians(1.0)
@@ -89,7 +89,7 @@ class ConstantVelocityTarget:
 
     marker_height_m: float = 0.4
     acceleration_std_m_s2: float = 0.3
-    correlation_s: float = 0.5
+    correlation_s: float = 0.25
     speed_std_m_s: float = 0.4
 
     def row(self) -> Array:

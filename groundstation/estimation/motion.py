@@ -10,6 +10,11 @@ from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.kernel import kernel
 from groundstation.estimation.linear import wrap
 
+# Prior of what joins, about the place that its first measurement puts it at: wide against any measurement, yet so
+# that the correction which follows loses no more than eight digits.
+DIFFUSE_M2 = 100.0
+DIFFUSE_RAD2 = 10.0
+
 
 @kernel("void(float64[:,::1], int64, int64)")
 def mirror(P: Array, start: int, size: int) -> None:
@@ -163,11 +168,11 @@ def join(mean: Array, P: Array, entity: IntArray, p: Array, pose: Array) -> None
     start = entity[s.ENTITY_START]
     for i in range(2):
         mean[start + i] = pose[i]
-        P[start + i, start + i] = 1e4
+        P[start + i, start + i] = DIFFUSE_M2
     if entity[s.ENTITY_MODEL] == s.ODOMETRY_ROBOT:
         mean[start + s.Z], mean[start + s.YAW], mean[start + s.SCALE] = pose[2], pose[3], 1.0
-        P[start + s.Z, start + s.Z] = 1e4
-        P[start + s.YAW, start + s.YAW] = 1e2
+        P[start + s.Z, start + s.Z] = DIFFUSE_M2
+        P[start + s.YAW, start + s.YAW] = DIFFUSE_RAD2
         P[start + s.CLIMB, start + s.CLIMB] = p[s.CLIMB_STD] ** 2
         P[start + s.SCALE, start + s.SCALE] = p[s.SCALE_STD] ** 2
         P[start + s.ROLL_ERROR, start + s.ROLL_ERROR] = p[s.ATTITUDE_STD] ** 2

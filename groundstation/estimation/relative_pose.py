@@ -83,8 +83,9 @@ def relative_pose(
     D[0, 5], D[1, 5], D[2, 5] = 0.0, b[2], -b[1]
     for i in range(3):
         D[i, 6] = D[i, 0] * slope[0] + D[i, 1] * slope[1]
-    H_observer[:, :] = 0.0
-    H_subject[:, :] = 0.0
+    for i in range(4):
+        for j in range(s.MAX_BLOCK):
+            H_observer[i, j] = H_subject[i, j] = 0.0
     for i in range(3):
         h[i] = 0.0
         for k in range(3):
@@ -99,7 +100,8 @@ def relative_pose(
         for j in range(3):
             H_observer[i, j] = -H_subject[i, j]
     if model != s.ODOMETRY_ROBOT:
-        H_subject[:, 2:] = 0.0
+        for i in range(3):
+            H_subject[i, s.Z] = H_subject[i, s.YAW] = 0.0
     if rows == 4:
         h[3] = wrap(subject[s.YAW] - observer[s.YAW])
         H_observer[3, s.YAW] = -1.0

@@ -5,7 +5,7 @@ from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.correction import correct_sum
 from groundstation.estimation.events import handle
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import wrap
+from groundstation.estimation.linear import copy_matrix, wrap
 from groundstation.estimation.motion import predict
 
 
@@ -80,16 +80,18 @@ def replay(
     """
     ring = means.shape[0]
     step = settings[s.SETTING_STEP]
-    mean[:] = means[first % ring]
-    P[:, :] = covariances[first % ring]
-    aux[:, :] = auxiliaries[first % ring]
+    for j in range(mean.shape[0]):
+        mean[j] = means[first % ring, j]
+    copy_matrix(covariances[first % ring], P)
+    copy_matrix(auxiliaries[first % ring], aux)
     i = 0
     for k in range(first, last + 1):
         slot = k % ring
         if k > first:
-            means[slot] = mean
-            covariances[slot] = P
-            auxiliaries[slot] = aux
+            for j in range(mean.shape[0]):
+                means[slot, j] = mean[j]
+            copy_matrix(P, covariances[slot])
+            copy_matrix(aux, auxiliaries[slot])
         begin_step(mean, P, entities, parameters, aux, odometry[slot], settings)
         t = k * step
         end = min((k + 1) * step, max(now, t))

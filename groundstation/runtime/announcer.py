@@ -1,0 +1,114 @@
+"""What the tracker says on the bus: estimate, belief, setpoints, plan, innovations, journal, orders to land."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import (
+    Belief,
+    Command,
+    Control,
+    Estimate,
+    Innovation,
+    JournalEntry,
+    Plan,
+    VelocitySetpoint,
+    Verb,
+)
+from groundstation.bus.topics import BELIEF, COMMAND, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT
+from groundstation.control.safety import Limited
+from groundstation.estimation.measurement import Correction
+from groundstation.planning.plan import PlanResult
+from groundstation.tracker import Tracker
+
+TEAM = "team"
+
+
+class Announcer:
+    """Turns the tracker's values into messages. Estimates, beliefs and setpoints are stamped with the belief's time."""
+
+    def __init__(self, bus: Bus, lifetime_ms: int) -> None:
+        self._bus = bus
+        self._lifetime_ms = lifetime_ms
+        self._orders = 0
+
+    def estimate(self, tracker: Tracker, now_ns: int) -> None:
+        """Publish what is believed of each entity."""
+        header = self._bus.header(TEAM, now_ns)
+        self._bus.publish(ESTIMATE, Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch))
+
+    def belief(self, tracker: Tracker, now_ns: int) -> None:
+        """Publish the joint belief."""
+        belief = tracker.belief
+        upper = belief.covariance[np.triu_indices(belief.layout.dim)]
+        message = Belief(
+            header=self._bus.header(TEAM, now_ns),
+            mean=tuple(belief.mean.tolist()),
+            covariance_upper=tuple(upper.tolist()),
+            layout=belief.layout.labels,
+        )
+        self._bus.publish(BELIEF, message)
+
+    def setpoints(self, tracker: Tracker, limited: Mapping[str, Limited], now_ns: int) -> None:
+        """Publish one setpoint per airborne robot; one that is not localised is told to hover, as not converged."""
+        for name, entry in limited.items():
+            message = VelocitySetpoint(
+                header=self._bus.header(name, now_ns),
+                velocity_m_s=entry.setpoint.velocity_m_s,
+                yaw_rate_rad_s=entry.setpoint.yaw_rate_rad_s,
+                lifetime_ms=self._lifetime_ms,
+                epoch=tracker.epoch,
+                converged=tracker.converged(name) and not tracker.holding,
+            )
+            self._bus.publish(SETPOINT, message)
+
+    def plan(self, plan: PlanResult, limited: Mapping[str, Limited], mode: str) -> None:
+        """Publish a plan that was adopted, with what safety makes of it now."""
+        controls = tuple(
+            Control(name, entry.setpoint.velocity_m_s, entry.setpoint.yaw_rate_rad_s, entry.limited_by)
+            for name, entry in limited.items()
+        )
+        message = Plan(
+            header=self._bus.header(TEAM, plan.stamp_ns),
+            topology=str(plan.topology),
+            cost=plan.cost,
+            controls=controls,
+            edges=plan.edges,
+            alternatives=plan.alternatives,
+            solver=plan.solver,
+            mode=mode,
+        )
+        self._bus.publish(PLAN, message)
+
+    def innovations(self, corrections: Iterable[Correction], now_ns: int) -> None:
+        """Publish what became of each observation."""
+        for correction in corrections:
+            message = Innovation(
+                header=self._bus.header(correction.observer, now_ns),
+                observer=correction.observer,
+                subject=correction.subject,
+                verdict=correction.verdict,
+                residual=correction.residual,
+                covariance=correction.covariance,
+                nis=correction.nis,
+                latency_ms=correction.latency_ms,
+                reason=correction.reason,
+            )
+            self._bus.publish(INNOVATION, message)
+
+    def journal(self, entry: JournalEntry) -> None:
+        """Publish a journal entry."""
+        self._bus.publish(JOURNAL, entry)
+
+    def land(self, robot: str, epoch: int) -> None:
+        """Order one robot to land: anyone may stop."""
+        self._orders += 1
+        order = Command(
+            header=self._bus.header(robot),
+            id=f"{self._bus.source}-{epoch}-{self._orders}",
+            verb=Verb.LAND,
+            scope=(robot,),
+            issuer=self._bus.source,
+        )
+        self._bus.publish(COMMAND, order)

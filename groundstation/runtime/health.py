@@ -1,0 +1,58 @@
+"""What the tracker's process watches in itself and in its robots: missed deadlines, robots that nobody sees."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+NS_PER_S = 1_000_000_000
+LATE_NS = 10_000_000
+_REPEAT_NS = NS_PER_S
+
+
+@dataclass(slots=True)
+class Deadlines:
+    """A fixed-rate loop: `next_ns` is when the coming tick is due; a tick late by more than 10 ms is an overrun."""
+
+    period_ns: int
+    next_ns: int
+    ticks: int = 0
+    overruns: int = 0
+
+    def start_tick(self, now_ns: int) -> None:
+        """Count a tick that starts now. Ticks that were slept through are counted as overruns and not made up for."""
+        self.ticks += 1
+        late_ns = now_ns - self.next_ns
+        if late_ns > LATE_NS:
+            missed = late_ns // self.period_ns
+            self.overruns += 1 + missed
+            self.ticks += missed
+            self.next_ns += missed * self.period_ns
+        self.next_ns += self.period_ns
+
+
+class UnseenWatch:
+    """Finds robots that fly although no camera has seen them for too long; they are to land."""
+
+    def __init__(self, limit_s: float) -> None:
+        self._limit_ns = round(limit_s * NS_PER_S)
+        self._airborne_since: dict[str, int] = {}
+        self._told: dict[str, int] = {}
+
+    def step(self, now_ns: int, ages_s: Mapping[str, float]) -> list[str]:
+        """Return who must be told to land now; ages_s: since each airborne robot was last observed (inf: never).
+
+        An order is repeated once a second for as long as it applies.
+        """
+        for name in [name for name in self._airborne_since if name not in ages_s]:
+            del self._airborne_since[name]
+            self._told.pop(name, None)
+        due = []
+        for name, age_s in ages_s.items():
+            since = self._airborne_since.setdefault(name, now_ns)
+            unseen_ns = now_ns - since
+            if math.isfinite(age_s):
+                unseen_ns = min(unseen_ns, round(age_s * NS_PER_S))
+            if unseen_ns >= self._limit_ns and now_ns - self._told.get(name, now_ns - _REPEAT_NS) >= _REPEAT_NS:
+                self._told[name] = now_ns
+                due.append(name)
+        return due

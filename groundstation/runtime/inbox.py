@@ -1,0 +1,49 @@
+"""What has arrived for the tracker since the last tick: decoded, in order of arrival, refusals counted."""
+
+from collections import Counter
+
+from groundstation.bus import codec, keys
+from groundstation.bus.api import Bus
+from groundstation.bus.keys import Key
+from groundstation.bus.messages import Message
+from groundstation.bus.topics import CLOCK, OBSERVATION, ODOMETRY, VEHICLE_STATUS
+from groundstation.errors import MessageError
+
+TOPICS = (ODOMETRY, OBSERVATION, VEHICLE_STATUS, CLOCK)
+CAPACITY = 8192  # at 200 Hz odometry of ten drones: four seconds of a stalled loop
+_MAX_PER_TICK = 4096
+
+
+class Inbox:
+    """Drains one bounded subscription; the network thread only enqueues into it.
+
+    The order of arrival need not be the order of measurement: the filter puts it right (estimation/fixed_lag.py).
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        self._subscription = bus.subscribe(TOPICS, capacity=CAPACITY)
+        self._keys: dict[str, Key] = {}
+        self.refused: Counter[str] = Counter()
+
+    @property
+    def overflowed(self) -> int:
+        """Return how many messages were dropped because the loop did not drain in time."""
+        return self._subscription.overflowed
+
+    def pop_ready(self) -> list[tuple[str, Message]]:
+        """Return (key, message) of all that has arrived, in order; what cannot be decoded is counted by reason."""
+        ready = []
+        for sample in self._subscription.drain_samples()[-_MAX_PER_TICK:]:
+            try:
+                ready.append((sample.key, codec.decode(self._key(sample.key), sample.payload)))
+            except MessageError as error:
+                self.refused[error.reason] += 1
+        return ready
+
+    def _key(self, text: str) -> Key:
+        key = self._keys.get(text)
+        if key is None:
+            key = keys.parse(text)
+            if len(self._keys) < 1024:
+                self._keys[text] = key
+        return key

@@ -1,0 +1,95 @@
+"""The tracker's loop: one tick takes in what arrived, advances the belief, and says what follows from it."""
+
+from collections import Counter
+from typing import Any
+
+import msgspec
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Severity
+from groundstation.runtime.announcer import TEAM, Announcer
+from groundstation.runtime.health import UnseenWatch
+from groundstation.runtime.inbox import Inbox
+from groundstation.runtime.journal import FAULT, entry_of
+from groundstation.runtime.plan_worker import PlanWorker
+from groundstation.tracker import Notice, Tracker, tracker_from_field
+
+_BELIEF_HZ = 5
+_PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
+_EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
+
+
+class TrackerSection(msgspec.Struct, frozen=True):
+    """What the supervisor hands to the tracker: the resolved field as JSON, the run folder, the life's number."""
+
+    field: dict[str, Any]
+    run_dir: str = ""
+    epoch: int = 0
+
+
+class Tracking:
+    """One tracker on one bus. Call `tick` at the estimator's rate; notices are left in `notices` for the process."""
+
+    def __init__(self, bus: Bus, section: TrackerSection) -> None:
+        field = section.field
+        self.rate_hz: int = field["estimator"]["rate_hz"]
+        self.tracker: Tracker = tracker_from_field(field, clock.clock_id(), section.epoch * _EPOCHS_PER_LIFE)
+        self.inbox = Inbox(bus)
+        self.notices: list[Notice] = []
+        self._bus = bus
+        self._announcer = Announcer(bus, field["safety"]["setpoint_lifetime_ms"])
+        self._unseen = UnseenWatch(field["safety"]["unseen_land_after_s"])
+        plan_hz = field["planner"]["rate_hz"]
+        self._plan_every = max(1, round(self.rate_hz / plan_hz))
+        self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
+        self._worker = PlanWorker(self.tracker.planner, _PLAN_BUDGET_SHARE / plan_hz)
+        self._tick = 0
+        self._known_refusals: Counter[str] = Counter()
+
+    def tick(self, now_ns: int) -> None:
+        """Do everything that is due at one time."""
+        tracker, announcer = self.tracker, self._announcer
+        ingested = self.inbox.pop_ready()
+        for key, message in ingested:
+            tracker.ingest(key, message, now_ns)
+        tracker.advance(now_ns)
+        adopted = self._worker.poll()
+        if adopted is not None and adopted.plan is not None:
+            tracker.adopt(adopted.plan)
+        if self._tick % self._plan_every == 0 and self._worker.idle:
+            self._worker.submit(self._tick, tracker.request())
+        limited = tracker.setpoints(now_ns)
+        announcer.setpoints(tracker, limited, now_ns)
+        announcer.estimate(tracker, now_ns)
+        if self._tick % self._belief_every == 0:
+            announcer.belief(tracker, now_ns)
+        if adopted is not None and adopted.plan is not None:
+            announcer.plan(adopted.plan, limited, "HOLD" if tracker.holding else adopted.plan.mode)
+        announcer.innovations(tracker.take_corrections(), now_ns)
+        announcer.journal(entry_of(self._bus.header(TEAM, now_ns), self._tick, now_ns, ingested, adopted))
+        if adopted is not None and adopted.stop_reason == FAULT:
+            self.notices.append(Notice(Severity.ERROR, "planning failed", "the last plan stays in force"))
+        self._watch(now_ns)
+        self._tick += 1
+
+    def close(self) -> None:
+        """Stop planning."""
+        self._worker.close()
+
+    def _watch(self, now_ns: int) -> None:
+        tracker = self.tracker
+        self.notices += tracker.take_notices()
+        for name in self._unseen.step(now_ns, {name: tracker.filter.age_s(name) for name in tracker.airborne}):
+            self._announcer.land(name, tracker.epoch)
+            text = "flies, but no camera has seen it for too long: ordered to land"
+            self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
+        if self._tick % self.rate_hz == 0:
+            self._report_refusals()
+
+    def _report_refusals(self) -> None:
+        """Say once of each kind that messages are refused; their numbers are in the log of the process."""
+        for reason in set(self.inbox.refused) | set(self.tracker.rejected):
+            if reason not in self._known_refusals:
+                self._known_refusals[reason] = 1
+                self.notices.append(Notice(Severity.WARNING, f"messages are refused: {reason}"))

@@ -34,7 +34,7 @@ class FigureEight(_Section):
     """A lemniscate along world x, at constant speed; `start_phase` in turns (0: centre, heading to +x +y)."""
 
     shape: Literal["figure_eight"] = "figure_eight"
-    half_length_m: Annotated[float, Field(gt=0, le=50)] = 3.1
+    half_length_m: Annotated[float, Field(gt=0, le=50)] = 3.2
     half_width_m: Annotated[float, Field(gt=0, le=50)] = 0.8
     speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.2
     start_phase: Annotated[float, Field(ge=0, le=1)] = 0.0
@@ -50,9 +50,14 @@ class Standstill(_Section):
 
 
 class TargetScenario(_Section):
-    """The TurtleBot: its path, its top speed, and the standard deviation of its wheel slip (share of the speed)."""
+    """The TurtleBot: its path, its top speed, and the standard deviation of its wheel slip (share of the speed).
+
+    departs_after_team_s: it stays parked at the start of its path until so long after all drones took off; without
+    it, it drives from the beginning.
+    """
 
     path: Annotated[FigureEight | Standstill, Field(discriminator="shape")] = FigureEight()
+    departs_after_team_s: Annotated[float, Field(ge=0)] | None = 3.0
     max_speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.7
     slip: Annotated[float, Field(ge=0, le=0.5)] = 0.05
 

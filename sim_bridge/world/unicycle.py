@@ -35,6 +35,7 @@ class Unicycle:
         self.x, self.y, self.yaw = _start(scenario, self._path)
         self.speed = self.turn_rate = 0.0
         self._wheels = (0.0, 0.0)
+        self.parked = scenario.departs_after_team_s is not None
 
     def drive(self, speed_m_s: float, turn_rate_rad_s: float) -> None:
         """Leave the path and drive so (within the limits) until told otherwise."""
@@ -56,7 +57,8 @@ class Unicycle:
 
     def step(self) -> None:
         """Advance by one tick."""
-        speed, turn_rate = self._steered or self._follow()
+        parked = self.parked and self._steered is None
+        speed, turn_rate = (0.0, 0.0) if parked else self._steered or self._follow()
         self._wheels = (
             _approach(self._wheels[0], _clamp(speed, self._max_speed), ACCELERATION_M_S2 * self._tick_s),
             _approach(
@@ -85,13 +87,13 @@ class Unicycle:
         goal = path.point()
         dx, dy = goal.x - self.x, goal.y - self.y
         c, s = math.cos(goal.heading), math.sin(goal.heading)
-        ahead, aside = _clamp(c * dx + s * dy, _LARGEST_ERROR_M), c * dy - s * dx
+        ahead, aside = c * dx + s * dy, c * dy - s * dx
         aim = goal.heading + math.atan2(aside, _LOOK_AHEAD_M)
         turn = math.remainder(aim - self.yaw, math.tau)
-        # The running point waits for a robot that is far off.
-        patience = max(0.0, min(1.0, 1.5 - math.hypot(dx, dy) / _LARGEST_ERROR_M))
+        # The running point waits for a robot that is far behind it.
+        patience = max(0.0, min(1.0, 1.5 - ahead / _LARGEST_ERROR_M))
         path.advance(path.speed_m_s * self._tick_s * patience)
-        speed = max(0.0, path.speed_m_s * math.cos(turn) + _ALONG * ahead)
+        speed = max(0.0, path.speed_m_s * math.cos(turn) + _ALONG * _clamp(ahead, _LARGEST_ERROR_M))
         return speed, path.speed_m_s * goal.curvature + _ABOUT * turn
 
 

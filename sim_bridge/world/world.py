@@ -34,6 +34,8 @@ class World:
             self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors)
         self.target_name = site.target.name
         self.target = Unicycle(scenario.target, TICK_S, generator_of(seed, site.target.name))
+        self._departs_after_s = scenario.target.departs_after_team_s or 0.0
+        self._together_s = 0.0
         self._downwash = scenario.drones.downwash
         self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         self._states = np.zeros((len(self.bodies), WIDTH))
@@ -56,6 +58,7 @@ class World:
             drone.step(wakes.get(name, _STILL_AIR))
             drone.airframe.confine(*self._half_room)
             self.onboard[name].step(drone, drone.autopilot.motors_on)
+        self._let_target_depart()
         self.target.step()
         self.target.confine(self._half_room[0], self._half_room[1])
         self.ticks += 1
@@ -67,6 +70,11 @@ class World:
             rows[index] = drone.airframe.row()
         rows[-1] = self.target.row()
         return rows
+
+    def _let_target_depart(self) -> None:
+        if self.target.parked and len(self.airborne) == len(self.drones):
+            self._together_s += TICK_S
+            self.target.parked = self._together_s < self._departs_after_s
 
     def _wake(self, name: str) -> tuple[float, float, float]:
         below = self.drones[name].airframe

@@ -14,7 +14,7 @@ from sim_bridge.world.world import TICK_S
 
 def test_the_turtlebot_drives_its_figure_eight() -> None:
     path = FigureEight(half_length_m=3.1, half_width_m=0.8, speed_m_s=0.2)
-    robot = Unicycle(TargetScenario(path=path), TICK_S, generator_of(1, "turtlebot"))
+    robot = Unicycle(TargetScenario(departs_after_team_s=None, path=path), TICK_S, generator_of(1, "turtlebot"))
     rows = []
     for _ in range(round(90 / TICK_S)):
         robot.step()
@@ -32,7 +32,7 @@ def test_the_turtlebot_drives_its_figure_eight() -> None:
 
 
 def test_kobuki_limits() -> None:
-    robot = Unicycle(TargetScenario(path=Standstill()), TICK_S, generator_of(1, "turtlebot"))
+    robot = Unicycle(TargetScenario(departs_after_team_s=None, path=Standstill()), TICK_S, generator_of(1, "turtlebot"))
     robot.drive(5.0, 50.0)
     speeds, turns = [0.0], [0.0]
     for _ in range(800):
@@ -51,7 +51,7 @@ def test_kobuki_limits() -> None:
 
 
 def test_the_turtlebot_returns_to_its_path() -> None:
-    robot = Unicycle(TargetScenario(), TICK_S, generator_of(1, "turtlebot"))
+    robot = Unicycle(TargetScenario(departs_after_team_s=None), TICK_S, generator_of(1, "turtlebot"))
     robot.drive(0.3, 0.2)
     for _ in range(2000):
         robot.step()
@@ -64,7 +64,11 @@ def test_the_turtlebot_returns_to_its_path() -> None:
 
 def test_slip_makes_odometry_wrong() -> None:
     def end(slip: float) -> tuple[float, float]:
-        robot = Unicycle(TargetScenario(path=Standstill(), slip=slip), TICK_S, generator_of(3, "turtlebot"))
+        robot = Unicycle(
+            TargetScenario(departs_after_team_s=None, path=Standstill(), slip=slip),
+            TICK_S,
+            generator_of(3, "turtlebot"),
+        )
         robot.drive(0.3, 0.1)
         for _ in range(4000):
             robot.step()

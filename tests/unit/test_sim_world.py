@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sim_bridge.scenario import DroneScenario, Scenario
+from sim_bridge.scenario import DroneScenario, Scenario, TargetScenario
 from sim_bridge.site import Site
 from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.autopilot import FlightLimits, Motion, Phase
@@ -257,3 +257,22 @@ def test_states_are_in_the_order_of_the_bodies() -> None:
     np.testing.assert_allclose(states[:2, :2], [[-1, 0.5], [-1, -0.5]])
     assert (states[:, 12] == 1.0).all()
     assert world.airborne == ()
+
+
+def test_the_target_waits_until_the_whole_team_has_been_in_the_air_long_enough() -> None:
+    scenario = Scenario(target=TargetScenario(departs_after_team_s=1.0))
+    world = World(site((-1, 0.5), (-1, -0.5)), scenario, 1)
+    first, second = world.drones.values()
+    first.autopilot.take_off()
+    for _ in range(round(8.0 / TICK_S)):
+        world.step()
+    assert world.target.speed == 0.0
+    second.autopilot.take_off()
+    while len(world.airborne) < 2:
+        world.step()
+    for _ in range(round(0.9 / TICK_S)):
+        world.step()
+    assert world.target.speed == 0.0
+    for _ in range(round(2.0 / TICK_S)):
+        world.step()
+    assert world.target.speed > 0.1

@@ -14,12 +14,16 @@ class Alternative(msgspec.Struct, frozen=True):
 
 
 class Control(msgspec.Struct, frozen=True):
-    """Planned velocity of one robot: (vx, vy, vz) [base_stabilized] and yaw rate, with what safety changed."""
+    """Commanded velocity of one robot: (vx, vy, vz) [base_stabilized] and yaw rate, with what safety changed.
+
+    wanted_m_s: the velocity before safety, where it is known.
+    """
 
     robot: str
     velocity_m_s: Vector3
     yaw_rate_rad_s: float
     limited_by: tuple[str, ...] = ()
+    wanted_m_s: Vector3 | None = None
 
 
 class Edge(msgspec.Struct, frozen=True):

@@ -1,0 +1,55 @@
+"""`groundstation console`: the web page of a run that goes on, from any terminal."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.monitor import cast_of, choose
+from groundstation.errors import GroundStationError
+
+if TYPE_CHECKING:
+    from groundstation.supervisor.runtime_file import RuntimeRecord
+
+
+@click.command(epilog="\b\nExamples:\n  groundstation console\n  groundstation console --port 9000 --run lab-4711")
+@click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
+@click.option("--port", type=click.IntRange(1024, 65535), help="Where to serve (default: the field's console.port).")
+def console(name: str | None, port: int | None) -> None:
+    """Serve the operator's page for a running ground station, on loopback. Leaving it stops nothing."""
+    import asyncio
+
+    from groundstation.bus.zenoh_bus import open_bus
+    from groundstation.console.scene import bare_scene, scene_from_field
+    from groundstation.console.server import ConsoleServer, claim_port
+
+    record = choose(name)
+    cast, field = cast_of(record), _field_of(record)
+    truth = any(process.role == "sim_bridge" for process in record.processes)
+    scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
+    listener = claim_port(port or field.get("console", {}).get("port", 8765))
+    bus = open_bus(record.endpoint, record.site, f"console_{os.getpid()}", timeout_s=2.0)
+    try:
+        server = ConsoleServer(bus, cast, scene, field, listener)
+        click.echo(f"console of {record.name} at {server.url} (Ctrl-C leaves it; the flight goes on)")
+        asyncio.run(server.serve(lambda turns, _late: turns % 20 != 0 or record.alive))
+        click.echo("the run has ended")
+    except KeyboardInterrupt:
+        pass
+    finally:
+        bus.close()
+
+
+def _field_of(record: "RuntimeRecord") -> dict[str, Any]:
+    """Return the resolved field from the recording that is being written, or {}."""
+    import msgspec
+
+    from groundstation.recording.reader import open_recording
+
+    try:
+        content = open_recording(Path(record.run_dir) / "state.mcap").attachments["field.json"]
+        field: dict[str, Any] = msgspec.json.decode(content, type=dict)
+    except (GroundStationError, KeyError, OSError, ValueError):
+        return {}
+    return field

@@ -1,0 +1,98 @@
+"""The web application: the files, the token, and the WebSocket's two directions."""
+
+import asyncio
+import itertools
+from collections import Counter
+from collections.abc import Callable
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from groundstation.console.board import Board
+from groundstation.console.gate import Gate
+from groundstation.console.pages import StaticFile
+from groundstation.console.protocol import decode
+from groundstation.console.session import Sessions
+from groundstation.console.viewer import Viewer
+from groundstation.errors import MessageError
+
+MAX_VIEWERS = 100
+_CLOSE_POLICY, _CLOSE_FULL, _CLOSE_SLOW = 1008, 1013, 1013
+_GONE = (WebSocketDisconnect, ConnectionError, RuntimeError)
+
+
+class ConsoleApp:
+    """Builds the ASGI application. `seed` gets a frame's number and returns everything a new viewer must know."""
+
+    def __init__(
+        self, pages: dict[str, StaticFile], token: str, board: Board, sessions: Sessions, seed: Callable[[int], str]
+    ) -> None:
+        self._pages, self._token, self._board, self._sessions, self._seed = pages, token, board, sessions, seed
+        self._numbers = itertools.count(1)
+        self.refused: Counter[str] = Counter()
+        routes = [
+            WebSocketRoute("/ws", self._socket),
+            Route("/token", self._give_token),
+            Route("/{path:path}", self._file),
+        ]
+        self.asgi = Gate(Starlette(routes=routes))
+
+    async def _file(self, request: Request) -> Response:
+        file = self._pages.get(request.url.path)
+        if file is None:
+            return PlainTextResponse("there is no such file", status_code=404)
+        return Response(file.content, media_type=file.media_type)
+
+    async def _give_token(self, _request: Request) -> Response:
+        # For a page that outlived the process that served it. Other sites cannot read the answer.
+        return PlainTextResponse(self._token)
+
+    async def _socket(self, socket: WebSocket) -> None:
+        await socket.accept()
+        if len(self._sessions.viewers) >= MAX_VIEWERS:
+            self.refused["full"] += 1
+            await socket.close(_CLOSE_FULL, f"{MAX_VIEWERS} viewers are connected already")
+            return
+        viewer = Viewer(next(self._numbers), self._board, socket.send_text, socket.send_bytes)
+        self._sessions.add(viewer)
+        listening = asyncio.create_task(self._listen(socket, viewer))
+        sending = asyncio.create_task(viewer.run(self._seed))
+        try:
+            await asyncio.wait({listening, sending}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._sessions.remove(viewer)
+            for task in (listening, sending):
+                task.cancel()
+            results = await asyncio.gather(listening, sending, return_exceptions=True)
+            await self._farewell(socket, viewer, results[0])
+
+    async def _listen(self, socket: WebSocket, viewer: Viewer) -> str:
+        """Obey the page until it goes; returns why it must go, if it must."""
+        while True:
+            try:
+                text = await socket.receive_text()
+            except KeyError:
+                return self._bad("binary")  # pages say nothing in binary
+            if not viewer.may_speak():
+                return self._bad("too_fast")
+            try:
+                message = decode(text)
+            except MessageError as error:
+                return self._bad(error.reason)
+            self._sessions.handle(viewer, message)
+
+    def _bad(self, reason: str) -> str:
+        self.refused[reason] += 1
+        return reason
+
+    async def _farewell(self, socket: WebSocket, viewer: Viewer, reason: object) -> None:
+        try:
+            if isinstance(reason, str):
+                await socket.close(_CLOSE_POLICY, f"message refused: {reason}")
+            elif viewer.too_slow:
+                await socket.close(_CLOSE_SLOW, "too slow")
+        except _GONE:
+            pass  # it was gone already

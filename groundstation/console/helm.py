@@ -1,0 +1,45 @@
+"""One operator at a time among the viewers; anybody may stop, and anybody may take over, in plain sight."""
+
+from dataclasses import dataclass
+
+# A page that reconnects within this time is still the operator.
+_GRACE_NS = 15_000_000_000
+
+
+@dataclass(slots=True)
+class Helm:
+    """Who of the viewers is the operator: `client` survives a reconnection, `name` is what the others see."""
+
+    client: str = ""
+    name: str = ""
+    _left_ns: int = 0
+
+    def may_start(self, client: str) -> bool:
+        """Whether a viewer may give starting orders: as the operator, or where there is none."""
+        return self.client in ("", client)
+
+    def take(self, client: str, name: str) -> str:
+        """Make a viewer the operator; returns the name of the one it replaces, or ""."""
+        replaced = self.name if self.client not in ("", client) else ""
+        self.client, self.name, self._left_ns = client, name, 0
+        return replaced
+
+    def release(self, client: str) -> None:
+        """Give the helm back, if it is that viewer's."""
+        if client == self.client:
+            self.client = self.name = ""
+
+    def arrived(self, client: str, name: str) -> None:
+        """A viewer came (back)."""
+        if client == self.client:
+            self.name, self._left_ns = name, 0
+
+    def left(self, client: str, now_ns: int) -> None:
+        """A viewer's connection ended."""
+        if client == self.client:
+            self._left_ns = now_ns
+
+    def step(self, now_ns: int) -> None:
+        """Free the helm when its viewer stays away."""
+        if self.client and self._left_ns and now_ns - self._left_ns > _GRACE_NS:
+            self.client = self.name = ""

@@ -1,0 +1,75 @@
+"""What lies behind: trails of all entities and the curves of the charts, for viewers that come later."""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from groundstation.bus.messages import Estimate, Plan, TruthState
+
+_TRAIL_POINTS = 300
+_TRAIL_NS = 200_000_000
+_SAMPLES = 240
+_SAMPLE_NS = 500_000_000
+_CHI2_95_2D = -2.0 * math.log(0.05)
+
+
+def semi_axis_95(covariance: tuple[float, ...], size: int) -> float:
+    """Return the major semi-axis [m] of the horizontal 95 % ellipse of a row-major (size, size) covariance."""
+    a, b, c = covariance[0], covariance[1], covariance[size + 1]
+    largest = (a + c) / 2 + math.hypot((a - c) / 2, b)
+    return math.sqrt(max(0.0, largest) * _CHI2_95_2D)
+
+
+class History:
+    """One minute of trails at 5 Hz, two minutes of samples at 2 Hz."""
+
+    def __init__(self, target: str) -> None:
+        self._target = target
+        self._trails: dict[str, deque[tuple[float, float]]] = {}
+        self._samples: deque[dict[str, Any]] = deque(maxlen=_SAMPLES)
+        self._next_trail_ns = self._next_sample_ns = 0
+
+    def step(
+        self,
+        now_ns: int,
+        estimate: Estimate | None,
+        plan: Plan | None,
+        nis: float | None,
+        truth: Mapping[str, TruthState],
+    ) -> dict[str, Any] | None:
+        """Take what is due; returns a new sample of the curves, if one was taken."""
+        if estimate is not None and now_ns >= self._next_trail_ns:
+            self._next_trail_ns = now_ns + _TRAIL_NS
+            for entity in estimate.entities:
+                trail = self._trails.setdefault(entity.name, deque(maxlen=_TRAIL_POINTS))
+                trail.append((round(entity.mean[0], 3), round(entity.mean[1], 3)))
+        if now_ns < self._next_sample_ns:
+            return None
+        self._next_sample_ns = now_ns + _SAMPLE_NS
+        sample = self._sample(now_ns, estimate, plan, nis, truth)
+        self._samples.append(sample)
+        return sample
+
+    def as_json(self) -> dict[str, Any]:
+        """Return everything kept."""
+        return {"trails": {name: list(trail) for name, trail in self._trails.items()}, "samples": list(self._samples)}
+
+    def _sample(
+        self,
+        now_ns: int,
+        estimate: Estimate | None,
+        plan: Plan | None,
+        nis: float | None,
+        truth: Mapping[str, TruthState],
+    ) -> dict[str, Any]:
+        entities = estimate.entities if estimate is not None else ()
+        target = next((entity for entity in entities if entity.name == self._target), None)
+        error = axis = None
+        if target is not None:
+            axis = round(semi_axis_95(target.covariance, len(target.mean)), 4)
+            there = truth.get(self._target)
+            if there is not None:
+                error = round(math.dist(target.mean[:2], there.position_m[:2]), 4)
+        cost = None if plan is None else round(plan.cost * 1e4, 2)
+        return {"t_ms": now_ns / 1e6, "axis_m": axis, "error_m": error, "cost_cm2": cost, "nis": nis}

@@ -1,0 +1,150 @@
+"""Commands of the page: given as the command line gives them, repeated until heard, followed until confirmed."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import AckStage, Command, CommandAck, Lease, Verb
+from groundstation.bus.topics import COMMAND
+from groundstation.runtime.acknowledgements import AckBook
+
+OPERATOR = "operator"
+STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
+_TEAM = "team"
+_NS_PER_MS = 1_000_000
+_EXPIRY_NS = 5_000_000_000
+_REPEAT_NS = 300_000_000
+_PATIENCE_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 60_000_000_000}
+_PATIENCE_DEFAULT_NS = 8_000_000_000
+# A start that lay in a frozen server's queue must not surprise anybody later; a stop never expires.
+_STALE_MS = 2000.0
+_KEPT = 8
+
+
+@dataclass(slots=True)
+class Followed:
+    """One command on the bus, with its answers; `by`: the viewer who gave it, `ref`: that page's own id of it."""
+
+    book: AckBook
+    given_ns: int
+    repeated_ns: int = 0
+    by: str = ""
+    ref: str = ""
+    closed: bool = False
+
+
+class OrderDesk:
+    """Gives commands and follows these and everybody else's.
+
+    Stops go to the drones at once. Starts go to the run's operator, who holds the lease and takes off one by one.
+    """
+
+    def __init__(self, bus: Bus, drones: tuple[str, ...]) -> None:
+        self._bus = bus
+        self._drones = drones
+        self._orders: dict[str, Followed] = {}
+        # An answer may overtake its command: they come from different senders.
+        self._early: dict[str, list[CommandAck]] = {}
+        self._lease: Lease | None = None
+        self._count = 0
+
+    def hear_lease(self, lease: Lease) -> None:
+        """Remember who holds the lease."""
+        self._lease = lease
+
+    def lease_holder(self, now_ns: int) -> str:
+        """Return who holds a live operator lease, or ""."""
+        return self._lease.holder if self._lease is not None and self._lease.expires_ns > now_ns else ""
+
+    def give(self, verb: Verb, drones: tuple[str, ...], by: str, at_ms: float, ref: str, now_ns: int) -> str:
+        """Send a command; returns "" or why it was not sent."""
+        strangers = [name for name in drones if name not in self._drones]
+        if strangers:
+            return f"there is no drone {', '.join(strangers)}"
+        stop = verb in STOPS
+        if not stop and not now_ns / _NS_PER_MS - at_ms < _STALE_MS:
+            return f"{verb} came too late ({now_ns / _NS_PER_MS - at_ms:.0f} ms) and was dropped"
+        if not stop and not self.lease_holder(now_ns):
+            return "nobody holds the operator lease: is the ground station's main process alive?"
+        self._count += 1
+        header = self._bus.header(_TEAM if stop else OPERATOR)
+        identity = f"{self._bus.source}-{header.stamp_ns}-{self._count}"
+        scope = drones if stop else (OPERATOR, *drones)
+        expires_ns = 0 if stop else header.stamp_ns + _EXPIRY_NS
+        command = Command(
+            header=header, id=identity, verb=verb, scope=scope, issuer=self._bus.source, expires_ns=expires_ns
+        )
+        self._keep(Followed(self._book(command), now_ns, now_ns, by, ref))
+        self._bus.publish(COMMAND, command)
+        return ""
+
+    def hear(self, message: Command | CommandAck, now_ns: int) -> None:
+        """Follow a command that somebody gave, and every answer."""
+        if isinstance(message, CommandAck):
+            followed = self._orders.get(message.command_id)
+            if followed is not None:
+                followed.book.note(message)
+            else:
+                self._remember_early(message)
+        elif message.id not in self._orders:
+            followed = Followed(self._book(message), now_ns)
+            for ack in self._early.pop(message.id, []):
+                followed.book.note(ack)
+            self._keep(followed)
+
+    def step(self, now_ns: int) -> None:
+        """Repeat what was not heard; close what is settled or out of time."""
+        for order in self._orders.values():
+            verb = order.book.command.verb
+            patience_ns = _PATIENCE_NS.get(verb, _PATIENCE_DEFAULT_NS)
+            order.closed = order.closed or order.book.settled or now_ns - order.given_ns > patience_ns
+            if not order.closed and order.by and order.book.unheard and now_ns - order.repeated_ns > _REPEAT_NS:
+                order.repeated_ns = now_ns
+                self._bus.publish(COMMAND, order.book.command)
+
+    def summary(self) -> list[dict[str, Any]]:
+        """Return the newest commands first, each with how far it came at each drone."""
+        return [_summary(order) for order in reversed(self._orders.values())]
+
+    def _book(self, command: Command) -> AckBook:
+        # The operator answers for what is asked of it; drones answer for themselves.
+        asked: Iterable[str] = (OPERATOR,) if OPERATOR in command.scope else command.scope or self._drones
+        return AckBook(command, tuple(asked))
+
+    def _keep(self, followed: Followed) -> None:
+        self._orders[followed.book.command.id] = followed
+        while len(self._orders) > _KEPT:
+            del self._orders[next(iter(self._orders))]
+
+    def _remember_early(self, ack: CommandAck) -> None:
+        self._early.setdefault(ack.command_id, []).append(ack)
+        while len(self._early) > _KEPT:
+            del self._early[next(iter(self._early))]
+
+
+def _summary(order: Followed) -> dict[str, Any]:
+    book = order.book
+    return {
+        "id": book.command.id,
+        "ref": order.ref,
+        "verb": book.command.verb,
+        "by": order.by or book.command.issuer,
+        "team": not set(book.command.scope) - {OPERATOR},
+        "given_ms": order.given_ns / _NS_PER_MS,
+        "closed": order.closed,
+        "state": _state(order),
+        "rows": [{"name": n, "stage": p.stage, "reason": p.reason} for n, p in book.progress.items()],
+    }
+
+
+def _state(order: Followed) -> str:
+    """Return sent, heard, confirmed, refused or not_confirmed: how the order as a whole stands."""
+    book = order.book
+    if book.confirmed:
+        return "confirmed"
+    if book.settled:
+        return "refused"
+    if order.closed:
+        return "not_confirmed"
+    return "sent" if book.unheard or any(p.stage is AckStage.REFUSED for p in book.progress.values()) else "heard"

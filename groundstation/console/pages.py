@@ -1,0 +1,40 @@
+"""The page's files, read once from the package: what is not in this table does not exist, whatever the path says."""
+
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+
+_TYPES = {
+    "html": "text/html; charset=utf-8",
+    "css": "text/css; charset=utf-8",
+    "js": "text/javascript; charset=utf-8",
+    "svg": "image/svg+xml",
+    "txt": "text/plain; charset=utf-8",
+}
+_TOKEN = b"@@TOKEN@@"
+
+
+@dataclass(frozen=True, slots=True)
+class StaticFile:
+    """Bytes and their media type."""
+
+    content: bytes
+    media_type: str
+
+
+def load_pages(token: str) -> dict[str, StaticFile]:
+    """Return all files by their path on the server; the token for commands is written into the page."""
+    files = dict(_walk(resources.files("groundstation.console") / "static", ""))
+    index = files.pop("/index.html")
+    files["/"] = StaticFile(index.content.replace(_TOKEN, token.encode()), index.media_type)
+    return files
+
+
+def _walk(folder: Traversable, path: str) -> list[tuple[str, StaticFile]]:
+    found = []
+    for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        if entry.is_dir():
+            found += _walk(entry, f"{path}/{entry.name}")
+        elif (kind := _TYPES.get(entry.name.rpartition(".")[2])) is not None:
+            found.append((f"{path}/{entry.name}", StaticFile(entry.read_bytes(), kind)))
+    return found

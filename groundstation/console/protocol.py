@@ -1,0 +1,85 @@
+"""What a page may say: small tagged JSON messages, checked before anything is done with them."""
+
+from typing import Annotated
+
+import msgspec
+
+from groundstation.bus.messages import Verb
+from groundstation.errors import MessageError
+
+MAX_BYTES = 4096
+Name = Annotated[str, msgspec.Meta(max_length=48)]
+Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=64)]
+Metres = Annotated[float, msgspec.Meta(ge=-100, le=100)]
+
+
+class FromPage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
+    """Base of what a page may say."""
+
+
+class Hello(FromPage, frozen=True):
+    """First message: the token that the page was served with, and an id that survives a reconnection."""
+
+    token: Annotated[str, msgspec.Meta(max_length=64)]
+    client: Annotated[str, msgspec.Meta(min_length=4, max_length=40)]
+
+
+class Order(FromPage, frozen=True):
+    """A command to the drones named (none: all); at_ms: the server's time when it was given; ref: the page's own id."""
+
+    verb: Verb
+    drones: Names
+    at_ms: float
+    ref: Annotated[str, msgspec.Meta(max_length=40)] = ""
+
+
+class TakeOver(FromPage, frozen=True):
+    """I am the operator now."""
+
+
+class Release(FromPage, frozen=True):
+    """I am not the operator any more."""
+
+
+class Seen(FromPage, frozen=True):
+    """Frames up to this number have been handled."""
+
+    seq: int
+
+
+class Watch(FromPage, frozen=True):
+    """The cameras whose pictures are wanted."""
+
+    cameras: Names
+
+
+class Drive(FromPage, frozen=True):
+    """Steers the simulated target."""
+
+    speed_m_s: Annotated[float, msgspec.Meta(ge=-2, le=2)]
+    turn_rad_s: Annotated[float, msgspec.Meta(ge=-4, le=4)]
+
+
+class Place(FromPage, frozen=True):
+    """Puts the simulated target somewhere [world]."""
+
+    x_m: Metres
+    y_m: Metres
+
+
+class FollowPath(FromPage, frozen=True):
+    """Sends the simulated target back to its path."""
+
+
+PageMessage = Hello | Order | TakeOver | Release | Seen | Watch | Drive | Place | FollowPath
+_decoder: msgspec.json.Decoder[PageMessage] = msgspec.json.Decoder(PageMessage)
+
+
+def decode(text: str | bytes) -> PageMessage:
+    """Return what a page said; raises MessageError (too_long, malformed)."""
+    if len(text) > MAX_BYTES:
+        raise MessageError("too_long", f"{len(text)} bytes")
+    try:
+        return _decoder.decode(text)
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        raise MessageError("malformed", str(error)) from error

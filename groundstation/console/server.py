@@ -1,0 +1,186 @@
+"""The console's loop: bus in, board out, twenty times a second; uvicorn serves in the same event loop."""
+
+import asyncio
+import contextlib
+import secrets
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import msgspec
+import uvicorn
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Command, CommandAck, Lease, RelativeObservation
+from groundstation.bus.topics import (
+    CAMERA_STATUS,
+    COMMAND,
+    COMMAND_ACK,
+    ESTIMATE,
+    EVENT,
+    IMAGE,
+    INNOVATION,
+    LEASE,
+    OBSERVATION,
+    PLAN,
+    PROCESS_STATUS,
+    SETPOINT,
+    SIM_STATUS,
+    TRUTH,
+    VEHICLE_STATUS,
+)
+from groundstation.console.app import ConsoleApp
+from groundstation.console.board import Board
+from groundstation.console.orders import OrderDesk
+from groundstation.console.pages import load_pages
+from groundstation.console.pictures import PictureDesk
+from groundstation.console.scene import lenses_of
+from groundstation.console.session import Sessions
+from groundstation.console.state import ConsoleState
+from groundstation.errors import GroundStationError
+from groundstation.monitor.state import Cast
+
+RATE_HZ = 20
+HOST = "127.0.0.1"
+_PORTS_TRIED = 10
+# Small, so that frames wait here, where the newest wins, and not in the kernel.
+_SEND_BUFFER_BYTES = 64 * 1024
+_NEWEST = (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS)
+_EACH = (EVENT, COMMAND, COMMAND_ACK, LEASE, OBSERVATION, INNOVATION)
+
+
+def claim_port(port: int) -> socket.socket:
+    """Return a socket listening on loopback at this port, or one of the next nine, or any; two runs at once work."""
+    for number in (*range(port, min(port + _PORTS_TRIED, 65536)), 0):
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+        try:
+            listener.bind((HOST, number))
+            listener.listen(128)
+        except OSError:
+            listener.close()
+            continue
+        return listener
+    raise GroundStationError(f"no port of {HOST} can be listened on")
+
+
+class ConsoleServer:
+    """Serves one run. `scene`: what does not move; `field`: the resolved field, or {} if it is not known."""
+
+    def __init__(self, bus: Bus, cast: Cast, scene: dict[str, Any], field: Mapping[str, Any], listener: socket.socket):
+        self._scene = scene
+        self._listener = listener
+        self.url = f"http://{HOST}:{listener.getsockname()[1]}/"
+        self.board = Board()
+        self.state = ConsoleState(cast, clock.now_ns())
+        self._pictures = PictureDesk(lenses_of(field) if field else {})
+        self._desk = OrderDesk(bus, tuple(cast.drones))
+        token = secrets.token_urlsafe(24)
+        self.sessions = Sessions(bus, self._desk, token, cast.target if scene["truth"] else "")
+        self.app = ConsoleApp(load_pages(token), token, self.board, self.sessions, self._seed)
+        self._run = secrets.token_hex(6)
+        newest = (*_NEWEST, TRUTH) if scene["truth"] else _NEWEST
+        self._newest = bus.subscribe(newest, newest=True)
+        self._each = bus.subscribe(_EACH, capacity=2048)
+        self._images = bus.subscribe((IMAGE,), newest=True)
+
+    @property
+    def overflowed(self) -> int:
+        """Messages that came faster than they were taken."""
+        return self._each.overflowed
+
+    async def serve(self, go_on: Callable[[int, int], bool]) -> None:
+        """Serve until `go_on(turns, late turns)`, asked in each turn, says no."""
+        config = uvicorn.Config(
+            self.app.asgi,
+            log_config=None,
+            access_log=False,
+            lifespan="off",
+            ws="websockets-sansio",
+            http="h11",
+            ws_max_size=16 * 1024,
+            ws_per_message_deflate=False,
+            ws_ping_interval=10.0,
+            ws_ping_timeout=20.0,
+            server_header=False,
+            timeout_graceful_shutdown=1,
+            limit_concurrency=400,
+        )
+        server = _Server(config)
+        serving = asyncio.create_task(server.serve(sockets=[self._listener]))
+        try:
+            await self._turns(go_on, serving)
+        finally:
+            server.should_exit = True
+            await serving
+
+    async def _turns(self, go_on: Callable[[int, int], bool], serving: "asyncio.Task[None]") -> None:
+        loop = asyncio.get_running_loop()
+        period_s, due_s, turns, late = 1.0 / RATE_HZ, loop.time(), 0, 0
+        while go_on(turns, late) and not serving.done():
+            self.turn(clock.now_ns())
+            turns += 1
+            due_s += period_s
+            if due_s < loop.time():
+                late += 1
+                due_s = loop.time()
+            await asyncio.sleep(due_s - loop.time())
+
+    def turn(self, now_ns: int) -> None:
+        """Take in what has arrived and tell the viewers."""
+        self.board.begin()
+        self.state.ingest(self._newest.drain())
+        each = self._each.drain()
+        self.state.ingest(each)
+        for received in each:
+            self._hear(received.message, now_ns)
+        self._desk.step(now_ns)
+        self.sessions.helm.step(now_ns)
+        self._take_pictures(now_ns)
+        self.state.put(self.board, now_ns)
+        self.board.put("detections", self._pictures.detections())
+        self.board.put("orders", self._desk.summary())
+        self.board.put("session", self.sessions.summary(now_ns))
+        for viewer in self.sessions.viewers.values():
+            viewer.notice()
+
+    def _hear(self, message: object, now_ns: int) -> None:
+        match message:
+            case Command() | CommandAck():
+                self._desk.hear(message, now_ns)
+            case Lease():
+                self._desk.hear_lease(message)
+            case RelativeObservation():
+                self._pictures.take_detection(message)
+            case _:
+                pass
+
+    def _take_pictures(self, now_ns: int) -> None:
+        for received in self._images.drain():
+            camera = received.header.entity
+            if self._pictures.take_picture(camera, received.header, received.payload, now_ns):
+                for viewer in self.sessions.viewers.values():
+                    viewer.show(camera, self._pictures.frames[camera])
+
+    def _seed(self, seq: int) -> str:
+        seed = {
+            "type": "seed",
+            "run": self._run,
+            "seq": seq,
+            "now": clock.now_ns() / 1e6,
+            "scene": self._scene,
+            "history": self.state.history.as_json(),
+            "s": msgspec.Raw(self.board.since(-1)),
+        }
+        return msgspec.json.encode(seed).decode()
+
+
+class _Server(uvicorn.Server):
+    """Leaves the signals to the process: the supervisor says when to stop."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Capture nothing."""
+        yield

@@ -1,0 +1,133 @@
+"""What a viewer's messages do: the one place where a page's words become commands."""
+
+import hmac
+from collections import Counter
+from typing import Any
+
+import msgspec
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import SimCommand
+from groundstation.bus.topics import SIM_COMMAND
+from groundstation.console.helm import Helm
+from groundstation.console.orders import STOPS, OrderDesk
+from groundstation.console.protocol import (
+    Drive,
+    FollowPath,
+    Hello,
+    Order,
+    PageMessage,
+    Place,
+    Release,
+    Seen,
+    TakeOver,
+    Watch,
+)
+from groundstation.console.viewer import Viewer
+
+
+def encoded(kind: str, **content: Any) -> str:
+    """Return a message to a page."""
+    return msgspec.json.encode({"type": kind, **content}).decode()
+
+
+class Sessions:
+    """All viewers, the operator among them, and what their pages may do.
+
+    simulated_target: the body that pages may steer, "" outside of simulation.
+    """
+
+    def __init__(self, bus: Bus, desk: OrderDesk, token: str, simulated_target: str) -> None:
+        self._bus = bus
+        self._desk = desk
+        self._token = token
+        self._target = simulated_target
+        self.helm = Helm()
+        self.viewers: dict[int, Viewer] = {}
+        self.refused: Counter[str] = Counter()
+
+    def add(self, viewer: Viewer) -> None:
+        """A viewer came."""
+        self.viewers[viewer.number] = viewer
+
+    def remove(self, viewer: Viewer) -> None:
+        """A viewer went."""
+        self.viewers.pop(viewer.number, None)
+        if viewer.client and not any(other.client == viewer.client for other in self.viewers.values()):
+            self.helm.left(viewer.client, clock.now_ns())
+
+    def summary(self, now_ns: int) -> dict[str, Any]:
+        """Return who is here and who is in command."""
+        return {
+            "operator": self.helm.client,
+            "operator_name": self.helm.name,
+            "viewers": len(self.viewers),
+            "lease": self._desk.lease_holder(now_ns),
+        }
+
+    def handle(self, viewer: Viewer, message: PageMessage) -> None:
+        """Do what a page asks for; what it may not is answered with the reason."""
+        match message:
+            case Seen(seq=seq):
+                viewer.saw(seq)
+            case Watch(cameras=cameras):
+                viewer.watched = frozenset(cameras)
+            case Hello():
+                self._greet(viewer, message)
+            case _ if not viewer.trusted:
+                self._refuse(viewer, "untrusted", "this page may only look: reload it")
+            case Order():
+                self._order(viewer, message)
+            case TakeOver():
+                self._take_over(viewer)
+            case Release():
+                self.helm.release(viewer.client)
+            case _:
+                self._steer(viewer, message)
+
+    def _greet(self, viewer: Viewer, hello: Hello) -> None:
+        viewer.client = hello.client
+        viewer.trusted = hmac.compare_digest(hello.token.encode(), self._token.encode())
+        if viewer.trusted:
+            self.helm.arrived(viewer.client, viewer.name)
+        else:
+            self.refused["token"] += 1
+        viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, trusted=viewer.trusted))
+
+    def _order(self, viewer: Viewer, order: Order) -> None:
+        if order.verb not in STOPS:
+            if not self.helm.may_start(viewer.client):
+                self._refuse(viewer, "not_operator", f"{self.helm.name} is the operator: take over first", order.ref)
+                return
+            self.helm.take(viewer.client, viewer.name)
+        now_ns = clock.now_ns()
+        problem = self._desk.give(order.verb, order.drones, viewer.name, order.at_ms, order.ref, now_ns)
+        if problem:
+            self._refuse(viewer, "order", problem, order.ref)
+
+    def _take_over(self, viewer: Viewer) -> None:
+        replaced = self.helm.take(viewer.client, viewer.name)
+        for other in self.viewers.values():
+            if replaced and other is not viewer:
+                other.say(encoded("notice", text=f"{viewer.name} has taken over from {replaced}", grave=True, ref=""))
+
+    def _steer(self, viewer: Viewer, message: PageMessage) -> None:
+        if not self._target:
+            self._refuse(viewer, "not_simulated", "the target is real: it cannot be steered from here")
+            return
+        header = self._bus.header(self._target)
+        match message:
+            case Drive(speed_m_s=speed, turn_rad_s=turn):
+                command = SimCommand(header=header, action="drive", speed_m_s=speed, turn_rate_rad_s=turn)
+            case Place(x_m=x, y_m=y):
+                command = SimCommand(header=header, action="place", position_m=(x, y, 0.0))
+            case FollowPath():
+                command = SimCommand(header=header, action="path")
+            case _:
+                return
+        self._bus.publish(SIM_COMMAND, command)
+
+    def _refuse(self, viewer: Viewer, reason: str, text: str, ref: str = "") -> None:
+        self.refused[reason] += 1
+        viewer.say(encoded("notice", text=text, grave=True, ref=ref))

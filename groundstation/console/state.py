@@ -1,0 +1,198 @@
+"""What the console knows, and how it is said to the page; the newest of everything is shared with the monitor."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from groundstation.bus import messages as m
+from groundstation.bus.api import Received
+from groundstation.console.board import Board
+from groundstation.console.health import Health
+from groundstation.console.history import History
+from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.state import Cast, MonitorState, Seen
+
+_EVENTS = 40
+_ALTERNATIVES = 8
+# Sections that change slowly are looked at every so many turns.
+_OFTEN, _SELDOM = 2, 5
+
+
+class ConsoleState:
+    """Takes messages in and puts the sections of the board; pure but for what it is given."""
+
+    def __init__(self, cast: Cast, started_ns: int) -> None:
+        self.monitor = MonitorState(cast=cast, started_ns=started_ns)
+        self.health = Health()
+        self.history = History(cast.target)
+        self.setpoints: dict[str, Seen[m.VelocitySetpoint]] = {}
+        self.truth: dict[str, Seen[m.TruthState]] = {}
+
+    def ingest(self, received: Iterable[Received]) -> None:
+        """Remember messages."""
+        for item in received:
+            match item.message:
+                case m.VelocitySetpoint() as setpoint:
+                    self.setpoints[item.header.entity] = Seen(item.header.stamp_ns, setpoint)
+                case m.TruthState() as truth:
+                    self.truth[item.header.entity] = Seen(item.header.stamp_ns, truth)
+                case m.Innovation() as innovation:
+                    self.health.take(innovation)
+                case _:
+                    self.monitor.ingest((item,))
+
+    def put(self, board: Board, now_ns: int) -> None:
+        """Put what changed on the board."""
+        board.put("estimate", _estimate(self.monitor.estimate))
+        board.put("setpoints", {name: _setpoint(seen) for name, seen in self.setpoints.items()})
+        if self.truth:
+            board.put("truth", {name: _truth(seen) for name, seen in self.truth.items()})
+        if board.turn % _OFTEN == 0:
+            self._put_often(board)
+        if board.turn % _SELDOM == 0:
+            self._put_seldom(board, now_ns)
+
+    def _put_often(self, board: Board) -> None:
+        known = self.monitor
+        board.put("vehicles", {name: _vehicle(seen) for name, seen in known.vehicles.items()})
+        board.put("plan", _plan(known.plan))
+        board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
+        board.put("events", [_event(seen) for seen in list(known.events)[-_EVENTS:]])
+
+    def _put_seldom(self, board: Board, now_ns: int) -> None:
+        known = self.monitor
+        board.put("cameras", {name: _camera(seen) for name, seen in known.cameras.items()})
+        board.put("processes", {name: _process(seen) for name, seen in known.processes.items()})
+        alarms = [{"text": alarm.text, "grave": alarm.grave} for alarm in alarms_of(known, now_ns)]
+        board.put("alarms", alarms)
+        health = self.health.summary()
+        board.put("health", health)
+        truth = {name: seen.message for name, seen in self.truth.items()}
+        plan = known.plan.message if known.plan else None
+        estimate = known.estimate.message if known.estimate else None
+        sample = self.history.step(now_ns, estimate, plan, health["nis"], truth)
+        if sample is not None:
+            board.put("sample", sample)
+
+
+def _ms(seen: Seen[Any]) -> float:
+    return seen.stamp_ns / 1e6
+
+
+def _rounded(values: Iterable[float], digits: int = 4) -> list[float]:
+    return [round(value, digits) for value in values]
+
+
+def _estimate(seen: Seen[m.Estimate] | None) -> dict[str, Any] | None:
+    if seen is None:
+        return None
+    entities = [
+        {
+            "name": entity.name,
+            "kind": entity.kind,
+            "mean": _rounded(entity.mean),
+            # Horizontal part only: xx, xy, yy [m^2].
+            "cov": _rounded((entity.covariance[0], entity.covariance[1], entity.covariance[len(entity.mean) + 1]), 7),
+            "velocity": _rounded(entity.velocity_m_s, 3),
+            "converged": entity.converged,
+            # Never seen is infinite in the filter, which JSON cannot say.
+            "age_s": round(min(entity.age_s, 1e6), 2),
+        }
+        for entity in seen.message.entities
+    ]
+    return {"at": _ms(seen), "epoch": seen.message.epoch, "entities": entities}
+
+
+def _setpoint(seen: Seen[m.VelocitySetpoint]) -> dict[str, Any]:
+    setpoint = seen.message
+    return {
+        "at": _ms(seen),
+        "velocity": _rounded(setpoint.velocity_m_s, 3),
+        "yaw_rate": round(setpoint.yaw_rate_rad_s, 3),
+        "converged": setpoint.converged,
+    }
+
+
+def _truth(seen: Seen[m.TruthState]) -> dict[str, Any]:
+    truth = seen.message
+    return {"at": _ms(seen), "position": _rounded(truth.position_m, 3), "yaw": round(truth.attitude_rad[2], 4)}
+
+
+def _vehicle(seen: Seen[m.VehicleStatus]) -> dict[str, Any]:
+    status = seen.message
+    return {
+        "at": _ms(seen),
+        "mode": status.mode,
+        "flight": status.flight_state,
+        "battery": status.battery,
+        "link": status.link_quality,
+        "rate_hz": round(status.rate_hz, 1),
+        "detail": status.detail,
+        "rejected": sum(status.rejected.values()),
+    }
+
+
+def _camera(seen: Seen[m.CameraStatus]) -> dict[str, Any]:
+    status = seen.message
+    return {
+        "at": _ms(seen),
+        "connected": status.connected,
+        "fps": round(status.fps, 1),
+        "age_ms": round(status.age_ms),
+        "detail": status.detail,
+    }
+
+
+def _process(seen: Seen[m.ProcessStatus]) -> dict[str, Any]:
+    status = seen.message
+    late = status.overruns / status.ticks if status.ticks else 0.0
+    return {
+        "at": _ms(seen),
+        "state": status.state,
+        "cpu": round(status.cpu, 3),
+        "late": round(late, 4),
+        "detail": status.detail,
+    }
+
+
+def _event(seen: Seen[m.Event]) -> dict[str, Any]:
+    event = seen.message
+    return {
+        "at": _ms(seen),
+        "severity": event.severity,
+        "entity": event.header.entity,
+        "text": event.text,
+        "remedy": event.remedy,
+    }
+
+
+def _plan(seen: Seen[m.Plan] | None) -> dict[str, Any] | None:
+    if seen is None:
+        return None
+    plan = seen.message
+    others = sorted(plan.alternatives, key=lambda alternative: alternative.cost)[:_ALTERNATIVES]
+    return {
+        "at": _ms(seen),
+        "topology": plan.topology,
+        "cost_cm2": round(plan.cost * 1e4, 2),
+        "mode": plan.mode,
+        "controls": [
+            {
+                "robot": c.robot,
+                "velocity": _rounded(c.velocity_m_s, 3),
+                "wanted": None if c.wanted_m_s is None else _rounded(c.wanted_m_s, 3),
+                "limited_by": c.limited_by,
+            }
+            for c in plan.controls
+        ],
+        "edges": [[e.observer, e.subject, round(e.information, 3)] for e in plan.edges],
+        "alternatives": [
+            {"topology": a.topology, "cost_cm2": round(a.cost * 1e4, 2), "bound_only": a.bound_only} for a in others
+        ],
+        "solver": {
+            "status": plan.solver.status,
+            "ms": round(plan.solver.seconds * 1e3, 1),
+            "evaluations": plan.solver.evaluations,
+            "topologies": plan.solver.topologies,
+            "survivors": plan.solver.survivors,
+        },
+    }

@@ -1,0 +1,94 @@
+// Live pictures with what was detected in exactly that picture; only cameras on screen are asked for.
+
+import { byId, el, seconds, text } from "./dom.js";
+import { on, watch } from "./link.js";
+import { colourOf } from "./palette.js";
+import { ageS, store } from "./store.js";
+
+const STALE_S = 1.5;
+const feeds = new Map(), visible = new Set();
+let observer = null;
+
+export const pictures = { frames: 0, marks: 0 };
+
+export function buildCameras() {
+  observer?.disconnect();
+  visible.clear();
+  feeds.clear();
+  const { cameras, drones } = store.scene;
+  const names = [...drones.filter((drone) => drone.camera).map((drone) => drone.camera.name), ...cameras.map((camera) => camera.name)];
+  byId("cameras").replaceChildren(...names.map(feed));
+  observer = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) isIntersecting ? visible.add(target.dataset.camera) : visible.delete(target.dataset.camera);
+    choose();
+  });
+  for (const { root } of feeds.values()) observer.observe(root);
+}
+
+const choose = () => watch(document.hidden ? [] : [...visible].sort());
+
+function feed(name) {
+  const canvas = el("canvas", { width: 320, height: 180, role: "img", "aria-label": `Picture of ${name}` });
+  const age = el("span", { class: "num" }), veil = el("span", { class: "pill veil", data: { level: "wait" } }, "no picture yet");
+  const root = el("figure", { class: "camera", data: { camera: name, testid: `camera-${name}` } }, canvas, veil, el("figcaption", {}, el("span", {}, name), age));
+  feeds.set(name, { root, canvas, age, veil, bitmap: null, stamp: null });
+  return root;
+}
+
+export function startCameras() {
+  document.addEventListener("visibilitychange", choose);
+  on("picture", async (head, blob) => {
+    const target = feeds.get(head.camera);
+    if (!target) return;
+    let bitmap = null;
+    try { bitmap = await createImageBitmap(blob); } catch { return; }
+    target.bitmap?.close();
+    Object.assign(target, { bitmap, stamp: head.stamp_ms });
+    pictures.frames += 1;
+    draw(head.camera, target);
+  });
+}
+
+// Detections of a picture may come after it.
+export function showDetections() {
+  for (const [name, target] of feeds) if (target.bitmap) draw(name, target);
+}
+
+function draw(name, { canvas, bitmap, stamp }) {
+  const width = Math.min(640, bitmap.width), scale = width / bitmap.width, height = Math.round(bitmap.height * scale);
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  const g = canvas.getContext("2d");
+  g.drawImage(bitmap, 0, 0, width, height);
+  const found = store.s.detections?.[name];
+  if (!found || Math.abs(found.stamp_ms - stamp) > 0.01) return;
+  for (const mark of found.marks) {
+    const [u, v, r] = [mark.u * scale, mark.v * scale, Math.max(8, mark.r * scale)], colour = colourOf(mark.subject);
+    const tint = mark.subject === store.scene.target.name ? "#ffe14d" : colour;
+    for (const [style, line] of [["#000", 5], [tint, 2.5]]) {
+      g.strokeStyle = style;
+      g.lineWidth = line;
+      g.beginPath();
+      g.arc(u, v, r, 0, 7);
+      g.stroke();
+    }
+    g.font = "700 20px system-ui, sans-serif";
+    g.lineWidth = 4;
+    g.strokeStyle = "#000";
+    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`, left = Math.min(u + r + 5, width - g.measureText(words).width - 4);
+    g.strokeText(words, left, v + 7);
+    g.fillStyle = tint;
+    g.fillText(words, left, v + 7);
+    pictures.marks += 1;
+  }
+}
+
+export function showCameras() {
+  for (const [name, { root, age, veil, stamp }] of feeds) {
+    const status = store.s.cameras?.[name], old = ageS(stamp), stale = old > STALE_S || !store.connected;
+    root.classList.toggle("stale", stale && stamp !== null);
+    text(age, `${status ? `${status.fps.toFixed(0)} fps` : ""} ${Number.isFinite(old) ? `${(1000 * old).toFixed(0)} ms` : ""}`.trim());
+    veil.hidden = !stale;
+    text(veil, stamp === null ? (status && !status.connected ? `no pictures${status.detail ? `: ${status.detail}` : ""}` : "no picture yet") : `${seconds(old)} old`);
+    veil.dataset.level = stamp === null ? "wait" : "bad";
+  }
+}

@@ -1,0 +1,91 @@
+// The WebSocket: one seed, then what changed; comes back by itself, and asks for the token again when it does.
+
+import { store, takeDelta, takeSeed } from "./store.js";
+
+const ACK_EVERY = 4, RETRY_MS = 300, RETRY_MAX_MS = 2000;
+const handlers = { seed: [], delta: [], notice: [], picture: [], state: [], welcome: [] };
+export const me = { client: clientId(), name: "", trusted: false };
+
+let socket = null, token = document.querySelector("meta[name=token]").content, retryMs = RETRY_MS, watched = [];
+
+export const on = (kind, handler) => handlers[kind].push(handler);
+const tell = (kind, ...content) => handlers[kind].forEach((handler) => handler(...content));
+
+function clientId() {
+  try {
+    const kept = sessionStorage.getItem("skein-client");
+    if (kept) return kept;
+  } catch { /* then the operator is another one after a reload */ }
+  const fresh = [...crypto.getRandomValues(new Uint8Array(9))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  try { sessionStorage.setItem("skein-client", fresh); } catch { /* as above */ }
+  return fresh;
+}
+
+// Returns whether the message went to the network; that is no promise that anybody heard it.
+export function send(type, content = {}) {
+  if (!socket || socket.readyState !== WebSocket.OPEN) return false;
+  socket.send(JSON.stringify({ type, ...content }));
+  return true;
+}
+
+export function watch(cameras) {
+  watched = cameras;
+  send("watch", { cameras });
+}
+
+export function connect() {
+  socket = new WebSocket(`ws://${location.host}/ws`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => {
+    retryMs = RETRY_MS;
+    send("hello", { token, client: me.client });
+    if (watched.length) watch(watched);
+  };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : takePicture(data));
+  socket.onclose = lost;
+}
+
+async function lost() {
+  socket = null;
+  store.connected = false;
+  tell("state");
+  const again = () => { retryMs = Math.min(RETRY_MAX_MS, retryMs * 1.5); setTimeout(reconnect, retryMs); };
+  again();
+}
+
+async function reconnect() {
+  try {
+    // The process may be another one by now, with another token.
+    const answer = await fetch("/token", { cache: "no-store" });
+    if (answer.ok) token = await answer.text();
+  } catch { return lost(); }
+  connect();
+}
+
+function take(message) {
+  switch (message.type) {
+    case "seed":
+      takeSeed(message);
+      store.connected = true;
+      tell("seed"); tell("state");
+      break;
+    case "delta": {
+      const sampled = takeDelta(message);
+      if (message.seq % ACK_EVERY === 0) send("seen", { seq: message.seq });
+      tell("delta", message.s, sampled);
+      break;
+    }
+    case "welcome":
+      Object.assign(me, { name: message.name, trusted: message.trusted });
+      tell("welcome"); tell("state");
+      break;
+    case "notice":
+      tell("notice", message);
+  }
+}
+
+function takePicture(data) {
+  const size = new DataView(data).getUint16(0);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 2, size)));
+  tell("picture", head, new Blob([new Uint8Array(data, 2 + size)], { type: "image/jpeg" }));
+}

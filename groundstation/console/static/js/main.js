@@ -1,0 +1,136 @@
+// Puts the page together: what comes in marks what is to be drawn; drawing happens once per picture of the screen.
+
+import { buildCameras, pictures, showCameras, showDetections, startCameras } from "./cameras.js";
+import { buildCharts, showSamples } from "./charts.js";
+import { byId, el, svg } from "./dom.js";
+import { connect, me, on, send } from "./link.js";
+import { drawMap, drawn, layers } from "./map.js";
+import { give, showControls, showOrders, startOrders } from "./orders.js";
+import { ink, nameRobots, startTheme } from "./palette.js";
+import { showPlan } from "./plan.js";
+import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
+import { ghostPoint, startSteering } from "./steer.js";
+import { droneNames, entities, estimateAge, now, store } from "./store.js";
+import { buildTeam, paint, showTeam } from "./team.js";
+import { View } from "./view.js";
+
+const SLOW_MS = 200;
+const NAMES = { footprints: "Footprints", graph: "Sensing graph", trails: "Trails", velocities: "Velocities", truth: "Truth" };
+let dirty = true, undrawnStamp = null, lastSlow = 0;
+
+const view = new View(byId("map"), () => { dirty = true; });
+
+on("seed", () => {
+  const { scene } = store;
+  nameRobots(droneNames());
+  document.title = `${scene.site} · Skein`;
+  byId("site").textContent = scene.site;
+  byId("sim").hidden = !scene.truth;
+  for (const node of document.querySelectorAll(".only-sim")) node.hidden = !scene.truth;
+  view.room = scene.room.size_m;
+  if (view.fitted) view.fit();
+  buildLayers(); buildLegend(); buildTeam(); buildCameras(); buildCharts();
+  showAll();
+  dirty = true;
+});
+
+on("delta", (sections, sampled) => {
+  if (sections.estimate) undrawnStamp = sections.estimate.at;
+  if (sections.orders || sections.session) { showOrders(); showControls(); }
+  if (sections.plan) showPlan();
+  if (sections.detections) showDetections();
+  if (sampled) showSamples();
+  dirty = true;
+});
+
+on("notice", (notice) => { addNotice(notice); showBanners(); });
+on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
+
+function showAll() {
+  showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showControls(); showOrders();
+  describe();
+}
+
+function describe() {
+  const note = byId("map-note");
+  note.hidden = !store.scene || entities().length > 0;
+  note.textContent = "Nobody is localised yet.";
+  const words = entities().map(({ name, mean }) => `${name} at ${mean[0].toFixed(1)}, ${mean[1].toFixed(1)} m`).join("; ");
+  byId("map").setAttribute("aria-label", `Map of the room. ${words || "Nobody is localised yet."}`);
+}
+
+function frame(at) {
+  if (at - lastSlow > SLOW_MS) {
+    lastSlow = at;
+    showAll();
+    dirty = true;
+  }
+  if (dirty) {
+    dirty = false;
+    drawMap(view, ghostPoint());
+    if (undrawnStamp !== null) {
+      drawn.latencies.push(now() - undrawnStamp);
+      if (drawn.latencies.length > 200) drawn.latencies.shift();
+      undrawnStamp = null;
+    }
+  }
+  requestAnimationFrame(frame);
+}
+
+function buildLayers() {
+  byId("layers").replaceChildren(...Object.keys(layers).filter((name) => name !== "truth" || store.scene.truth).map((name) => {
+    const button = el("button", { "aria-pressed": `${layers[name]}`, data: { testid: `layer-${name}` } }, NAMES[name]);
+    button.onclick = () => { layers[name] = !layers[name]; button.setAttribute("aria-pressed", `${layers[name]}`); dirty = true; };
+    return button;
+  }));
+}
+
+function buildLegend() {
+  const c = ink(), rows = [
+    ["95 % ellipse of the position", svg("ellipse", { cx: 15, cy: 7, rx: 12, ry: 5, fill: c.dim, "fill-opacity": 0.25, stroke: c.dim })],
+    ["link: expected information; dashed: unseen", svg("path", { d: "M1 7 H16", stroke: c.link, "stroke-width": 5 }), svg("path", { d: "M18 7 H30", stroke: c.link, "stroke-width": 2, "stroke-dasharray": "4 3" })],
+    [`camera footprint at ${store.scene.target.height_m.toFixed(1)} m`, svg("path", { d: "M4 12 L26 12 L29 2 L1 2 Z", fill: c.dim, "fill-opacity": 0.2, stroke: c.dim })],
+    ["velocity × 1.5 s", svg("path", { d: "M2 7 H22 M18 3 L25 7 L18 11", stroke: c.text, "stroke-width": 2.5, fill: "none" })],
+    ["target's prediction", svg("path", { d: "M2 7 H28", stroke: c.target, "stroke-width": 2, "stroke-dasharray": "2 4" })],
+    ["fence", svg("path", { d: "M2 7 H28", stroke: c.fence, "stroke-width": 2, "stroke-dasharray": "7 4" })],
+  ];
+  if (store.scene.truth) rows.push(["truth (simulation)", svg("path", { d: "M10 2 L20 12 M20 2 L10 12", stroke: c.truth, "stroke-width": 2 })]);
+  byId("legend").replaceChildren(...rows.map(([words, ...shapes]) => el("li", {}, svg("svg", { viewBox: "0 0 30 14" }, ...shapes), words)));
+}
+
+const toggleTheme = startTheme(() => {
+  if (!store.scene) return;
+  paint(); buildLegend(); buildCharts(); showPlan();
+  dirty = true;
+});
+byId("theme").onclick = toggleTheme;
+byId("help").onclick = () => byId("about").showModal();
+
+addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
+  const key = event.key.toLowerCase();
+  if (key === "l") give("LAND");
+  else if (key === "h") give("HOLD");
+  else if (key === "t") toggleTheme();
+  else if (key === "p" && store.scene?.truth) send("followpath");
+  else if (key === "?") byId("about").open ? byId("about").close() : byId("about").showModal();
+});
+
+// What tests read; nothing here can be changed to any effect.
+window.__console = {
+  get state() {
+    return {
+      frames: store.frames, seeds: store.seeds, seq: store.seq, run: store.run, connected: store.connected, client: me.client, trusted: me.trusted,
+      draws: drawn.draws, drawMs: drawn.ms, ellipses: structuredClone(drawn.ellipses), latencies: [...drawn.latencies], pictures: { ...pictures },
+      orders: structuredClone(store.s.orders ?? []), estimateAge: estimateAge(), trail: Object.fromEntries(Object.entries(store.trails).map(([name, trail]) => [name, trail.length])),
+      scale: view.scale, points: Object.fromEntries(entities().map(({ name, mean }) => [name, view.point(mean[0], mean[1])])), at: Object.fromEntries(entities().map(({ name, mean }) => [name, mean])),
+    };
+  },
+};
+
+if (innerWidth < 900) document.querySelector(".legend").open = false;
+startOrders();
+startCameras();
+startSteering(byId("map"), view);
+connect();
+requestAnimationFrame(frame);

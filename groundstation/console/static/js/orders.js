@@ -1,0 +1,103 @@
+// Buttons and keys that command, and how far each order came.
+
+import { byId, el, seconds, text } from "./dom.js";
+import { me, on, send } from "./link.js";
+import { ageS, droneNames, now, store } from "./store.js";
+
+const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
+const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000;
+const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
+const STATES = {
+  unsent: "NOT SENT", sent: "NOT CONFIRMED", heard: "acknowledged", confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
+};
+const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ effective" };
+// Orders that the server has not shown yet, so that nothing is silently lost on the way there.
+let own = [], count = 0;
+
+export function give(verb, drones = []) {
+  const order = { ref: `${me.client}-${++count}`, verb, drones, at: performance.now(), given_ms: now(), state: "sent", note: "" };
+  order.out = send("order", { verb, drones, at_ms: order.given_ms, ref: order.ref });
+  if (!order.out) {
+    order.state = "unsent";
+    order.note = STOPS.has(verb) ? "no connection: goes out when it is back. Now: groundstation " + verb.toLowerCase().replace("_", "-") + " in a shell" : "no connection";
+  }
+  own.push(order);
+  showOrders();
+}
+
+export function startOrders() {
+  byId("land").onclick = () => give("LAND");
+  byId("hold").onclick = () => give("HOLD");
+  byId("takeoff").onclick = () => give("TAKEOFF");
+  byId("track").onclick = () => give("TRACK");
+  byId("resume").onclick = () => give("RESUME");
+  byId("takeover").onclick = () => send("takeover");
+  holdToPress(byId("cut"), () => give("CUT_MOTORS"));
+  on("welcome", () => {
+    // Stops never expire; a start that did not get out is forgotten.
+    for (const order of own) if (!order.out && STOPS.has(order.verb)) {
+      order.out = send("order", { verb: order.verb, drones: order.drones, at_ms: order.given_ms, ref: order.ref });
+      if (order.out) Object.assign(order, { state: "sent", note: "sent when the connection was back" });
+    }
+    showOrders();
+  });
+  on("notice", ({ ref, text: reason }) => {
+    const order = own.find((candidate) => ref && candidate.ref === ref);
+    if (order) Object.assign(order, { state: "refused", note: reason });
+    showOrders();
+  });
+}
+
+// Fires after one second of pressing, by pointer or by key; anything that ends it early ends it.
+function holdToPress(button, fire) {
+  let timer = 0;
+  const stop = () => { clearTimeout(timer); timer = 0; button.classList.remove("held"); };
+  const start = () => {
+    if (timer) return;
+    button.classList.add("held");
+    timer = setTimeout(() => { stop(); fire(); }, PRESS_MS);
+  };
+  button.addEventListener("pointerdown", (event) => { if (event.button === 0) { button.setPointerCapture(event.pointerId); start(); } });
+  for (const kind of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(kind, stop);
+  button.addEventListener("pointermove", (event) => {
+    const box = button.getBoundingClientRect();
+    if (event.clientX < box.left || event.clientX > box.right || event.clientY < box.top || event.clientY > box.bottom) stop();
+  });
+  button.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); if (!event.repeat) start(); } });
+  button.addEventListener("keyup", stop);
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+}
+
+export function showControls() {
+  const names = droneNames(), session = store.s.session ?? {};
+  for (const node of document.querySelectorAll(".count")) text(node, names.length ? `${names.length}` : "");
+  const free = !session.operator, mine = session.operator === me.client;
+  text(byId("operator"), !me.trusted ? "looking only" : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
+  byId("takeover").hidden = !me.trusted || free || mine;
+  const able = me.trusted && store.connected && (free || mine) && Boolean(session.lease);
+  const why = !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
+  for (const id of ["takeoff", "track", "resume"]) { byId(id).disabled = !able; byId(id).title = why; }
+}
+
+export function showOrders() {
+  const listed = store.s.orders ?? [], known = new Set(listed.map((order) => order.ref).filter(Boolean));
+  own = own.filter((order) => !known.has(order.ref) && (performance.now() - order.at < KEPT_MS || order.state === "unsent"));
+  const waiting = own.map((order) => ({ ...order, rows: (order.drones.length ? order.drones : droneNames()).map((name) => ({ name })), by: "you", team: !order.drones.length }));
+  const all = [...waiting.reverse(), ...listed].slice(0, SHOWN);
+  byId("orders").replaceChildren(...all.map(line));
+}
+
+function line(order) {
+  const age = ageS(order.given_ms), scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
+  return el("li", { class: `order${age > 20 ? " old" : ""}`, data: { state: order.state, verb: order.verb, testid: "order" } },
+    el("div", { class: "head" },
+      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${order.by === me.name ? "you" : order.by} · ${seconds(age)} ago`)),
+      el("span", { class: "state" }, STATES[order.state] ?? order.state)),
+    el("div", { class: "rows" }, ...order.rows.map((row) => el("span", {}, el("b", {}, `${row.name} `), el("span", { class: row.stage && row.stage !== "REFUSED" ? "" : "missing" }, stage(row, order)))),
+      order.note ? el("span", { class: "missing" }, order.note) : null));
+}
+
+function stage(row, order) {
+  if (!row.stage) return order.state === "unsent" ? "not sent" : order.state === "refused" ? "—" : "no answer";
+  return row.stage === "REFUSED" ? `refused: ${row.reason}` : STAGES[row.stage];
+}

@@ -1,0 +1,64 @@
+// The chosen sensing topology beside its alternatives, as small graphs with their costs.
+
+import { byId, el, seconds, svg, text } from "./dom.js";
+import { colourOf, ink } from "./palette.js";
+import { ageS, store } from "./store.js";
+
+const cost = (value) => (value >= 1e4 ? `${(value / 1e4).toFixed(2)} m²` : value >= 100 ? `${value.toFixed(0)} cm²` : `${value.toFixed(1)} cm²`);
+let shown = "";
+
+export function showPlan() {
+  const plan = store.s.plan, age = ageS(plan?.at), node = byId("plan");
+  text(byId("plan-age"), plan ? (age > 1 ? `${seconds(age)} old` : "") : "");
+  node.classList.toggle("stale-panel", age > 1 || !store.connected);
+  const state = JSON.stringify([plan, document.documentElement.dataset.theme]);
+  if (state === shown) return;
+  shown = state;
+  if (!plan) return node.replaceChildren(el("p", { class: "dim" }, "No plan yet: it needs a drone in the air that a camera sees."));
+  const others = plan.alternatives.filter((option) => option.topology !== plan.topology);
+  const worst = Math.max(plan.cost_cm2, ...others.map((option) => option.cost_cm2), 1e-9);
+  const { solver } = plan;
+  node.replaceChildren(
+    el("div", { class: "chosen" }, glyph(plan.topology),
+      el("p", {}, el("span", { class: "cost num", data: { testid: "cost" } }, cost(plan.cost_cm2)), el("br"), el("strong", { data: { testid: "topology" } }, words(plan.topology)), el("br"),
+        el("span", { class: "dim num" }, `${solver.ms.toFixed(0)} ms, ${solver.evaluations} evaluations, ${solver.topologies} topologies, ${solver.status.toLowerCase()}`))),
+    el("div", { class: "options" }, option({ topology: plan.topology, cost_cm2: plan.cost_cm2 }, worst, plan, true), ...others.map((other) => option(other, worst, plan, false))),
+    cuts(plan));
+}
+
+const words = (topology) => topology.split("/").map((level) => level.split(",").join(" + ")).join(" over ") || "nobody in the air";
+
+function option(item, worst, plan, now) {
+  const bar = el("i");
+  bar.style.width = `${Math.max(2, (100 * item.cost_cm2) / worst)}%`;
+  const more = now ? "chosen" : `${item.bound_only ? "at least " : ""}${cost(item.cost_cm2)} (${item.cost_cm2 >= plan.cost_cm2 ? "+" : "−"}${Math.abs((100 * item.cost_cm2) / plan.cost_cm2 - 100).toFixed(0)} %)`;
+  return el("div", { class: `option${now ? " now" : ""}${item.bound_only ? " bound" : ""}` }, glyph(item.topology),
+    el("div", {}, el("div", { class: "name num" }, el("span", {}, words(item.topology)), el("span", {}, more)), el("div", { class: "bar" }, bar)));
+}
+
+// Root: the fixed cameras; then the levels; leaf: the target.
+function glyph(topology) {
+  const levels = topology ? topology.split("/").map((level) => level.split(",")) : [];
+  const width = 96, height = 78, rows = levels.length + 1, y = (row) => 9 + (row * (height - 18)) / rows;
+  const x = (index, count) => (width * (index + 1)) / (count + 1);
+  const nodes = [[[width / 2, y(0), null]], ...levels.map((level, row) => level.map((name, index) => [x(index, level.length), y(row + 1), name])), [[width / 2, y(rows), null]]];
+  const root = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: "glyph", role: "img", "aria-label": words(topology) });
+  for (let row = 1; row < nodes.length; row++) for (const [ax, ay] of nodes[row - 1]) for (const [bx, by] of nodes[row]) {
+    root.append(svg("line", { x1: ax, y1: ay, x2: bx, y2: by, stroke: ink().dim, "stroke-width": 2 }));
+  }
+  // A drone also sees the target itself if it is on the last level only: the edges above are the permitted ones.
+  root.append(svg("rect", { x: width / 2 - 8, y: y(0) - 5, width: 16, height: 10, rx: 2, fill: ink().link }));
+  for (const level of nodes.slice(1, -1)) for (const [cx, cy, name] of level) root.append(svg("circle", { cx, cy, r: 8, fill: colourOf(name) }));
+  root.append(svg("circle", { cx: width / 2, cy: y(rows), r: 6, fill: ink().floor, stroke: ink().target, "stroke-width": 3 }));
+  return root;
+}
+
+function cuts(plan) {
+  const limited = plan.controls.filter((control) => control.limited_by.length);
+  const lines = limited.map((control) => {
+    const speed = (v) => Math.hypot(v[0], v[1]).toFixed(2);
+    const how = control.wanted ? `${speed(control.wanted)} → ${speed(control.velocity)} m/s` : `now ${speed(control.velocity)} m/s`;
+    return el("div", {}, el("strong", {}, control.robot), ` cut by ${control.limited_by.join(", ")}: ${how}`);
+  });
+  return el("div", { class: "cuts num", data: { testid: "cuts" } }, ...(lines.length ? lines : [el("span", { class: "dim" }, "Safety cuts nothing now.")]));
+}

@@ -1,0 +1,82 @@
+// Is what you see true? Banners, the pills of the top bar, estimator health, events, processes.
+
+import { byId, el, seconds, text } from "./dom.js";
+import { drawn } from "./map.js";
+import { ageS, estimateAge, silentS, store } from "./store.js";
+
+const SILENT_S = 0.8, TRACKER_S = 0.5;
+const notices = [];
+let eventsShown = "";
+
+export function addNotice({ text: words, grave }) {
+  notices.push({ words, grave, at: performance.now() });
+  if (notices.length > 3) notices.shift();
+}
+
+export function showBanners() {
+  const banners = [];
+  const age = estimateAge(), ageWords = Number.isFinite(age) ? `What you see is ${seconds(age)} old.` : "";
+  if (!store.connected) banners.push(["link", true, "NO CONNECTION TO THE CONSOLE", ageWords, true]);
+  else if (silentS() > SILENT_S) banners.push(["silent", true, `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
+  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", true, `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land after 3 s."]);
+  for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave, notice.words, ""]);
+  for (const alarm of store.connected ? (store.s.alarms ?? []).slice(0, 4) : []) {
+    if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave, alarm.text, ""]);
+  }
+  const host = byId("banners"), kinds = banners.map(([kind]) => kind).join();
+  if (host.dataset.kinds !== kinds) {
+    host.dataset.kinds = kinds;
+    host.replaceChildren(...banners.map(([kind, , , , shell]) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
+  }
+  banners.forEach(([, grave, title, more], index) => {
+    const node = host.children[index];
+    node.className = `banner ${grave ? "grave" : "mild"}`;
+    text(node.children[0], `${grave ? "⚠ " : ""}${title}`);
+    text(node.children[1], more);
+  });
+}
+
+export function showTop() {
+  const link = byId("link"), silent = silentS() > SILENT_S, age = estimateAge();
+  const [level, words] = !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : age > TRACKER_S ? ["bad", "tracker silent"] : ["good", "live"];
+  link.dataset.level = level;
+  text(link, words);
+  const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];
+  text(byId("clock"), level === "good" && middle !== undefined ? `${middle.toFixed(0)} ms` : Number.isFinite(age) ? `${seconds(age)} old` : "");
+}
+
+export function showHealth() {
+  const health = store.s.health, pill = byId("nis");
+  if (!health || health.nis === null) { text(pill, health ? "no innovations yet" : ""); delete pill.dataset.level; return; }
+  const good = health.nis >= health.low && health.nis <= health.high, far = health.nis > 2 * health.high;
+  pill.className = "pill num";
+  pill.dataset.level = good ? "good" : far ? "bad" : "warn";
+  text(pill, `NIS ${health.nis.toFixed(2)} ${good ? "consistent" : health.nis > health.high ? "overconfident" : "cautious"} · ${(100 * (health.accepted ?? 0)).toFixed(0)} % accepted`);
+  pill.title = `95 % bounds ${health.low.toFixed(2)} to ${health.high.toFixed(2)}`;
+  if (!byId("edges").parentElement.open) return;
+  byId("edges").replaceChildren(el("table", {}, el("tr", {}, ...["edge", "NIS", "95 % bounds", "accepted", "last refused"].map((title) => el("th", {}, title))),
+    ...health.edges.map((edge) => el("tr", {}, el("td", {}, `${edge.observer} → ${edge.subject}`), el("td", {}, edge.nis === null ? "–" : edge.nis.toFixed(2)),
+      el("td", {}, edge.low === null ? "–" : `${edge.low.toFixed(2)}…${edge.high.toFixed(2)}`), el("td", {}, edge.accepted === null ? "–" : `${(100 * edge.accepted).toFixed(0)} %`), el("td", {}, edge.refused)))));
+}
+
+export function showEvents() {
+  const events = store.s.events ?? [], key = `${events.length}:${events.at(-1)?.at}:${events[0]?.at}`;
+  const host = byId("events");
+  if (key !== eventsShown) {
+    eventsShown = key;
+    host.replaceChildren(...[...events].reverse().map((event) => el("li", { class: event.severity }, el("time", { class: "dim num", data: { at: event.at } }), el("span", { class: "mark" }, event.severity.toLowerCase()),
+      el("span", {}, event.text.startsWith(event.entity) ? event.text : `${event.entity}: ${event.text}`, event.remedy ? el("small", {}, event.remedy) : null))));
+  }
+  for (const node of host.querySelectorAll("time")) text(node, `${seconds(ageS(Number(node.dataset.at)))} ago`);
+}
+
+export function showProcesses() {
+  const processes = Object.entries(store.s.processes ?? {}).sort(([a], [b]) => a.localeCompare(b));
+  const total = processes.reduce((sum, [, status]) => sum + (ageS(status.at) < 3 ? status.cpu : 0), 0);
+  byId("processes").replaceChildren(...processes.map(([name, status]) => {
+    const silent = ageS(status.at) > 3 && status.state !== "STOPPING";
+    const level = silent ? "bad" : status.state === "DEGRADED" ? "warn" : status.state === "READY" ? "good" : "wait";
+    const late = status.late > 0.01 ? ` · ${(100 * status.late).toFixed(0)} % late` : "";
+    return el("span", { class: "pill num", title: status.detail, data: { level } }, `${name} ${silent ? "silent" : `${(100 * status.cpu).toFixed(0)} %${late}`}`);
+  }), el("span", { class: "pill plain num" }, `together ${total.toFixed(2)} cores`));
+}

@@ -1,0 +1,65 @@
+// The one state of the page: the newest of each section, the server's time, trails and curves.
+
+const TRAIL_MS = 200, TRAIL_POINTS = 300, SAMPLES = 240;
+const OFFSET_WINDOW_MS = 30000;
+
+export const store = {
+  scene: null, s: {}, run: "", seq: 0, frames: 0, seeds: 0,
+  trails: {}, samples: [], receivedAt: -Infinity, connected: false,
+};
+
+let offsets = [], lastTrail = 0, lastSample = 0;
+
+// The greatest difference seen is the one with the least delay: sent and received at nearly the same time.
+function noteClock(serverMs) {
+  const at = performance.now();
+  offsets.push([at, serverMs - at]);
+  offsets = offsets.filter(([when]) => at - when < OFFSET_WINDOW_MS);
+  store.offset = Math.max(...offsets.map(([, offset]) => offset));
+  store.receivedAt = at;
+}
+
+export const now = () => performance.now() + (store.offset ?? 0);
+export const ageS = (atMs) => (atMs === undefined || atMs === null ? Infinity : Math.max(0, (now() - atMs) / 1000));
+export const silentS = () => (performance.now() - store.receivedAt) / 1000;
+
+export function takeSeed(seed) {
+  offsets = [];
+  noteClock(seed.now);
+  Object.assign(store, { scene: seed.scene, s: seed.s, run: seed.run, seq: seed.seq });
+  store.trails = seed.history.trails;
+  store.samples = seed.history.samples;
+  store.seeds += 1;
+}
+
+export function takeDelta(delta) {
+  noteClock(delta.now);
+  store.seq = delta.seq;
+  store.frames += 1;
+  Object.assign(store.s, delta.s);
+  if (delta.s.estimate) extendTrails(delta.s.estimate);
+  if (delta.s.sample && delta.s.sample.t_ms > lastSample) {
+    lastSample = delta.s.sample.t_ms;
+    store.samples.push(delta.s.sample);
+    if (store.samples.length > SAMPLES) store.samples.shift();
+    return true;
+  }
+  return false;
+}
+
+function extendTrails(estimate) {
+  if (estimate.at - lastTrail < TRAIL_MS) return;
+  lastTrail = estimate.at;
+  for (const { name, mean } of estimate.entities) {
+    const trail = (store.trails[name] ??= []);
+    trail.push([mean[0], mean[1]]);
+    if (trail.length > TRAIL_POINTS) trail.shift();
+  }
+}
+
+export const entities = () => store.s.estimate?.entities ?? [];
+export const entity = (name) => entities().find((candidate) => candidate.name === name);
+export const estimateAge = () => ageS(store.s.estimate?.at);
+export const droneNames = () => (store.scene?.drones ?? []).map((drone) => drone.name);
+export const seenBy = (name) => (store.s.sightings ?? []).filter(([, subject, at]) => subject === name && ageS(at) < 0.6).map(([observer]) => observer);
+export const isSeen = (observer, subject) => (store.s.sightings ?? []).some(([o, s, at]) => o === observer && s === subject && ageS(at) < 0.6);

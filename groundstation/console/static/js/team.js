@@ -1,0 +1,99 @@
+// A card for each drone and one for the target.
+
+import { byId, el, seconds, svg, text } from "./dom.js";
+import { ellipse95 } from "./geometry.js";
+import { give } from "./orders.js";
+import { colourOf } from "./palette.js";
+import { ageS, entity, estimateAge, seenBy, store } from "./store.js";
+
+const STALE_S = 1;
+const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad" };
+const cards = new Map();
+
+export function buildTeam() {
+  cards.clear();
+  const { drones, target } = store.scene;
+  const nodes = drones.map((drone) => card(drone.name, ["battery", "link", "heard", "seen", "position", "ellipse", "speed", "by"], true));
+  if (target.name) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
+  byId("team").replaceChildren(...nodes);
+}
+
+const TITLES = { battery: "battery", link: "telemetry", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
+const WIDE = new Set(["position", "ellipse", "by"]);
+
+function card(name, fields, drone) {
+  const values = Object.fromEntries(fields.map((field) => [field, el("dd", { data: { testid: `${name}-${field}` } })]));
+  const mode = el("span", { class: "pill", data: { testid: `${name}-mode` } });
+  const chip = svg("svg", { viewBox: "0 0 18 18", class: "chip", "aria-hidden": "true" });
+  const land = drone ? el("button", { class: "small", "aria-label": `Land ${name}`, data: { testid: `${name}-land` } }, "Land") : null;
+  if (land) land.onclick = () => give("LAND", [name]);
+  const detail = el("p", { class: "detail", hidden: true });
+  const root = el("article", { class: "unit", "aria-label": name, data: { testid: `card-${name}` } },
+    el("div", { class: "head" }, chip, el("strong", {}, name), mode, land),
+    el("dl", {}, ...fields.map((field) => el("div", { class: WIDE.has(field) ? "wide" : "" }, el("dt", {}, TITLES[field]), values[field]))), detail);
+  cards.set(name, { root, values, mode, chip, detail, drone });
+  paint(name);
+  return root;
+}
+
+export function paint(only) {
+  for (const [name, { root, chip, drone }] of cards) {
+    if (only && name !== only) continue;
+    root.style.setProperty("--own", colourOf(name));
+    chip.replaceChildren(drone ? svg("path", { d: "M4 4 L14 14 M14 4 L4 14", stroke: colourOf(name), "stroke-width": 3 }) : svg("circle", { cx: 9, cy: 9, r: 6, fill: "none", stroke: colourOf(name), "stroke-width": 3 }));
+  }
+}
+
+export function showTeam() {
+  for (const [name, parts] of cards) {
+    if (parts.drone) showVehicle(name, parts);
+    showBelief(name, parts);
+  }
+}
+
+function showVehicle(name, { root, values, mode, detail }) {
+  const status = store.s.vehicles?.[name], age = ageS(status?.at), stale = age > STALE_S || !store.connected;
+  root.classList.toggle("stale", stale);
+  text(mode, status ? status.mode.replace("_", " ").toLowerCase() : "no word yet");
+  mode.dataset.level = !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : LEVELS[status.mode] ?? "wait";
+  const heard = values.heard;
+  text(heard, status ? `${seconds(age)} ago` : "never");
+  heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
+  if (!status) return;
+  showBattery(values.battery, status.battery, store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15);
+  text(values.link, `${status.rate_hz.toFixed(0)} Hz${status.link === null ? "" : ` ${(100 * status.link).toFixed(0)} %`}`);
+  values.link.className = status.rate_hz < 20 ? "empty" : status.rate_hz < 100 ? "low" : "";
+  detail.hidden = !status.detail;
+  text(detail, status.detail);
+}
+
+function showBattery(node, value, least) {
+  if (value === null || value === undefined) return text(node, "?");
+  const level = value < least + 0.05 ? "empty" : value < least + 0.15 ? "low" : "full";
+  const words = `${(100 * value).toFixed(0)} %${level === "empty" ? " land!" : level === "low" ? " low" : ""}`;
+  if (node.dataset.words === words) return;
+  node.dataset.words = words;
+  node.className = level === "full" ? "" : level;
+  node.dataset.battery = level;
+  const fill = el("i");
+  fill.style.width = `${Math.max(6, 100 * value)}%`;
+  node.replaceChildren(el("span", { class: "battery" }, fill), words);
+}
+
+function showBelief(name, { root, values, mode, drone }) {
+  const body = entity(name), age = body ? estimateAge() + body.age_s : Infinity;
+  if (!drone) {
+    const lost = age > store.scene.lost_after_s;
+    text(mode, !body ? "not found yet" : lost ? "lost" : "tracked");
+    mode.dataset.level = !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
+    root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
+  }
+  text(values.seen, body ? `${seconds(age)} ago` : "not yet");
+  values.seen.className = age > 3 ? "empty" : age > 1 ? "low" : "";
+  text(values.by, seenBy(name).join(", ") || "nobody");
+  if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
+  const { major, minor } = ellipse95(body.cov);
+  text(values.position, body.mean.slice(0, drone ? 3 : 2).map((value) => value.toFixed(2)).join("  "));
+  text(values.ellipse, `${major.toFixed(2)} × ${minor.toFixed(2)}${body.converged ? "" : " unfit"}`);
+  text(values.speed, `${Math.hypot(...body.velocity.slice(0, 2)).toFixed(2)} m/s`);
+}

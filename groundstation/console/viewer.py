@@ -1,0 +1,102 @@
+"""One viewer: its frames, newest wins, never more on the way than it has handled."""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+
+from groundstation.console.board import Board
+
+# Frames that may be on the way unanswered; the page answers each fourth. 12 frames are 0.6 s.
+WINDOW = 12
+_URGENT = 64
+_RATE_PER_S = 60.0
+_BURST = 120.0
+
+
+class Viewer:
+    """What is waiting for one page. `run` sends; the others only say that there is something to send.
+
+    Telemetry and pictures wait as "newest" and replace each other; notices and answers wait in order, and a viewer
+    with too many of these is too slow to be helped.
+    """
+
+    def __init__(self, number: int, board: Board, send_text: "SendText", send_bytes: "SendBytes") -> None:
+        self.number = number
+        self.name = f"viewer {number}"
+        self.client = ""
+        self.trusted = False
+        self.too_slow = False
+        self.watched: frozenset[str] = frozenset()
+        self.skipped = 0
+        self._board = board
+        self._send_text, self._send_bytes = send_text, send_bytes
+        self._urgent: deque[str] = deque()
+        self._pictures: dict[str, bytes] = {}
+        self._wake = asyncio.Event()
+        self._seq = self._seen = 0
+        self._turn = -1
+        self._allowance, self._allowance_at = _BURST, time.monotonic()
+
+    def notice(self) -> None:
+        """Say that the board has changed."""
+        self._wake.set()
+
+    def say(self, text: str) -> None:
+        """Send this in any case, before telemetry."""
+        self.too_slow = self.too_slow or len(self._urgent) >= _URGENT
+        self._urgent.append(text)
+        self._wake.set()
+
+    def show(self, camera: str, frame: bytes) -> None:
+        """Send this picture, unless a newer one of the camera comes first."""
+        if camera in self.watched:
+            self._pictures[camera] = frame
+            self._wake.set()
+
+    def saw(self, seq: int) -> None:
+        """The page has handled frames up to this one."""
+        self._seen = max(self._seen, min(seq, self._seq))
+        self._wake.set()
+
+    def may_speak(self) -> bool:
+        """Whether the page keeps to the rate at which pages may speak."""
+        now = time.monotonic()
+        self._allowance = min(_BURST, self._allowance + (now - self._allowance_at) * _RATE_PER_S)
+        self._allowance_at = now
+        self._allowance -= 1.0
+        return self._allowance >= 0.0
+
+    async def run(self, seed: Callable[[int], str]) -> None:
+        """Send a seed, then what changes, until cancelled; `seed` gets the frame's number."""
+        self._seq += 1
+        self._turn = self._board.turn
+        await self._send_text(seed(self._seq))
+        while not self.too_slow:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._urgent:
+                await self._send_text(self._urgent.popleft())
+            if self._seq - self._seen < WINDOW:
+                await self._send_newest()
+            else:
+                self.skipped += 1
+
+    async def _send_newest(self) -> None:
+        if self._turn < self._board.turn:
+            sections = self._board.since(self._turn)
+            self._turn = self._board.turn
+            self._seq += 1
+            await self._send_text(delta(self._seq, sections))
+        while self._pictures:
+            camera = next(iter(self._pictures))
+            await self._send_bytes(self._pictures.pop(camera))
+
+
+def delta(seq: int, sections: bytes) -> str:
+    """Return a frame of what changed, with the server's time."""
+    return f'{{"type":"delta","seq":{seq},"now":{time.monotonic_ns() / 1e6:.3f},"s":{sections.decode()}}}'
+
+
+SendText = Callable[[str], Awaitable[None]]
+SendBytes = Callable[[bytes], Awaitable[None]]

@@ -1,0 +1,354 @@
+"""A flight that nobody flies: two drones, a target, plans, pictures and answers to commands, on a real Zenoh router.
+
+Run it by hand to work on the page: `python tests/browser/fake_flight.py`, then `groundstation console` is not needed:
+it serves the page itself and prints the address.
+"""
+
+import math
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus import zenoh_bus
+from groundstation.process.child import ChildSpec
+from groundstation.settings.load import load_field
+
+ROOT = Path(__file__).parents[2]
+DRONES = ("drone_1", "drone_2")
+TARGET = "turtlebot"
+_LEVEL = {m.Verb.HOLD: "HOLD", m.Verb.LAND: "LANDED", m.Verb.CUT_MOTORS: "CUT", m.Verb.TRACK: "TRACK"}
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def field_json(port: int) -> dict[str, Any]:
+    field = load_field(ROOT / "config" / "lab.yaml", [f"console.port={port}"])
+    return dict(field.model_dump(mode="json"))
+
+
+class FakeFlight(threading.Thread):
+    """Publishes until `stop`; `frozen` silences the tracker, `deaf` drones answer nothing, `battery` is what they say."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self._router = zenoh_bus.open_router(self.endpoint)
+        self._session = zenoh_bus.open_bus(self.endpoint, "lab", "fake")._session
+        self._buses: dict[str, zenoh_bus.ZenohBus] = {}
+        self.modes = dict.fromkeys(DRONES, "TRACK")
+        self.battery = {"drone_1": 0.82, "drone_2": 0.34}
+        self.deaf: set[str] = set()
+        self.frozen = False
+        self.lease = True
+        self.commands: list[m.Command] = []
+        self.steered: list[m.SimCommand] = []
+        self._later: list[tuple[float, str, m.Command, m.AckStage]] = []
+        self._over = threading.Event()
+        self.began = time.monotonic()
+
+    def bus(self, source: str) -> zenoh_bus.ZenohBus:
+        return self._buses.setdefault(source, zenoh_bus.ZenohBus(self._session, "lab", source))
+
+    def run(self) -> None:
+        orders = self.bus("drone_1").subscribe([t.COMMAND])
+        steering = self.bus("sim_bridge").subscribe([t.SIM_COMMAND])
+        tick, due = 0, time.monotonic()
+        while not self._over.is_set():
+            self._turn(tick, time.monotonic() - self.began)
+            for received in orders.drain():
+                if isinstance(received.message, m.Command):
+                    self._obey(received.message)
+            self.steered += [r.message for r in steering.drain() if isinstance(r.message, m.SimCommand)]
+            self._answer()
+            tick += 1
+            due += 0.02
+            time.sleep(max(0.0, due - time.monotonic()))
+
+    def stop(self) -> None:
+        self._over.set()
+        self.join(5)
+        self._session.close()
+        self._router.close()
+
+    # --- where everything is ---
+
+    def target_at(self, s: float) -> tuple[float, float, float, float]:
+        w = 0.11
+        return (
+            2.4 * math.sin(w * s),
+            1.0 * math.sin(2 * w * s),
+            2.4 * w * math.cos(w * s),
+            2.0 * w * math.cos(2 * w * s),
+        )
+
+    def drone_at(self, name: str, s: float) -> tuple[float, float, float, float]:
+        x, y, vx, vy = self.target_at(s - (1.5 if name == "drone_2" else 0.6))
+        side = 1.0 if name == "drone_1" else -1.0
+        px, py = x - 1.1 * math.cos(0.25 * s * side), y - 1.1 * math.sin(0.25 * s * side) * side
+        tx, ty, *_ = self.target_at(s)
+        return px, py, 2.1 if name == "drone_1" else 1.2, math.atan2(ty - py, tx - px)
+
+    # --- what is said ---
+
+    def _turn(self, tick: int, s: float) -> None:
+        self._say_truth(s)
+        if not self.frozen:
+            self._say_estimate(s)
+            if tick % 5 == 0:
+                self._say_plan(s)
+            if tick % 4 == 0:
+                self._say_innovations(s, tick)
+        if tick % 3 == 0:
+            self._see(s, tick)
+        if tick % 10 == 0:
+            self._say_vehicles(s)
+        if tick % 25 == 0:
+            self._say_slow(s, tick)
+
+    def _say_truth(self, s: float) -> None:
+        bus = self.bus("sim_bridge")
+        x, y, vx, vy = self.target_at(s)
+        poses = {TARGET: (x, y, 0.0, math.atan2(vy, vx)), **{name: self.drone_at(name, s) for name in DRONES}}
+        for name, (px, py, pz, yaw) in poses.items():
+            state = m.TruthState(
+                header=bus.header(name),
+                position_m=(px, py, pz),
+                velocity_m_s=(0.0, 0.0, 0.0),
+                attitude_rad=(0.0, 0.0, yaw),
+                on_ground=False,
+            )
+            bus.publish(t.TRUTH, state)
+
+    def _say_estimate(self, s: float) -> None:
+        bus = self.bus("tracker")
+        entities = []
+        for index, name in enumerate(DRONES):
+            x, y, z, yaw = self.drone_at(name, s)
+            a, b, c = 0.004 + 0.002 * math.sin(s), 0.0015 * (1 - 2 * index), 0.003
+            cov = [0.0] * 16
+            cov[0], cov[1], cov[4], cov[5], cov[10], cov[15] = a, b, b, c, 0.001, 0.002
+            mean = (x + 0.04 * math.sin(3 * s), y + 0.04 * math.cos(2 * s), z, yaw)
+            entities.append(m.EntityEstimate(name, "robot", mean, tuple(cov), (0.2, 0.1, 0.0), True, 0.05))
+        x, y, vx, vy = self.target_at(s)
+        mean = (x + 0.06 * math.sin(1.3 * s), y + 0.05 * math.cos(1.1 * s))
+        spread = (0.012 + 0.008 * math.sin(0.4 * s), 0.004, 0.004, 0.008)
+        entities.append(m.EntityEstimate(TARGET, "target", mean, spread, (vx, vy), True, 0.1))
+        bus.publish(t.ESTIMATE, m.Estimate(header=bus.header("team"), entities=tuple(entities), epoch=1))
+        for name in DRONES:
+            setpoint = m.VelocitySetpoint(
+                header=bus.header(name),
+                velocity_m_s=(0.35 if name == "drone_1" else 0.1, 0.15, 0.0),
+                yaw_rate_rad_s=0.1,
+                lifetime_ms=300,
+                epoch=1,
+            )
+            bus.publish(t.SETPOINT, setpoint)
+
+    def _say_plan(self, s: float) -> None:
+        bus = self.bus("tracker")
+        string = math.sin(0.3 * s) > 0
+        edges = [m.Edge("ceiling", "drone_1", 820.0), m.Edge("drone_1", TARGET, 145.0)]
+        edges += (
+            [m.Edge("drone_1", "drone_2", 210.0), m.Edge("drone_2", TARGET, 380.0)]
+            if string
+            else [m.Edge("ceiling", "drone_2", 640.0), m.Edge("drone_2", TARGET, 330.0)]
+        )
+        controls = (
+            m.Control("drone_1", (0.35, 0.15, 0.0), 0.1, ()),
+            m.Control("drone_2", (0.1, 0.15, 0.0), 0.1, ("fence",), (0.55, 0.2, 0.0)),
+        )
+        cost = 0.0123 + 0.004 * math.sin(0.5 * s)
+        chosen, other = ("drone_1/drone_2", "drone_1,drone_2") if string else ("drone_1,drone_2", "drone_1/drone_2")
+        alternatives = (
+            m.Alternative(chosen, cost),
+            m.Alternative(other, cost * 1.18),
+            m.Alternative("drone_2/drone_1", cost * 1.7, bound_only=True),
+        )
+        plan = m.Plan(
+            header=bus.header("team"),
+            topology=chosen,
+            cost=cost,
+            controls=controls,
+            edges=tuple(edges),
+            alternatives=alternatives,
+            solver=m.SolverReport("converged", 84, 0.018, 3, 2),
+            mode="TRACK",
+        )
+        bus.publish(t.PLAN, plan)
+
+    def _say_innovations(self, s: float, tick: int) -> None:
+        bus = self.bus("tracker")
+        rng = np.random.default_rng(tick)
+        for observer, subject, size in (("ceiling", "drone_1", 4), ("drone_1", TARGET, 3), ("drone_2", TARGET, 3)):
+            late = tick % 60 == 0 and subject == TARGET
+            innovation = m.Innovation(
+                header=bus.header(observer),
+                observer=observer,
+                subject=subject,
+                verdict=m.Verdict.LATE if late else m.Verdict.ACCEPTED,
+                residual=(0.01,) * size,
+                nis=None if late else float(rng.chisquare(size)),
+                latency_ms=140.0,
+            )
+            bus.publish(t.INNOVATION, innovation)
+
+    def _see(self, s: float, tick: int) -> None:
+        stamp_ns = time.monotonic_ns() - 20_000_000
+        for name in DRONES:
+            self._observe(name, f"{name}_camera", TARGET, (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6), stamp_ns)
+            if tick % 12 == 0:
+                self._picture(
+                    f"{name}_camera", (640, 360), 460.0, (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6), stamp_ns
+                )
+        for name in DRONES:
+            x, y, z, _ = self.drone_at(name, s)
+            self._observe("ceiling", "ceiling", name, (x, -y, 4.2 - z), stamp_ns)
+        if tick % 12 == 0:
+            x, y, z, _ = self.drone_at("drone_1", s)
+            self._picture("ceiling", (1280, 720), 1179.0, (x, -y, 4.2 - z), stamp_ns)
+
+    def _observe(self, observer: str, camera: str, subject: str, at: tuple[float, float, float], stamp_ns: int) -> None:
+        bus = self.bus(camera)
+        observation = m.RelativeObservation(
+            header=bus.header(observer, stamp_ns),
+            observer=observer,
+            subject=subject,
+            camera=camera,
+            position_m=at,
+            yaw_rad=0.0,
+            covariance=(1e-4,) * 16,
+            margin=3.0,
+        )
+        bus.publish(t.OBSERVATION, observation)
+
+    def _picture(
+        self, camera: str, size: tuple[int, int], focal: float, at: tuple[float, float, float], stamp_ns: int
+    ) -> None:
+        width, height = size
+        picture = np.full((height, width, 3), 96, np.uint8)
+        picture[::40, :] = picture[:, ::40] = 120
+        u, v, r = width / 2 + focal * at[0] / at[2], height / 2 + focal * at[1] / at[2], focal * 0.11 / at[2]
+        cv2.rectangle(picture, (int(u - r), int(v - r)), (int(u + r), int(v + r)), (245, 245, 245), -1)
+        step = 2 * r / 5
+        for i in range(5):
+            for j in range(4):
+                if (i + j) % 2 == 0:
+                    a = (int(u - r + i * step), int(v - r + j * step))
+                    cv2.rectangle(picture, a, (int(a[0] + step), int(a[1] + step)), (20, 20, 20), -1)
+        ok, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
+        assert ok
+        bus = self.bus(camera)
+        bus.publish_bytes(t.IMAGE, bus.header(camera, stamp_ns), jpeg.tobytes())
+
+    def _say_vehicles(self, s: float) -> None:
+        for name in DRONES:
+            bus, mode = self.bus(name), self.modes[name]
+            down = mode in ("LANDED", "CUT")
+            status = m.VehicleStatus(
+                header=bus.header(name),
+                flight_state=m.FlightState.LANDED if down else m.FlightState.FLYING,
+                mode=mode,
+                battery=self.battery[name],
+                link_quality=0.93,
+                rate_hz=198.0 + math.sin(s),
+            )
+            bus.publish(t.VEHICLE_STATUS, status)
+
+    def _say_slow(self, s: float, tick: int) -> None:
+        if self.lease:
+            bus = self.bus("supervisor")
+            header = bus.header("team")
+            bus.publish(t.LEASE, m.Lease(header=header, holder="operator", expires_ns=header.stamp_ns + 1_500_000_000))
+        for name in ("tracker", "recorder", "drone_1", "drone_2", "ceiling", "sim_bridge"):
+            bus = self.bus(name)
+            status = m.ProcessStatus(
+                header=bus.header(name), state=m.Lifecycle.READY, pid=1, cpu=0.12, ticks=tick + 1, overruns=0
+            )
+            bus.publish(t.PROCESS_STATUS, status)
+        for name in ("ceiling", "drone_1_camera", "drone_2_camera"):
+            bus = self.bus(name)
+            status_of_camera = m.CameraStatus(
+                header=bus.header(name), connected=True, fps=15.0, age_ms=131.0, frames=tick, skipped=0, detections=tick
+            )
+            bus.publish(t.CAMERA_STATUS, status_of_camera)
+        if tick % 250 == 0:
+            self.event(m.Severity.INFO, "turtlebot localised by drone_1")
+
+    def event(self, severity: m.Severity, text: str, entity: str = "tracker", remedy: str = "") -> None:
+        bus = self.bus("tracker")
+        bus.publish(t.EVENT, m.Event(header=bus.header(entity), severity=severity, text=text, remedy=remedy))
+
+    # --- what is obeyed ---
+
+    def _obey(self, command: m.Command) -> None:
+        if any(known.id == command.id for known in self.commands):
+            return
+        self.commands.append(command)
+        now = time.monotonic()
+        starts = "operator" in command.scope
+        names = [name for name in command.scope or DRONES if name in DRONES]
+        if not starts:
+            for name in names:
+                for delay, stage in enumerate((m.AckStage.RECEIVED, m.AckStage.ACCEPTED, m.AckStage.EFFECTIVE)):
+                    self._later.append((now + 0.15 * delay, name, command, stage))
+            return
+        for delay, stage in enumerate((m.AckStage.RECEIVED, m.AckStage.ACCEPTED, m.AckStage.EFFECTIVE)):
+            self._later.append((now + 0.2 * delay, "operator", command, stage))
+        for name in names or DRONES:
+            self.modes[name] = _LEVEL.get(command.verb, "HOVER")
+
+    def _answer(self) -> None:
+        now = time.monotonic()
+        for entry in [entry for entry in self._later if entry[0] <= now]:
+            self._later.remove(entry)
+            _, name, command, stage = entry
+            if name in self.deaf:
+                continue
+            bus = self.bus(name)
+            ack = m.CommandAck(header=bus.header(name), command_id=command.id, verb=command.verb, stage=stage)
+            bus.publish(t.COMMAND_ACK, ack)
+            if name in self.modes:
+                landing = command.verb is m.Verb.LAND and stage is not m.AckStage.EFFECTIVE
+                self.modes[name] = "LANDING" if landing else _LEVEL.get(command.verb, "HOVER")
+
+
+def start_console(flight: FakeFlight, port: int, truth: bool = True) -> "subprocess.Popen[bytes]":
+    """Start the console process as the supervisor does."""
+    section = {"field": field_json(port), "run_dir": "", "epoch": 1, "truth": truth}
+    spec = ChildSpec("console", "console", flight.endpoint, "lab", section=msgspec.json.encode(section).decode())
+    process = subprocess.Popen(
+        [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"],
+        stdin=subprocess.PIPE,
+        stderr=subprocess.DEVNULL if __name__ != "__main__" else None,
+    )
+    assert process.stdin is not None
+    process.stdin.write(msgspec.json.encode(spec))
+    process.stdin.close()
+    return process
+
+
+if __name__ == "__main__":
+    fake = FakeFlight()
+    fake.start()
+    served = start_console(fake, int(sys.argv[1]) if len(sys.argv) > 1 else 8765)
+    try:
+        served.wait()
+    except KeyboardInterrupt:
+        served.terminate()
+    finally:
+        fake.stop()

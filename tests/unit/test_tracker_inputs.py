@@ -1,0 +1,313 @@
+"""The tracker's inputs: joining, leaving, re-initialisation; everything unusable is a verdict, never an exception."""
+
+import itertools
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import (
+    ClockOffset,
+    FlightState,
+    Header,
+    Odometry,
+    PoseHypothesis,
+    RelativeObservation,
+    Severity,
+    VehicleStatus,
+    Verdict,
+)
+from groundstation.control.setpoints import Phase
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z
+from groundstation.tracker import Tracker, tracker_from_field
+
+MS = 1_000_000
+START = 7_000_000_000_000
+COVARIANCE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
+TILTED = base_from_tilted_optical(math.radians(45))
+PLACES = {"drone_1": np.array([-0.9, 0.5, 1.3]), "drone_2": np.array([-0.9, -0.7, 1.3])}
+TARGET = np.array([0.2, 0.3, 0.4])
+
+
+class Flight:
+    """Two drones that hover, a target that stands still, and cameras without noise."""
+
+    def __init__(self, field: dict[str, Any]) -> None:
+        self.tracker: Tracker = tracker_from_field(field, "here", 3)
+        self.now = START
+        self.seq = 0
+        self.target = TARGET.copy()
+        self.places = {name: place.copy() for name, place in PLACES.items()}
+        self.corrections: list[Any] = []
+        self.notices: list[Any] = []
+
+    def header(self, entity: str, age_ms: int = 0, clock: str = "here") -> Header:
+        self.seq += 1
+        return Header(self.now - age_ms * MS, clock, entity, entity, self.seq)
+
+    def ingest(self, message: Any, key: str = "") -> Verdict | None:
+        return self.tracker.ingest(key or f"{type(message).__name__}/{message.header.entity}", message, self.now)
+
+    def fly(self, *names: str, state: FlightState = FlightState.FLYING) -> None:
+        for name in names:
+            assert self.ingest(VehicleStatus(header=self.header(name), flight_state=state, mode="TRACK")) is None
+
+    def odometry(self, name: str, **changes: Any) -> Odometry:
+        values = {"velocity_m_s": (0.0, 0.0, 0.0), "yaw_rad": 0.0, "roll_rad": 0.0, "pitch_rad": 0.0, "height_m": 1.3}
+        return Odometry(header=self.header(name), velocity_covariance=(0.01,) * 9, **(values | changes))
+
+    def ceiling(self, name: str, age_ms: int = 50, **changes: Any) -> RelativeObservation:
+        x, y, z = self.places[name]
+        position = (float(x), float(-y), 4.2 - float(z) - 0.08)
+        return self.sighting("ceiling", name, position, 0.0, age_ms, **changes)
+
+    def onboard(self, name: str, age_ms: int = 50, **changes: Any) -> RelativeObservation:
+        base = self.target - self.places[name] - np.array([0.09, 0.0, 0.0])
+        return self.sighting(name, "turtlebot", tuple((TILTED.T @ base).tolist()), 0.3, age_ms, **changes)
+
+    def sighting(
+        self, observer: str, subject: str, position: tuple[float, ...], yaw: float | None, age_ms: int, **changes: Any
+    ) -> RelativeObservation:
+        values = {"position_m": position, "yaw_rad": yaw, "covariance": COVARIANCE, "camera": f"{observer}_camera"}
+        header = changes.pop("header", None) or self.header(observer, age_ms)
+        return RelativeObservation(header=header, observer=observer, subject=subject, **(values | changes))
+
+    def run(self, seconds: float, look: bool = True, onboard: bool = True) -> None:
+        for _ in range(round(seconds * 50)):
+            self.now += 20 * MS
+            for name in self.places:
+                assert self.ingest(self.odometry(name)) is None
+                if look:
+                    assert self.ingest(self.ceiling(name)) is None
+                if onboard:
+                    assert self.ingest(self.onboard(name)) is None
+            self.tracker.advance(self.now)
+            self.corrections += self.tracker.take_corrections()
+            self.notices += self.tracker.take_notices()
+
+
+@pytest.fixture
+def flight(lab_field: dict[str, Any]) -> Flight:
+    return Flight(lab_field)
+
+
+@pytest.fixture
+def tracking(flight: Flight) -> Flight:
+    flight.fly("drone_1", "drone_2")
+    flight.run(1.0)
+    return flight
+
+
+def test_robots_and_target_join_where_they_are(tracking: Flight) -> None:
+    belief = tracking.tracker.belief
+    assert belief.layout.robots == ("drone_1", "drone_2")
+    assert belief.layout.targets == ("turtlebot",)
+    for name, place in PLACES.items():
+        np.testing.assert_allclose(belief.mean_of(name)[:3], place, atol=0.03)
+    np.testing.assert_allclose(belief.mean_of("turtlebot")[:2], TARGET[:2], atol=0.05)
+    block = belief.layout.block("turtlebot")
+    cross = belief.covariance[block.slice, belief.layout.block("drone_1").slice]
+    assert np.abs(cross[:2, :2]).max() > 1e-6, "what the target is known by is the drone: they must be correlated"
+    assert {str(v.severity) for v in tracking.notices} == {"INFO"}
+
+
+def test_nobody_joins_on_the_ground(flight: Flight) -> None:
+    flight.run(0.2)
+    assert flight.tracker.belief.layout.robots == ()
+    assert flight.tracker.setpoints(flight.now) == {}
+    assert {c.verdict for c in flight.corrections} == {Verdict.UNKNOWN_ENTITY}
+
+
+def test_with_the_drones_on_the_ground_the_targets_covariance_grows_without_bound(tracking: Flight) -> None:
+    tracking.fly("drone_1", "drone_2", state=FlightState.LANDED)
+    traces = []
+    for _ in range(4):
+        tracking.run(10.0)
+        belief = tracking.tracker.belief
+        assert belief.layout.robots == ()
+        traces.append(float(np.trace(belief.covariance_of("turtlebot")[:2, :2])))
+    assert all(later > 2 * earlier for earlier, later in itertools.pairwise(traces))
+    assert traces[-1] > 100.0
+    assert tracking.tracker.filter.is_sound()
+
+
+def test_a_landed_drone_leaves_and_comes_back(tracking: Flight) -> None:
+    tracking.fly("drone_1", state=FlightState.LANDED)
+    tracking.run(0.1)
+    assert tracking.tracker.belief.layout.robots == ("drone_2",)
+    assert tracking.tracker.topology.robots == {"drone_2"}
+    tracking.fly("drone_1")
+    tracking.run(0.2)
+    assert set(tracking.tracker.belief.layout.robots) == {"drone_1", "drone_2"}
+
+
+def test_a_ceiling_camera_must_not_see_the_target(tracking: Flight) -> None:
+    before = tracking.tracker.belief
+    seen = tracking.sighting("ceiling", "turtlebot", (0.2, -0.3, 3.8), 0.0, 50)
+    assert tracking.ingest(seen) is Verdict.NOT_PERMITTED
+    after = tracking.tracker.advance(tracking.now)
+    assert np.array_equal(before.mean, after.mean)
+
+
+def test_bad_inputs_are_verdicts_and_leave_the_belief_untouched(tracking: Flight) -> None:
+    t = tracking
+    t.tracker.advance(t.now)
+    before = t.tracker.belief
+    bad = msgspec.structs.force_setattr
+    nan_odometry, nan_sight = t.odometry("drone_1"), t.ceiling("drone_1")
+    bad(nan_odometry, "yaw_rad", math.nan)
+    bad(nan_sight, "position_m", (math.inf, 0.0, 3.0))
+    repeated = t.ceiling("drone_1", age_ms=400)
+    cases = [
+        (nan_odometry, Verdict.IMPLAUSIBLE),
+        (nan_sight, Verdict.IMPLAUSIBLE),
+        (t.sighting("ceiling", "stranger", (0, 0, 3), 0.0, 50), Verdict.UNKNOWN_ENTITY),
+        (t.sighting("stranger", "drone_1", (0, 0, 3), 0.0, 50), Verdict.UNKNOWN_ENTITY),
+        (t.sighting("drone_1", "drone_1", (0, 0, 3), 0.0, 50), Verdict.UNKNOWN_ENTITY),
+        (t.odometry("stranger"), Verdict.UNKNOWN_ENTITY),
+        (t.odometry("turtlebot"), Verdict.UNKNOWN_ENTITY),
+        (t.ceiling("drone_1", age_ms=3_600_000), Verdict.LATE),
+        (t.ceiling("drone_1", age_ms=-3_600_000), Verdict.IMPLAUSIBLE),
+        (t.ceiling("drone_1", header=t.header("ceiling", 50, "elsewhere")), Verdict.UNSYNCED),
+        (t.ceiling("drone_1", header=t.header("drone_2", 50)), Verdict.UNKNOWN_ENTITY),
+    ]
+    for message, verdict in cases:
+        assert t.ingest(message) is verdict, message
+    after = t.tracker.advance(t.now)
+    assert np.array_equal(before.mean, after.mean)
+    assert np.array_equal(before.covariance, after.covariance)
+    assert t.ingest(repeated) is None
+    assert t.ingest(repeated) is Verdict.DUPLICATE
+    assert sum(t.tracker.rejected.values()) == len(cases) + 1
+
+
+def test_unusable_observations_get_a_verdict_from_the_filter(tracking: Flight) -> None:
+    t = tracking
+    negative = tuple(np.diag([1e-4, -1e-4, 4e-4, 1e-3]).ravel().tolist())
+    for message in (
+        t.ceiling("drone_1", covariance=negative),
+        t.sighting("ceiling", "drone_1", (0.0, 0.0, -2.0), 0.0, 50),
+        t.sighting("ceiling", "drone_1", (9.0, 9.0, 2.0), 0.0, 50),
+    ):
+        assert t.ingest(message) is None
+    t.tracker.advance(t.now)
+    verdicts = [c.verdict for c in t.tracker.take_corrections()]
+    assert sorted(verdicts) == sorted([Verdict.SINGULAR, Verdict.OUT_OF_VIEW, Verdict.IMPLAUSIBLE])
+
+
+def test_another_clock_counts_once_its_offset_is_known(tracking: Flight) -> None:
+    t = tracking
+    t.now += 20 * MS
+    offset = ClockOffset(header=t.header("team"), of="elsewhere", offset_ns=5_000_000_000)
+    assert t.ingest(offset) is None
+    header = Header(t.now - 5_000_000_000 - 50 * MS, "elsewhere", "ceiling", "ceiling", 99_999)
+    assert t.ingest(t.ceiling("drone_1", header=header)) is None
+    t.tracker.advance(t.now)
+    assert [c.verdict for c in t.tracker.take_corrections()] == [Verdict.ACCEPTED]
+
+
+def test_the_more_likely_of_two_poses_is_used(tracking: Flight) -> None:
+    t = tracking
+    right = t.ceiling("drone_1")
+    wrong_place = (right.position_m[0] + 0.4, right.position_m[1], right.position_m[2])
+    swapped = t.ceiling(
+        "drone_1",
+        position_m=wrong_place,
+        alternative=PoseHypothesis(right.position_m, right.yaw_rad, right.covariance),
+    )
+    t.ingest(swapped)
+    t.tracker.advance(t.now)
+    (correction,) = t.tracker.take_corrections()
+    assert correction.verdict is Verdict.ACCEPTED
+    assert "other pose" in correction.reason
+
+
+def test_outliers_do_not_move_the_belief_but_a_kidnapped_target_is_found_again(tracking: Flight) -> None:
+    t = tracking
+    t.target = TARGET + np.array([1.5, -1.0, 0.0])
+    t.ingest(t.onboard("drone_1"))
+    t.tracker.advance(t.now)
+    assert t.tracker.take_corrections()[-1].verdict is Verdict.IMPLAUSIBLE
+    np.testing.assert_allclose(t.tracker.belief.mean_of("turtlebot")[:2], TARGET[:2], atol=0.06)
+    t.run(1.5)
+    np.testing.assert_allclose(t.tracker.belief.mean_of("turtlebot")[:2], t.target[:2], atol=0.06)
+    assert any(n.severity is Severity.WARNING and n.entity == "turtlebot" for n in t.notices)
+    np.testing.assert_allclose(t.tracker.belief.mean_of("drone_1")[:3], PLACES["drone_1"], atol=0.04)
+
+
+def test_a_kidnapped_robot_is_found_again_alone(tracking: Flight) -> None:
+    t = tracking
+    t.places["drone_1"] += np.array([0.8, 0.9, 0.0])
+    t.run(1.0, onboard=False)
+    np.testing.assert_allclose(t.tracker.belief.mean_of("drone_1")[:3], t.places["drone_1"], atol=0.04)
+    np.testing.assert_allclose(t.tracker.belief.mean_of("drone_2")[:3], PLACES["drone_2"], atol=0.04)
+    assert {n.entity for n in t.notices if n.severity is Severity.WARNING} == {"drone_1"}
+
+
+def test_a_heading_jump_with_reset_does_not_turn_the_robot(tracking: Flight) -> None:
+    t = tracking
+    t.now += 20 * MS
+    t.ingest(t.odometry("drone_1", yaw_rad=2.0, reset=1))
+    t.now += 20 * MS
+    t.ingest(t.odometry("drone_1", yaw_rad=2.1, reset=1))
+    t.tracker.advance(t.now + 20 * MS)
+    assert t.tracker.belief.mean_of("drone_1")[3] == pytest.approx(0.1, abs=0.02)
+
+
+def test_reported_velocity_moves_the_robot_in_its_own_frame(tracking: Flight) -> None:
+    t = tracking
+    before = t.tracker.belief.mean_of("drone_1").copy()
+    for _ in range(25):
+        t.now += 20 * MS
+        t.ingest(t.odometry("drone_1", velocity_m_s=(0.5, 0.0, 0.0), yaw_rad=math.pi / 2, reset=1))
+    t.tracker.advance(t.now)
+    moved = t.tracker.belief.mean_of("drone_1")[:2] - before[:2]
+    # The jump of the heading is void: the robot still looks along world x. 0.5 m/s x 1.18 for some 0.5 s.
+    np.testing.assert_allclose(moved, rotation_z(float(before[3]))[:2, 0] * 0.29, atol=0.06)
+
+
+def test_a_broken_covariance_means_hold_hover_and_a_new_epoch(tracking: Flight) -> None:
+    t = tracking
+    epoch = t.tracker.epoch
+    t.tracker.filter._covariances[:] = np.nan
+    t.run(0.02, look=False, onboard=False)
+    assert t.tracker.holding
+    assert t.tracker.epoch == epoch + 1
+    assert any(n.severity is Severity.ERROR for n in t.notices)
+    limited = t.tracker.setpoints(t.now)
+    assert set(limited) == {"drone_1", "drone_2"}
+    assert all(entry.setpoint.velocity_m_s == (0.0, 0.0, 0.0) for entry in limited.values())
+    t.run(0.5)
+    assert not t.tracker.holding
+    assert t.tracker.filter.is_sound()
+    assert set(t.tracker.belief.layout.robots) == {"drone_1", "drone_2"}
+
+
+def test_plan_and_setpoints_follow_from_the_belief(tracking: Flight) -> None:
+    plan = tracking.tracker.plan(tracking.now)
+    assert plan is not None
+    assert plan.topology.robots == {"drone_1", "drone_2"}
+    limited = tracking.tracker.setpoints(tracking.now)
+    assert {entry.setpoint.phase for entry in limited.values()} == {Phase.TRACK}
+    for entry in limited.values():
+        assert math.hypot(*entry.setpoint.velocity_m_s[:2]) <= 0.6 + 1e-9
+
+
+def test_an_airborne_robot_nobody_has_seen_hovers(flight: Flight) -> None:
+    flight.fly("drone_1")
+    flight.run(0.1, look=False, onboard=False)
+    limited = flight.tracker.setpoints(flight.now)
+    assert limited["drone_1"].setpoint.velocity_m_s == (0.0, 0.0, 0.0)
+    assert not flight.tracker.converged("drone_1")
+
+
+def test_estimates_say_who_is_where_and_since_when(tracking: Flight) -> None:
+    tracking.run(0.5, look=False, onboard=False)
+    estimates = {e.name: e for e in tracking.tracker.estimates()}
+    assert set(estimates) == {"drone_1", "drone_2", "turtlebot"}
+    assert len(estimates["drone_1"].mean) == 4
+    assert len(estimates["turtlebot"].mean) == 2
+    assert estimates["drone_1"].age_s == pytest.approx(0.55, abs=0.03)
+    assert estimates["drone_1"].converged

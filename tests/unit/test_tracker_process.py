@@ -1,0 +1,211 @@
+"""The tracker's loop on a bus: what it publishes, its journal and the replay of it, its deadlines, its watch."""
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import (
+    Belief,
+    Command,
+    Estimate,
+    FlightState,
+    Header,
+    JournalEntry,
+    Message,
+    Odometry,
+    Plan,
+    RelativeObservation,
+    VehicleStatus,
+    VelocitySetpoint,
+    Verb,
+    Verdict,
+)
+from groundstation.bus.topics import (
+    BELIEF,
+    COMMAND,
+    ESTIMATE,
+    INNOVATION,
+    JOURNAL,
+    OBSERVATION,
+    ODOMETRY,
+    PLAN,
+    SETPOINT,
+    VEHICLE_STATUS,
+    Topic,
+)
+from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.runtime.health import Deadlines, UnseenWatch
+from groundstation.runtime.journal import replay_journal
+from groundstation.runtime.tracking import TrackerSection, Tracking
+from groundstation.runtime.warm_up import warm_up
+from groundstation.tracker import tracker_from_field
+
+MS = 1_000_000
+PLACES = {"drone_1": (-0.9, 0.5, 1.3), "drone_2": (-0.9, -0.7, 1.3)}
+COVARIANCE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
+TARGET = np.array([0.2, 0.3, 0.4])
+
+
+class Lab:
+    """Drivers and cameras on a memory bus, and the tracker's loop under test."""
+
+    def __init__(self, field: dict[str, Any]) -> None:
+        exchange = MemoryExchange()
+        self.buses = {name: MemoryBus(exchange, "lab", name) for name in (*PLACES, "ceiling")}
+        self.listener = MemoryBus(exchange, "lab", "listener")
+        self.heard = self.listener.subscribe([ESTIMATE, BELIEF, SETPOINT, PLAN, INNOVATION, JOURNAL, COMMAND])
+        self.tape = self.listener.subscribe([ODOMETRY, OBSERVATION, VEHICLE_STATUS])
+        self.tracking = Tracking(MemoryBus(exchange, "lab", "tracker"), TrackerSection(field, "", 2))
+        self.now = clock.now_ns()
+        self.rng = np.random.default_rng(1)
+        self.beliefs: list[Any] = []
+
+    def send(self, topic: Topic, source: str, make: Any, age_ms: int = 0, entity: str = "") -> None:
+        bus = self.buses[source]
+        bus.publish(topic, make(bus.header(entity or source, self.now - age_ms * MS)))
+
+    def sense(self, look: bool) -> None:
+        for name, (x, y, z) in PLACES.items():
+            noise = self.rng.normal(0.0, 0.01, 3).tolist()
+            self.send(VEHICLE_STATUS, name, _flying)
+            self.send(ODOMETRY, name, _odometry, age_ms=5)
+            position = (x + noise[0], -y + noise[1], 4.12 - z + noise[2])
+            if look:
+                self.send(OBSERVATION, "ceiling", lambda h, n=name, p=position: _sight(h, n, p), age_ms=120)
+                base = TARGET - np.array([x + 0.09, y, z])
+                relative = tuple((base_from_tilted_optical(math.radians(45)).T @ base + noise).tolist())
+                self.send(OBSERVATION, name, lambda h, p=relative: _sight(h, "turtlebot", p), age_ms=150)
+
+    def run(self, ticks: int, look: bool = True, pause_s: float = 0.0) -> None:
+        for _ in range(ticks):
+            self.now += 20 * MS
+            self.sense(look)
+            self.tracking.tick(self.now)
+            self.beliefs.append(self.tracking.tracker.belief)
+            time.sleep(pause_s)
+
+    def messages(self) -> dict[str, list[Any]]:
+        found: dict[str, list[Any]] = {}
+        for received in self.heard.drain():
+            found.setdefault(received.key.topic.name, []).append(received.message)
+        return found
+
+
+def _flying(header: Header) -> Message:
+    return VehicleStatus(header=header, flight_state=FlightState.FLYING, mode="TRACK")
+
+
+def _odometry(header: Header) -> Message:
+    covariance = (0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.01)
+    return Odometry(
+        header=header, velocity_m_s=(0, 0, 0), velocity_covariance=covariance, yaw_rad=0, roll_rad=0, pitch_rad=0,
+        height_m=1.3,
+    )  # fmt: skip
+
+
+def _sight(header: Header, subject: str, position: tuple[float, float, float]) -> Message:
+    return RelativeObservation(
+        header=header, observer=header.entity, subject=subject, camera=f"{header.entity}_camera", position_m=position,
+        yaw_rad=0.0, covariance=COVARIANCE,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def lab(lab_field: dict[str, Any]):
+    lab = Lab(lab_field)
+    yield lab
+    lab.tracking.close()
+
+
+def test_everything_that_others_wait_for_is_published(lab: Lab) -> None:
+    lab.run(60, pause_s=0.002)
+    heard = lab.messages()
+    estimates: list[Estimate] = heard["estimate"]
+    assert len(estimates) == 60
+    assert {e.name for e in estimates[-1].entities} == {"drone_1", "drone_2", "turtlebot"}
+    belief: Belief = heard["belief"][-1]
+    assert len(heard["belief"]) == 6
+    assert len(belief.covariance_upper) == len(belief.layout) * (len(belief.layout) + 1) // 2
+    setpoints: list[VelocitySetpoint] = heard["setpoint"]
+    assert {m.header.entity for m in setpoints} == set(PLACES)
+    assert setpoints[-1].converged and setpoints[-1].epoch == 2000
+    assert setpoints[-1].lifetime_ms == 300
+    assert {m.verdict for m in heard["innovation"]} <= {Verdict.ACCEPTED, Verdict.INFLATED, Verdict.UNKNOWN_ENTITY}
+    plans: list[Plan] = heard["plan"]
+    assert plans and plans[-1].topology in {"drone_1,drone_2", "drone_1/drone_2", "drone_2/drone_1"}
+    assert {c.robot for c in plans[-1].controls} == set(PLACES)
+
+
+def test_a_replayed_journal_gives_the_same_beliefs_to_the_bit(lab: Lab, lab_field: dict[str, Any]) -> None:
+    lab.run(80, pause_s=0.002)
+    journal: list[JournalEntry] = lab.messages()["journal"]
+    tape = [(str(received.key), received.message) for received in lab.tape.drain()]
+    tape.reverse()  # the journal alone says in which order
+    tape.sort(key=lambda item: item[1].header.seq)
+    fresh = tracker_from_field(lab_field, clock.clock_id(), 2000)
+    replayed = list(replay_journal(journal, tape, fresh))
+    assert len(replayed) == len(lab.beliefs)
+    for (_, belief), flown in zip(replayed, lab.beliefs, strict=True):
+        assert belief.layout == flown.layout
+        assert np.array_equal(belief.mean, flown.mean)
+        assert np.array_equal(belief.covariance, flown.covariance)
+    assert str(fresh.topology) == str(lab.tracking.tracker.topology)
+    assert sum(entry.plan_tick >= 0 for entry in journal) >= 3
+
+
+def test_garbage_is_counted_by_reason_and_reported_once(lab: Lab) -> None:
+    bus = lab.buses["drone_1"]
+    for payload in (b"", b"\xff", b"{}", b'{"header":null}', b"[" * 5000):
+        bus.put(ODOMETRY, "drone_1", payload, b"")
+    lab.run(51)
+    assert lab.tracking.inbox.refused["malformed"] == 5
+    texts = [notice.text for notice in lab.tracking.notices]
+    assert texts.count("messages are refused: malformed") == 1
+
+
+def test_a_drone_that_nobody_sees_is_ordered_to_land(lab: Lab) -> None:
+    lab.run(25)
+    lab.run(9 * 50, look=False)
+    assert "command" not in lab.messages()
+    lab.run(2 * 50, look=False)
+    orders: list[Command] = lab.messages()["command"]
+    assert {order.verb for order in orders} == {Verb.LAND}
+    assert {order.scope for order in orders} == {("drone_1",), ("drone_2",)}
+    assert all(order.expires_ns == 0 and order.issuer == "tracker" for order in orders)
+    assert len({order.id for order in orders}) == len(orders)
+
+
+def test_an_unseen_robot_is_told_once_a_second_until_it_has_landed() -> None:
+    watch = UnseenWatch(10.0)
+    told = [t for t in range(0, 14_000, 100) if watch.step(t * MS, {"a": math.inf})]
+    assert told == [10_000, 11_000, 12_000, 13_000]
+    assert watch.step(14_000 * MS, {}) == []
+    assert watch.step(14_100 * MS, {"a": math.inf}) == []
+    assert watch.step(20_000 * MS, {"a": 0.1}) == []
+    assert watch.step(24_200 * MS, {"a": 4.3}) == []
+
+
+def test_late_ticks_are_counted_and_not_made_up_for() -> None:
+    deadlines = Deadlines(20 * MS, 0)
+    deadlines.start_tick(5 * MS)
+    deadlines.start_tick(31 * MS)  # 11 ms late
+    assert (deadlines.ticks, deadlines.overruns) == (2, 1)
+    deadlines.start_tick(140 * MS)  # 100 ms late: five ticks were slept through
+    assert deadlines.overruns == 1 + 6
+    assert deadlines.next_ns > 140 * MS
+    deadlines.start_tick(deadlines.next_ns)
+    assert deadlines.overruns == 7
+
+
+def test_nothing_compiles_after_the_warm_up(lab: Lab, lab_field: dict[str, Any]) -> None:
+    from numba.core import event
+
+    warm_up(lab_field)
+    with event.install_recorder("numba:compile") as recorder:
+        lab.run(30, pause_s=0.002)
+    assert recorder.buffer == []

@@ -29,7 +29,7 @@ _MEANING = {
     ExitCode.FAILED: "the run failed its own criteria (report.json says which)",
     ExitCode.SETTINGS: "wrong settings or wrong usage",
     ExitCode.UNREACHABLE: "no running ground station could be reached",
-    ExitCode.FAULT: "a driver, a link or a process failed",
+    ExitCode.FAULT: "a driver, a link or a process failed, or a command was not confirmed",
     ExitCode.BUG: "a fault of the program itself, with a traceback",
     ExitCode.INTERRUPTED: "interrupted by the operator",
 }

@@ -144,9 +144,9 @@ class Operator:
                 self.phase = Phase.HELD if command.verb is Verb.HOLD else Phase.LANDING
                 self._say(f"{command.verb} by {command.issuer}")
         elif command.verb in _STOPS and self._sequence is not None:
-            self._abandon()
-            self.phase = Phase.HELD
-            self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}: take-off abandoned")
+            for name in command.scope:
+                self._sequence.drop(name, f"{command.verb} by {command.issuer}", now_ns)
+            self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")
 
     def _is_partial(self, command: Command) -> bool:
         return bool(command.scope) and not set(command.scope) >= set(self.team.members)

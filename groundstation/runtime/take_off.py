@@ -76,6 +76,18 @@ class TakeOff:
         """The drone whose turn it is, or ""."""
         return self._waiting[0] if self._waiting else ""
 
+    def drop(self, drone: str, reason: str, now_ns: int) -> None:
+        """Leave out a drone that someone stopped; the others go on."""
+        if drone in self._waiting:
+            was_current = drone == self.current
+            self._waiting.remove(drone)
+            self.left_out[drone] = reason
+            if was_current:
+                self._next(now_ns)
+        elif drone in self.up:
+            self.up.remove(drone)
+            self.left_out[drone] = reason
+
     def step(self, now_ns: int, team: Team, progress: Progress | None) -> Order | None:
         """Return what to order now; progress: the answers to the last TAKEOFF of the current drone."""
         if self.finished:

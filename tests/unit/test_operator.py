@@ -171,6 +171,18 @@ def test_a_stop_by_anyone_ends_the_take_off(scene: Scene, verb: Verb) -> None:
     assert two.heard == [verb]
 
 
+def test_a_stop_of_one_drone_leaves_the_others_to_go_on(scene: Scene) -> None:
+    one, two = scene.add("drone_1", seen=False), scene.add("drone_2")
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(2.0)
+    tracker = MemoryBus(scene.exchange, "lab", "tracker")
+    command = Command(header=tracker.header("team"), id="x", verb=Verb.LAND, scope=("drone_1",), issuer="tracker")
+    tracker.publish(COMMAND, command)
+    scene.pass_(4.0)
+    assert one.heard == [Verb.TAKEOFF, Verb.LAND]
+    assert two.heard == [Verb.TAKEOFF, Verb.TRACK]
+
+
 def test_unheard_order_is_repeated_with_the_same_id(scene: Scene) -> None:
     scene.add("drone_1")
     scene.pass_(0.2)

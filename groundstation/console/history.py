@@ -72,4 +72,6 @@ class History:
             if there is not None:
                 error = round(math.dist(target.mean[:2], there.position_m[:2]), 4)
         cost = None if plan is None else round(plan.cost * 1e4, 2)
-        return {"t_ms": now_ns / 1e6, "axis_m": axis, "error_m": error, "cost_cm2": cost, "nis": nis}
+        topology = "" if plan is None else plan.topology
+        figures = {"axis_m": axis, "error_m": error, "cost_cm2": cost, "nis": nis, "topology": topology}
+        return {"t_ms": now_ns / 1e6, **figures}

@@ -42,7 +42,7 @@ def field_json(port: int) -> dict[str, Any]:
 
 
 class FakeFlight(threading.Thread):
-    """Publishes until `stop`; `frozen` silences the tracker, `deaf` drones answer nothing, `battery` is what they say."""
+    """Publishes until `stop`; `frozen` silences the tracker, `deaf` drones answer nothing."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -97,10 +97,9 @@ class FakeFlight(threading.Thread):
         )
 
     def drone_at(self, name: str, s: float) -> tuple[float, float, float, float]:
-        x, y, vx, vy = self.target_at(s - (1.5 if name == "drone_2" else 0.6))
-        side = 1.0 if name == "drone_1" else -1.0
-        px, py = x - 1.1 * math.cos(0.25 * s * side), y - 1.1 * math.sin(0.25 * s * side) * side
         tx, ty, *_ = self.target_at(s)
+        angle = 0.12 * s + (2.2 if name == "drone_1" else 0.0)
+        px, py = 0.75 * tx + 1.3 * math.cos(angle), 0.75 * ty + 1.3 * math.sin(angle)
         return px, py, 2.1 if name == "drone_1" else 1.2, math.atan2(ty - py, tx - px)
 
     # --- what is said ---

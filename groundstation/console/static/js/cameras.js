@@ -55,7 +55,8 @@ export function showDetections() {
 }
 
 function draw(name, { canvas, bitmap, stamp }) {
-  const width = Math.min(640, bitmap.width), scale = width / bitmap.width, height = Math.round(bitmap.height * scale);
+  const shown = Math.round((canvas.clientWidth || 320) * Math.min(2, devicePixelRatio || 1));
+  const width = Math.max(120, Math.min(bitmap.width, shown)), scale = width / bitmap.width, height = Math.round(bitmap.height * scale);
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const g = canvas.getContext("2d");
   g.drawImage(bitmap, 0, 0, width, height);
@@ -71,13 +72,13 @@ function draw(name, { canvas, bitmap, stamp }) {
       g.arc(u, v, r, 0, 7);
       g.stroke();
     }
-    g.font = "700 20px system-ui, sans-serif";
+    g.font = `700 ${13 * Math.min(2, devicePixelRatio || 1)}px system-ui, "DejaVu Sans", sans-serif`;
     g.lineWidth = 4;
     g.strokeStyle = "#000";
     const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`, left = Math.min(u + r + 5, width - g.measureText(words).width - 4);
-    g.strokeText(words, left, v + 7);
+    g.strokeText(words, left, v + 5);
     g.fillStyle = tint;
-    g.fillText(words, left, v + 7);
+    g.fillText(words, left, v + 5);
     pictures.marks += 1;
   }
 }

@@ -7,7 +7,7 @@ import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
 import { give, showControls, showOrders, startOrders } from "./orders.js";
 import { ink, nameRobots, startTheme } from "./palette.js";
-import { showPlan } from "./plan.js";
+import { showPlan, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { ghostPoint, startSteering } from "./steer.js";
 import { droneNames, entities, estimateAge, now, store } from "./store.js";
@@ -29,6 +29,7 @@ on("seed", () => {
   for (const node of document.querySelectorAll(".only-sim")) node.hidden = !scene.truth;
   view.room = scene.room.size_m;
   if (view.fitted) view.fit();
+  document.querySelector(".legend").open = (view.width - view.scale * view.room[0]) / 2 > 265;
   buildLayers(); buildLegend(); buildTeam(); buildCameras(); buildCharts();
   showAll();
   dirty = true;
@@ -39,7 +40,7 @@ on("delta", (sections, sampled) => {
   if (sections.orders || sections.session) { showOrders(); showControls(); }
   if (sections.plan) showPlan();
   if (sections.detections) showDetections();
-  if (sampled) showSamples();
+  if (sampled) { showSamples(); showTimeline(); }
   dirty = true;
 });
 
@@ -128,7 +129,6 @@ window.__console = {
   },
 };
 
-if (innerWidth < 900) document.querySelector(".legend").open = false;
 startOrders();
 startCameras();
 startSteering(byId("map"), view);

@@ -101,7 +101,11 @@ function drawPads(g, view, colours) {
 // --- what cameras see ----------------------------------------------------------------------------------------------
 
 function drawFootprints(g, view) {
-  const alpha = g.globalAlpha;
+  const alpha = g.globalAlpha, [w, h] = store.scene.room.size_m;
+  g.save();
+  g.beginPath();
+  g.rect(...view.point(-w / 2, h / 2), w * view.scale, h * view.scale);
+  g.clip();
   for (const camera of store.scene.cameras) {
     const up = entities().filter((e) => e.kind === "robot").map((e) => e.mean[2]);
     const height = up.length ? Math.max(...up) : 0;
@@ -133,6 +137,7 @@ function drawFootprints(g, view) {
     g.stroke();
     g.globalAlpha = alpha;
   }
+  g.restore();
 }
 
 function drawTrails(g, view) {

@@ -23,7 +23,8 @@ export function showPlan() {
       el("p", {}, el("span", { class: "cost num", data: { testid: "cost" } }, cost(plan.cost_cm2)), el("br"), el("strong", { data: { testid: "topology" } }, words(plan.topology)), el("br"),
         el("span", { class: "dim num" }, `${solver.ms.toFixed(0)} ms, ${solver.evaluations} evaluations, ${solver.topologies} topologies, ${solver.status.toLowerCase()}`))),
     el("div", { class: "options" }, option({ topology: plan.topology, cost_cm2: plan.cost_cm2 }, worst, plan, true), ...others.map((other) => option(other, worst, plan, false))),
-    cuts(plan));
+    cuts(plan), el("div", { class: "timeline", id: "timeline" }));
+  showTimeline();
 }
 
 const words = (topology) => topology.split("/").map((level) => level.split(",").join(" + ")).join(" over ") || "nobody in the air";
@@ -51,6 +52,26 @@ function glyph(topology) {
   for (const level of nodes.slice(1, -1)) for (const [cx, cy, name] of level) root.append(svg("circle", { cx, cy, r: 8, fill: colourOf(name) }));
   root.append(svg("circle", { cx: width / 2, cy: y(rows), r: 6, fill: ink().floor, stroke: ink().target, "stroke-width": 3 }));
   return root;
+}
+
+// Which topology was chosen when; letters and shades, since names are too long for short stays.
+export function showTimeline() {
+  const host = byId("timeline"), samples = store.samples.filter((sample) => sample.topology);
+  if (!host || !samples.length) return;
+  const runs = [];
+  for (const { topology, t_ms } of samples) {
+    if (runs.at(-1)?.topology === topology) runs.at(-1).to = t_ms;
+    else runs.push({ topology, from: t_ms, to: t_ms });
+  }
+  const kinds = [...new Set(runs.map((run) => run.topology))];
+  const strip = el("div", { class: "strip" }, ...runs.map((run) => {
+    const piece = el("span", { title: `${words(run.topology)}, ${((run.to - run.from) / 1000).toFixed(0)} s` }, words(run.topology));
+    piece.style.flex = `${run.to - run.from + 500} 0 0`;
+    piece.style.background = `color-mix(in srgb, #0072b2 ${15 + (50 * kinds.indexOf(run.topology)) / kinds.length}%, transparent)`;
+    return piece;
+  }));
+  const span = (samples.at(-1).t_ms - samples[0].t_ms) / 1000, switches = runs.length - 1;
+  host.replaceChildren(el("div", { class: "title num" }, el("span", {}, `last ${span.toFixed(0)} s`), el("span", {}, `${switches} switch${switches === 1 ? "" : "es"}`)), strip);
 }
 
 function cuts(plan) {

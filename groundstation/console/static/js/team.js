@@ -13,12 +13,12 @@ const cards = new Map();
 export function buildTeam() {
   cards.clear();
   const { drones, target } = store.scene;
-  const nodes = drones.map((drone) => card(drone.name, ["battery", "link", "heard", "seen", "position", "ellipse", "speed", "by"], true));
+  const nodes = drones.map((drone) => card(drone.name, ["battery", "rate", "link", "heard", "position", "ellipse", "seen", "speed", "by"], true));
   if (target.name) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
   byId("team").replaceChildren(...nodes);
 }
 
-const TITLES = { battery: "battery", link: "telemetry", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
+const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
 const WIDE = new Set(["position", "ellipse", "by"]);
 
 function card(name, fields, drone) {
@@ -61,8 +61,9 @@ function showVehicle(name, { root, values, mode, detail }) {
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
   if (!status) return;
   showBattery(values.battery, status.battery, store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15);
-  text(values.link, `${status.rate_hz.toFixed(0)} Hz${status.link === null ? "" : ` ${(100 * status.link).toFixed(0)} %`}`);
-  values.link.className = status.rate_hz < 20 ? "empty" : status.rate_hz < 100 ? "low" : "";
+  text(values.rate, `${status.rate_hz.toFixed(0)} Hz`);
+  values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
+  text(values.link, status.link === null ? "?" : `${(100 * status.link).toFixed(0)} %`);
   detail.hidden = !status.detail;
   text(detail, status.detail);
 }

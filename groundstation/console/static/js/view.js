@@ -20,8 +20,7 @@ export class View {
   }
 
   fit() {
-    const margin = Math.min(56, this.width * 0.06);
-    this.scale = Math.min((this.width - 2 * margin) / this.room[0], (this.height - 2 * margin) / this.room[1]);
+    this.scale = Math.min((this.width - 70) / this.room[0], (this.height - 96) / this.room[1]);
     Object.assign(this, { x: 0, y: 0, fitted: true });
     this.changed();
   }

@@ -1,0 +1,155 @@
+"""What the page shows, and that it shows when it is not true any more."""
+
+import math
+import os
+import signal
+import time
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+
+def test_first_frame_comes_soon_and_nothing_leaves_loopback(stage: Any) -> None:
+    began = time.monotonic()
+    page = stage.open()
+    took = time.monotonic() - began
+    state = page.wait(lambda s: s["draws"] > 20 and s["pictures"]["marks"] > 0)
+    assert took < 15.0  # 5 s on a machine that has nothing else to do; the console process starts within it
+    assert set(state["ellipses"]) == {"drone_1", "drone_2", "turtlebot"}
+    assert state["trail"]["turtlebot"] > 0
+    page.page.wait_for_timeout(1500)
+    page.shot("light")
+    assert {urlsplit(url).hostname for url in page.requests if not url.startswith("blob:")} == {"127.0.0.1"}
+    assert not page.troubles, page.troubles
+
+
+def test_ellipses_are_to_scale(stage: Any) -> None:
+    page = stage.open()
+    state = page.state()
+    # The fake drone's covariance is [[a, b], [b, 0.003]] with a in 0.002..0.006, |b| = 0.0015.
+    drawn = state["ellipses"]["drone_1"]
+    factor = math.sqrt(-2 * math.log(0.05))
+    assert 0.05 * factor < drawn["major"] < 0.082 * factor
+    assert drawn["minor"] < drawn["major"]
+    x, y = state["points"]["drone_1"]
+    there = state["at"]["drone_1"]
+    centre = page.page.get_by_test_id("map").bounding_box()
+    assert math.isclose(x - centre["width"] / 2, there[0] * state["scale"], abs_tol=2.0)
+    assert math.isclose(centre["height"] / 2 - y, there[1] * state["scale"], abs_tol=2.0)
+
+
+def test_canvas_is_painted_and_dark_differs_from_light(stage: Any) -> None:
+    light, dark = stage.open(color_scheme="light"), stage.open(color_scheme="dark")
+    script = """() => {
+      const c = document.getElementById("map");
+      const d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+      const seen = new Set();
+      let sum = 0;
+      for (let i = 0; i < d.length; i += 4004) {
+        seen.add(`${d[i]},${d[i + 1]},${d[i + 2]}`);
+        sum += d[i] + d[i + 1] + d[i + 2];
+      }
+      return [seen.size, sum];
+    }"""
+    (colours, bright), (dark_colours, dim) = light.page.evaluate(script), dark.page.evaluate(script)
+    assert colours > 5 and dark_colours > 5
+    assert bright > 2 * dim
+    dark.page.wait_for_timeout(1000)
+    dark.shot("dark")
+    assert not light.troubles + dark.troubles
+
+
+def test_phone_and_keyboard(stage: Any) -> None:
+    page = stage.open(wait=True)
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    page.page.wait_for_timeout(800)
+    assert page.page.evaluate("() => document.documentElement.scrollWidth") <= 390
+    land = page.there("land-all").bounding_box()
+    assert land["y"] + land["height"] <= 844 and land["height"] >= 44
+    page.shot("phone")
+    page.page.keyboard.press("Tab")
+    reached = []
+    for _ in range(30):
+        reached.append(page.page.evaluate("() => document.activeElement.dataset.testid ?? ''"))
+        page.page.keyboard.press("Tab")
+    assert {"hold", "land-all", "map", "take-off", "cut-motors", "drone_1-land"} <= set(reached)
+    unnamed = page.page.evaluate(
+        """() => [...document.querySelectorAll("button")].filter((b) => !b.textContent.trim() && !b.ariaLabel).length"""
+    )
+    assert unnamed == 0
+    assert "certified emergency stop" in page.page.inner_text("#commands")
+
+
+def test_frozen_tracker_is_shown_as_stale(stage: Any) -> None:
+    page = stage.open()
+    stage.flight.frozen = True
+    began = time.monotonic()
+    page.there("banner-tracker").wait_for(timeout=5000)
+    assert time.monotonic() - began < 1.5
+    assert "TRACKER SILENT" in page.there("banner-tracker").inner_text()
+    page.page.wait_for_timeout(1500)
+    assert "stale" in (page.there("card-turtlebot").get_attribute("class") or "")
+    page.shot("stale")
+    stage.flight.frozen = False
+    page.there("banner-tracker").wait_for(state="detached", timeout=5000)
+
+
+def test_frozen_console_is_shown(stage: Any) -> None:
+    page = stage.open()
+    os.kill(stage.console.pid, signal.SIGSTOP)
+    try:
+        page.there("banner-silent").wait_for(timeout=3000)
+        page.there("land-all").click()
+        page.page.wait_for_timeout(300)
+        assert "NOT CONFIRMED" in page.there("orders").inner_text()
+        page.shot("console_frozen")
+    finally:
+        os.kill(stage.console.pid, signal.SIGCONT)
+    page.wait(lambda s: any(order["state"] == "confirmed" for order in s["orders"]))
+    assert [command.verb for command in stage.flight.commands] == ["LAND"]
+
+
+def test_killed_console_comes_back_with_everything(stage: Any) -> None:
+    page = stage.open()
+    before = page.state()
+    stage.console.kill()
+    stage.console.wait(5)
+    page.there("banner-link").wait_for(timeout=3000)
+    page.there("land-all").click()
+    page.shot("console_killed")
+    assert "NOT SENT" in page.there("orders").inner_text()
+    stage.start_console()
+    after = page.wait(lambda s: s["connected"] and s["seeds"] == 2 and s["trusted"] and s["frames"] > before["frames"])
+    assert after["run"] != before["run"]
+    assert set(after["ellipses"]) == set(before["ellipses"])
+    # A stop never expires: it goes out as soon as there is somebody to take it.
+    page.wait(lambda s: any(order["state"] == "confirmed" for order in s["orders"]))
+    assert [command.verb for command in stage.flight.commands] == ["LAND"]
+
+
+def test_battery_colours_at_their_thresholds(stage: Any) -> None:
+    page = stage.open()
+    levels = {}
+    for value, level in ((0.82, "full"), (0.29, "low"), (0.18, "empty")):
+        stage.flight.battery["drone_1"] = value
+        page.page.wait_for_timeout(900)
+        levels[level] = page.there("drone_1-battery").get_attribute("data-battery")
+    assert all(level == shown for level, shown in levels.items()), levels
+    assert "land!" in page.there("drone_1-battery").inner_text()
+
+
+def test_a_slow_viewer_slows_nobody(stage: Any) -> None:
+    fast, slow = stage.open(), stage.open()
+    slow.page.evaluate(
+        "() => { setTimeout(() => { const end = performance.now() + 4000; while (performance.now() < end); }, 0); }"
+    )
+    before, began = fast.state()["frames"], time.monotonic()
+    fast.page.wait_for_timeout(3000)
+    state, took = fast.state(), time.monotonic() - began
+    assert (state["frames"] - before) / took > 10
+    slow.page.wait_for_timeout(2500)
+    caught_up = slow.state()
+    assert caught_up["connected"] and caught_up["estimateAge"] < 2.0

@@ -33,6 +33,7 @@ VERBS: dict[str, Verb] = {
     "land": Verb("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones."),
     "cut-motors": Verb("Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall."),
     "monitor": Verb("Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station."),
+    "console": Verb("Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."),
     "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
     "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
     "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),

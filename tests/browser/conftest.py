@@ -1,6 +1,5 @@
 """A page in the system's Chromium, in front of a console process, in front of a flight that nobody flies."""
 
-import importlib.util
 import os
 import shutil
 import subprocess
@@ -9,12 +8,12 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))  # fake_flight and serve_fake are no tests, but theirs
 FLAGS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -26,16 +25,6 @@ FLAGS = [
 ]
 CHROMIUM = "/usr/bin/chromium"
 WITHIN_S = 20.0
-
-
-def load_fake_flight() -> ModuleType:
-    name = "skein_fake_flight"
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, HERE / "fake_flight.py")
-        assert spec is not None and spec.loader is not None
-        sys.modules[name] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules[name]
 
 
 def eventually(condition: Callable[[], Any], within_s: float = WITHIN_S, what: str = "") -> Any:
@@ -94,12 +83,12 @@ class Stage:
     """A flight with its console, and pages in front of it."""
 
     def __init__(self, browser: Any) -> None:
-        module = load_fake_flight()
+        from fake_flight import FakeFlight, free_port
+
         self.browser = browser
-        self.port = module.free_port()
-        self.flight = module.FakeFlight()
+        self.port = free_port()
+        self.flight = FakeFlight()
         self.flight.start()
-        self._start = module.start_console
         self.console = self.start_console()
         self._contexts: list[Any] = []
         self.pages: list[Seen] = []
@@ -109,7 +98,9 @@ class Stage:
         return f"http://127.0.0.1:{self.port}/"
 
     def start_console(self, truth: bool = True) -> "subprocess.Popen[bytes]":
-        self.console = self._start(self.flight, self.port, truth)
+        from serve_fake import start_console
+
+        self.console = start_console(self.flight.endpoint, self.port, truth)
         return self.console
 
     def open(self, wait: bool = True, **options: Any) -> Seen:

@@ -1,30 +1,18 @@
-"""A flight that nobody flies: two drones, a target, plans, pictures and answers to commands, on a real Zenoh router.
-
-Run it by hand to work on the page: `python tests/browser/fake_flight.py`, then `groundstation console` is not needed:
-it serves the page itself and prints the address.
-"""
+"""A flight that nobody flies: two drones, a target, plans, pictures and answers to commands, on a real Zenoh router."""
 
 import math
 import socket
-import subprocess
-import sys
 import threading
 import time
 from contextlib import closing
-from pathlib import Path
-from typing import Any
 
-import cv2
-import msgspec
 import numpy as np
+from fake_pictures import paint
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus import zenoh_bus
-from groundstation.process.child import ChildSpec
-from groundstation.settings.load import load_field
 
-ROOT = Path(__file__).parents[2]
 DRONES = ("drone_1", "drone_2")
 TARGET = "turtlebot"
 _LEVEL = {m.Verb.HOLD: "HOLD", m.Verb.LAND: "LANDED", m.Verb.CUT_MOTORS: "CUT", m.Verb.TRACK: "TRACK"}
@@ -34,11 +22,6 @@ def free_port() -> int:
     with closing(socket.socket()) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
-
-
-def field_json(port: int) -> dict[str, Any]:
-    field = load_field(ROOT / "config" / "lab.yaml", [f"console.port={port}"])
-    return dict(field.model_dump(mode="json"))
 
 
 class FakeFlight(threading.Thread):
@@ -238,21 +221,8 @@ class FakeFlight(threading.Thread):
     def _picture(
         self, camera: str, size: tuple[int, int], focal: float, at: tuple[float, float, float], stamp_ns: int
     ) -> None:
-        width, height = size
-        picture = np.full((height, width, 3), 96, np.uint8)
-        picture[::40, :] = picture[:, ::40] = 120
-        u, v, r = width / 2 + focal * at[0] / at[2], height / 2 + focal * at[1] / at[2], focal * 0.11 / at[2]
-        cv2.rectangle(picture, (int(u - r), int(v - r)), (int(u + r), int(v + r)), (245, 245, 245), -1)
-        step = 2 * r / 5
-        for i in range(5):
-            for j in range(4):
-                if (i + j) % 2 == 0:
-                    a = (int(u - r + i * step), int(v - r + j * step))
-                    cv2.rectangle(picture, a, (int(a[0] + step), int(a[1] + step)), (20, 20, 20), -1)
-        ok, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
-        assert ok
         bus = self.bus(camera)
-        bus.publish_bytes(t.IMAGE, bus.header(camera, stamp_ns), jpeg.tobytes())
+        bus.publish_bytes(t.IMAGE, bus.header(camera, stamp_ns), paint(size, focal, at))
 
     def _say_vehicles(self, s: float) -> None:
         for name in DRONES:
@@ -324,30 +294,3 @@ class FakeFlight(threading.Thread):
             if name in self.modes:
                 landing = command.verb is m.Verb.LAND and stage is not m.AckStage.EFFECTIVE
                 self.modes[name] = "LANDING" if landing else _LEVEL.get(command.verb, "HOVER")
-
-
-def start_console(flight: FakeFlight, port: int, truth: bool = True) -> "subprocess.Popen[bytes]":
-    """Start the console process as the supervisor does."""
-    section = {"field": field_json(port), "run_dir": "", "epoch": 1, "truth": truth}
-    spec = ChildSpec("console", "console", flight.endpoint, "lab", section=msgspec.json.encode(section).decode())
-    process = subprocess.Popen(
-        [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"],
-        stdin=subprocess.PIPE,
-        stderr=subprocess.DEVNULL if __name__ != "__main__" else None,
-    )
-    assert process.stdin is not None
-    process.stdin.write(msgspec.json.encode(spec))
-    process.stdin.close()
-    return process
-
-
-if __name__ == "__main__":
-    fake = FakeFlight()
-    fake.start()
-    served = start_console(fake, int(sys.argv[1]) if len(sys.argv) > 1 else 8765)
-    try:
-        served.wait()
-    except KeyboardInterrupt:
-        served.terminate()
-    finally:
-        fake.stop()

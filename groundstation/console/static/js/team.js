@@ -7,7 +7,7 @@ import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, seenBy, store } from "./store.js";
 
 const STALE_S = 1;
-const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad" };
+const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const cards = new Map();
 
 export function buildTeam() {

@@ -14,7 +14,7 @@ _Z_95 = 1.959964
 
 
 def chi_square_bounds(degrees: int) -> tuple[float, float]:
-    """Return the two-sided 95 % bounds of a chi-square variable, by Wilson and Hilferty (1931); good to 1 % from 5."""
+    """Return the two-sided 95 % bounds of a chi-square variable, by Wilson and Hilferty (1931); good to 5 % from 5."""
     spread = 2.0 / (9.0 * degrees)
     low, high = (degrees * (1.0 - spread + sign * _Z_95 * math.sqrt(spread)) ** 3 for sign in (-1.0, 1.0))
     return max(0.0, low), high

@@ -1,4 +1,4 @@
-// Elements without innerHTML: text from the bus is never markup.
+// Elements, never from strings of markup: text from the bus is never markup.
 
 export const byId = (id) => document.getElementById(id);
 

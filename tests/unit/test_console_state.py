@@ -1,0 +1,228 @@
+"""What the console knows and how it says it: sections, history, health, pictures, scene."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.bus import keys
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.api import Received
+from groundstation.bus.topics import Topic
+from groundstation.console.board import Board
+from groundstation.console.health import Health, chi_square_bounds
+from groundstation.console.history import History, semi_axis_95
+from groundstation.console.pictures import PictureDesk, frame_of
+from groundstation.console.scene import bare_scene, lenses_of, scene_from_field
+from groundstation.console.section import port_of
+from groundstation.console.state import ConsoleState
+from groundstation.monitor.state import Cast
+from groundstation.settings.load import load_field
+
+LAB = Path(__file__).parents[2] / "config" / "lab.yaml"
+NS = 1_000_000_000
+
+
+@pytest.fixture(scope="module")
+def field() -> dict[str, Any]:
+    return dict(load_field(LAB, []).model_dump(mode="json"))
+
+
+def header(entity: str, stamp_ns: int = NS) -> m.Header:
+    return m.Header(stamp_ns, "c", entity, "s", 0)
+
+
+def received(topic: Topic, message: m.Message) -> Received:
+    key = keys.Key("lab", message.header.entity, topic, "s")
+    return Received(key, message.header, message, b"")
+
+
+def estimate(stamp_ns: int = NS, age_s: float = 0.1) -> m.Estimate:
+    robot = m.EntityEstimate(
+        "drone_1", "robot", (1.0, 2.0, 1.5, 0.3), (0.04, 0.01, 0, 0, 0.01, 0.02) + (0.0,) * 10, (0, 0, 0), True, age_s
+    )
+    target = m.EntityEstimate("turtlebot", "target", (0.5, 0.0), (0.01, 0.0, 0.0, 0.01), (0.1, 0.0), True, age_s)
+    return m.Estimate(header=header("team", stamp_ns), entities=(robot, target), epoch=3)
+
+
+def test_a_board_tells_what_changed_since() -> None:
+    board = Board()
+    board.begin()
+    board.put("a", 1)
+    board.put("b", 2)
+    first = board.turn
+    assert json.loads(board.since(-1)) == {"a": 1, "b": 2}
+    board.begin()
+    board.put("a", 1)
+    board.put("b", 3)
+    assert json.loads(board.since(first)) == {"b": 3}
+    assert json.loads(board.since(board.turn)) == {}
+    assert json.loads(board.since(0)) == {"a": 1, "b": 3}
+    # Two viewers at the same place share the bytes.
+    assert board.since(first) is board.since(first)
+
+
+def test_sections_say_what_came() -> None:
+    state, board = ConsoleState(Cast("lab", {"drone_1": 0.15}, "turtlebot"), NS), Board()
+    setpoint = m.VelocitySetpoint(
+        header=header("drone_1"), velocity_m_s=(0.1, 0, 0), yaw_rate_rad_s=0.2, lifetime_ms=300, epoch=3
+    )
+    control = m.Control("drone_1", (0.1, 0, 0), 0.2, ("fence",), (0.5, 0, 0))
+    plan = m.Plan(
+        header=header("team"),
+        topology="drone_1",
+        cost=0.01,
+        controls=(control,),
+        edges=(m.Edge("ceiling", "drone_1", 5.0),),
+        alternatives=(m.Alternative("drone_1", 0.01),),
+        solver=m.SolverReport("converged", 10, 0.02, 1, 1),
+        mode="TRACK",
+    )
+    truth = m.TruthState(
+        header=header("turtlebot"),
+        position_m=(0.5, 0.1, 0),
+        velocity_m_s=(0, 0, 0),
+        attitude_rad=(0, 0, 1.0),
+        on_ground=True,
+    )
+    status = m.VehicleStatus(header=header("drone_1"), flight_state=m.FlightState.FLYING, mode="TRACK", battery=0.5)
+    event = m.Event(header=header("drone_1"), severity=m.Severity.ERROR, text="bang", remedy="duck")
+    process = m.ProcessStatus(header=header("tracker"), state=m.Lifecycle.READY, pid=1, cpu=0.1, ticks=100, overruns=2)
+    camera = m.CameraStatus(
+        header=header("ceiling"), connected=True, fps=15, age_ms=90, frames=1, skipped=0, detections=0
+    )
+    state.ingest(
+        [
+            received(t.ESTIMATE, estimate()),
+            received(t.SETPOINT, setpoint),
+            received(t.PLAN, plan),
+            received(t.TRUTH, truth),
+            received(t.VEHICLE_STATUS, status),
+            received(t.EVENT, event),
+            received(t.PROCESS_STATUS, process),
+            received(t.CAMERA_STATUS, camera),
+        ]
+    )
+    for turn in range(10):
+        board.begin()
+        state.put(board, NS + turn * 50_000_000)
+    said = json.loads(board.since(-1))
+    assert [entity["name"] for entity in said["estimate"]["entities"]] == ["drone_1", "turtlebot"]
+    assert said["estimate"]["entities"][0]["cov"] == [0.04, 0.01, 0.02]
+    assert said["plan"]["cost_cm2"] == 100.0 and said["plan"]["controls"][0]["wanted"] == [0.5, 0, 0]
+    assert said["setpoints"]["drone_1"]["at"] == 1000.0
+    assert said["truth"]["turtlebot"]["yaw"] == 1.0
+    assert said["vehicles"]["drone_1"]["battery"] == 0.5
+    assert said["events"][0]["remedy"] == "duck"
+    assert said["processes"]["tracker"]["late"] == 0.02
+    assert said["cameras"]["ceiling"]["fps"] == 15
+    assert said["sample"]["error_m"] == pytest.approx(0.1)
+    assert any("bang" in alarm["text"] and alarm["grave"] for alarm in said["alarms"])
+
+
+def test_what_was_never_seen_can_still_be_said() -> None:
+    state, board = ConsoleState(Cast("lab", {}, "turtlebot"), 0), Board()
+    state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])
+    board.begin()
+    state.put(board, NS)
+    assert json.loads(board.since(-1))["estimate"]["entities"][0]["age_s"] == 1e6
+
+
+def test_history_keeps_trails_and_samples_within_bounds() -> None:
+    history = History("turtlebot")
+    samples = [history.step(NS + k * 50_000_000, estimate(NS + k * 50_000_000), None, 1.0, {}) for k in range(20 * 200)]
+    kept = history.as_json()
+    assert len(kept["trails"]["drone_1"]) == 300 and kept["trails"]["drone_1"][-1] == (1.0, 2.0)
+    assert len(kept["samples"]) == 240
+    assert sum(sample is not None for sample in samples) == pytest.approx(400, abs=2)
+    assert kept["samples"][-1]["axis_m"] == pytest.approx(0.1 * math.sqrt(5.991), abs=1e-3)
+
+
+def test_the_95_percent_ellipse_holds_95_percent() -> None:
+    covariance = np.array([[0.04, 0.015], [0.015, 0.02]])
+    largest = float(np.linalg.eigvalsh(covariance)[-1])
+    assert semi_axis_95(tuple(covariance.ravel()), 2) == pytest.approx(math.sqrt(largest * 5.991), rel=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [5, 20, 200])
+def test_chi_square_bounds(degrees: int) -> None:
+    from scipy.stats import chi2
+
+    low, high = chi_square_bounds(degrees)
+    assert low == pytest.approx(chi2.ppf(0.025, degrees), rel=0.05)
+    assert high == pytest.approx(chi2.ppf(0.975, degrees), rel=0.01)
+
+
+def test_health_counts_what_entered_and_names_what_did_not() -> None:
+    health = Health()
+    assert health.summary()["nis"] is None
+    for k in range(40):
+        late = k % 4 == 0
+        health.take(
+            m.Innovation(
+                header=header("drone_1"),
+                observer="drone_1",
+                subject="turtlebot",
+                verdict=m.Verdict.LATE if late else m.Verdict.ACCEPTED,
+                residual=() if late else (0.1, 0.1, 0.1),
+                nis=None if late else 3.0,
+                reason="by 0.7 s" if late else "",
+            )
+        )
+    said = health.summary()
+    assert said["nis"] == 1.0 and said["low"] < 1.0 < said["high"]
+    assert said["accepted"] == 0.75
+    assert said["edges"][0]["refused"] == "LATE by 0.7 s"
+
+
+def test_detections_belong_to_their_picture(field: dict[str, Any]) -> None:
+    desk = PictureDesk(lenses_of(field))
+
+    def sight(stamp_ns: int) -> m.RelativeObservation:
+        return m.RelativeObservation(
+            header=header("drone_1", stamp_ns),
+            observer="drone_1",
+            subject="turtlebot",
+            camera="drone_1_camera",
+            position_m=(0.0, 0.0, 2.0),
+            yaw_rad=None,
+            covariance=(0.1,) * 9,
+        )
+
+    desk.take_detection(sight(5))  # before its picture
+    assert desk.take_picture("drone_1_camera", header("drone_1_camera", 5), b"\xff\xd8jpeg", NS)
+    desk.take_detection(sight(6))  # of another picture
+    (mark,) = desk.detections()["drone_1_camera"]["marks"]
+    assert (mark["u"], mark["v"], mark["range_m"]) == (319.5, 179.5, 2.0)
+    assert not desk.take_picture("drone_1_camera", header("drone_1_camera", 7), b"\xff\xd8jpeg", NS + 50_000_000)
+    assert not desk.take_picture("drone_1_camera", header("drone_1_camera", 7), b"GIF89a", 9 * NS)
+    size = int.from_bytes(desk.frames["drone_1_camera"][:2], "big")
+    assert json.loads(desk.frames["drone_1_camera"][2 : 2 + size])["camera"] == "drone_1_camera"
+    assert frame_of("a", 0, b"xyz").endswith(b"xyz")
+
+
+def test_footprints_are_true_to_scale(field: dict[str, Any]) -> None:
+    scene = scene_from_field(field, truth=True)
+    lens = lenses_of(field)["ceiling"]
+    rays = np.array(scene["cameras"][0]["rays"])
+    # The middle of the left edge: undo the projection by projecting it again.
+    left = rays[np.abs(rays[:, 1]) < 1e-3][:, 0].min()
+    pixel = lens.project(np.array([left, 0.0, 1.0]))
+    assert pixel[0] == pytest.approx(-0.5, abs=0.1)
+    onboard = np.array(scene["drones"][0]["camera"]["rays"])
+    assert onboard[:, 0].min() > 0  # tilted 45 degrees down with less than 90 of view: all of it lies ahead
+    assert onboard[:, 2].max() < 0
+    assert json.loads(json.dumps(scene))["target"]["name"] == "turtlebot"
+
+
+def test_a_scene_without_a_field() -> None:
+    assert bare_scene("lab", ("a",), False)["drones"][0]["name"] == "a"
+
+
+def test_the_port_is_the_field_s(field: dict[str, Any]) -> None:
+    assert port_of(json.dumps(field).encode()) == 8765
+    assert port_of(b"{}") == 8765

@@ -44,9 +44,9 @@ class OdometryRobot:
     marker_position_m: Vector3 = (0.0, 0.0, 0.08)
     velocity_scale: float = 1.0
     scale_std: float = 0.10
-    scale_drift: float = 0.003
+    scale_drift: float = 0.005
     velocity_std_m_s: float = 0.05
-    velocity_correlation_s: float = 0.25
+    velocity_correlation_s: float = 0.2
     velocity_delay_s: float = 0.03
     yaw_std_rad: float = math.radians(1.0)
     attitude_std_rad: float = math.radians(1.0)
@@ -54,7 +54,7 @@ class OdometryRobot:
     height_std_m: float = 0.04
     height_correlation_s: float = 2.0
     height_delay_s: float = 0.085
-    climb_std_m_s: float = 0.2
+    climb_std_m_s: float = 0.08
     climb_correlation_s: float = 0.7
     reports_climb: bool = False
     hold_s: float = 0.2
@@ -89,7 +89,7 @@ class ConstantVelocityTarget:
 
     marker_height_m: float = 0.4
     acceleration_std_m_s2: float = 0.3
-    correlation_s: float = 0.25
+    correlation_s: float = 0.12
     speed_std_m_s: float = 0.4
 
     def row(self) -> Array:

@@ -71,7 +71,7 @@ def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
         attitude_std_rad=math.radians(odometry["attitude_std_deg"]),
         height_std_m=odometry["height_std_m"],
         height_delay_s=odometry["height_delay_ms"] / 1000,
-        climb_std_m_s=0.5 * drone["limits"]["max_climb_m_s"],
+        climb_std_m_s=0.2 * drone["limits"]["max_climb_m_s"],
     )
 
 

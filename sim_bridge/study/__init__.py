@@ -1,1 +1,1 @@
-"""TODO"""
+"""Whole flights at message level: world, noise and the tracker under a manual clock, faster than real time."""

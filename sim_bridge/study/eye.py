@@ -84,7 +84,8 @@ class Eye:
             own = states[self._carrier]
             base = rotation_from_euler(own[6], own[7], own[8])
             rotation, position = base @ rotation, own[:3] + base @ position
-            onboard = world.onboard[self._carrier]
+            copter = world.copters.get(self._carrier)
+            onboard = copter.estimate if copter is not None else world.onboard[self._carrier]
             reported = (onboard.roll, onboard.pitch)
         jitter = self._rng.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
         seen = []

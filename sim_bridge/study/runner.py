@@ -15,6 +15,7 @@ from groundstation.bus.messages import Message
 from groundstation.tracker import Tracker, tracker_from_field
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
+from sim_bridge.study.copter_link import CopterLink
 from sim_bridge.study.eye import Eye
 from sim_bridge.study.pilot import Pilot
 from sim_bridge.study.score import Score
@@ -60,11 +61,15 @@ class Study:
         self._tick_every = round(1e9 / field["estimator"]["rate_hz"]) // TICK_NS
         self._plan_every = round(1e9 / field["planner"]["rate_hz"]) // TICK_NS
         world = self.world
-        self._telemetry = {n: Telemetry(n, d, world.onboard[n], CLOCK) for n, d in world.drones.items()}
         lifetime = field["safety"]["setpoint_lifetime_ms"] / 1000
+        self._links = {n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.copters.items()}
+        self._telemetry: dict[str, Telemetry | CopterLink] = {
+            n: Telemetry(n, d, world.onboard[n], CLOCK) for n, d in world.ardrones.items()
+        }
+        self._telemetry |= self._links
         self._pilots = {
             name: Pilot(drone, world.onboard[name], field["drones"][name]["odometry"]["velocity_scale"], lifetime)
-            for name, drone in world.drones.items()
+            for name, drone in world.ardrones.items()
         }
         self._eyes = self._build_eyes(field)
         fence = field["room"]["fence"]
@@ -103,7 +108,7 @@ class Study:
     def run(self) -> dict[str, Any]:
         """Fly until the duration is over; returns the figures, with the CPU time of each part."""
         started = time.process_time()
-        for drone in self.world.drones.values():
+        for drone in self.world.ardrones.values():
             drone.autopilot.take_off()
         ticks = round((_TAKE_OFF_S + self.options.duration_s) * 1e9) // TICK_NS
         for _ in range(ticks):
@@ -119,6 +124,10 @@ class Study:
         world = self.world
         mark = time.process_time()
         world.step()
+        if self._links:
+            estimates = self.tracker.estimates()
+            for link in self._links.values():
+                link.step(world.time_s, estimates)
         self._sense()
         self.cpu_s["world"] += time.process_time() - mark
         tracking = world.time_s >= _TAKE_OFF_S
@@ -133,7 +142,8 @@ class Study:
     def _sense(self) -> None:
         world, now_ns = self.world, self.now_ns
         for name, telemetry in self._telemetry.items():
-            self._send(now_ns + _ODOMETRY_LATENCY_NS, f"odometry/{name}", telemetry.odometry(now_ns))
+            if (odometry := telemetry.odometry(now_ns)) is not None:
+                self._send(now_ns + _ODOMETRY_LATENCY_NS, f"odometry/{name}", odometry)
             if world.ticks % _STATUS_TICKS == 0:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
         for index, eye in enumerate(self._eyes):
@@ -169,7 +179,8 @@ class Study:
         mark = time.process_time()
         for name, limited in tracker.setpoints(now_ns).items():
             setpoint = limited.setpoint
-            self._pilots[name].obey(setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.world.time_s)
+            pilot = self._links.get(name) or self._pilots[name]
+            pilot.obey(setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.world.time_s)
         self.cpu_s["setpoints"] += time.process_time() - mark
 
     def _judge(self) -> None:

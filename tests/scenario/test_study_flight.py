@@ -1,0 +1,60 @@
+"""A flight at message level: honest sensors, the tracker, the planner, a manual clock."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sim_bridge.scenario import Scenario
+from sim_bridge.study.runner import Study, StudyOptions
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def flight(lab_field: dict[str, Any]) -> dict[str, Any]:
+    return Study(lab_field, Scenario(), StudyOptions(seed=3, duration_s=25.0)).run()
+
+
+def test_the_target_is_found_and_held(flight: dict[str, Any]) -> None:
+    assert flight["target_rmse_m"] <= 0.30  # the first seconds count as 1 m until it is found
+    assert flight["robot_rmse_m"]["turtlebot"] <= 0.12
+    assert flight["target_lost_s"] <= 3.0
+    assert flight["max_fence_violation_m"] == 0.0
+    assert flight["min_separation_m"] >= 0.6
+
+
+def test_robots_know_where_they_are(flight: dict[str, Any]) -> None:
+    assert max(flight["robot_rmse_m"][name] for name in ("drone_1", "drone_2")) <= 0.10
+    assert flight["verdicts"].get("IMPLAUSIBLE", 0) == 0
+    assert flight["verdicts"].get("LATE", 0) == 0
+
+
+def test_the_same_seed_gives_the_same_flight(lab_field: dict[str, Any]) -> None:
+    reports = [Study(lab_field, Scenario(), StudyOptions(seed=5, duration_s=2.0)).run() for _ in range(2)]
+    for report in reports:
+        report.pop("cpu_s")
+    assert reports[0] == reports[1]
+
+
+def test_grossly_wrong_sightings_do_no_harm(lab_field: dict[str, Any]) -> None:
+    report = Study(lab_field, Scenario(), StudyOptions(seed=3, duration_s=15.0, outliers=0.02)).run()
+    assert report["verdicts"]["IMPLAUSIBLE"] > 0
+    assert max(report["robot_rmse_m"][name] for name in ("drone_1", "drone_2")) <= 0.12
+
+
+def test_the_command_line_prints_json() -> None:
+    command = [sys.executable, "-m", "sim_bridge.study", "demo", "--seed", "2", "--duration", "1", "--json"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=110, check=False)
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["seed"] == 2
+
+
+def test_a_wrong_field_is_reported_as_the_command_line_does() -> None:
+    command = [sys.executable, "-m", "sim_bridge.study", "demo", "--set", "planner.horizn_steps=3"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 2
+    assert "horizn_steps" in result.stderr

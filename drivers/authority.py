@@ -92,7 +92,10 @@ class Ack:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What to do now; velocity and yaw rate count for FLY only. `reason` says why the mode is what it is."""
+    """What to do now; velocity and yaw rate count for FLY only. `reason` says why the mode is what it is.
+
+    setpoint_ns: stamp of the setpoint obeyed, for vehicles that are told each setpoint once; 0 when none is.
+    """
 
     mode: Mode
     action: Action
@@ -100,3 +103,4 @@ class Decision:
     yaw_rate_rad_s: float = 0.0
     reason: str = ""
     acks: tuple[Ack, ...] = ()
+    setpoint_ns: int = 0

@@ -2,7 +2,7 @@
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from drivers.authority import Ack, AuthorityLimits, Decision, Mode, Upstream, VehicleView
 from drivers.base import HostProcess, Vehicle
@@ -161,13 +161,22 @@ class VehicleHost:
         self._child.event(severity, text, remedy, self.vehicle.name)
 
 
-def run_hosts(child: HostProcess, hosts: Sequence[VehicleHost], rate_hz: float = RATE_HZ) -> int:
-    """Turn all hosts at the sender's rate until each is finished; returns the exit code 0."""
+def run_hosts(
+    child: HostProcess,
+    hosts: Sequence[VehicleHost],
+    rate_hz: float = RATE_HZ,
+    before: Callable[[int], None] = lambda now_ns: None,
+) -> int:
+    """Turn all hosts at the sender's rate until each is finished; returns the exit code 0.
+
+    before: what the vehicles of one link share, done ahead of each turn.
+    """
     period_ns = round(1e9 / rate_hz)
     overruns = 0
     deadline_ns = clock.now_ns()
     for tick in itertools.count(1):
         now_ns = clock.now_ns()
+        before(now_ns)
         for host in hosts:
             host.turn(now_ns)
         child.beat()

@@ -4,6 +4,7 @@ from groundstation.errors import DriverError
 
 ENTRY_POINTS: dict[str, str] = {
     "ardrone": "drivers.ardrone.driver:run",
+    "mavlink": "drivers.mavlink.driver:run",
     "camera": "drivers.camera.driver:run",
 }
 

@@ -171,7 +171,8 @@ class Watchdog:
         acks = self._effective_ack(now_ns)
         if setpoint is None:
             return Decision(self.mode, self._action(now_ns), reason=self.reason, acks=acks)
-        return Decision(self.mode, Action.FLY, setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.reason, acks)
+        velocity, turn, stamp_ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
+        return Decision(self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns)
 
     def _follow_vehicle(self, now_ns: int) -> None:
         state = self.vehicle.flight_state

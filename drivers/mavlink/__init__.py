@@ -1,0 +1,1 @@
+"""Vehicles that speak MAVLink 2: PX4 and ArduPilot, over UDP, serial lines or MAVSDK."""

@@ -1,0 +1,117 @@
+"""The MAVLink driver: one port, one reader thread, a watchdog per vehicle, and the process entry `run`."""
+
+import logging
+import threading
+from collections import Counter
+from collections.abc import Sequence
+
+from pydantic import ValidationError
+
+from drivers.base import HostProcess
+from drivers.host import VehicleHost, run_hosts
+from drivers.mavlink.link import Heard, Link, open_link
+from drivers.mavlink.settings import MavlinkDriverSettings
+from drivers.mavlink.vehicle import MavlinkVehicle
+from drivers.mavlink.wire import frames
+from drivers.mavlink.wire.telemetry import Heartbeat
+from groundstation.bus.messages import Estimate, Severity
+from groundstation.bus.topics import ESTIMATE
+from groundstation.errors import DriverError, SettingsError
+
+# A setpoint waits at most one turn: 5 ms.
+RATE_HZ = 200.0
+_SAME_TEXT_NS = 10_000_000_000
+_log = logging.getLogger(__name__)
+
+
+class Fleet:
+    """All vehicles of one link. Frames go to the vehicle of their system id; other ids are counted and named once."""
+
+    def __init__(self, child: HostProcess, settings: MavlinkDriverSettings) -> None:
+        faults = frames.dialect_faults()
+        if faults:
+            raise DriverError(f"this pymavlink knows other messages than we do: {'; '.join(faults)}")
+        self._child = child
+        self._estimates = child.bus.subscribe([ESTIMATE], newest=True)
+        systems = frozenset(vehicle.system_id for vehicle in settings.vehicles)
+        self.vehicles: dict[int, MavlinkVehicle] = {}
+        self.link: Link = open_link(settings.link, systems, self._sniff)
+        self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
+        self.strangers: Counter[int] = Counter()
+        self._news: list[str] = []
+        self._announced: dict[tuple[str, str], int] = {}
+        self._closing = threading.Event()
+        self._reader = threading.Thread(target=self._read, name="mavlink", daemon=True)
+        self._reader.start()
+
+    def _sniff(self, system: int, stamp_ns: int, data: bytes, received: bool) -> None:
+        vehicle = self.vehicles.get(system)
+        if vehicle is not None:
+            (vehicle.log.received if received else vehicle.log.sent)(stamp_ns, data)
+
+    def _read(self) -> None:
+        while not self._closing.is_set():
+            try:
+                for heard in self.link.receive():
+                    self._hand_on(heard)
+            except Exception:  # noqa: BLE001 - the reader must outlive whatever arrives: count, log, go on
+                if self._closing.is_set():
+                    return
+                self.link.rejected["internal"] += 1
+                _log.exception("a frame could not be used")
+
+    def _hand_on(self, heard: Heard) -> None:
+        vehicle = self.vehicles.get(heard.frame.system)
+        if vehicle is not None:
+            vehicle.hear(heard)
+        elif isinstance(heard.frame.message, Heartbeat) and heard.frame.message.autopilot != 8:
+            self.strangers[heard.frame.system] += 1
+            self.link.rejected["unknown_system"] += 1
+            if self.strangers[heard.frame.system] == 1:
+                self._news.append(f"system {heard.frame.system} answers, which is not in the field file")
+
+    def turn(self, now_ns: int) -> None:
+        """Hand the tracker's estimate to the vehicles and tell the operator what they say."""
+        for received in self._estimates.drain():
+            if isinstance(received.message, Estimate):
+                for vehicle in self.vehicles.values():
+                    vehicle.see(now_ns, received.message)
+        while self._news:
+            self._child.event(Severity.WARNING, self._news.pop(0), "see system_id in the field file")
+        for vehicle in self.vehicles.values():
+            while vehicle.orders.events:
+                self._announce(now_ns, vehicle.name, *vehicle.orders.events.popleft())
+
+    def _announce(self, now_ns: int, name: str, severity: int, text: str) -> None:
+        last_ns = self._announced.get((name, text))
+        if last_ns is not None and now_ns - last_ns < _SAME_TEXT_NS:
+            return
+        self._announced[name, text] = now_ns
+        level = Severity.ERROR if severity <= 3 else Severity.WARNING if severity <= 4 else Severity.INFO
+        self._child.event(level, f"{name}: {text}", "", name)
+
+    def close(self) -> None:
+        """Stop the reader and give the port back."""
+        self._closing.set()
+        self._reader.join(timeout=1.0)
+        self.link.close()
+        for vehicle in self.vehicles.values():
+            vehicle.flush()
+
+
+def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) -> Sequence[VehicleHost]:
+    """Return a host, with its own watchdog, for each vehicle."""
+    return [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v)) for v in settings.vehicles]
+
+
+def run(child: HostProcess) -> int:
+    """Fly the vehicles of one link until told to stop; the process entry."""
+    try:
+        settings = MavlinkDriverSettings.model_validate_json(child.section)
+    except ValidationError as error:
+        raise SettingsError([str(error)]) from error
+    fleet = Fleet(child, settings)
+    try:
+        return run_hosts(child, hosts_of(child, fleet, settings), RATE_HZ, fleet.turn)
+    finally:
+        fleet.close()

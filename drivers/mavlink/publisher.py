@@ -1,0 +1,80 @@
+"""Odometry and IMU samples of one vehicle on the bus.
+
+The autopilot's position, height and heading are our own estimate come back, and are never published. Its velocity is
+partly ours: it goes out with an inflated covariance. Its heading is replaced by what its gyros say, whose increments
+are the vehicle's own measurement (estimation.md 3).
+"""
+
+import math
+
+from drivers.mavlink.convert import Attitude, attitude_quaternion
+from drivers.mavlink.settings import VehicleSettings
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import ImuSample, Odometry, Vector3
+from groundstation.bus.topics import IMU, ODOMETRY
+from groundstation.geometry.angles import wrap
+
+_GAP_S = 0.5
+_CLIMB_SHARE = 1.5
+
+
+class GyroHeading:
+    """Heading by integrated turn rates, from 0; `resets` rises where a gap makes the increment void."""
+
+    def __init__(self) -> None:
+        self.yaw_rad = 0.0
+        self.resets = 0
+        self._stamp_ns: int | None = None
+        self._rate_rad_s = 0.0
+
+    def update(self, stamp_ns: int, attitude: Attitude) -> None:
+        """Take the turn rate of a sample."""
+        _, q, r = attitude.rates_rad_s
+        # Rate of the heading about the vertical, not about the tilted body axis.
+        sine, cosine = math.sin(attitude.roll_rad), math.cos(attitude.roll_rad)
+        rate = (q * sine + r * cosine) / max(0.2, math.cos(attitude.pitch_rad))
+        if self._stamp_ns is not None:
+            elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
+            if elapsed_s > _GAP_S:
+                self.resets += 1
+            else:
+                self.yaw_rad = wrap(self.yaw_rad + 0.5 * (rate + self._rate_rad_s) * elapsed_s)
+        self._stamp_ns, self._rate_rad_s = stamp_ns, rate
+
+
+class MotionPublisher:
+    """Turns what the reader hears into messages, stamped with their receipt."""
+
+    def __init__(self, settings: VehicleSettings, bus: Bus) -> None:
+        self._name, self._bus = settings.name, bus
+        self._heading = GyroHeading()
+        horizontal = settings.velocity_std_m_s**2
+        vertical = horizontal * _CLIMB_SHARE**2
+        self._covariance = (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical)
+
+    def attitude(self, stamp_ns: int, attitude: Attitude) -> None:
+        """Take an attitude: its turn rate moves the heading."""
+        self._heading.update(stamp_ns, attitude)
+
+    def velocity(self, stamp_ns: int, velocity_m_s: Vector3, attitude: Attitude) -> None:
+        """Publish a velocity [base_stabilized]."""
+        message = Odometry(
+            header=self._bus.header(self._name, stamp_ns),
+            velocity_m_s=velocity_m_s,
+            velocity_covariance=self._covariance,
+            yaw_rad=self._heading.yaw_rad,
+            roll_rad=attitude.roll_rad,
+            pitch_rad=attitude.pitch_rad,
+            reset=self._heading.resets,
+        )
+        self._bus.publish(ODOMETRY, message)
+
+    def imu(self, stamp_ns: int, rates: Vector3, force: Vector3, attitude: Attitude | None) -> None:
+        """Publish rates and specific force [base]."""
+        sample = ImuSample(
+            header=self._bus.header(self._name, stamp_ns),
+            angular_velocity_rad_s=rates,
+            specific_force_m_s2=force,
+            attitude=None if attitude is None else attitude_quaternion(attitude),
+        )
+        self._bus.publish(IMU, sample)

@@ -1,0 +1,90 @@
+"""Requests to one vehicle that are acknowledged: asked again until answered, and what the answers were. Pure."""
+
+from collections import deque
+from dataclasses import dataclass
+
+from drivers.mavlink.wire.flight import CommandAck, CommandLong
+from drivers.mavlink.wire.names import Command, Result
+
+_RETRY_NS = 500_000_000
+_TRIES = 4
+_SETTLE_NS = 1_000_000_000
+_REFUSED_NS = 1_000_000_000
+
+
+@dataclass(slots=True)
+class _Open:
+    message: CommandLong
+    due_ns: int
+    tries: int = 0
+
+
+class Requests:
+    """What was asked, by key. `ask` is called as often as the wish stands; it repeats nothing that is under way.
+
+    failures: what the vehicle refused or never answered, for the operator; drained by the driver.
+    """
+
+    def __init__(self, system: int) -> None:
+        self._system = system
+        self._open: dict[str, _Open] = {}
+        self._quiet_until_ns: dict[str, int] = {}
+        self.accepted: set[str] = set()
+        self.failures: deque[str] = deque(maxlen=16)
+
+    def ask(self, now_ns: int, key: str, command: Command, *params: float) -> None:
+        """Wish for a command; nothing happens while it is under way, or was answered within the last second."""
+        if key in self._open or now_ns < self._quiet_until_ns.get(key, 0):
+            return
+        padded = (*params, *(0.0,) * (7 - len(params)))
+        self._open[key] = _Open(CommandLong(self._system, 1, command, 0, *padded), now_ns)
+
+    def drop(self, *keys: str) -> None:
+        """Give up wishes: a landing must not be followed by a late order to climb."""
+        for key in keys:
+            self._open.pop(key, None)
+
+    def forget(self) -> None:
+        """Begin anew: the vehicle was restarted."""
+        self._open.clear()
+        self._quiet_until_ns.clear()
+        self.accepted.clear()
+
+    def due(self, now_ns: int) -> list[CommandLong]:
+        """Return what to send now."""
+        messages = []
+        for key, request in list(self._open.items()):
+            if now_ns < request.due_ns:
+                continue
+            if request.tries == _TRIES:
+                del self._open[key]
+                self._quiet_until_ns[key] = now_ns + _REFUSED_NS
+                self.failures.append(f"{key}: no answer")
+                continue
+            messages.append(request.message._replace(confirmation=request.tries))
+            request.tries, request.due_ns = request.tries + 1, now_ns + _RETRY_NS
+        return messages
+
+    def answer(self, now_ns: int, ack: CommandAck) -> None:
+        """Take an acknowledgement; it belongs to the oldest open request of that command that was sent."""
+        sent = [key for key, r in self._open.items() if r.message.command == ack.command and r.tries]
+        if not sent:
+            return
+        key, request = sent[0], self._open[sent[0]]
+        if ack.result == Result.IN_PROGRESS:
+            request.due_ns = now_ns + _RETRY_NS
+            return
+        del self._open[key]
+        self._quiet_until_ns[key] = now_ns + _SETTLE_NS
+        if ack.result == Result.ACCEPTED:
+            self.accepted.add(key)
+        else:
+            self._quiet_until_ns[key] = now_ns + _REFUSED_NS
+            self.failures.append(f"{key}: {_word(ack.result)}")
+
+
+def _word(result: int) -> str:
+    try:
+        return Result(result).name.lower().replace("_", " ")
+    except ValueError:
+        return f"result {result}"

@@ -1,0 +1,91 @@
+"""A serial radio or a wire: the same frames in a stream of bytes, one or more vehicles at the other end."""
+
+import os
+import select
+import termios
+import threading
+from collections import Counter
+
+from drivers.mavlink.link import Heard, Sniffer, StreamCutter, ignore_bytes
+from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.frames import Decoder, Encoder, Message, Signing
+from groundstation.bus import clock
+from groundstation.errors import DriverError
+
+_POLL_S = 0.1
+_CHUNK = 4096
+
+
+class SerialLink:
+    """A terminal device, raw, 8N1."""
+
+    def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
+        _, device, baud = settings.target.split(":")
+        self.rejected: Counter[str] = Counter()
+        self._own = (settings.system_id, settings.component_id)
+        self._decoder = Decoder(signing)
+        self._encoder = Encoder(settings.system_id, settings.component_id, signing)
+        self._cutter, self._lock, self._sniffer = StreamCutter(), threading.Lock(), sniffer
+        try:
+            self._fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise DriverError(f"cannot open {device}: {error.strerror}") from error
+        try:
+            _make_raw(self._fd, int(baud))
+        except (termios.error, DriverError) as error:
+            os.close(self._fd)
+            raise DriverError(f"cannot use {device} at {baud} baud: {error}") from error
+
+    def receive(self) -> list[Heard]:
+        """Wait up to 0.1 s for bytes; return the frames that are whole by now."""
+        try:
+            ready, _, _ = select.select([self._fd], [], [], _POLL_S)
+            data = os.read(self._fd, _CHUNK) if ready else b""
+        except (OSError, ValueError) as error:
+            self.rejected["receive_failed"] += 1
+            # An unplugged radio fails at once and for ever: do not spin.
+            select.select([], [], [], _POLL_S)
+            raise_if_closed(error)
+            return []
+        now_ns, heard = clock.now_ns(), []
+        for raw in self._cutter.feed(data):
+            try:
+                frame = self._decoder.decode(raw)
+            except WireError as error:
+                self.rejected[error.reason] += 1
+                continue
+            if (frame.system, frame.component) != self._own:
+                self._sniffer(frame.system, now_ns, raw, True)
+                heard.append(Heard(now_ns, frame))
+        return heard
+
+    def send(self, system: int, message: Message) -> None:
+        """Write one frame; a line that is too slow loses it."""
+        with self._lock:
+            data = self._encoder.encode(message)
+            try:
+                if os.write(self._fd, data) < len(data):
+                    self.rejected["send_cut"] += 1
+            except OSError:
+                self.rejected["send_failed"] += 1
+        self._sniffer(system, clock.now_ns(), data, False)
+
+    def close(self) -> None:
+        """Close the device."""
+        os.close(self._fd)
+
+
+def raise_if_closed(error: Exception) -> None:
+    """Raise again what means that we closed the line ourselves (ValueError); other errors may pass."""
+    if isinstance(error, ValueError):
+        raise error
+
+
+def _make_raw(fd: int, baud: int) -> None:
+    speed = getattr(termios, f"B{baud}", None)
+    if speed is None:
+        raise DriverError("no such speed")
+    attributes = termios.tcgetattr(fd)
+    control = termios.CS8 | termios.CREAD | termios.CLOCAL
+    termios.tcsetattr(fd, termios.TCSANOW, [0, 0, control, 0, speed, speed, attributes[6]])

@@ -1,0 +1,127 @@
+"""From silence to full telemetry: streams asked for, origin set, parameters checked. Pure.
+
+WIRE (mavlink.md 1): ArduPilot streams nothing but heartbeats unless asked, one interval at a time; the origin is
+ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back.
+"""
+
+from drivers.mavlink import parameters
+from drivers.mavlink.requests import Requests
+from drivers.mavlink.settings import Origin
+from drivers.mavlink.wire import service, telemetry
+from drivers.mavlink.wire.frames import Message, id_of
+from drivers.mavlink.wire.names import Command, Flavour
+from drivers.mavlink.wire.parameters import value_from_carried
+
+_ORIGIN_PERIOD_NS = 3_000_000_000
+_PARAM_PERIOD_NS = 500_000_000
+_HEARTBEAT_NS = 1_000_000_000
+_DISCONNECTED_NS = 2_000_000_000
+_PARAM_BURST = 4
+
+
+def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
+    """Return the messages to ask for and their rates [Hz]."""
+    imu = telemetry.HighresImu if flavour is Flavour.PX4 else telemetry.RawImu
+    wanted: dict[type[Message], float] = {
+        telemetry.ExtendedSysState: 5.0,
+        telemetry.LocalPositionNed: odometry_hz,
+        telemetry.AttitudeQuaternion: odometry_hz,
+        telemetry.SysStatus: 2.0,
+        telemetry.BatteryStatus: 1.0,
+    }
+    if imu_hz > 0:
+        wanted[imu] = imu_hz
+    if flavour is Flavour.ARDUPILOT:
+        wanted[telemetry.EkfStatusReport] = 5.0
+    return wanted
+
+
+class Session:
+    """What one vehicle still has to be asked; starts over when it was silent for 2 s.
+
+    problems: parameters that forbid a take-off. detail: what is waited for, or "".
+    """
+
+    def __init__(
+        self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: Origin
+    ) -> None:
+        self._system, self._flavour, self._rates, self._origin = system, flavour, rates, origin
+        self._needed = parameters.needed(flavour, our_system)
+        self._connected = False
+        self._found: dict[str, float] = {}
+        self._asked: set[str] = set()
+        self._has_origin = False
+        self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
+
+    @property
+    def problems(self) -> list[str]:
+        """Return what is wrong with the parameters that were read."""
+        found = self._found
+        return [text for n in self._needed if n.name in found and (text := parameters.difference(n, found))]
+
+    @property
+    def unread(self) -> list[str]:
+        """Return the parameters that were not read yet."""
+        return [n.name for n in self._needed if n.name not in self._found]
+
+    def detail(self, requests: Requests) -> str:
+        """Return what is still missing, or ""."""
+        if not self._connected:
+            return "waiting for its heartbeat"
+        missing = [kind for kind in self._rates if self._key(kind) not in requests.accepted]
+        if missing:
+            return f"asking for {missing[0].__name__}"
+        if self.unread:
+            return f"reading parameter {self.unread[0]}"
+        if self.problems:
+            return f"parameter {self.problems[0]}: groundstation mavlink setup --apply"
+        return "" if self._has_origin else "waiting for the origin to be taken"
+
+    def hear_parameter(self, message: service.ParamValue) -> None:
+        """Take a parameter's value; raises WireError."""
+        names = {n.name for n in self._needed}
+        if message.param_id in names:
+            value = value_from_carried(self._flavour, message.param_value, message.param_type)
+            self._found[message.param_id] = value
+
+    def hear_origin(self) -> None:
+        """Note that the origin is set."""
+        self._has_origin = True
+
+    def step(self, now_ns: int, silence_ns: int, requests: Requests) -> list[Message]:
+        """Return what to send now, commands excepted: those are asked through `requests`."""
+        messages: list[Message] = []
+        if now_ns >= self._next_heartbeat_ns:
+            self._next_heartbeat_ns = now_ns + _HEARTBEAT_NS
+            messages.append(telemetry.Heartbeat(6, 8, 0, 0, 4))
+        if silence_ns > _DISCONNECTED_NS:
+            if self._connected:
+                self._connected, self._has_origin = False, False
+                self._found.clear()
+                requests.forget()
+            return messages
+        self._connected = True
+        for kind, rate_hz in self._rates.items():
+            if (key := self._key(kind)) not in requests.accepted:
+                requests.ask(now_ns, key, Command.SET_MESSAGE_INTERVAL, float(id_of(kind)), 1e6 / rate_hz)
+                break
+        return messages + self._service(now_ns)
+
+    def _service(self, now_ns: int) -> list[Message]:
+        messages: list[Message] = []
+        if not self._has_origin and now_ns >= self._next_origin_ns:
+            self._next_origin_ns = now_ns + _ORIGIN_PERIOD_NS
+            o = self._origin
+            degrees = (round(o.latitude_deg * 1e7), round(o.longitude_deg * 1e7))
+            messages.append(service.SetGpsGlobalOrigin(self._system, *degrees, round(o.altitude_m * 1000)))
+        unread = self.unread
+        if unread and (now_ns >= self._next_param_ns or self._asked.isdisjoint(unread)):
+            self._next_param_ns = now_ns + _PARAM_PERIOD_NS
+            # A burst at a time, so that a slow radio is not flooded; answers bring the next one forward.
+            messages += [service.ParamRequestRead(self._system, 1, name, -1) for name in unread[:_PARAM_BURST]]
+            self._asked = set(unread[:_PARAM_BURST])
+        return messages
+
+    @staticmethod
+    def _key(kind: type[Message]) -> str:
+        return f"stream {kind.__name__}"

@@ -1,0 +1,136 @@
+"""What the MAVLink driver is told; the composition root fills it from the field file."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from drivers.authority import AuthorityLimits
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Port = Annotated[int, Field(ge=1, le=65535)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Limits(_Section):
+    """What the vehicle is never asked to exceed."""
+
+    max_speed_m_s: Positive = 0.6
+    max_climb_m_s: Annotated[float, Field(gt=0, le=2)] = 0.4
+    max_yaw_rate_deg_s: Annotated[float, Field(gt=0, le=350)] = 60.0
+    battery_min: Annotated[float, Field(ge=0, le=1)] = 0.15
+    battery_hold_s: NotNegative = 3.0
+
+    @property
+    def max_yaw_rate_rad_s(self) -> float:
+        """Return the largest turn rate [rad/s]."""
+        return math.radians(self.max_yaw_rate_deg_s)
+
+
+class Safety(_Section):
+    """How long silence is borne; setpoint_lifetime_ms caps the lifetime that a setpoint may claim."""
+
+    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
+    land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
+    unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
+
+
+class Vision(_Section):
+    """What of the tracker's estimate is fed back to the autopilot, and what its loss does.
+
+    rate_hz: of the messages; max_std_m: a worse known position is none; max_age_s: an estimate that no camera has
+    confirmed for so long is none; velocity_std_m_s: what the autopilot is told of a fed velocity.
+    """
+
+    rate_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
+    max_std_m: Positive = 0.4
+    max_age_s: Positive = 1.0
+    hover_after_s: Positive = 0.5
+    land_after_s: Positive = 2.0
+    jump_m: Positive = 0.3
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.land_after_s <= self.hover_after_s:
+            raise ValueError("land_after_s must be longer than hover_after_s")
+        return self
+
+
+class Origin(_Section):
+    """Where on Earth the estimator is told to be; any place will do indoors."""
+
+    latitude_deg: Annotated[float, Field(ge=-85, le=85)] = 47.397742
+    longitude_deg: Annotated[float, Field(ge=-180, le=180)] = 8.545594
+    altitude_m: Annotated[float, Field(ge=-500, le=9000)] = 488.0
+
+
+class LinkSettings(_Section):
+    """How a port is reached.
+
+    target: `udpout:ADDRESS:PORT` speaks first; `udpin:ADDRESS:PORT` waits there, for many vehicles at once;
+    `serial:DEVICE:BAUD`. key_file: 32 bytes, raw or as 64 hex digits; then only signed frames count (pymavlink alone).
+    """
+
+    kind: Literal["pymavlink", "mavsdk"] = "pymavlink"
+    target: Annotated[str, Field(pattern=r"^(udpout|udpin|serial):[^:]+:\d+$")]
+    system_id: Annotated[int, Field(ge=1, le=255)] = 255
+    component_id: Annotated[int, Field(ge=1, le=255)] = 190
+    key_file: str = ""
+
+    @model_validator(mode="after")
+    def _signable(self) -> Self:
+        if self.key_file and self.kind == "mavsdk":
+            raise ValueError("MAVSDK cannot sign: use link: pymavlink for a signed link")
+        if self.target.startswith("serial") and self.kind == "mavsdk" and self.key_file:
+            raise ValueError("a signed serial link needs link: pymavlink")
+        return self
+
+
+class VehicleSettings(_Section):
+    """One vehicle on the link: who it is, where it stands before take-off [world], what it may do."""
+
+    name: Name
+    system_id: Annotated[int, Field(ge=1, le=250)]
+    flavour: Literal["px4", "ardupilot"]
+    pad_m: tuple[float, float] = (0.0, 0.0)
+    pad_yaw_rad: float = 0.0
+    limits: Limits = Limits()
+    take_off_m: Annotated[float, Field(ge=0.4, le=3)] = 0.8
+    odometry_hz: Annotated[float, Field(gt=0, le=100)] = 50.0
+    imu_hz: Annotated[float, Field(ge=0, le=200)] = 100.0
+    setpoint_hz: Annotated[float, Field(ge=5, le=50)] = 20.0
+    velocity_std_m_s: Positive = 0.15
+
+
+class MavlinkDriverSettings(_Section):
+    """One port and the vehicles behind it."""
+
+    link: LinkSettings
+    vehicles: Annotated[tuple[VehicleSettings, ...], Field(min_length=1)]
+    safety: Safety = Safety()
+    vision: Vision = Vision()
+    origin: Origin = Origin()
+    raw_datagrams: bool = True
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        for what in ("name", "system_id"):
+            values = [getattr(vehicle, what) for vehicle in self.vehicles]
+            if len(set(values)) < len(values):
+                raise ValueError(f"two vehicles on {self.link.target} have the same {what}")
+        return self
+
+    def authority(self, vehicle: VehicleSettings) -> AuthorityLimits:
+        """Return the limits of one vehicle's watchdog."""
+        return AuthorityLimits(
+            hover_after_s=self.safety.setpoint_lifetime_ms / 1000,
+            land_after_s=self.safety.land_after_s,
+            unseen_land_after_s=self.safety.unseen_land_after_s,
+            battery_min=vehicle.limits.battery_min,
+            battery_hold_s=vehicle.limits.battery_hold_s,
+        )

@@ -1,0 +1,251 @@
+"""One MAVLink vehicle: what it says, and what a decision of the watchdog means to it; `drivers.base.Vehicle`."""
+
+from collections import Counter, deque
+from dataclasses import dataclass, replace
+
+from drivers.authority import Decision, VehicleView
+from drivers.base import Health
+from drivers.datagrams import DatagramLog
+from drivers.mavlink import convert
+from drivers.mavlink.convert import Attitude
+from drivers.mavlink.link import Heard, Link
+from drivers.mavlink.orders import Orders
+from drivers.mavlink.publisher import MotionPublisher
+from drivers.mavlink.requests import Requests
+from drivers.mavlink.session import Session, streams
+from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
+from drivers.mavlink.traffic import Traffic
+from drivers.mavlink.vision import VisionFeed
+from drivers.mavlink.wire import flight, service, telemetry
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, Sensor
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Estimate, FlightState, Vector3
+
+_FRESH_NS = 300_000_000
+_HEARTBEAT_NS = 3_000_000_000
+_FAULTS = Sensor.GYRO | Sensor.ACCELEROMETER
+_FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
+
+
+@dataclass(frozen=True, slots=True)
+class Telemetry:
+    """The newest word of the vehicle; times 0: never. moved_ns is of the last velocity."""
+
+    heard_ns: int = 0
+    moved_ns: int = 0
+    heartbeat_ns: int = 0
+    base_mode: int = 0
+    custom_mode: int = 0
+    status: int = 0
+    landed: int = 0
+    healthy: int = 0
+    ekf: int = 0
+    battery: float | None = None
+    attitude: Attitude | None = None
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    position_m: Vector3 | None = None
+
+
+class MavlinkVehicle:
+    """The reader thread calls `hear` and replaces `telemetry` as a whole; everything else is the sender loop's."""
+
+    def __init__(self, settings: MavlinkDriverSettings, vehicle: VehicleSettings, link: Link, bus: Bus) -> None:
+        self.name, self.address = vehicle.name, settings.link.target
+        self.system = vehicle.system_id
+        self.telemetry = Telemetry()
+        self.flavour = _FLAVOURS[vehicle.flavour]
+        self.texts: deque[tuple[int, str]] = deque(maxlen=32)
+        self.log = DatagramLog(bus, vehicle.name, settings.raw_datagrams)
+        self._settings, self._link = settings, link
+        self._publisher = MotionPublisher(vehicle, bus)
+        self._requests = Requests(self.system)
+        self._acks: deque[flight.CommandAck] = deque(maxlen=64)
+        self._values: deque[service.ParamValue | telemetry.GpsGlobalOrigin] = deque(maxlen=256)
+        rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
+        self._session = Session(self.system, self.flavour, rates, settings.link.system_id, settings.origin)
+        pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
+        self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
+        self.orders = Orders(vehicle, self.flavour, settings.vision, self._requests)
+        self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
+        self._next_vision_ns = 0
+        self._traffic = Traffic()
+        self._refused: Counter[str] = Counter()
+
+    # -- reader thread ------------------------------------------------------------------------------------------------
+
+    def hear(self, heard: Heard) -> None:
+        """Take a frame of this vehicle; what cannot be used is counted."""
+        self._traffic.count(heard.stamp_ns, heard.frame.component, heard.frame.sequence)
+        if heard.frame.component != 1 or heard.frame.message is None:
+            return
+        try:
+            self._take(heard.stamp_ns, heard.frame.message)
+        except WireError as error:
+            self._refused[error.reason] += 1
+
+    def _take(self, now_ns: int, message: tuple[object, ...]) -> None:
+        known = replace(self.telemetry, heard_ns=now_ns)
+        match message:
+            case telemetry.LocalPositionNed():
+                known = self._moved(now_ns, message, known)
+            case telemetry.AttitudeQuaternion():
+                attitude = convert.attitude_from_quaternion(message)
+                self._publisher.attitude(now_ns, attitude)
+                known = replace(known, attitude=attitude)
+            case telemetry.HighresImu():
+                self._publisher.imu(now_ns, *convert.imu_from_highres(message), known.attitude)
+            case telemetry.RawImu():
+                self._publisher.imu(now_ns, *convert.imu_from_raw(message), known.attitude)
+            case telemetry.Heartbeat():
+                mode = (message.base_mode, message.custom_mode, message.system_status)
+                known = replace(known, heartbeat_ns=now_ns, base_mode=mode[0], custom_mode=mode[1], status=mode[2])
+                if message.autopilot != self.flavour:
+                    raise WireError(
+                        "wrong_flavour", f"autopilot {message.autopilot}, the field says {self.flavour.name}"
+                    )
+            case _:
+                known = self._take_rare(now_ns, message, known)
+        self.telemetry = known
+
+    def _moved(self, now_ns: int, message: telemetry.LocalPositionNed, known: Telemetry) -> Telemetry:
+        if known.attitude is None:
+            return known
+        velocity = convert.velocity_from_local(message, known.attitude)
+        position = convert.position_from_local(message)
+        self._publisher.velocity(now_ns, velocity, known.attitude)
+        return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
+
+    def _take_rare(self, now_ns: int, message: tuple[object, ...], known: Telemetry) -> Telemetry:
+        match message:
+            case telemetry.ExtendedSysState():
+                return replace(known, landed=message.landed_state)
+            case telemetry.SysStatus():
+                return replace(
+                    known,
+                    healthy=message.onboard_control_sensors_health,
+                    battery=_share(message.battery_remaining, known.battery),
+                )
+            case telemetry.BatteryStatus():
+                return replace(known, battery=_share(message.battery_remaining, known.battery))
+            case telemetry.EkfStatusReport():
+                return replace(known, ekf=message.flags)
+            case telemetry.Statustext():
+                self.texts.append((message.severity, message.text))
+            case flight.CommandAck():
+                self._acks.append(message)
+            case service.ParamValue() | telemetry.GpsGlobalOrigin():
+                self._values.append(message)
+            case service.Timesync() if message.tc1 == 0:
+                # WIRE (mavlink.md 5.6): without answers PX4 does not accept the times of our poses.
+                self._link.send(self.system, service.Timesync(clock.now_ns(), message.ts1))
+        return known
+
+    # -- sender loop --------------------------------------------------------------------------------------------------
+
+    def see(self, now_ns: int, estimate: Estimate) -> None:
+        """Take the tracker's estimate."""
+        self.vision.hear(now_ns, estimate)
+
+    def view(self, now_ns: int) -> VehicleView:
+        """Return what the vehicle last said."""
+        known = self.telemetry
+        fresh = self._is_heard(now_ns, known)
+        state = convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
+        if not known.heartbeat_ns or not known.landed:
+            state = FlightState.UNKNOWN
+        elif state is FlightState.FLYING and convert.is_still(known.velocity_m_s):
+            state = FlightState.HOVERING
+        elif state is FlightState.LANDED and self.orders.starting:
+            state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
+        return VehicleView(state, fresh, known.battery, self._not_ready(now_ns, known))
+
+    def _is_heard(self, now_ns: int, known: Telemetry) -> bool:
+        # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.
+        newest = known.moved_ns if known.landed != 1 else known.heard_ns
+        return known.heartbeat_ns > 0 and now_ns - newest < _FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
+
+    def _not_ready(self, now_ns: int, known: Telemetry) -> str:
+        detail = self._session.detail(self._requests)
+        if detail:
+            return detail
+        if now_ns - known.moved_ns > _FRESH_NS:
+            return "it has no position yet"
+        if known.healthy & _FAULTS != _FAULTS:
+            return "its gyros or accelerometers are not healthy"
+        if self.flavour is Flavour.PX4:
+            # WIRE (mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD arming works.
+            return ""
+        if not known.ekf & EkfFlag.POS_HORIZ_REL:
+            return "its estimator has no position yet"
+        return "" if known.healthy & Sensor.PREARM_CHECK else self._arming_reason()
+
+    def _arming_reason(self) -> str:
+        said = [text for _, text in self.orders.said if "arm" in text.lower()]
+        return f"it does not want to arm{': ' + said[-1] if said else ''}"
+
+    def apply(self, now_ns: int, decision: Decision) -> None:
+        """Tell the vehicle what the decision means to it, feed its estimator, and ask what is still unknown."""
+        known = self.telemetry
+        self._take_answers(now_ns)
+        silence_ns = now_ns - known.heartbeat_ns if known.heartbeat_ns else 1 << 62
+        messages = self._session.step(now_ns, silence_ns, self._requests)
+        messages += self._feed(now_ns, known)
+        height = known.position_m[2] if known.position_m else 0.0
+        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, known.landed, height,
+                                    self.vision.lost_s(now_ns))  # fmt: skip
+        messages += self._requests.due(now_ns)
+        if setpoint is not None:
+            messages.append(setpoint)
+        for message in messages:
+            self._link.send(self.system, message)
+
+    def _take_answers(self, now_ns: int) -> None:
+        while self._acks:
+            self._requests.answer(now_ns, self._acks.popleft())
+        while self._values:
+            value = self._values.popleft()
+            try:
+                if isinstance(value, service.ParamValue):
+                    self._session.hear_parameter(value)
+                else:
+                    self._session.hear_origin()
+            except WireError as error:
+                self._refused[error.reason] += 1
+        while self.texts:
+            said = self.texts.popleft()
+            self.orders.said.append(said)
+            self.orders.events.append(said)
+        while self._requests.failures:
+            self.orders.events.append((4, f"{self._requests.failures.popleft()}{self.orders.last_words()}"))
+
+    def _feed(self, now_ns: int, known: Telemetry) -> list[tuple[object, ...]]:
+        if now_ns < self._next_vision_ns or known.attitude is None:
+            return []
+        self._next_vision_ns = max(self._next_vision_ns + self._vision_period_ns, now_ns)
+        aloft = bool(known.base_mode & ARMED) and known.landed != 1
+        pose = self.vision.pose(now_ns, aloft)
+        if pose is None:
+            return []
+        if self.flavour is Flavour.PX4:
+            return [convert.odometry_from_pose(pose, known.attitude, self.vision.resets)]
+        return [convert.vision_from_pose(pose, known.attitude, self.vision.resets)]
+
+    def health(self, now_ns: int) -> Health:
+        """Return rates, losses and refusals; those of the link are shared by all vehicles on it."""
+        rate_hz, quality = self._traffic.rates(now_ns)
+        detail = self.orders.detail or self._session.detail(self._requests)
+        return Health(quality, rate_hz, dict(self._link.rejected + self._refused), detail)
+
+    def flush(self) -> None:
+        """Publish the raw datagrams that wait."""
+        self.log.flush()
+
+    def close(self) -> None:
+        """Nothing to do: the link is the driver's."""
+
+
+def _share(percent: int, before: float | None) -> float | None:
+    # WIRE: -1 means unknown; a vehicle that knew once has not forgotten.
+    return min(percent, 100) / 100 if percent >= 0 else before

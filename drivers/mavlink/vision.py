@@ -1,0 +1,92 @@
+"""What the tracker believes of a vehicle, fed back to its autopilot; and how long it has had nothing to feed. Pure.
+
+Before take-off no camera's word counts (landed robots are not in the belief): the pad of the field file is fed instead.
+An estimate that no camera has confirmed for a while is not fed: it would be the autopilot's own dead reckoning.
+"""
+
+import math
+from dataclasses import replace
+
+from drivers.mavlink.convert import Pose
+from drivers.mavlink.settings import Vision
+from groundstation.bus.clock import NS_PER_S
+from groundstation.bus.messages import EntityEstimate, Estimate
+from groundstation.geometry.angles import difference
+
+_FRESH_NS = 300_000_000
+_JUMP_RAD = math.radians(15.0)
+_STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
+# After lift-off cameras need a while to find it; autopilots coast for 4.8 s and more (mavlink.md 1.1, 2).
+_FIRST_SIGHT_NS = 4 * NS_PER_S
+
+
+class VisionFeed:
+    """The poses for one vehicle. resets: rises at each jump, as the autopilots want it told."""
+
+    def __init__(self, name: str, clock: str, vision: Vision, pad_m: tuple[float, float], pad_yaw_rad: float) -> None:
+        self.resets = 0
+        self._name, self._clock, self._vision = name, clock, vision
+        self._standing = Pose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
+        self._last: Pose | None = None
+        self._newest: Pose | None = None
+        self._epoch: int | None = None
+        self._good_ns: int | None = None
+        self._aloft_ns: int | None = None
+
+    def hear(self, now_ns: int, estimate: Estimate) -> None:
+        """Take the tracker's estimate."""
+        for entity in estimate.entities:
+            if entity.name == self._name:
+                break
+        else:
+            return
+        if estimate.epoch != self._epoch:
+            self._epoch, self._last = estimate.epoch, None
+            self.resets += 1
+        if len(entity.mean) < 4 or len(entity.velocity_m_s) < 3 or len(entity.covariance) != 16:
+            return
+        header = estimate.header
+        stamp_ns = header.stamp_ns if header.clock == self._clock and header.stamp_ns <= now_ns else now_ns
+        if self._is_good(entity):
+            x, y, z, yaw = entity.mean[:4]
+            variances = (entity.covariance[0], entity.covariance[5], entity.covariance[10], entity.covariance[15])
+            vx, vy, vz = entity.velocity_m_s[:3]
+            self._newest = Pose(stamp_ns, (x, y, z), yaw, variances, (vx, vy, vz))
+            self._good_ns = stamp_ns
+
+    def _is_good(self, entity: EntityEstimate) -> bool:
+        worst = max(entity.covariance[0], entity.covariance[5], entity.covariance[10])
+        return entity.converged and worst <= self._vision.max_std_m**2 and entity.age_s <= self._vision.max_age_s
+
+    def pose(self, now_ns: int, aloft: bool) -> Pose | None:
+        """Return what to feed now, or None; aloft: the vehicle says it flies."""
+        if not aloft:
+            self._aloft_ns = None
+            pose: Pose | None = replace(self._standing, stamp_ns=now_ns)
+        else:
+            if self._aloft_ns is None:
+                self._aloft_ns, self._newest, self._good_ns = now_ns, None, None
+            pose = self._newest
+            if pose is None or now_ns - pose.stamp_ns > _FRESH_NS:
+                return None
+            # Where it will stand once it has landed.
+            self._standing = replace(pose, position_m=(*pose.position_m[:2], 0.0), variances=_STANDING_VARIANCES)
+        assert pose is not None
+        if self._last is not None and self._jumps(self._last, pose):
+            self.resets += 1
+        self._last = pose
+        return pose
+
+    def _jumps(self, before: Pose, now: Pose) -> bool:
+        # A pose further off than the vehicle can have flown since.
+        elapsed_s = (now.stamp_ns - before.stamp_ns) / NS_PER_S
+        allowed_m = self._vision.jump_m + 2.0 * elapsed_s
+        turned = abs(difference(now.yaw_rad, before.yaw_rad))
+        return math.dist(before.position_m, now.position_m) > allowed_m or turned > _JUMP_RAD + 2.0 * elapsed_s
+
+    def lost_s(self, now_ns: int) -> float:
+        """Return for how long a flying vehicle has been without a position from us."""
+        if self._aloft_ns is None:
+            return 0.0
+        since_ns = self._good_ns if self._good_ns is not None else self._aloft_ns + _FIRST_SIGHT_NS
+        return max(0.0, (now_ns - since_ns) / NS_PER_S)

@@ -1,0 +1,1 @@
+"""MAVLink 2 frames and the messages we know, as values; pymavlink's dialect is the codec."""

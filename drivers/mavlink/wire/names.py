@@ -1,0 +1,156 @@
+"""Numbers of the protocol that this project uses, by name."""
+
+from enum import IntEnum, IntFlag
+
+# SET_POSITION_TARGET_LOCAL_NED.type_mask: obey velocity and yaw rate, ignore all else (mavlink.md 5.1).
+VELOCITY_AND_YAW_RATE = 0x5C7
+VELOCITY_AND_YAW = 0x9C7
+VELOCITY_ONLY = 0xDC7
+ARMED = 128
+CUSTOM_MODE_ENABLED = 1
+FORCE = 21196.0
+GCS_TYPE, GCS_AUTOPILOT = 6, 8
+QUADROTOR = 2
+ESTIMATOR_VISION = 2
+
+
+class Flavour(IntEnum):
+    """MAV_AUTOPILOT of the two that are flown."""
+
+    ARDUPILOT = 3
+    PX4 = 12
+
+
+class Frame(IntEnum):
+    """MAV_FRAME."""
+
+    LOCAL_NED = 1
+    LOCAL_OFFSET_NED = 7
+    BODY_NED = 8
+    BODY_OFFSET_NED = 9
+    BODY_FRD = 12
+    LOCAL_FRD = 20
+
+
+class Command(IntEnum):
+    """MAV_CMD."""
+
+    NAV_RETURN_TO_LAUNCH = 20
+    NAV_LAND = 21
+    NAV_TAKEOFF = 22
+    DO_SET_MODE = 176
+    DO_SET_HOME = 179
+    PREFLIGHT_REBOOT = 246
+    COMPONENT_ARM_DISARM = 400
+    GET_HOME_POSITION = 410
+    SET_MESSAGE_INTERVAL = 511
+    REQUEST_MESSAGE = 512
+    REQUEST_AUTOPILOT_CAPABILITIES = 520
+
+
+class Result(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+
+
+class Landed(IntEnum):
+    """MAV_LANDED_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKE_OFF = 3
+    LANDING = 4
+
+
+class Sensor(IntFlag):
+    """MAV_SYS_STATUS_SENSOR."""
+
+    GYRO = 0x1
+    ACCELEROMETER = 0x2
+    MAGNETOMETER = 0x4
+    VISION_POSITION = 0x80
+    PREARM_CHECK = 0x10000000
+
+
+class EkfFlag(IntFlag):
+    """ESTIMATOR_STATUS_FLAGS as ArduPilot reports them."""
+
+    ATTITUDE = 1
+    VELOCITY_HORIZ = 2
+    VELOCITY_VERT = 4
+    POS_HORIZ_REL = 8
+    POS_HORIZ_ABS = 16
+    POS_VERT_ABS = 32
+    CONST_POS_MODE = 128
+    PRED_POS_HORIZ_REL = 256
+    PRED_POS_HORIZ_ABS = 512
+
+
+class Px4Main(IntEnum):
+    """PX4 main modes; custom_mode = main << 16 | sub << 24."""
+
+    MANUAL = 1
+    ALTITUDE = 2
+    POSITION = 3
+    AUTO = 4
+    OFFBOARD = 6
+    STABILIZED = 7
+
+
+class Px4Auto(IntEnum):
+    """Sub-modes of AUTO."""
+
+    TAKE_OFF = 2
+    HOLD = 3
+    MISSION = 4
+    RETURN = 5
+    LAND = 6
+
+
+class Copter(IntEnum):
+    """ArduCopter's custom_mode."""
+
+    STABILIZE = 0
+    ALT_HOLD = 2
+    AUTO = 3
+    GUIDED = 4
+    LOITER = 5
+    RTL = 6
+    LAND = 9
+    POSHOLD = 16
+    BRAKE = 17
+    GUIDED_NOGPS = 20
+
+
+def px4_mode(main: int, sub: int = 0) -> int:
+    """Return PX4's custom_mode."""
+    return main << 16 | sub << 24
+
+
+def guided_mode(flavour: Flavour) -> int:
+    """Return the custom_mode in which set-points are obeyed."""
+    return px4_mode(Px4Main.OFFBOARD) if flavour is Flavour.PX4 else Copter.GUIDED
+
+
+def land_mode(flavour: Flavour) -> int:
+    """Return the custom_mode in which it lands by itself."""
+    return px4_mode(Px4Main.AUTO, Px4Auto.LAND) if flavour is Flavour.PX4 else Copter.LAND
+
+
+def mode_name(flavour: Flavour, custom_mode: int) -> str:
+    """Return a mode in words."""
+    try:
+        if flavour is Flavour.ARDUPILOT:
+            return Copter(custom_mode).name
+        main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
+        name = Px4Main(main).name
+        return f"AUTO.{Px4Auto(sub).name}" if main == Px4Main.AUTO else name
+    except ValueError:
+        return f"mode {custom_mode:#x}"

@@ -1,0 +1,27 @@
+"""How parameters travel: PX4 puts the bits of an integer into the float, ArduPilot its value (mavlink.md 5.4)."""
+
+import math
+import struct
+
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.names import Flavour
+
+INT32, REAL32 = 6, 9
+_INTEGERS = range(1, 9)  # MAV_PARAM_TYPE UINT8 .. INT64
+
+
+def carried_from_value(flavour: Flavour, value: float, kind: int) -> float:
+    """Return what to put into param_value."""
+    if flavour is Flavour.PX4 and kind in _INTEGERS:
+        carried: float = struct.unpack("<f", struct.pack("<i", round(value)))[0]
+        return carried
+    return float(value)
+
+
+def value_from_carried(flavour: Flavour, carried: float, kind: int) -> float:
+    """Return the value in a param_value; raises WireError when it is no number."""
+    if flavour is Flavour.PX4 and kind in _INTEGERS:
+        return float(struct.unpack("<i", struct.pack("<f", carried))[0])
+    if not math.isfinite(carried):
+        raise WireError("not_finite", "parameter")
+    return float(carried)

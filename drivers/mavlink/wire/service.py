@@ -1,0 +1,117 @@
+"""Parameters, clocks, origin and the small services around a flight, in the order of the dialect."""
+
+from typing import NamedTuple
+
+
+class ParamRequestRead(NamedTuple):
+    """Ask for one parameter, by name where the index is -1."""
+
+    target_system: int
+    target_component: int
+    param_id: str
+    param_index: int
+
+
+class ParamRequestList(NamedTuple):
+    """Ask for all parameters."""
+
+    target_system: int
+    target_component: int
+
+
+class ParamSet(NamedTuple):
+    """Write a parameter; WIRE (mavlink.md 5.4): PX4 carries integers bytewise, ArduPilot as a float of the value."""
+
+    target_system: int
+    target_component: int
+    param_id: str
+    param_value: float
+    param_type: int
+
+
+class ParamValue(NamedTuple):
+    """A parameter as it is now."""
+
+    param_id: str
+    param_value: float
+    param_type: int
+    param_count: int
+    param_index: int
+
+
+class Timesync(NamedTuple):
+    """tc1 0: a request sent at ts1 [ns]; else the answer: own time tc1, the request's ts1."""
+
+    tc1: int
+    ts1: int
+
+
+class SystemTime(NamedTuple):
+    """UNIX and boot time."""
+
+    time_unix_usec: int
+    time_boot_ms: int
+
+
+class Ping(NamedTuple):
+    """target 0/0: a request; else the answer to it."""
+
+    time_usec: int
+    seq: int
+    target_system: int
+    target_component: int
+
+
+class SetGpsGlobalOrigin(NamedTuple):
+    """Where on Earth the local origin shall lie: degrees x 1e7, mm."""
+
+    target_system: int
+    latitude: int
+    longitude: int
+    altitude: int
+    time_usec: int = 0
+
+
+class RequestDataStream(NamedTuple):
+    """The old way to ask for rates (MAVProxy, dronekit)."""
+
+    target_system: int
+    target_component: int
+    req_stream_id: int
+    req_message_rate: int
+    start_stop: int
+
+
+class MissionRequestList(NamedTuple):
+    """Ask how many mission items there are."""
+
+    target_system: int
+    target_component: int
+    mission_type: int = 0
+
+
+class MissionCount(NamedTuple):
+    """How many mission items there are."""
+
+    target_system: int
+    target_component: int
+    count: int  # type: ignore[assignment]
+    mission_type: int = 0
+
+
+class FileTransferProtocol(NamedTuple):
+    """A step of MAVLink FTP."""
+
+    target_network: int
+    target_system: int
+    target_component: int
+    payload: tuple[int, ...]
+
+
+class SetupSigning(NamedTuple):
+    """Hand over a signing key; WIRE (mavlink.md 5.9): in clear, so over a wire only."""
+
+    target_system: int
+    target_component: int
+    secret_key: tuple[int, ...]
+    initial_timestamp: int

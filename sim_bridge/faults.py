@@ -1,12 +1,14 @@
 """Faults of a scenario: what breaks when, and what heals."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from groundstation.errors import SettingsError
 from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.scenario import Fault, FaultKind
 from sim_bridge.world.world import World
 
+Emulator = ArDroneEmulator | MavlinkEmulator
 CAMERA_FAULTS = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL})
 
 
@@ -25,7 +27,7 @@ def check_faults(faults: Iterable[Fault], drones: Iterable[str], cameras: Iterab
 class FaultSchedule:
     """Applies the faults of drones as time passes; those of cameras are handed to the render processes."""
 
-    def __init__(self, faults: Iterable[Fault], world: World, emulators: dict[str, ArDroneEmulator]) -> None:
+    def __init__(self, faults: Iterable[Fault], world: World, emulators: Mapping[str, Emulator]) -> None:
         self._world, self._emulators = world, emulators
         edges = []
         for fault in faults:

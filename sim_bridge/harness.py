@@ -12,6 +12,8 @@ from groundstation.process.child import Child
 from sim_bridge.cameras import Cameras, render_specs
 from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.order import Order
 from sim_bridge.truth import TruthBoard, remove_stale_boards
@@ -29,7 +31,7 @@ class Harness:
     def __init__(self, child: Child, order: Order) -> None:
         self._child, self._order = child, order
         self.world = World(order.site, order.scenario, order.seed)
-        self.emulators: dict[str, ArDroneEmulator] = {}
+        self.emulators: dict[str, ArDroneEmulator | MavlinkEmulator] = {}
         self._board: TruthBoard | None = None
         self._cameras: Cameras | None = None
         self._poll = select.poll()
@@ -101,9 +103,15 @@ class Harness:
             self._board = None
 
     def _open_emulators(self) -> None:
-        for name, drone in self.world.drones.items():
-            address = self._order.addresses[name]
-            rate_hz = self._order.scenario.drones.navdata_hz
+        order = self._order
+        for name, copter in self.world.copters.items():
+            vehicle = open_vehicle(name, order.site.drones[name], copter, order)
+            self.emulators[name] = vehicle
+            self._poll.register(vehicle.socket, select.POLLIN)
+            self._readers[vehicle.socket.fileno()] = vehicle.receive
+        for name, drone in self.world.ardrones.items():
+            address = order.addresses[name]
+            rate_hz = order.scenario.drones.navdata_hz
             emulator = ArDroneEmulator(name, address, drone, self.world.onboard[name], rate_hz)
             self.emulators[name] = emulator
             for udp, reader in (

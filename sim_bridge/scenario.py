@@ -82,6 +82,20 @@ class DroneScenario(_Section):
     downwash: bool = True
 
 
+class CopterScenario(_Section):
+    """Every emulated MAVLink vehicle: errors of its inertial sensors, battery, unrest of the air.
+
+    configured: it comes with the parameters that indoor flight needs, not with the factory's.
+    """
+
+    configured: bool = True
+    attitude_noise_deg: Annotated[float, Field(ge=0, le=5)] = 0.3
+    gyro_bias_deg_s: Annotated[float, Field(ge=0, le=5)] = 0.05
+    battery: Annotated[tuple[Share, Share], AfterValidator(_rising)] = (0.85, 1.0)
+    battery_drain_per_min: Annotated[float, Field(ge=0, le=10)] = 0.05
+    air_unrest_m_s2: Annotated[float, Field(ge=0, le=5)] = 0.08
+
+
 class CameraScenario(_Section):
     """Every emulated camera: its stream and the errors of its picture.
 
@@ -136,6 +150,7 @@ class Scenario(_Section):
     seed: Annotated[int, Field(ge=0)] = 1
     target: TargetScenario = TargetScenario()
     drones: DroneScenario = DroneScenario()
+    mavlink: CopterScenario = CopterScenario()
     cameras: CameraScenario = CameraScenario()
     faults: tuple[Fault, ...] = ()
 

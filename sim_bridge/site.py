@@ -52,10 +52,21 @@ class OnboardCamera(_Part):
     pan_left_deg: float = 0.0
 
 
+class MavlinkIdentity(_Part):
+    """Who a MAVLink vehicle is, and the port that it listens on or calls."""
+
+    flavour: Literal["px4", "ardupilot"]
+    system_id: int
+    port: int = 14550
+    listen: bool = False
+    local_address: str = "127.0.0.1"
+
+
 class SiteDrone(_Part):
     """One drone: kind, place and heading of its pad, what it carries."""
 
-    kind: Literal["ardrone"]
+    kind: Literal["ardrone", "mavlink"]
+    mavlink: MavlinkIdentity | None = None
     pad_m: tuple[float, float]
     pad_yaw_deg: float = 0.0
     marker: Marker

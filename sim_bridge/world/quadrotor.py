@@ -1,22 +1,14 @@
 """One AR.Drone in the room: airframe, autopilot, battery, and the air that pushes it."""
 
-import math
-
 import numpy as np
 
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import Airframe
 from sim_bridge.world.autopilot import Autopilot
 from sim_bridge.world.noise import GaussMarkov, standard_normals
+from sim_bridge.world.wake import wake_between
 
 _UNREST_CORRELATION_S = 0.8
-
-# A modest wake: momentum theory gives 7.5 m/s under an AR.Drone, and forces of several do not add linearly.
-_WAKE_RADIUS_M = 0.3
-_WAKE_REACH_M = 0.5
-_WAKE_DOWN_M_S2 = 1.2
-_WAKE_OUT_M_S2 = 0.6
-_WAKE_NEAR_M = 1.2
 
 
 class Quadrotor:
@@ -55,11 +47,4 @@ class Quadrotor:
 
     def wake_on(self, other: Airframe) -> tuple[float, float, float] | None:
         """Return how this drone's downwash accelerates another one below it, None when out of its reach."""
-        body = self.airframe
-        dx, dy, below = other.x - body.x, other.y - body.y, body.z - other.z
-        if body.on_ground or below < 0.1 or abs(dx) > _WAKE_REACH_M or abs(dy) > _WAKE_REACH_M:
-            return None
-        radius = math.hypot(dx, dy) / _WAKE_RADIUS_M
-        strength = math.exp(-radius * radius) * min(1.0, _WAKE_NEAR_M / below)
-        outward = _WAKE_OUT_M_S2 * strength / _WAKE_RADIUS_M
-        return outward * dx, outward * dy, -_WAKE_DOWN_M_S2 * strength
+        return wake_between(self.airframe, other)

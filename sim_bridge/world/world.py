@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_bridge.scenario import Scenario
-from sim_bridge.site import Site
+from sim_bridge.site import MavlinkIdentity, Site, SiteDrone
 from sim_bridge.truth import WIDTH
+from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.onboard import Onboard
 from sim_bridge.world.quadrotor import Quadrotor
@@ -25,9 +26,12 @@ class World:
     def __init__(self, site: Site, scenario: Scenario, seed: int) -> None:
         self.bodies = site.bodies
         self.ticks = 0
-        self.drones: dict[str, Quadrotor] = {}
+        self.drones: dict[str, Quadrotor | Copter] = {}
         self.onboard: dict[str, Onboard] = {}
         for name, drone in site.drones.items():
+            if drone.mavlink is not None:
+                self.drones[name] = _copter(drone, drone.mavlink, scenario, generator_of(seed, name))
+                continue
             body = Quadrotor(drone.pad_m, drone.pad_yaw_rad, scenario.drones, TICK_S, generator_of(seed, name))
             self.drones[name] = body
             sensors = generator_of(seed, f"{name}/onboard")
@@ -57,7 +61,10 @@ class World:
         for name, drone in drones.items():
             drone.step(wakes.get(name, _STILL_AIR))
             drone.airframe.confine(*self._half_room)
-            self.onboard[name].step(drone, drone.autopilot.motors_on)
+            if isinstance(drone, Copter):
+                drone.estimate.step(drone.airframe, drone.motors_on)
+            else:
+                self.onboard[name].step(drone, drone.autopilot.motors_on)
         self._let_target_depart()
         self.target.step()
         self.target.confine(self._half_room[0], self._half_room[1])
@@ -76,6 +83,16 @@ class World:
             self._together_s += TICK_S
             self.target.parked = self._together_s < self._departs_after_s
 
+    @property
+    def copters(self) -> dict[str, Copter]:
+        """Return the MAVLink vehicles."""
+        return {name: drone for name, drone in self.drones.items() if isinstance(drone, Copter)}
+
+    @property
+    def ardrones(self) -> dict[str, Quadrotor]:
+        """Return the AR.Drones."""
+        return {name: drone for name, drone in self.drones.items() if isinstance(drone, Quadrotor)}
+
     def _wake(self, name: str) -> tuple[float, float, float]:
         below = self.drones[name].airframe
         if below.on_ground:
@@ -85,3 +102,8 @@ class World:
             if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
                 strongest = push  # wakes do not add
         return strongest
+
+
+def _copter(drone: SiteDrone, identity: MavlinkIdentity, scenario: Scenario, rng: np.random.Generator) -> Copter:
+    response = PX4_RESPONSE if identity.flavour == "px4" else ARDUPILOT_RESPONSE
+    return Copter(drone.pad_m, drone.pad_yaw_rad, scenario.mavlink, response, TICK_S, rng)

@@ -1,0 +1,166 @@
+"""A MAVLink vehicle at the wire: one UDP port of its own loopback address, PX4 or ArduPilot behind it."""
+
+import socket
+from collections import Counter
+from contextlib import suppress
+
+from drivers.mavlink.wire import service as s
+from drivers.mavlink.wire import telemetry as t
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, Decoder, Encoder, Frame, Message, Signing, split
+from drivers.mavlink.wire.names import Flavour
+from groundstation.errors import GroundStationError
+from sim_bridge.devices.mavlink_ardupilot import ArduCopter
+from sim_bridge.devices.mavlink_firmware import Firmware
+from sim_bridge.devices.mavlink_messages import Speaker
+from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_px4 import Px4
+from sim_bridge.devices.mavlink_services import Services
+from sim_bridge.world.copter import Copter
+from sim_bridge.world.world import TICK_NS
+
+PORT = 14550
+Address = tuple[str, int]
+_DATAGRAMS_PER_TICK = 64
+_FORGET_NS = 10_000_000_000
+_CLIENTS = 8
+_TIMESYNC_TICKS = 20
+_LIST_PER_TICK = 2
+
+
+class MavlinkEmulator:
+    """Socket and firmware around one body of the world: `receive`, a step of the world, then `send`, once per tick.
+
+    calls: an address that it speaks to without being spoken to. `silent` stops what it sends, `deaf` drops what
+    arrives (faults). signing: only rightly signed frames count, and all of ours are signed. Times are the world's.
+    """
+
+    def __init__(
+        self, name: str, address: Address, flavour: Flavour, system: int, copter: Copter, *, configured: bool = True,
+        calls: Address | None = None, video: str = "", signing: Signing | None = None,
+    ) -> None:  # fmt: skip
+        self.name = name
+        self.silent = False
+        self.deaf = False
+        self.rejected: Counter[str] = Counter()
+        parameters = Parameters(flavour, system, configured)
+        self.firmware: Firmware = (Px4 if flavour is Flavour.PX4 else ArduCopter)(copter, parameters)
+        self.speaker = Speaker(self.firmware)
+        stream = t.VideoStreamInformation(1, 1, 0, 1, 15.0, 640, 360, 0, 0, 70, name, video) if video else None
+        self.services = Services(system, self.firmware, self.speaker, stream)
+        self._encoder, self._decoder = Encoder(system, 1, signing), Decoder(signing)
+        self._calls = calls
+        self._clients: dict[Address, int] = {}
+        self._ground_ns: int | None = None
+        self._lists: dict[Address, int] = {}
+        self._ticks = 0
+        self.socket = _open(name, address)
+
+    @property
+    def now_ns(self) -> int:
+        """Return the vehicle's own time since power-on."""
+        return self._ticks * TICK_NS
+
+    def receive(self) -> None:
+        """Take all waiting datagrams."""
+        for _ in range(_DATAGRAMS_PER_TICK):
+            try:
+                data, source = self.socket.recvfrom(MAX_DATAGRAM)
+            except OSError:
+                return
+            if not self.deaf:
+                self.hear(data, source)
+
+    def hear(self, data: bytes, source: Address) -> None:
+        """Take one datagram; what is no frame, or not signed as it must be, is counted."""
+        try:
+            for raw in split(data):
+                try:
+                    frame = self._decoder.decode(raw)
+                except WireError as error:
+                    self.rejected[error.reason] += 1
+                    continue
+                self._take(frame, source)
+        except WireError as error:
+            self.rejected[error.reason] += 1
+
+    def _take(self, frame: Frame, source: Address) -> None:
+        if source not in self._clients:
+            if len(self._clients) >= _CLIENTS:
+                del self._clients[min(self._clients, key=lambda address: self._clients[address])]
+            self._clients[source] = self.now_ns
+            self._send_to(source, self.speaker.heartbeat())
+        self._clients[source] = self.now_ns
+        message = frame.message
+        if isinstance(message, t.Heartbeat) and self._is_ground(frame.system):
+            self._ground_ns = self.now_ns
+        if isinstance(message, s.ParamRequestList):
+            self._lists[source] = 0
+        for answer in self.services.take(frame, self.now_ns):
+            self._send_to(source, answer)
+
+    def _is_ground(self, system: int) -> bool:
+        mine = self.firmware.parameters.values.get("SYSID_MYGCS")
+        return mine is None or system == int(mine)
+
+    def send(self) -> None:
+        """End a tick: let the firmware watch, and send what is due."""
+        self._ticks += 1
+        now_ns = self.now_ns
+        self.speaker.boot_us = now_ns // 1000
+        silence_s = 0.0 if self._ground_ns is None else (now_ns - self._ground_ns) / 1e9
+        self.firmware.step(now_ns / 1e9, silence_s)
+        for client in [c for c, heard_ns in self._clients.items() if now_ns - heard_ns > _FORGET_NS]:
+            del self._clients[client]
+            self._lists.pop(client, None)
+        for kind, every in list(self.services.intervals.items()):
+            if self._ticks % every == 0 and (message := self.speaker.builders[kind]()) is not None:
+                self._send_to_all(message)
+        if self.firmware.flavour is Flavour.PX4 and self._ticks % _TIMESYNC_TICKS == 0:
+            self._send_to_all(s.Timesync(0, now_ns))
+        while self.firmware.texts:
+            severity, text = self.firmware.texts.popleft()
+            self._send_to_all(t.Statustext(severity, text[:50]))
+        self._send_lists()
+
+    def _send_lists(self) -> None:
+        names = self.firmware.parameters.names
+        for client, begin in list(self._lists.items()):
+            for name in names[begin : begin + _LIST_PER_TICK]:
+                self._send_to(client, self.services.parameter(name))
+            self._lists[client] = begin + _LIST_PER_TICK
+            if begin + _LIST_PER_TICK >= len(names):
+                del self._lists[client]
+
+    def _send_to_all(self, message: Message) -> None:
+        clients = list(self._clients)
+        if self._calls is not None and self._calls not in self._clients:
+            clients.append(self._calls)
+        if clients and not self.silent:
+            data = self._encoder.encode(message)
+            for client in clients:
+                with suppress(OSError):  # a full buffer or a vanished client loses packets, as radio does
+                    self.socket.sendto(data, client)
+
+    def _send_to(self, client: Address, message: Message) -> None:
+        if not self.silent:
+            with suppress(OSError):
+                self.socket.sendto(self._encoder.encode(message), client)
+
+    def close(self) -> None:
+        """Close the port."""
+        self.socket.close()
+
+
+def _open(name: str, address: Address) -> socket.socket:
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp.setblocking(False)
+    try:
+        udp.bind(address)
+    except OSError as error:
+        udp.close()
+        place = f"{address[0]}:{address[1]}"
+        raise GroundStationError(
+            f"emulated {name}: cannot listen on {place} (UDP): is another run using this address? ({error})"
+        ) from error
+    return udp

@@ -1,0 +1,135 @@
+"""ArduCopter 4.6 as far as a ground station meets it (mavlink.md 1, 5.3)."""
+
+from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
+from drivers.mavlink.wire.names import Copter as Mode
+from drivers.mavlink.wire.names import Flavour, Landed, Result
+from sim_bridge.devices.mavlink_firmware import Answer, Firmware
+from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.world.copter import Copter, Steering
+
+_SPOOL_S = 3.3
+_CLIMB_M_S = 0.5
+_REACHED_M = 0.08
+# Measured after the last pose.
+_EKF_FAILSAFE_S = 8.0
+_STOPPED_AIDING_S = 15.0
+_LEVEL = (Mode.STABILIZE, Mode.ALT_HOLD)
+_GCS_ACTIONS = frozenset({1, 3, 5, 7})
+
+
+class ArduCopter(Firmware):
+    """GUIDED obeys velocities until GUID_TIMEOUT, and stays GUIDED when it brakes."""
+
+    flavour = Flavour.ARDUPILOT
+    guided = Mode.GUIDED
+    landing = Mode.LAND
+    frames = frozenset({1, 7, 8, 9})
+    arming_refusal = Result.FAILED
+    disarmed_text = "Disarming motors"
+
+    def __init__(self, copter: Copter, parameters: Parameters) -> None:
+        super().__init__(copter, parameters, Mode.STABILIZE)
+        self._climb_to_m: float | None = None
+        self._take_off_s = 0.0
+        self._braked = True
+        self._ground_lost = self._aiding_stopped = False
+
+    def knows(self, mode: int) -> bool:
+        """Return whether a mode exists."""
+        return mode in list(Mode)
+
+    def prearm_fault(self) -> str:
+        """Return what forbids arming in any mode, or ""."""
+        fault = self.health_fault()
+        return f"PreArm: {fault.capitalize()}" if fault else ""
+
+    def arming_fault(self) -> str:
+        """Return why it does not arm now, or ""."""
+        fault = self.health_fault()
+        if fault:
+            return f"Arm: {fault.capitalize()}"
+        return "Arm: mode not armable" if self.mode in (Mode.LAND, Mode.RTL, Mode.BRAKE) else ""
+
+    def set_mode(self, mode: int) -> Answer:
+        """Change the mode; those that need a position are refused without one."""
+        needs_position = self.knows(mode) and mode not in (*_LEVEL, Mode.LAND, Mode.GUIDED_NOGPS)
+        if needs_position and not self.located:
+            self.say(4, f"Mode change to {Mode(mode).name} failed: requires position")
+            return Result.FAILED, "requires position"
+        return super().set_mode(mode)
+
+    def take_off(self, height_m: float) -> Answer:
+        """Climb: only armed, on the floor, in GUIDED."""
+        if not self.armed or self.mode != Mode.GUIDED or self.copter.airborne or not 0.1 < height_m < 100:
+            return Result.FAILED, "cannot take off now"
+        self._climb_to_m, self._take_off_s = height_m, self.now_s
+        return Result.ACCEPTED, ""
+
+    def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
+        """WIRE: an invalid frame or mask makes it stop where it is."""
+        if self.mode == Mode.GUIDED and self.copter.airborne:
+            self.copter.steer(Steering.HOLD)
+
+    def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
+        """Fly; a velocity ends a take-off, and moves nothing that stands."""
+        if self.copter.airborne:
+            self._climb_to_m = None
+            self._braked = False
+            super().obey(velocity_m_s, turn)
+
+    def enter(self, mode: int) -> None:
+        """Change the mode; a take-off belongs to GUIDED."""
+        if mode != Mode.GUIDED:
+            self._climb_to_m = None
+        super().enter(mode)
+
+    def step(self, now_s: float, ground_silence_s: float) -> None:
+        """Climb when asked to, then watch over time-outs."""
+        super().step(now_s, ground_silence_s)
+        if self.armed and self._climb_to_m is not None and now_s - self._take_off_s >= _SPOOL_S:
+            if self.copter.estimate.position[2] < self._climb_to_m - _REACHED_M:
+                self.copter.fly((0.0, 0.0, _CLIMB_M_S), 0.0)
+            else:
+                self._climb_to_m = None
+                self.copter.steer(Steering.HOLD)
+
+    @property
+    def landed(self) -> Landed:
+        """Return what the landing detector says."""
+        climbing = self._climb_to_m is not None and self.armed and self.now_s - self._take_off_s >= _SPOOL_S
+        return Landed.TAKE_OFF if climbing and self.copter.airframe.z < 0.2 else super().landed
+
+    def steering_of(self, mode: int) -> Steering:
+        """Return what the motors do in a mode, in the air."""
+        return Steering.LEVEL if mode in _LEVEL else Steering.HOLD
+
+    def watch(self, ground_silence_s: float) -> None:
+        """Brake when set-points stop; land when the ground or the position is lost."""
+        if self.mode == Mode.GUIDED and not self._braked and self.setpoint_age_s > self.parameters["GUID_TIMEOUT"]:
+            self._braked = True
+            self.copter.fly((0.0, 0.0, 0.0), 0.0)
+        if ground_silence_s > self.parameters["FS_GCS_TIMEOUT"] and self.parameters["FS_GCS_ENABLE"] in _GCS_ACTIONS:
+            if not self._ground_lost:
+                self._ground_lost = True
+                self.say(4, "GCS Failsafe")
+                self.enter(Mode.LAND)
+        elif self._ground_lost:
+            self._ground_lost = False
+            self.say(4, "GCS Failsafe Cleared")
+        self._watch_position(self.copter.estimate.aided_s)
+
+    def _watch_position(self, aided_s: float) -> None:
+        if aided_s < _EKF_FAILSAFE_S:
+            self._failed = self._aiding_stopped = False
+        elif not self._failed:
+            self._failed = True
+            self.say(2, "EKF variance")
+            self.say(2, "EKF Failsafe: changed to LAND Mode")
+            self.enter(Mode.LAND)
+        elif aided_s > _STOPPED_AIDING_S and not self._aiding_stopped:
+            self._aiding_stopped = True
+            self.say(4, "EKF3 IMU0 stopped aiding")
+
+    def disarm_after_s(self) -> float:
+        """Return after how long on the floor the motors stop."""
+        return 1.0 if self.mode == Mode.LAND else self.parameters["DISARM_DELAY"]

@@ -1,0 +1,206 @@
+"""What both emulated autopilots share: armed or not, mode, set-points, landing, what the ground hears. No sockets.
+
+Times are seconds of the world. Set-points arrive in MAVLink's frames and are turned into the world's here, by this
+file's own signs.
+"""
+
+import math
+from collections import deque
+
+from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
+from drivers.mavlink.wire.names import (
+    FORCE,
+    VELOCITY_AND_YAW,
+    VELOCITY_AND_YAW_RATE,
+    VELOCITY_ONLY,
+    Flavour,
+    Landed,
+    Result,
+)
+from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.world.copter import Copter, Steering
+
+Answer = tuple[Result, str]
+_MASKS = frozenset({VELOCITY_AND_YAW_RATE, VELOCITY_AND_YAW, VELOCITY_ONLY})
+_YAW_GAIN = 2.0
+_AIDED_S = 1.0
+_BATTERY_MIN = 0.15
+_OK: Answer = (Result.ACCEPTED, "")
+
+
+class Firmware:
+    """One autopilot around a body of the world; flavours override what differs. texts: (severity, line) to send."""
+
+    flavour: Flavour
+    guided: int
+    landing: int
+    frames: frozenset[int]
+
+    def __init__(self, copter: Copter, parameters: Parameters, start_mode: int) -> None:
+        self.copter, self.parameters = copter, parameters
+        self.armed = False
+        self.mode = start_mode
+        self.texts: deque[tuple[int, str]] = deque(maxlen=32)
+        self.origin: tuple[int, int, int] | None = None
+        self.now_s = 0.0
+        self._setpoint_s = -math.inf
+        self._stream_s = 0.0
+        self._armed_s = self._grounded_s = 0.0
+        self._failed = False
+
+    # -- requests -----------------------------------------------------------------------------------------------------
+
+    def arm(self, force: bool = False) -> Answer:
+        """Start the motors, if nothing forbids it."""
+        if self.armed:
+            return _OK
+        fault = "" if force else self.arming_fault()
+        if fault:
+            self.say(2, fault)
+            return self.arming_refusal, fault
+        self.armed, self._armed_s, self._grounded_s, self._failed = True, self.now_s, self.now_s, False
+        self.copter.steer(Steering.IDLE)
+        return _OK
+
+    def disarm(self, code: float) -> Answer:
+        """Stop the motors; in the air only by force."""
+        if self.copter.airborne and code != FORCE:
+            return Result.FAILED if self.flavour is Flavour.ARDUPILOT else Result.DENIED, "not landed"
+        self.armed = False
+        self.copter.steer(Steering.OFF)
+        return _OK
+
+    def set_mode(self, mode: int) -> Answer:
+        """Change the mode on request."""
+        if not self.knows(mode):
+            return Result.DENIED, f"mode {mode:#x} unknown"
+        self.enter(mode)
+        return _OK
+
+    def land(self) -> Answer:
+        """Land here."""
+        self.enter(self.landing)
+        return _OK
+
+    def take_off(self, height_m: float) -> Answer:
+        """Climb to a height above the floor."""
+        raise NotImplementedError
+
+    def fly(self, setpoint: SetPositionTargetLocalNed) -> None:
+        """Take a set-point; WIRE (mavlink.md 5.1): frames and masks that are not understood are refused aloud."""
+        if setpoint.coordinate_frame not in self.frames or setpoint.type_mask & 0xDFF not in {
+            m & 0xDFF for m in _MASKS
+        }:
+            self.refuse_setpoint(setpoint)
+            return
+        if not all(map(math.isfinite, (setpoint.vx, setpoint.vy, setpoint.vz, setpoint.yaw, setpoint.yaw_rate))):
+            return
+        if self.now_s - self._setpoint_s > 0.5:
+            self._stream_s = self.now_s
+        self._setpoint_s = self.now_s
+        if self.armed and self.mode == self.guided:
+            self.obey(self._velocity(setpoint), self._turn(setpoint))
+
+    def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
+        """Say what is wrong with a set-point."""
+        raise NotImplementedError
+
+    def _velocity(self, setpoint: SetPositionTargetLocalNed) -> tuple[float, float, float]:
+        # North-east-down or forward-right-down to the heading frame's forward-left-up.
+        first, second, up = setpoint.vx, -setpoint.vy, -setpoint.vz
+        if setpoint.coordinate_frame in (8, 9):
+            return first, second, up
+        c, s = math.cos(self.copter.estimate.yaw), math.sin(self.copter.estimate.yaw)
+        return c * first + s * second, c * second - s * first, up
+
+    def _turn(self, setpoint: SetPositionTargetLocalNed) -> float:
+        mask = setpoint.type_mask
+        if not mask & 2048:
+            return -setpoint.yaw_rate
+        if not mask & 1024:
+            return _YAW_GAIN * math.remainder(-setpoint.yaw - self.copter.estimate.yaw, math.tau)
+        return 0.0
+
+    # -- what happens by itself ---------------------------------------------------------------------------------------
+
+    def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
+        """Fly a velocity [heading frame, FLU]."""
+        self.copter.fly(velocity_m_s, turn)
+
+    def enter(self, mode: int) -> None:
+        """Change the mode."""
+        if mode != self.mode:
+            self.mode = mode
+            if self.armed and self.copter.airborne:
+                self.copter.steer(Steering.LAND if mode == self.landing else self.steering_of(mode))
+
+    def step(self, now_s: float, ground_silence_s: float) -> None:
+        """Watch over time-outs; call it once per tick."""
+        self.now_s = now_s
+        if not self.armed:
+            return
+        if self.copter.airborne:
+            self._grounded_s = now_s
+            self.watch(ground_silence_s)
+        elif now_s - self._grounded_s > self.disarm_after_s():
+            self.say(6, self.disarmed_text)
+            self.disarm(0.0)
+
+    def say(self, severity: int, text: str) -> None:
+        """Send a line to the operator."""
+        self.texts.append((severity, text))
+
+    @property
+    def landed(self) -> Landed:
+        """Return what the landing detector says."""
+        if not self.copter.airborne:
+            return Landed.ON_GROUND
+        return Landed.LANDING if self.mode == self.landing else Landed.IN_AIR
+
+    @property
+    def setpoint_age_s(self) -> float:
+        """Return the time since the last good set-point."""
+        return self.now_s - self._setpoint_s
+
+    @property
+    def streams(self) -> bool:
+        """Whether set-points have kept coming for a second."""
+        return self.setpoint_age_s < 0.5 and self.now_s - self._stream_s >= 1.0
+
+    @property
+    def located(self) -> bool:
+        """Whether the estimator knows where it is, now."""
+        return self.copter.estimate.has_position and self.copter.estimate.aided_s < _AIDED_S
+
+    def health_fault(self) -> str:
+        """Return what forbids arming in any mode, or ""."""
+        if not self.parameters.indoor:
+            return "no GPS"
+        if not self.located:
+            return "need position estimate"
+        return "battery low" if self.copter.battery < _BATTERY_MIN else ""
+
+    # -- flavours -----------------------------------------------------------------------------------------------------
+
+    arming_refusal = Result.DENIED
+    disarmed_text = "Disarmed"
+
+    def arming_fault(self) -> str:
+        """Return why it does not arm now, in its own words, or ""."""
+        raise NotImplementedError
+
+    def knows(self, mode: int) -> bool:
+        """Return whether a mode exists."""
+        raise NotImplementedError
+
+    def steering_of(self, mode: int) -> Steering:
+        """Return what the motors do in a mode, in the air."""
+        raise NotImplementedError
+
+    def watch(self, ground_silence_s: float) -> None:
+        """Do what silence of the set-points, the ground or the cameras asks for."""
+        raise NotImplementedError
+
+    def disarm_after_s(self) -> float:
+        """Return after how long on the floor the motors stop."""
+        raise NotImplementedError

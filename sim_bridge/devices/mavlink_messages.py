@@ -1,0 +1,176 @@
+"""What an emulated autopilot says: its telemetry in MAVLink's own units and frames, by this file's own signs.
+
+World and body are x forward, y left, z up; MAVLink wants north-east-down and forward-right-down, yaw clockwise.
+"""
+
+import math
+from collections.abc import Callable
+
+from drivers.mavlink.wire import telemetry as t
+from drivers.mavlink.wire.flight import Odometry
+from drivers.mavlink.wire.frames import Message
+from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, Sensor
+from sim_bridge.devices.mavlink_ardupilot import ArduCopter
+from sim_bridge.devices.mavlink_firmware import Firmware
+
+_MG = 1000.0 / 9.80665
+_NO_CELL = 65535
+_VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
+
+
+class Speaker:
+    """Builds the messages of one vehicle."""
+
+    def __init__(self, firmware: Firmware) -> None:
+        self._firmware = firmware
+        self._copter, self._estimate = firmware.copter, firmware.copter.estimate
+        self.boot_us = 0
+        self.builders: dict[type[Message], Callable[[], Message | None]] = {
+            t.Heartbeat: self.heartbeat,
+            t.SysStatus: self.sys_status,
+            t.ExtendedSysState: self.extended,
+            t.LocalPositionNed: self.local_position,
+            t.Attitude: self.attitude,
+            t.AttitudeQuaternion: self.quaternion,
+            t.HighresImu: self.highres_imu,
+            t.RawImu: self.raw_imu,
+            t.BatteryStatus: self.battery,
+            t.HomePosition: self.home,
+            t.GpsGlobalOrigin: self.origin,
+            t.AutopilotVersion: self.version,
+        }
+        if firmware.flavour is Flavour.PX4:
+            self.builders[Odometry] = self.odometry
+        else:
+            self.builders[t.EkfStatusReport] = self.ekf
+
+    @property
+    def boot_ms(self) -> int:
+        """Return the time since power-on [ms]."""
+        return self.boot_us // 1000 % (1 << 32)
+
+    def heartbeat(self) -> Message:
+        """Return who it is and in which mode."""
+        firmware = self._firmware
+        status = 4 if self._copter.airborne else 3
+        base = 1 | (128 if firmware.armed else 0)
+        return t.Heartbeat(QUADROTOR, firmware.flavour, base, firmware.mode, status)
+
+    def sys_status(self) -> Message:
+        """Return health and battery."""
+        healthy = Sensor.GYRO | Sensor.ACCELEROMETER | Sensor.MAGNETOMETER
+        if self._firmware.located:
+            healthy |= Sensor.VISION_POSITION
+        if isinstance(self._firmware, ArduCopter) and not self._firmware.prearm_fault():
+            healthy |= Sensor.PREARM_CHECK
+        present = healthy | Sensor.VISION_POSITION | Sensor.PREARM_CHECK
+        return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
+
+    @property
+    def _percent(self) -> int:
+        return round(100 * self._copter.battery)
+
+    @property
+    def _millivolts(self) -> int:
+        return round(1000 * (_VOLTS_EMPTY + _VOLTS_SPAN * self._copter.battery))
+
+    def extended(self) -> Message:
+        """Return the landed state."""
+        return t.ExtendedSysState(0, self._firmware.landed)
+
+    def local_position(self) -> Message | None:
+        """Return where it believes to be, if it does."""
+        if not self._estimate.has_position:
+            return None
+        (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
+        return t.LocalPositionNed(self.boot_ms, x, -y, -z, vx, -vy, -vz)
+
+    def _rates(self) -> tuple[float, float, float]:
+        wx, wy, wz = self._estimate.gyros
+        return wx, -wy, -wz
+
+    def attitude(self) -> Message:
+        """Return its attitude as angles."""
+        e = self._estimate
+        return t.Attitude(self.boot_ms, e.roll, -e.pitch, -e.yaw, *self._rates())
+
+    def _quaternion(self) -> tuple[float, float, float, float]:
+        # Yaw about down, then pitch about right, then roll about forward.
+        e = self._estimate
+        halves = (e.roll / 2, -e.pitch / 2, -e.yaw / 2)
+        (cr, cp, cy), (sr, sp, sy) = map(math.cos, halves), map(math.sin, halves)
+        return (
+            cy * cp * cr + sy * sp * sr,
+            cy * cp * sr - sy * sp * cr,
+            cy * sp * cr + sy * cp * sr,
+            sy * cp * cr - cy * sp * sr,
+        )
+
+    def quaternion(self) -> Message:
+        """Return its attitude as a quaternion."""
+        return t.AttitudeQuaternion(self.boot_ms, *self._quaternion(), *self._rates())
+
+    def highres_imu(self) -> Message:
+        """Return its inertial sensors in SI units."""
+        fx, fy, fz = self._estimate.accelerometers
+        return t.HighresImu(self.boot_us, fx, -fy, -fz, *self._rates())
+
+    def raw_imu(self) -> Message:
+        """Return its inertial sensors in mG and mrad/s."""
+        fx, fy, fz = self._estimate.accelerometers
+        force = (_whole(fx * _MG), _whole(-fy * _MG), _whole(-fz * _MG))
+        wx, wy, wz = self._rates()
+        return t.RawImu(self.boot_us, *force, _whole(wx * 1000), _whole(wy * 1000), _whole(wz * 1000))
+
+    def odometry(self) -> Message | None:
+        """WIRE (mavlink.md 2): PX4 sends its velocity in NED and says so by child frame 1."""
+        if not self._estimate.has_position:
+            return None
+        (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
+        pose = _diagonal(0.01, 0.01, 0.01, 0.001, 0.001, 0.003)
+        velocity = _diagonal(0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
+        q = self._quaternion()
+        return Odometry(self.boot_us, 1, 1, x, -y, -z, q, vx, -vy, -vz, *self._rates(), pose, velocity, 0, 8, 0)
+
+    def battery(self) -> Message:
+        """Return the battery."""
+        cells = (self._millivolts, *(_NO_CELL,) * 9)
+        return t.BatteryStatus(0, 0, 3, 32767, cells, 500, -1, -1, self._percent)
+
+    def ekf(self) -> Message:
+        """Return what its estimator can deliver (ArduPilot)."""
+        flags = EkfFlag.ATTITUDE | EkfFlag.VELOCITY_VERT | EkfFlag.POS_VERT_ABS
+        if self._firmware.located:
+            flags |= EkfFlag.VELOCITY_HORIZ | EkfFlag.POS_HORIZ_REL | EkfFlag.POS_HORIZ_ABS
+            flags |= EkfFlag.PRED_POS_HORIZ_REL | EkfFlag.PRED_POS_HORIZ_ABS
+        else:
+            flags |= EkfFlag.CONST_POS_MODE
+        return t.EkfStatusReport(flags, 0.05, 0.05, 0.05, 0.0, 0.0)
+
+    def home(self) -> Message | None:
+        """Return where it took off, once it has an origin."""
+        origin = self._firmware.origin
+        return origin and t.HomePosition(*origin, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, self.boot_us)
+
+    def origin(self) -> Message | None:
+        """Return the estimator's origin, once it has one."""
+        origin = self._firmware.origin
+        return origin and t.GpsGlobalOrigin(*origin, self.boot_us)
+
+    def version(self) -> Message:
+        """Return what it is and can: MISSION_INT, COMMAND_INT, SET_POSITION_TARGET, MAVLINK2, parameter encoding."""
+        px4 = self._firmware.flavour is Flavour.PX4
+        capabilities = 4 | 8 | 128 | 8192 | (16 if px4 else 131072)
+        version = 0x011000FF if px4 else 0x040602FF
+        return t.AutopilotVersion(capabilities, version)
+
+
+def _diagonal(*values: float) -> tuple[float, ...]:
+    triangle = [0.0] * 21
+    for place, value in zip((0, 6, 11, 15, 18, 20), values, strict=True):
+        triangle[place] = value
+    return tuple(triangle)
+
+
+def _whole(value: float) -> int:
+    return max(-32768, min(32767, round(value)))

@@ -1,0 +1,86 @@
+"""PX4 1.16 as far as a ground station meets it (mavlink.md 2, 5.2)."""
+
+from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
+from drivers.mavlink.wire.names import Flavour, Px4Auto, Px4Main, Result, px4_mode
+from sim_bridge.devices.mavlink_firmware import Answer, Firmware
+from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.world.copter import Copter, Steering
+
+HOLD = px4_mode(Px4Main.AUTO, Px4Auto.HOLD)
+LAND = px4_mode(Px4Main.AUTO, Px4Auto.LAND)
+OFFBOARD = px4_mode(Px4Main.OFFBOARD)
+POSITION = px4_mode(Px4Main.POSITION)
+ALTITUDE = px4_mode(Px4Main.ALTITUDE)
+# Measured: 1.42 s for COM_OF_LOSS_T 1.0, 4.8 to 5.6 s for lost vision.
+_GRANULARITY_S = 0.42
+_VISION_LOST_S = 5.0
+_SPOOL_S = 1.0
+_LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAND, 5: HOLD}
+_LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL))
+
+
+class Px4(Firmware):
+    """OFFBOARD needs a stream of set-points to arm and to stay in."""
+
+    flavour = Flavour.PX4
+    guided = OFFBOARD
+    landing = LAND
+    frames = frozenset({1, 8})
+    disarmed_text = "Disarmed by landing"
+
+    def __init__(self, copter: Copter, parameters: Parameters) -> None:
+        super().__init__(copter, parameters, HOLD)
+
+    def knows(self, mode: int) -> bool:
+        """Return whether a mode exists."""
+        return mode in (HOLD, LAND, OFFBOARD, POSITION, *_LEVEL)
+
+    def arming_fault(self) -> str:
+        """Return why it does not arm now, or ""."""
+        fault = self.health_fault()
+        if fault:
+            return f"Arming denied: {fault}"
+        if self.mode != OFFBOARD:
+            # WIRE (mavlink.md 2): Hold needs a global position, which there is none of indoors.
+            return "Arming denied: Resolve system health failures first"
+        return "" if self.streams else "Arming denied: no offboard signal"
+
+    def take_off(self, height_m: float) -> Answer:
+        """Refuse: without a global position there is no AUTO.TAKEOFF."""
+        self.say(2, "Takeoff denied: no global position")
+        return Result.TEMPORARILY_REJECTED, "no global position"
+
+    def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
+        """Say what is wrong with a set-point."""
+        self.say(2, f"SET_POSITION_TARGET_LOCAL_NED invalid coordinate frame {setpoint.coordinate_frame}")
+
+    def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
+        """Fly, once the propellers are up to speed."""
+        if self.now_s - self._armed_s >= _SPOOL_S:
+            if not self.copter.airborne and velocity_m_s[2] > 0.05:
+                self.say(6, "Takeoff detected")
+            super().obey(velocity_m_s, turn)
+
+    def steering_of(self, mode: int) -> Steering:
+        """Return what the motors do in a mode, in the air."""
+        if mode == OFFBOARD:
+            return Steering.VELOCITY
+        return Steering.LEVEL if mode in _LEVEL else Steering.HOLD
+
+    def watch(self, ground_silence_s: float) -> None:
+        """Leave OFFBOARD when set-points stop; level out when the position is lost."""
+        if self.mode == OFFBOARD and self.setpoint_age_s > self.parameters["COM_OF_LOSS_T"] + _GRANULARITY_S:
+            self._fail(_LOSS_MODES.get(int(self.parameters["COM_OBL_RC_ACT"]), POSITION))
+        if self.copter.estimate.aided_s > _VISION_LOST_S and self.mode not in (*_LEVEL, LAND):
+            self._fail(ALTITUDE)
+        silent = ground_silence_s > self.parameters["COM_DL_LOSS_T"]
+        if silent and self.parameters["NAV_DLL_ACT"] == 3 and self.mode != LAND:
+            self._fail(LAND)
+
+    def _fail(self, mode: int) -> None:
+        self.say(2, "Failsafe activated")
+        self.enter(mode)
+
+    def disarm_after_s(self) -> float:
+        """Return after how long on the floor the motors stop."""
+        return self.parameters["COM_DISARM_LAND" if self.mode == LAND else "COM_DISARM_PRFLT"]

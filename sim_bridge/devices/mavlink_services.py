@@ -1,0 +1,227 @@
+"""What an emulated autopilot answers: commands, parameters, rates, clocks, and the poses that it is fed. No sockets.
+
+WIRE (mavlink.md 4): an unknown command is answered UNSUPPORTED, never with silence; a request for another vehicle is
+none of ours; the answer names who asked.
+"""
+
+import math
+from collections.abc import Iterator
+
+from drivers.mavlink.wire import flight as f
+from drivers.mavlink.wire import service as s
+from drivers.mavlink.wire import telemetry as t
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.frames import CLASSES, Frame, Message, id_of
+from drivers.mavlink.wire.names import Command, Flavour, Result, px4_mode
+from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
+from sim_bridge.devices.mavlink_firmware import Answer, Firmware
+from sim_bridge.devices.mavlink_messages import Speaker
+from sim_bridge.devices.mavlink_time import SenderClock
+
+TICK_HZ = 200.0
+_PX4_RATES: dict[type[Message], float] = {
+    t.HighresImu: 50, t.LocalPositionNed: 30, f.Odometry: 30, t.Attitude: 100, t.AttitudeQuaternion: 50,
+    t.SysStatus: 5, t.ExtendedSysState: 5, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
+}  # fmt: skip
+_UNSUPPORTED: Answer = (Result.UNSUPPORTED, "")
+_OK: Answer = (Result.ACCEPTED, "")
+_NAK, _FTP_FAIL = 129, 1
+_FRESH_S = 0.5
+
+
+class Services:
+    """Handles one frame after the other; `take` returns what to answer to its sender."""
+
+    def __init__(
+        self, system: int, firmware: Firmware, speaker: Speaker, stream: t.VideoStreamInformation | None
+    ) -> None:
+        self._system, self._firmware, self._speaker, self._stream = system, firmware, speaker, stream
+        px4 = firmware.flavour is Flavour.PX4
+        self.intervals: dict[type[Message], int] = {t.Heartbeat: 200}
+        if px4:
+            self.intervals |= {kind: max(1, round(TICK_HZ / hz)) for kind, hz in _PX4_RATES.items()}
+        self.clock = SenderClock(learns=not px4)
+        self.listing: dict[tuple[str, int], list[str]] = {}
+        self._by_id = {id_of(kind): kind for kind in CLASSES.values()}
+
+    def take(self, frame: Frame, now_ns: int) -> list[Message]:
+        """Obey a frame and return the answers."""
+        message = frame.message
+        target = getattr(message, "target_system", 0)
+        if message is None or target not in (0, self._system):
+            return []
+        if getattr(message, "target_component", 0) not in (0, 1):
+            return []
+        match message:
+            case f.CommandLong():
+                params = message[4:]
+                return self._command(frame, message.command, params)
+            case f.CommandInt():
+                params = (message.param1, message.param2, message.param3, message.param4, 0.0, 0.0, message.z)
+                return self._command(frame, message.command, params)
+            case f.SetMode():
+                self._firmware.set_mode(message.custom_mode)
+            case f.SetPositionTargetLocalNed():
+                self._firmware.fly(message)
+            case f.VisionPositionEstimate() | f.Odometry():
+                self._vision(message, now_ns)
+            case s.SetGpsGlobalOrigin():
+                return self._set_origin(message)
+            case _:
+                return list(self._small(frame, message, now_ns))
+        return []
+
+    # -- commands -----------------------------------------------------------------------------------------------------
+
+    def _command(self, frame: Frame, command: int, p: tuple[float, ...]) -> list[Message]:
+        (result, _), more = self._obey(command, p)
+        return [f.CommandAck(command, result, 0, 0, frame.system, frame.component), *more]
+
+    def _obey(self, command: int, p: tuple[float, ...]) -> tuple[Answer, list[Message]]:
+        firmware = self._firmware
+        match command:
+            case Command.COMPONENT_ARM_DISARM:
+                return (firmware.arm(p[1] == 21196.0) if p[0] == 1.0 else firmware.disarm(p[1])), []
+            case Command.DO_SET_MODE:
+                return self._set_mode(p), []
+            case Command.NAV_TAKEOFF:
+                return firmware.take_off(p[6] if math.isfinite(p[6]) else 0.0), []
+            case Command.NAV_LAND:
+                return firmware.land(), []
+            case Command.SET_MESSAGE_INTERVAL:
+                return self._set_interval(p), []
+            case Command.REQUEST_MESSAGE:
+                return self._request(_number(p[0]))
+            case Command.REQUEST_AUTOPILOT_CAPABILITIES:
+                return _OK, [self._speaker.version()]
+            case Command.GET_HOME_POSITION:
+                return self._request(id_of(t.HomePosition))
+            case Command.DO_SET_HOME:
+                return _OK, []
+            case _:
+                return _UNSUPPORTED, []
+
+    def _set_mode(self, p: tuple[float, ...]) -> Answer:
+        main, sub = _number(p[1]), _number(p[2])
+        return self._firmware.set_mode(px4_mode(main, sub) if self._firmware.flavour is Flavour.PX4 else main)
+
+    def _set_interval(self, p: tuple[float, ...]) -> Answer:
+        number, interval_us = _number(p[0]), p[1]
+        kind = self._by_id.get(number)
+        if kind is None or kind not in self._speaker.builders or not math.isfinite(interval_us):
+            ardupilot = self._firmware.flavour is Flavour.ARDUPILOT
+            self._firmware.say(4, f"No ap_message for mavlink id ({number})") if ardupilot else None
+            return (Result.DENIED if ardupilot else Result.UNSUPPORTED), ""
+        if interval_us < 0:
+            self.intervals.pop(kind, None)
+        elif interval_us > 0:
+            self.intervals[kind] = max(1, round(interval_us * 1e-6 * TICK_HZ))
+        return _OK
+
+    def _request(self, number: int) -> tuple[Answer, list[Message]]:
+        kind = self._by_id.get(number)
+        if kind is t.VideoStreamInformation and self._stream is not None:
+            return _OK, [self._stream]
+        build = self._speaker.builders.get(kind) if kind is not None else None
+        message = build() if build is not None else None
+        return (_OK, [message]) if message is not None else ((Result.DENIED, ""), [])
+
+    # -- parameters and the rest --------------------------------------------------------------------------------------
+
+    def parameter(self, name: str) -> Message:
+        """Return one parameter as it is carried."""
+        parameters = self._firmware.parameters
+        kind = parameters.kind(name)
+        carried = carried_from_value(self._firmware.flavour, parameters[name], kind)
+        return s.ParamValue(name, carried, kind, len(parameters.names), parameters.names.index(name))
+
+    def _small(self, frame: Frame, message: Message, now_ns: int) -> Iterator[Message]:
+        names = self._firmware.parameters.names
+        match message:
+            case s.ParamRequestRead():
+                name = message.param_id if message.param_index < 0 else ""
+                if 0 <= message.param_index < len(names):
+                    name = names[message.param_index]
+                if name in names:
+                    yield self.parameter(name)
+            case s.ParamSet() if message.param_id in names:
+                self._write(message)
+                yield self.parameter(message.param_id)
+            case s.Timesync() if message.tc1 == 0:
+                yield s.Timesync(now_ns, message.ts1)
+            case s.Timesync():
+                self.clock.synchronise(now_ns, message.tc1, message.ts1)
+            case s.Ping() if message.target_system == 0:
+                yield s.Ping(message.time_usec, message.seq, frame.system, frame.component)
+            case s.MissionRequestList():
+                yield s.MissionCount(frame.system, frame.component, 0, message.mission_type)
+            case s.FileTransferProtocol():
+                yield self._ftp_refusal(frame, message)
+            case s.RequestDataStream() if message.start_stop:
+                self._old_rates(message.req_message_rate)
+
+    def _write(self, message: s.ParamSet) -> None:
+        parameters = self._firmware.parameters
+        kind = parameters.kind(message.param_id)
+        try:
+            value = value_from_carried(self._firmware.flavour, message.param_value, kind)
+        except WireError:
+            return
+        parameters.values[message.param_id] = value
+
+    def _ftp_refusal(self, frame: Frame, message: s.FileTransferProtocol) -> Message:
+        # WIRE (MAVLink FTP): sequence + 1, opcode NAK, the request's opcode, error FAIL.
+        request = message.payload
+        sequence = (request[0] | request[1] << 8) + 1 & 0xFFFF
+        head = [sequence & 255, sequence >> 8, request[2], _NAK, 1, request[3], 0, 0, 0, 0, 0, 0, _FTP_FAIL]
+        return s.FileTransferProtocol(0, frame.system, frame.component, tuple(head + [0] * (251 - len(head))))
+
+    def _old_rates(self, rate_hz: int) -> None:
+        ticks = max(4, round(TICK_HZ / max(1, rate_hz)))
+        for kind in (t.SysStatus, t.LocalPositionNed, t.Attitude, t.ExtendedSysState, t.BatteryStatus):
+            self.intervals.setdefault(kind, ticks)
+
+    # -- position from outside ----------------------------------------------------------------------------------------
+
+    def _set_origin(self, message: s.SetGpsGlobalOrigin) -> list[Message]:
+        # WIRE (mavlink.md 1.1): ignored until the estimator runs.
+        if self._speaker.boot_us < 2_000_000:
+            return []
+        if self._firmware.origin is None and self._firmware.flavour is Flavour.ARDUPILOT:
+            self._firmware.say(6, "EKF3 IMU0 origin set")
+        self._firmware.origin = (message.latitude, message.longitude, message.altitude)
+        return [t.GpsGlobalOrigin(*self._firmware.origin, self._speaker.boot_us)]
+
+    def _vision(self, message: f.VisionPositionEstimate | f.Odometry, now_ns: int) -> None:
+        if not self._firmware.parameters.indoor:
+            return
+        if isinstance(message, f.Odometry):
+            usec = message.time_usec
+            yaw = self._yaw_of(message)
+        else:
+            usec = message.usec
+            yaw = -message.yaw
+        if yaw is None or not all(map(math.isfinite, (message.x, message.y, message.z, yaw))):
+            return
+        age_s = (now_ns - self.clock.local_ns(usec * 1000, now_ns)) / 1e9
+        estimate = self._firmware.copter.estimate
+        if not -_FRESH_S < age_s < _FRESH_S:
+            estimate.rejected += 1
+            return
+        # North-east-down to the world's axes; the pose is as old as it is.
+        vx, vy, vz = estimate.velocity
+        position = (message.x + vx * age_s, -message.y + vy * age_s, -message.z + vz * age_s)
+        estimate.aid(position, yaw, message.reset_counter)
+
+    def _yaw_of(self, message: f.Odometry) -> float | None:
+        # WIRE (mavlink.md 1.1, 5.5): ArduPilot takes local FRD with body FRD only, in silence; PX4 NED as well.
+        frames = (message.frame_id, message.child_frame_id)
+        allowed = {(20, 12)} if self._firmware.flavour is Flavour.ARDUPILOT else {(1, 12), (1, 1), (20, 12), (20, 20)}
+        if frames not in allowed:
+            return None
+        w, x, y, z = message.q
+        return -math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def _number(value: float) -> int:
+    return int(value) if math.isfinite(value) and abs(value) < 1e9 else -1

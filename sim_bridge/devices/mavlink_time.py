@@ -1,0 +1,40 @@
+"""How an emulated autopilot maps the times of a sender to its own."""
+
+_JUMP_NS = 100_000_000
+_STUBBORN = 5
+_SHARE = 0.1
+
+
+class SenderClock:
+    """PX4 asks for TIMESYNC answers and follows them; ArduPilot learns the least lag of what arrives (`learns`).
+
+    Without either a time means: now.
+    """
+
+    def __init__(self, learns: bool) -> None:
+        self._learns = learns
+        self._offset_ns: float | None = None
+        self._odd = 0
+
+    def synchronise(self, now_ns: int, remote_ns: int, asked_ns: int) -> None:
+        """Take an answer: the sender's time between our asking and now."""
+        if self._learns or not 0 <= now_ns - asked_ns < 1_000_000_000:
+            return
+        offset = (asked_ns + now_ns) / 2 - remote_ns
+        if self._offset_ns is None:
+            self._offset_ns = offset
+        elif abs(offset - self._offset_ns) > _JUMP_NS:
+            # A clock that jumped is believed only when it insists.
+            self._odd += 1
+            if self._odd >= _STUBBORN:
+                self._offset_ns, self._odd = offset, 0
+        else:
+            self._odd = 0
+            self._offset_ns += _SHARE * (offset - self._offset_ns)
+
+    def local_ns(self, remote_ns: int, now_ns: int) -> int:
+        """Return a time of the sender on our clock."""
+        if self._learns:
+            lag = now_ns - remote_ns
+            self._offset_ns = lag if self._offset_ns is None else min(self._offset_ns + 1000.0, lag)
+        return now_ns if self._offset_ns is None else round(remote_ns + self._offset_ns)

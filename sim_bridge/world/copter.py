@@ -1,0 +1,189 @@
+"""A quadrotor with a velocity-controlled autopilot (PX4- or ArduPilot-like): how it moves when told a velocity.
+
+Step responses as measured on real firmwares (mavlink.md 1, 2): ArduCopter t10 0.31, t63 0.74, t90 1.23-1.41 s, all of
+the speed; PX4 t10 0.22, t63 0.67, t90 1.35 s, 14-20 % under the command for seconds. Frames are FLU and world.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+
+from sim_bridge.scenario import CopterScenario
+from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.inertial import InertialEstimate
+from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
+from sim_bridge.world.wake import wake_between
+
+Vector3 = tuple[float, float, float]
+_STILL: Vector3 = (0.0, 0.0, 0.0)
+_UNREST_CORRELATION_S = 0.8
+_MOST_M_S2 = 3.0
+_CLIMB_RATE, _CLIMB_DAMPING = 4.4, 0.6
+_YAW_RATE = 6.0
+_HOLD_GAIN, _HOLD_M_S = 0.9, 0.5
+_TILT_TIME_S = 0.12
+_DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
+_DRAG = 0.25  # 1/s, when only the attitude is held
+
+
+class Steering(Enum):
+    """What the motors are doing."""
+
+    OFF = auto()
+    IDLE = auto()
+    VELOCITY = auto()
+    HOLD = auto()
+    LEVEL = auto()
+    LAND = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """How one firmware answers a velocity step: dead time, natural frequency [rad/s], damping, final gain."""
+
+    dead_s: float
+    rate: float
+    damping: float
+    gain: float
+
+
+PX4_RESPONSE = Response(dead_s=0.06, rate=3.3, damping=0.92, gain=0.85)
+ARDUPILOT_RESPONSE = Response(dead_s=0.13, rate=3.5, damping=1.0, gain=1.0)
+
+
+class Copter:
+    """A drone standing on its pad. `steering` and the methods take the requests, `airframe` holds the true state."""
+
+    def __init__(
+        self, pad_m: tuple[float, float], yaw_rad: float, scenario: CopterScenario, response: Response, tick_s: float,
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        draw = standard_normals(rng)
+        self.airframe = Airframe(*pad_m, yaw_rad)
+        self.estimate = InertialEstimate(scenario, tick_s, rng)
+        self.steering = Steering.OFF
+        self.battery = float(rng.uniform(*scenario.battery))
+        self.since_s = 0.0  # in this steering
+        self._response, self._tick_s = response, tick_s
+        self._drain = scenario.battery_drain_per_min / 60.0 * tick_s
+        self._unrest = tuple(
+            GaussMarkov(scenario.air_unrest_m_s2 * share, _UNREST_CORRELATION_S, tick_s, draw)
+            for share in (1.0, 1.0, 0.5)
+        )
+        self._wanted: tuple[Vector3, float] = (_STILL, 0.0)
+        self._delayed: DelayLine[tuple[Vector3, float]] = DelayLine(response.dead_s, tick_s, (_STILL, 0.0))
+        self._acceleration = [0.0, 0.0, 0.0]  # heading frame
+        self._held: Vector3 | None = None
+
+    @property
+    def autopilot(self) -> "Copter":
+        """Return itself: what asks whether motors turn need not know which firmware it is."""
+        return self
+
+    @property
+    def motors_on(self) -> bool:
+        """Whether the propellers turn."""
+        return self.steering is not Steering.OFF
+
+    @property
+    def airborne(self) -> bool:
+        """Whether it has no contact with the floor."""
+        return not self.airframe.on_ground
+
+    def steer(self, steering: Steering) -> None:
+        """Change what the motors do."""
+        if steering is not self.steering:
+            self.steering, self.since_s, self._held = steering, 0.0, None
+            self._wanted = (_STILL, 0.0)
+            if steering in (Steering.OFF, Steering.IDLE):
+                self._acceleration = [0.0, 0.0, 0.0]
+
+    def fly(self, velocity_m_s: Vector3, yaw_rate_rad_s: float) -> None:
+        """Fly a velocity [heading frame, FLU] until told otherwise."""
+        self.steer(Steering.VELOCITY)
+        self._wanted = (velocity_m_s, yaw_rate_rad_s)
+
+    def step(self, wake: Vector3) -> None:
+        """Advance by one tick under the wake of the others [m/s^2; world]."""
+        self.since_s += self._tick_s
+        wanted = self._delayed.push(self._wanted)
+        body = self.airframe
+        if self.motors_on:
+            self.battery = max(0.0, self.battery - self._drain)
+            wake = (
+                wake[0] + self._unrest[0].step(),
+                wake[1] + self._unrest[1].step(),
+                wake[2] + self._unrest[2].step(),
+            )
+        match self.steering:
+            case Steering.OFF:
+                if not body.on_ground:
+                    self._move((0.0, 0.0, -GRAVITY_M_S2), 0.0, wake)
+            case Steering.IDLE:
+                return
+            case Steering.VELOCITY:
+                (forward, left, up), turn = wanted
+                if body.on_ground and up <= 0.05:
+                    return
+                gain = self._response.gain
+                self._pursue((gain * forward, gain * left, up), turn, wake)
+            case Steering.HOLD:
+                self._pursue(self._towards_held(), 0.0, wake)
+            case Steering.LAND:
+                self._pursue((0.0, 0.0, -(_DESCENT_M_S if body.z > _FLARE_M else _TOUCH_DOWN_M_S)), 0.0, wake)
+            case Steering.LEVEL:
+                vx, vy = body.velocity_stabilized()
+                self._acceleration[0], self._acceleration[1] = -_DRAG * vx, -_DRAG * vy
+                self._vertical(-0.5 * self.estimate.velocity[2])
+                self._move(tuple(self._acceleration), 0.0, wake)
+
+    def _towards_held(self) -> Vector3:
+        position = self.estimate.position
+        if self._held is None:
+            self._held = position
+        dx, dy, dz = (_HOLD_GAIN * (h - p) for h, p in zip(self._held, position, strict=True))
+        c, s = math.cos(self.estimate.yaw), math.sin(self.estimate.yaw)
+        limited = [max(-_HOLD_M_S, min(_HOLD_M_S, v)) for v in (c * dx + s * dy, c * dy - s * dx, dz)]
+        return limited[0], limited[1], limited[2]
+
+    def _pursue(self, wanted: Vector3, turn: float, wake: Vector3) -> None:
+        # The autopilot knows its velocity and heading by its estimate only.
+        response, estimate = self._response, self.estimate
+        c, s = math.cos(estimate.yaw), math.sin(estimate.yaw)
+        vx, vy, vz = estimate.velocity
+        for axis, error in enumerate((wanted[0] - c * vx - s * vy, wanted[1] - c * vy + s * vx)):
+            a = self._acceleration[axis]
+            a += (response.rate**2 * error - 2 * response.damping * response.rate * a) * self._tick_s
+            self._acceleration[axis] = max(-_MOST_M_S2, min(_MOST_M_S2, a))
+        self._vertical(wanted[2] - vz)
+        self._move(tuple(self._acceleration), turn, wake)
+
+    def _vertical(self, error: float) -> None:
+        a = self._acceleration[2]
+        self._acceleration[2] = a + (_CLIMB_RATE**2 * error - 2 * _CLIMB_DAMPING * _CLIMB_RATE * a) * self._tick_s
+
+    def _move(self, acceleration: tuple[float, ...], turn: float, push: Vector3) -> None:
+        """Integrate an acceleration [heading frame]; tilt is what that acceleration takes."""
+        body, dt = self.airframe, self._tick_s
+        c, s = math.cos(body.yaw), math.sin(body.yaw)
+        forward, left, up = acceleration
+        body.ax, body.ay, body.az = c * forward - s * left + push[0], s * forward + c * left + push[1], up + push[2]
+        share = dt / _TILT_TIME_S
+        body.roll_rate = (math.atan(-left / GRAVITY_M_S2) - body.roll) / _TILT_TIME_S
+        body.pitch_rate = (math.atan(forward / GRAVITY_M_S2) - body.pitch) / _TILT_TIME_S
+        body.roll += share * (math.atan(-left / GRAVITY_M_S2) - body.roll)
+        body.pitch += share * (math.atan(forward / GRAVITY_M_S2) - body.pitch)
+        body.yaw_rate += _YAW_RATE * (turn - body.yaw_rate) * dt
+        body.yaw = math.remainder(body.yaw + body.yaw_rate * dt, math.tau)
+        body.vx, body.vy, body.vz = body.vx + body.ax * dt, body.vy + body.ay * dt, body.vz + body.az * dt
+        body.x, body.y, body.z = body.x + body.vx * dt, body.y + body.vy * dt, body.z + body.vz * dt
+        body.on_ground = False
+        if body.z <= STANDING_HEIGHT_M:
+            body.stand()
+            self._acceleration = [0.0, 0.0, 0.0]
+
+    def wake_on(self, other: Airframe) -> Vector3 | None:
+        """Return how this drone's downwash accelerates another one below it, None when out of its reach."""
+        return wake_between(self.airframe, other)

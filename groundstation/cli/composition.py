@@ -122,8 +122,20 @@ def _driver(section: DriverSection, field: Field) -> ProcessSpec:
         section=section.section,
         required=False,
         stop_limit_s=12.0,
-        last_words=_ardrone_last_words(field.drones[section.entity].address, field.safety.land_after_s),
+        last_words=_last_words(field, section),
     )
+
+
+def _last_words(field: Field, section: DriverSection) -> LastWords | None:
+    drone = field.drones[section.entity]
+    if drone.mavlink is None:
+        return _ardrone_last_words(drone.address, field.safety.land_after_s)
+    if drone.mavlink.listen or drone.mavlink.serial or drone.mavlink.key_file:
+        return None  # nobody but the driver can speak to it; its own time-outs act
+    from drivers.mavlink.last_words import hover_and_land
+
+    hover, land = hover_and_land(drone.mavlink.system_id)
+    return LastWords(drone.address, drone.mavlink.port, hover, land, field.safety.land_after_s)
 
 
 def _ardrone_last_words(address: str, land_after_s: float) -> LastWords:

@@ -113,6 +113,25 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
     yield from _unique(((("drones", n, "address"), d.address, n) for n, d in parts.drones.items()), "address")
 
 
+def _mavlink(parts: Parts) -> Iterator[Finding]:
+    for name, drone in parts.drones.items():
+        path: KeyPath = ("drones", name, "mavlink")
+        if (drone.kind == "mavlink") != (drone.mavlink is not None):
+            needs = "must be given for kind: mavlink" if drone.mavlink is None else f"has no meaning for {drone.kind}"
+            yield path, needs
+        elif drone.mavlink is not None and drone.mavlink.key_file and drone.mavlink.link == "mavsdk":
+            yield (*path, "link"), "must be pymavlink for a signed link: MAVSDK cannot sign"
+        elif drone.mavlink is not None and drone.mavlink.serial and drone.mavlink.listen:
+            yield (*path, "listen"), "has no meaning on a serial line"
+    flown = {name: drone.mavlink for name, drone in parts.drones.items() if drone.mavlink is not None}
+    yield from _unique(((("drones", n, "mavlink", "system_id"), m.system_id, n) for n, m in flown.items()), "system id")
+    shared: dict[int, tuple[str, tuple[str, str, str]]] = {}
+    for name, m in flown.items():
+        how = (m.link, m.key_file, m.local_address)
+        if m.listen and shared.setdefault(m.port, (name, how))[1] != how:
+            yield ("drones", name, "mavlink", "port"), f"is shared with {shared[m.port][0]}, which is reached otherwise"
+
+
 def _names(parts: Parts) -> Iterator[Finding]:
     named: list[tuple[KeyPath, str]] = [(("drones", name), name) for name in parts.drones]
     named += [(("cameras", name), name) for name in parts.cameras]
@@ -181,6 +200,7 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _team,
     _pads,
     _distinct,
+    _mavlink,
     _names,
     _heights,
     _rates_and_times,

@@ -89,10 +89,30 @@ class OdometryCalibration(Section):
         return math.radians(self.yaw_rate_std_deg_s)
 
 
+class Mavlink(Section):
+    """How a MAVLink vehicle is met: PX4 or ArduPilot, its system id, and the way to it.
+
+    Over UDP to address:port, which is spoken to first; with `listen`, vehicles call local_address:port instead, many on
+    one port; with `serial`, `DEVICE:BAUD`. key_file: signed links only (link: pymavlink).
+    """
+
+    flavour: Literal["px4", "ardupilot"]
+    system_id: Annotated[int, Field(ge=1, le=250)]
+    link: Literal["pymavlink", "mavsdk"] = "pymavlink"
+    port: Annotated[int, Field(ge=1024, le=65535)] = 14550
+    listen: bool = False
+    local_address: Address = "0.0.0.0"
+    serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d+)?$")] = ""
+    key_file: str = ""
+    take_off_m: Annotated[float, Field(ge=0.4, le=3)] = 0.8
+    vision_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
+
+
 class Drone(Section):
     """One drone with all three levels merged. `pad_m` is where it takes off, `pad_yaw_deg` how it stands there."""
 
-    kind: Literal["ardrone"]
+    kind: Literal["ardrone", "mavlink"]
+    mavlink: Mavlink | None = None
     enabled: bool = True
     address: Address
     limits: Limits = Limits()

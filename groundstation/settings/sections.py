@@ -8,7 +8,8 @@ from typing import Any
 
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.camera.settings import CameraDriverSettings
-from groundstation.settings.drones import Drone
+from drivers.mavlink.settings import MavlinkDriverSettings
+from groundstation.settings.drones import Drone, Mavlink
 from groundstation.settings.room import Calibration, WorldCamera
 from groundstation.settings.schema import Field
 
@@ -19,6 +20,7 @@ class DriverKind(StrEnum):
     """What a driver process talks to; the value is its package below `drivers`."""
 
     ARDRONE = "ardrone"
+    MAVLINK = "mavlink"
     CAMERA = "camera"
 
 
@@ -54,10 +56,19 @@ def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, t
     drones = {}
     for name, drone in field.drones.items():
         camera = drone.camera.model_copy(update=_source(streams.get(name)))
-        address = {"address": addresses[name]} if name in addresses else {}
-        drones[name] = drone.model_copy(update={"camera": camera, **address})
+        drones[name] = drone.model_copy(update={"camera": camera, **_place(drone, addresses.get(name))})
     cameras = {name: camera.model_copy(update=_source(streams.get(name))) for name, camera in field.cameras.items()}
     return field.model_copy(update={"drones": drones, "cameras": cameras})
+
+
+def _place(drone: Drone, address: str | None) -> dict[str, Any]:
+    if address is None:
+        return {}
+    if drone.mavlink is None:
+        return {"address": address}
+    # Vehicles that call us do so within the simulated network; there are no serial lines in it.
+    local = address.rpartition(".")[0] + ".1"
+    return {"address": address, "mavlink": drone.mavlink.model_copy(update={"local_address": local, "serial": ""})}
 
 
 def _source(stream: tuple[str, int] | None) -> dict[str, str]:
@@ -75,7 +86,12 @@ def driver_sections(field: Field) -> list[DriverSection]:
     phases = [index / (count * _SEARCH_RATE_HZ) for index in range(count)]
     vehicles = [
         DriverSection(name, DriverKind.ARDRONE, name, _ardrone(field, name, index).model_dump_json())
-        for index, name in enumerate(field.drones)
+        for index, (name, drone) in enumerate(field.drones.items())
+        if drone.mavlink is None
+    ]
+    vehicles += [
+        DriverSection(names[0], DriverKind.MAVLINK, names[0], _mavlink(field, names).model_dump_json())
+        for names in _mavlink_links(field)
     ]
     fixed = [
         DriverSection(name, DriverKind.CAMERA, name, _world_camera(field, name, camera, phase).model_dump_json())
@@ -104,6 +120,55 @@ def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
             "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
         }
     )
+
+
+def _mavlink_links(field: Field) -> list[tuple[str, ...]]:
+    """Return the MAVLink vehicles by driver process: those that call the same port, the others alone."""
+    links: dict[object, list[str]] = {}
+    for name, drone in field.drones.items():
+        if drone.mavlink is not None:
+            links.setdefault(drone.mavlink.port if drone.mavlink.listen else name, []).append(name)
+    return [tuple(names) for names in links.values()]
+
+
+def _target(drone: Drone, mavlink: Mavlink) -> str:
+    if mavlink.serial:
+        return f"serial:{mavlink.serial}"
+    if mavlink.listen:
+        return f"udpin:{mavlink.local_address}:{mavlink.port}"
+    return f"udpout:{drone.address}:{mavlink.port}"
+
+
+def _mavlink(field: Field, names: tuple[str, ...]) -> MavlinkDriverSettings:
+    first = field.drones[names[0]]
+    assert first.mavlink is not None
+    return MavlinkDriverSettings.model_validate(
+        {
+            "link": {
+                "kind": first.mavlink.link,
+                "target": _target(first, first.mavlink),
+                "key_file": first.mavlink.key_file,
+            },
+            "vehicles": [_mavlink_vehicle(name, field.drones[name]) for name in names],
+            "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
+            "vision": {"rate_hz": first.mavlink.vision_hz},
+            "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
+        }
+    )
+
+
+def _mavlink_vehicle(name: str, drone: Drone) -> dict[str, Any]:
+    assert drone.mavlink is not None
+    return {
+        "name": name,
+        "system_id": drone.mavlink.system_id,
+        "flavour": drone.mavlink.flavour,
+        "pad_m": drone.pad_m,
+        "pad_yaw_rad": drone.pad_yaw_rad,
+        "limits": drone.limits.model_dump(exclude={"max_tilt_deg"}),
+        "take_off_m": drone.mavlink.take_off_m,
+        "velocity_std_m_s": drone.odometry.velocity_std_m_s,
+    }
 
 
 def _world_camera(field: Field, name: str, camera: WorldCamera, phase_s: float) -> CameraDriverSettings:

@@ -1,0 +1,179 @@
+"""The driver flies the emulated PX4 and ArduPilot: start, velocity, silence of anybody, landing."""
+
+import itertools
+import math
+
+import pytest
+
+from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
+from groundstation.bus.messages import Verb
+from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, VEHICLE_STATUS
+
+
+def test_it_is_discovered_and_configured_within_two_seconds(rig):
+    rig.until(lambda: rig.host.watchdog.mode == "LANDED", 2.0)
+    rig.until(lambda: not rig.host.watchdog.vehicle.not_ready, 6.0)
+
+
+def test_it_takes_off_hovers_flies_and_lands(rig):
+    rig.track_on()
+    assert 0.65 < rig.body.z < 1.1
+    rig.wanted = ((0.4, 0.0, 0.0), 0.0)
+    rig.run(4.0)
+    forward, left, up = rig.velocity()
+    # PX4 stays 15 % under what it is told: nothing may wind up over that.
+    assert 0.3 < forward < 0.45 and abs(left) < 0.08 and abs(up) < 0.1
+    rig.wanted = ((0.0, 0.3, 0.0), 0.5)
+    rig.run(3.0)
+    forward, left, up = rig.velocity()
+    assert 0.15 < left < 0.4 and abs(forward) < 0.25
+    assert rig.body.yaw_rate == pytest.approx(0.5, abs=0.08)
+    rig.wanted = ((0.0, 0.0, 0.2), 0.0)
+    rig.run(2.0)
+    assert rig.velocity()[2] == pytest.approx(0.2, abs=0.08)
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED")
+    rig.until(lambda: not rig.emulator.firmware.armed, 5.0)
+    stages = [(a.verb, a.stage) for a in rig.messages(COMMAND_ACK)]
+    assert (Verb.TAKEOFF, "EFFECTIVE") in stages and (Verb.LAND, "EFFECTIVE") in stages
+
+
+def test_what_is_published_is_what_it_measures_and_never_our_own_position(rig):
+    rig.track_on()
+    rig.wanted = ((0.3, -0.2, 0.0), 0.3)
+    for topic in (ODOMETRY, IMU, VEHICLE_STATUS):
+        rig.messages(topic)
+    yaw = rig.body.yaw
+    rig.run(4.0)
+    odometry, imu, status = (rig.messages(t) for t in (ODOMETRY, IMU, VEHICLE_STATUS))
+    assert 190 <= len(odometry) <= 210 and 390 <= len(imu) <= 410
+    assert all(o.position_m is None and o.height_m is None for o in odometry)
+    assert odometry[-1].velocity_covariance[0] >= 0.1**2
+    assert odometry[-1].velocity_m_s[:2] == pytest.approx(rig.velocity()[:2], abs=0.12)
+    turned = math.remainder(odometry[-1].yaw_rad - odometry[0].yaw_rad, math.tau)
+    assert turned == pytest.approx(math.remainder(rig.body.yaw - yaw, math.tau), abs=0.05)
+    assert imu[-1].specific_force_m_s2[2] == pytest.approx(9.8, abs=0.8)
+    assert imu[-1].angular_velocity_rad_s[2] == pytest.approx(0.3, abs=0.1)
+    assert status[-1].battery > 0.5 and status[-1].link_quality == 1.0 and status[-1].mode == "TRACK"
+
+
+def test_each_setpoint_goes_out_once_at_most_at_its_rate(rig):
+    rig.track_on()
+    rig.wanted = ((0.2, 0.0, 0.0), 0.0)
+    rig.run(0.5)
+    rig.link.sent.clear()
+    rig.run(2.0)
+    times = [at for at, _ in rig.sent(SetPositionTargetLocalNed)]
+    assert 36 <= len(times) <= 52
+    assert all(m.type_mask == 0x5C7 and m.coordinate_frame == 8 for _, m in rig.sent(SetPositionTargetLocalNed))
+    assert max(b - a for a, b in itertools.pairwise(times)) <= 70_000_000
+    rig.tracking = False
+    rig.link.sent.clear()
+    rig.run(0.25)
+    # Nothing new from the tracker: nothing is repeated; after 0.3 s the watchdog hovers.
+    assert len(rig.sent(SetPositionTargetLocalNed)) <= 1
+    rig.run(0.3)
+    assert rig.sent(SetPositionTargetLocalNed)[-1][1].vx == 0.0
+
+
+def test_setpoints_are_clamped(rig):
+    rig.track_on()
+    rig.wanted = ((9.0, 9.0, 9.0), 9.0)
+    rig.link.sent.clear()
+    rig.run(0.2)
+    sent = rig.sent(SetPositionTargetLocalNed)[-1][1]
+    assert math.hypot(sent.vx, sent.vy) == pytest.approx(0.6)
+    assert sent.vz == pytest.approx(-0.4) and sent.yaw_rate == pytest.approx(-math.radians(60))
+
+
+def test_silent_tracker_hovers_then_lands(rig):
+    rig.track_on()
+    rig.wanted = ((0.5, 0.0, 0.0), 0.0)
+    rig.run(2.0)
+    rig.tracking = False
+    rig.run(1.8)
+    assert math.hypot(*rig.velocity()[:2]) < 0.2
+    rig.until(lambda: rig.mode == "LANDED", 15.0)
+
+
+def test_unseen_vehicle_hovers_then_lands_before_the_autopilot_would(rig):
+    rig.track_on()
+    rig.wanted = ((0.4, 0.0, 0.0), 0.0)
+    rig.run(2.0)
+    rig.sees = False
+    began = rig.hand.now
+    rig.until(lambda: rig.emulator.firmware.mode == rig.emulator.firmware.landing, 6.0)
+    # max_age_s 1.0 + land_after_s 2.0
+    assert (rig.hand.now - began) / 1e9 < 3.3
+    assert any("no position from the cameras" in text for text in rig.texts)
+    rig.until(lambda: rig.mode == "LANDED", 15.0)
+
+
+def test_killed_driver_is_survived_by_the_vehicles_own_time_out(rig):
+    rig.track_on()
+    rig.wanted = ((0.5, 0.0, 0.0), 0.0)
+    rig.run(3.0)
+    assert rig.velocity()[0] > 0.35
+    rig.driving = False
+    rig.run(3.5)
+    assert math.hypot(*rig.velocity()[:2]) < 0.25
+    rig.until(lambda: not rig.emulator.firmware.armed, 25.0)
+
+
+def test_restarted_driver_lands_what_flies(rig, rig_of, flavour):
+    rig.track_on()
+    rig.run(0.5)
+    before = rig.host
+    from drivers.host import VehicleHost
+    from drivers.mavlink.vehicle import MavlinkVehicle
+
+    rig.vehicle = MavlinkVehicle(rig.settings, rig.settings.vehicles[0], rig.link, rig.process.bus)
+    rig.host = VehicleHost(rig.process, rig.vehicle, before.watchdog.limits)
+    rig.link.sent.clear()
+    rig.until(lambda: rig.mode == "LANDING", 2.0)
+    rig.until(lambda: rig.mode == "LANDED", 15.0)
+    assert not [m for _, m in rig.sent(CommandLong) if m.command in (22,)]
+
+
+def test_cut_motors_falls(rig):
+    rig.track_on()
+    rig.order(Verb.CUT_MOTORS)
+    rig.run(0.2)
+    assert not rig.emulator.firmware.armed
+    rig.until(lambda: rig.body.on_ground, 2.0)
+
+
+def test_refused_arming_is_explained(rig_of, flavour):
+    rig = rig_of(flavour)
+    rig.connect()
+    rig.copter.battery = 0.10
+    rig.host.watchdog.limits = rig.host.watchdog.limits.__class__(battery_min=0.0)
+    rig.order(Verb.TAKEOFF)
+    rig.run(4.0)
+    assert rig.mode != "HOVER"
+    assert any("battery low" in text.lower() for text in rig.texts) or "arm" in rig.host.watchdog.vehicle.not_ready
+
+
+def test_wrong_parameters_forbid_the_take_off(rig_of, flavour):
+    rig = rig_of(flavour, configured=False)
+    rig.run(5.0)
+    assert "groundstation mavlink setup --apply" in rig.host.watchdog.vehicle.not_ready
+    rig.order(Verb.TAKEOFF)
+    rig.run(1.0)
+    assert rig.mode == "LANDED" and not rig.emulator.firmware.armed
+    assert [a.reason for a in rig.messages(COMMAND_ACK) if a.stage == "REFUSED"]
+
+
+def test_pilots_mode_change_is_not_fought(rig):
+    rig.track_on()
+    rig.run(1.0)
+    rig.emulator.firmware.enter(3 << 16 if rig.flavour == 12 else 16)  # POSCTL, POSHOLD
+    rig.link.sent.clear()
+    rig.run(3.0)
+    assert not [m for _, m in rig.sent(CommandLong) if m.command == 176]
+    assert any("not ours to fly until RESUME" in text for text in rig.texts)
+    rig.order(Verb.HOLD)
+    rig.run(0.1)
+    rig.order(Verb.RESUME)
+    rig.run(1.0)
+    assert rig.emulator.firmware.mode == rig.emulator.firmware.guided

@@ -33,9 +33,8 @@ class Fleet:
             raise DriverError(f"this pymavlink knows other messages than we do: {'; '.join(faults)}")
         self._child = child
         self._estimates = child.bus.subscribe([ESTIMATE], newest=True)
-        systems = frozenset(vehicle.system_id for vehicle in settings.vehicles)
         self.vehicles: dict[int, MavlinkVehicle] = {}
-        self.link: Link = open_link(settings.link, systems, self._sniff)
+        self.link: Link = open_link(settings.link, self._sniff)
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
         self.strangers: Counter[int] = Counter()
         self._news: list[str] = []

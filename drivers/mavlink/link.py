@@ -51,12 +51,12 @@ def ignore_bytes(system: int, stamp_ns: int, data: bytes, received: bool) -> Non
     """Sniff nothing."""
 
 
-def open_link(settings: LinkSettings, systems: frozenset[int], sniffer: Sniffer = ignore_bytes) -> Link:
+def open_link(settings: LinkSettings, sniffer: Sniffer = ignore_bytes) -> Link:
     """Return the link that the settings describe; raises DriverError when it cannot be opened."""
     if settings.kind == "mavsdk":
         from drivers.mavlink.mavsdk_link import MavsdkLink
 
-        return MavsdkLink(settings, systems)
+        return MavsdkLink(settings)
     if settings.target.startswith("serial"):
         from drivers.mavlink.serial_link import SerialLink
 

@@ -1,0 +1,135 @@
+"""What every link keeps: discovery, telemetry, commands, floats and 64-bit numbers to the bit, several vehicles, close."""
+
+import time
+
+import pytest
+
+from drivers.mavlink.link import open_link
+from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.wire import flight, service, telemetry
+from drivers.mavlink.wire.names import Command
+from groundstation.errors import DriverError
+
+
+@pytest.fixture(params=["pymavlink", "mavsdk"])
+def kind(request):
+    return request.param
+
+
+@pytest.fixture
+def opened(kind):
+    links = []
+
+    def make(target):
+        links.append(open_link(LinkSettings(kind=kind, target=target)))
+        return links[-1]
+
+    yield make
+    for link in links:
+        link.close()
+
+
+def collect(link, wanted, seconds=5.0, each=lambda: None):
+    """Return everything heard until `wanted(heard)`; fails after a while."""
+    heard, deadline = [], time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        each()
+        heard += link.receive()
+        if wanted(heard):
+            return heard
+    raise AssertionError(f"not heard within {seconds} s; got {sorted({type(h.frame.message).__name__ for h in heard})}")
+
+
+def of(heard, kind, system=None):
+    return [
+        h.frame.message
+        for h in heard
+        if isinstance(h.frame.message, kind) and (system is None or h.frame.system == system)
+    ]
+
+
+def heartbeat(link, *systems):
+    def send():
+        for system in systems:
+            link.send(system, telemetry.Heartbeat(6, 8, 0, 0, 4))
+
+    return send
+
+
+def test_it_speaks_first_and_is_answered_within_two_seconds(hangar, opened):
+    _, _, (address, port) = hangar.add("px4", 7)
+    link = opened(f"udpout:{address}:{port}")
+    began = time.monotonic()
+    heard = collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, heartbeat(link, 7))
+    assert time.monotonic() - began < 2.0
+    assert of(heard, telemetry.Heartbeat)[0].autopilot == 12
+
+
+def test_commands_are_acknowledged_and_rates_are_granted(hangar, opened):
+    _, _, (address, port) = hangar.add("ardupilot", 9, aided=True)
+    link = opened(f"udpout:{address}:{port}")
+    each = heartbeat(link, 9)
+    collect(link, lambda h: of(h, telemetry.Heartbeat, 9), 3.0, each)
+    link.send(9, flight.CommandLong(9, 1, Command.SET_MESSAGE_INTERVAL, 0, 32.0, 20_000.0))
+    heard = collect(link, lambda h: of(h, flight.CommandAck))
+    assert of(heard, flight.CommandAck)[0][:2] == (511, 0)
+    heard = collect(link, lambda h: len(of(h, telemetry.LocalPositionNed)) > 20)
+    stamps = [m.time_boot_ms for m in of(heard, telemetry.LocalPositionNed)]
+    assert all(b - a == 20 for a, b in zip(stamps, stamps[1:], strict=False))
+    link.send(9, flight.CommandLong(9, 1, 9999, 0))
+    heard = collect(link, lambda h: of(h, flight.CommandAck))
+    assert of(heard, flight.CommandAck)[0][:2] == (9999, 3)
+
+
+def test_values_arrive_to_the_bit(hangar, opened):
+    emulator, _, (address, port) = hangar.add("px4", 7)
+    link = opened(f"udpout:{address}:{port}")
+    collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, heartbeat(link, 7))
+    seen = []
+    emulator.services.take, original = (
+        (lambda frame, now: [*(seen.append(frame), original(frame, now))[1]]),
+        (emulator.services.take),
+    )
+    sent = flight.Odometry(
+        2**53 + 12345, 1, 12, 1.5, -2.25, -0.125, (0.5, 0.5, -0.5, 0.5), 0.25, 0.0, -0.75, 0.0, 0.0, 0.5,
+        tuple(i / 8 for i in range(21)), tuple(-i / 4 for i in range(21)), 3, 2, 100,
+    )  # fmt: skip
+    setpoint = flight.SetPositionTargetLocalNed(5, 7, 1, 8, 0x5C7, *(0.0,) * 3, 0.5, -0.25, 0.125, *(0.0,) * 4, -0.5)
+    link.send(7, sent)
+    link.send(7, setpoint)
+    link.send(7, service.ParamRequestRead(7, 1, "COM_OF_LOSS_T", -1))
+    heard = collect(link, lambda h: of(h, service.ParamValue))
+    messages = [frame.message for frame in seen]
+    assert sent in messages and setpoint in messages
+    assert of(heard, service.ParamValue)[0][:2] == ("COM_OF_LOSS_T", 1.0)
+
+
+def test_two_vehicles_call_one_port_and_each_gets_its_own(hangar, opened, port):
+    place = ("127.0.0.1", port)
+    link = opened(f"udpin:127.0.0.1:{port}")
+    hangar.add("px4", 21, calls=place)
+    hangar.add("ardupilot", 22, calls=place)
+    each = heartbeat(link, 21, 22)
+    collect(link, lambda h: of(h, telemetry.Heartbeat, 21) and of(h, telemetry.Heartbeat, 22), 4.0, each)
+    for system in (21, 22):
+        link.send(system, service.ParamRequestRead(system, 1, "SYSID_MYGCS" if system == 22 else "EKF2_EV_CTRL", -1))
+    heard = collect(link, lambda h: of(h, service.ParamValue, 21) and of(h, service.ParamValue, 22), 4.0)
+    assert of(heard, service.ParamValue, 21)[0].param_id == "EKF2_EV_CTRL"
+    assert of(heard, service.ParamValue, 22)[0].param_value == 255.0
+
+
+def test_silence_returns_and_close_gives_the_port_back(kind, opened, port):
+    link = open_link(LinkSettings(kind=kind, target=f"udpin:127.0.0.1:{port}"))
+    began = time.monotonic()
+    assert link.receive() == []
+    assert time.monotonic() - began < 1.0
+    link.send(5, flight.CommandLong(5, 1, 21, 0))  # to nobody
+    link.close()
+    again = opened(f"udpin:127.0.0.1:{port}")
+    assert again.receive() == []
+
+
+def test_a_taken_port_is_named(kind, opened, port):
+    opened(f"udpin:127.0.0.1:{port}")
+    with pytest.raises(DriverError, match=str(port)):
+        open_link(LinkSettings(kind=kind, target=f"udpin:127.0.0.1:{port}"))

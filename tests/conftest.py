@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.process import numba_cache
 
-numba_cache.activate()
+numba_cache.activate(numba_cache.EVERYTHING)
 
 CONFIG = Path(__file__).parents[1] / "config"
 

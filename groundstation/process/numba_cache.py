@@ -5,33 +5,68 @@ numba does not notice an edited callee or constant in another module, so a cache
 
 import hashlib
 import os
+import shutil
+import subprocess
 import sys
+from collections.abc import Iterable
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-_PACKAGES = ("estimation", "experiments", "geometry", "planning", "sensing")
+FLIGHT = ("estimation", "geometry", "planning", "sensing")
+"""Packages whose kernels fly."""
+
+EVERYTHING = (*FLIGHT, "planning/planar", "experiments")
+
+_KEPT = 12  # directories of older states that are not deleted
+_COMPILE_LIMIT_S = 180.0
 
 
-def sources_hash() -> str:
-    """Return a short hash of all sources that kernels are built from, and of the versions that build them."""
+def sources_hash(packages: Iterable[str] = FLIGHT) -> str:
+    """Return a short hash of the sources that kernels are built from, and of the versions that build them."""
     root = Path(__file__).parents[1]
     digest = hashlib.sha256(f"{sys.version}/{version('numba')}/{version('numpy')}".encode())
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
+    for package in packages:
+        for path in sorted((root / package).glob("*.py")):
             digest.update(str(path.relative_to(root)).encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def activate() -> Path:
-    """Point numba to this state's cache and return it; call it before numba is imported.
+def activate(packages: Iterable[str] = FLIGHT) -> Path:
+    """Point numba to the cache of these packages' state and return it; call it before numba is imported.
 
     A NUMBA_CACHE_DIR that somebody has set already is respected.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen)
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "skein" / f"numba-{sources_hash()}"
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "skein"
+    folder = base / f"numba-{sources_hash(packages)}"
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    if not folder.exists():
+        _forget_old(base)
     return folder
+
+
+def _forget_old(base: Path) -> None:
+    with suppress(OSError):  # another process may be tidying as well
+        folders = sorted(base.glob("numba-*"), key=lambda path: path.stat().st_mtime, reverse=True)
+        for folder in folders[_KEPT:]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+class ParallelCompilation:
+    """Compiles the kernels that some modules import in a process of its own, while this one compiles others."""
+
+    def __init__(self, modules: Iterable[str]) -> None:
+        statement = "\n".join(f"import {module}" for module in modules)
+        self._process = subprocess.Popen([sys.executable, "-c", statement], stdin=subprocess.DEVNULL)
+
+    def finish(self) -> None:
+        """Wait for it; whatever it did not compile is compiled where it is imported."""
+        try:
+            self._process.wait(_COMPILE_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

@@ -7,6 +7,7 @@ needs it is imported only after the kernel cache is chosen.
 from __future__ import annotations
 
 import gc
+import importlib
 import sys
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,13 @@ _SWITCH_INTERVAL_S = 0.001  # how long the planner's thread may keep the interpr
 def run(child: Child) -> int:
     """Run the tracker until it is stopped or its supervisor is gone; returns the exit code."""
     cache = numba_cache.activate()
-    child.starting("loading kernels" if cache.exists() else "compiling kernels (once per version, some 30 s)")
+    if cache.exists():
+        child.starting("loading kernels")
+    else:
+        child.starting("compiling kernels (once per version, some 30 s)")
+        other_half = numba_cache.ParallelCompilation(["groundstation.planning.plan"])
+        importlib.import_module("groundstation.estimation.replay")
+        other_half.finish()
     from groundstation.runtime.tracking import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up
 

@@ -168,16 +168,28 @@ def test_garbage_is_counted_by_reason_and_reported_once(lab: Lab) -> None:
     assert texts.count("messages are refused: malformed") == 1
 
 
-def test_a_drone_that_nobody_sees_is_ordered_to_land(lab: Lab) -> None:
+def test_a_drone_that_nobody_sees_is_ordered_to_land(lab_field: dict[str, Any]) -> None:
+    """Its position would be good for longer, by its odometry: three times the limit of 2 s is the end of patience."""
+    lab = Lab({**lab_field, "safety": {**lab_field["safety"], "unseen_land_after_s": 2.0}})
     lab.run(25)
-    lab.run(9 * 50, look=False)
+    lab.run(round(5.8 * 50), look=False)
     assert "command" not in lab.messages()
-    lab.run(2 * 50, look=False)
+    lab.run(50, look=False)
+    lab.tracking.close()
     orders: list[Command] = lab.messages()["command"]
     assert {order.verb for order in orders} == {Verb.LAND}
     assert {order.scope for order in orders} == {("drone_1",), ("drone_2",)}
     assert all(order.expires_ns == 0 and order.issuer == "tracker" for order in orders)
     assert len({order.id for order in orders}) == len(orders)
+
+
+def test_a_drone_that_was_never_seen_is_ordered_to_land(lab_field: dict[str, Any]) -> None:
+    lab = Lab({**lab_field, "safety": {**lab_field["safety"], "unseen_land_after_s": 2.0}})
+    lab.run(95, look=False)
+    assert "command" not in lab.messages()
+    lab.run(10, look=False)
+    assert {order.scope for order in lab.messages()["command"]} == {("drone_1",), ("drone_2",)}
+    lab.tracking.close()
 
 
 def test_an_unseen_robot_is_told_once_a_second_until_it_has_landed() -> None:

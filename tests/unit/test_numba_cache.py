@@ -1,0 +1,41 @@
+"""The kernel cache belongs to one state of the sources, and to nobody who chose another."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from groundstation.process import numba_cache
+
+
+def test_a_state_of_the_sources_has_its_own_directory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    flight = numba_cache.activate()
+    assert flight.parent == tmp_path / "skein"
+    assert os.environ["NUMBA_CACHE_DIR"] == str(flight)
+    assert numba_cache.sources_hash() == numba_cache.sources_hash()
+    assert numba_cache.sources_hash() != numba_cache.sources_hash(numba_cache.EVERYTHING)
+
+
+def test_a_chosen_directory_is_respected(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert numba_cache.activate() == tmp_path
+
+
+def test_old_states_are_forgotten(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for number in range(20):
+        folder = tmp_path / "skein" / f"numba-{number:02d}"
+        folder.mkdir(parents=True)
+        os.utime(folder, (number, number))
+    (tmp_path / "skein" / "other").mkdir()
+    numba_cache.activate()
+    left = sorted(path.name for path in (tmp_path / "skein").iterdir())
+    assert left == [*(f"numba-{number:02d}" for number in range(8, 20)), "other"]
+
+
+def test_another_process_compiles_what_it_is_asked_for(tmp_path: Path) -> None:
+    other = numba_cache.ParallelCompilation(["json", "a_module_that_is_missing"])
+    other.finish()  # failing there is no failure here: what is missing is compiled where it is imported

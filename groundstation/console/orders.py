@@ -113,6 +113,11 @@ class OrderDesk:
         return AckBook(command, tuple(asked))
 
     def _keep(self, followed: Followed) -> None:
+        new = followed.book.command
+        for identity, old in list(self._orders.items()):
+            same = (old.book.command.issuer, old.book.command.verb, old.book.command.scope)
+            if not old.by and same == (new.issuer, new.verb, new.scope):
+                del self._orders[identity]  # said again by somebody who repeats himself with new ids
         self._orders[followed.book.command.id] = followed
         while len(self._orders) > _KEPT:
             del self._orders[next(iter(self._orders))]

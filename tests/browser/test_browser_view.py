@@ -63,7 +63,7 @@ def test_canvas_is_painted_and_dark_differs_from_light(stage: Any) -> None:
 
 
 def test_phone_and_keyboard(stage: Any) -> None:
-    page = stage.open(wait=True)
+    page = stage.open()
     page.page.set_viewport_size({"width": 390, "height": 844})
     page.page.wait_for_timeout(800)
     assert page.page.evaluate("() => document.documentElement.scrollWidth") <= 390

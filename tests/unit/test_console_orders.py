@@ -126,7 +126,12 @@ def test_everybody_s_orders_are_followed_even_if_answers_come_first() -> None:
     room.desk.step(room.now_ns + NS)
     assert room.commands() == []  # others repeat their own
     for number in range(50):
-        room.desk.hear(m.Command(header=header, id=f"{number}", verb=m.Verb.HOLD, scope=(), issuer="b"), room.now_ns)
+        again = m.Command(header=header, id=f"{number}", verb=m.Verb.HOLD, scope=(), issuer="tracker")
+        room.desk.hear(again, room.now_ns)
+    assert len(room.desk.summary()) == 2
+    for number in range(50):
+        other = m.Command(header=header, id=f"{number}-b", verb=m.Verb.HOLD, scope=(), issuer=f"cli_{number}")
+        room.desk.hear(other, room.now_ns)
     assert len(room.desk.summary()) == 8
 
 

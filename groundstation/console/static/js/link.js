@@ -42,12 +42,12 @@ export function connect() {
     if (watched.length) watch(watched);
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : takePicture(data));
-  socket.onclose = lost;
+  socket.onclose = (event) => lost(event.reason);
 }
 
-async function lost() {
+async function lost(reason = "") {
   socket = null;
-  store.connected = false;
+  Object.assign(store, { connected: false, reason });
   tell("state");
   const again = () => { retryMs = Math.min(RETRY_MAX_MS, retryMs * 1.5); setTimeout(reconnect, retryMs); };
   again();

@@ -29,7 +29,7 @@ on("seed", () => {
   for (const node of document.querySelectorAll(".only-sim")) node.hidden = !scene.truth;
   view.room = scene.room.size_m;
   if (view.fitted) view.fit();
-  document.querySelector(".legend").open = (view.width - view.scale * view.room[0]) / 2 > 265;
+  document.querySelector(".legend").open = (view.width - view.scale * view.room[0]) / 2 > 335;
   buildLayers(); buildLegend(); buildTeam(); buildCameras(); buildCharts();
   showAll();
   dirty = true;

@@ -84,14 +84,24 @@ export function showOrders() {
   own = own.filter((order) => !known.has(order.ref) && (performance.now() - order.at < KEPT_MS || order.state === "unsent"));
   const waiting = own.map((order) => ({ ...order, rows: (order.drones.length ? order.drones : droneNames()).map((name) => ({ name })), by: "you", team: !order.drones.length }));
   const all = [...waiting.reverse(), ...listed].slice(0, SHOWN);
-  byId("orders").replaceChildren(...all.map(line));
+  // Rebuilt only when an order has come further: a screen reader reads what changes.
+  const host = byId("orders"), key = JSON.stringify(all.map(({ id, ref, state, rows, note }) => [id, ref, state, rows, note]));
+  if (host.dataset.key !== key) {
+    host.dataset.key = key;
+    host.replaceChildren(...all.map(line));
+  }
+  all.forEach((order, index) => {
+    const age = ageS(order.given_ms);
+    host.children[index].classList.toggle("old", age > 20);
+    text(host.children[index].querySelector(".ago"), `${seconds(age)} ago`);
+  });
 }
 
 function line(order) {
-  const age = ageS(order.given_ms), scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
-  return el("li", { class: `order${age > 20 ? " old" : ""}`, data: { state: order.state, verb: order.verb, testid: "order" } },
+  const scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
+  return el("li", { class: "order", data: { state: order.state, verb: order.verb, testid: "order" } },
     el("div", { class: "head" },
-      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${order.by === me.name ? "you" : order.by} · ${seconds(age)} ago`)),
+      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${order.by === me.name ? "you" : order.by} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
       el("span", { class: "state" }, STATES[order.state] ?? order.state)),
     el("div", { class: "rows" }, ...order.rows.map((row) => el("span", {}, el("b", {}, `${row.name} `), el("span", { class: row.stage && row.stage !== "REFUSED" ? "" : "missing" }, stage(row, order)))),
       order.note ? el("span", { class: "missing" }, order.note) : null));

@@ -16,7 +16,7 @@ export function addNotice({ text: words, grave }) {
 export function showBanners() {
   const banners = [];
   const age = estimateAge(), ageWords = Number.isFinite(age) ? `What you see is ${seconds(age)} old.` : "";
-  if (!store.connected) banners.push(["link", true, "NO CONNECTION TO THE CONSOLE", ageWords, true]);
+  if (!store.connected) banners.push(["link", true, "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", true, `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
   else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", true, `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land after 3 s."]);
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave, notice.words, ""]);
@@ -73,7 +73,10 @@ export function showEvents() {
 export function showProcesses() {
   const processes = Object.entries(store.s.processes ?? {}).sort(([a], [b]) => a.localeCompare(b));
   const total = processes.reduce((sum, [, status]) => sum + (ageS(status.at) < 3 ? status.cpu : 0), 0);
-  byId("processes").replaceChildren(...processes.map(([name, status]) => {
+  const host = byId("processes"), key = JSON.stringify(processes.map(([name, { cpu, state, late, at }]) => [name, cpu, state, late, ageS(at) > 3]));
+  if (host.dataset.key === key) return;
+  host.dataset.key = key;
+  host.replaceChildren(...processes.map(([name, status]) => {
     const silent = ageS(status.at) > 3 && status.state !== "STOPPING";
     const level = silent ? "bad" : status.state === "DEGRADED" ? "warn" : status.state === "READY" ? "good" : "wait";
     const late = status.late > 0.01 ? ` · ${(100 * status.late).toFixed(0)} % late` : "";

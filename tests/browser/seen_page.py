@@ -1,0 +1,78 @@
+"""A page under observation: what it shows, what it asked for, what went wrong in it."""
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HERE = Path(__file__).parent
+WITHIN_S = 20.0
+
+
+def eventually(condition: Callable[[], Any], within_s: float = WITHIN_S, what: str = "") -> Any:
+    """Return the first true value of the condition; fails when none comes in time."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.05)
+    pytest.fail(f"not within {within_s:g} s: {what or condition}")
+
+
+@dataclass
+class Seen:
+    """One page, and everything it did that it should not have done."""
+
+    page: Any
+    requests: list[str] = field(default_factory=list)
+    troubles: list[str] = field(default_factory=list)
+
+    def state(self) -> dict[str, Any]:
+        # No wait_for_function: it evaluates a string in the page, which the content security policy forbids.
+        return dict(self.page.evaluate("() => window.__console?.state ?? {}"))
+
+    def wait(self, condition: Callable[[dict[str, Any]], Any], within_s: float = WITHIN_S) -> Any:
+        deadline = time.monotonic() + within_s
+        while time.monotonic() < deadline:
+            state = self.state()
+            if state and condition(state):
+                return state
+            self.page.wait_for_timeout(50)
+        pytest.fail(f"the page did not come to this within {within_s:g} s")
+
+    def there(self, testid: str) -> Any:
+        return self.page.get_by_test_id(testid)
+
+    def shot(self, name: str) -> None:
+        folder = Path(os.environ.get("CONSOLE_SCREENSHOTS", "") or HERE.parents[1] / ".pytest_cache" / "screenshots")
+        folder.mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=str(folder / f"{name}.png"), full_page=True)
+
+
+def open_seen(browser: Any, contexts: list[Any], url: str, **options: Any) -> Seen:
+    """Return a page of its own profile at the address, once it has the first frames."""
+    from playwright.sync_api import Error
+
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, **options)
+    contexts.append(context)
+    seen = Seen(context.new_page())
+    seen.page.on("request", lambda request: seen.requests.append(request.url))
+    seen.page.on("websocket", lambda socket: seen.requests.append(socket.url))
+    seen.page.on("pageerror", lambda error: seen.troubles.append(f"error: {error}"))
+    seen.page.on("console", lambda line: seen.troubles.append(line.text) if line.type in ("error", "warning") else None)
+
+    def answers() -> bool:
+        try:
+            seen.page.goto(url)
+        except Error:
+            return False
+        return True
+
+    eventually(answers, what="the console answers")
+    seen.wait(lambda state: state["frames"] > 2 and state["trusted"])
+    return seen

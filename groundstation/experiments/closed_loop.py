@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from groundstation.experiments.filter import PlanarBelief, correct, initial_belief, predict
 from groundstation.experiments.paths import Path
 from groundstation.experiments.strategies import Strategy
-from groundstation.planning.planar.edges import list_edges
 from groundstation.planning.planar.parameters import PlanarParameters
 
 Array = NDArray[np.float64]
@@ -108,6 +107,12 @@ def forget_target(belief: PlanarBelief) -> PlanarBelief:
     return PlanarBelief(belief.mean, covariance, belief.robots)
 
 
+def edges_of(level: Levels) -> list[tuple[int, int]]:
+    """Return the (observer, subject) pairs of a level vector; -1 is the global sensor, n the target."""
+    ends = [-1, *level.tolist(), int(level.max()) + 1]
+    return [(a - 1, b - 1) for a, upper in enumerate(ends) for b, lower in enumerate(ends) if lower == upper + 1]
+
+
 def observe(
     belief: PlanarBelief,
     truth: Array,
@@ -120,10 +125,8 @@ def observe(
 
     PAPER: the filter uses the edges of the selected topology only.
     """
-    robots = len(level)
-    edges = np.empty((robots * robots // 4 + robots + 2, 2), dtype=np.int64)
     readings = 0
-    for observer, subject in edges[: list_edges(level, edges)]:
+    for observer, subject in edges_of(level):
         true = truth[subject] - (truth[observer] if observer >= 0 else 0.0)
         distance = float(np.hypot(*true))
         variance = parameters.sigma_m**2 * (1.0 + settings.noise_growth * distance**4)

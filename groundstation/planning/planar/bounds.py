@@ -10,85 +10,102 @@ import math
 import numpy as np
 from numba import njit, types
 
-from groundstation.planning.planar.edges import exponentials
+from groundstation.planning.planar.edges import exponentials, sort_team
 from groundstation.planning.planar.objective import weighted_cost
-from groundstation.planning.planar.problem import PROBLEM, WORKSPACE
+from groundstation.planning.planar.problem import PROBLEM, WORKSPACE, load_topology
 from groundstation.planning.planar.rollout import adjoint_columns
 
-_f2, _f3, _f8, _i8 = types.float64[:, ::1], types.float64[:, :, ::1], types.float64, types.int64
+_f1, _f2, _f3, _f8 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.float64
+_i1, _i2, _i8 = types.int64[::1], types.int64[:, ::1], types.int64
 
 
-@njit(types.void(PROBLEM, _f3), cache=True, nogil=True)
+@njit(types.void(PROBLEM, _f3), cache=True, nogil=True, error_model="numpy")
 def reach_information(problem, reach):  # type: ignore[no-untyped-def]
-    """Write w^R of every pair (h, n + 2, n + 2), upper triangle; index n + 1 is the global sensor."""
+    """Write w^R of every pair (h, n + 2, n + 2), symmetric; index n + 1 is the global sensor."""
     constants, size = problem.constants, problem.mean.shape[0]
-    exponent, out = np.empty(size + 1), np.empty(size + 1)
+    exponent, out, far = np.empty(size + 1), np.empty(size + 1), np.empty(size + 1)
+    x, y, slack = np.zeros(size + 1), np.zeros(size + 1), np.zeros(size + 1)
+    square, weight = constants[1] * constants[1], 1.0 / (constants[0] * constants[0])
     for i in range(problem.steps):
         elapsed = (i + 1) * constants[4]
-        step = elapsed * constants[6]
         for a in range(size):
-            for b in range(a + 1, size + 1):
-                dx, dy = -problem.mean[a, 0], -problem.mean[a, 1]
-                if b < size:
-                    dx += problem.mean[b, 0]
-                    dy += problem.mean[b, 1]
-                if b == size - 1:
-                    dx += elapsed * constants[7]
-                    dy += elapsed * constants[8]
-                slack = 2.0 * step if b < size - 1 else step
-                dx, dy = max(abs(dx) - slack, 0.0), max(abs(dy) - slack, 0.0)
+            x[a], y[a], slack[a] = problem.mean[a, 0], problem.mean[a, 1], elapsed * constants[6]
+        x[size - 1] += elapsed * constants[7]
+        y[size - 1] += elapsed * constants[8]
+        slack[size - 1] = 0.0
+        for a in range(size + 1):
+            for b in range(a + 1):
+                free = slack[a] + slack[b]
+                dx, dy = max(abs(x[b] - x[a]) - free, 0.0), max(abs(y[b] - y[a]) - free, 0.0)
                 distance = math.sqrt(dx * dx + dy * dy + constants[3] * constants[3])
                 exponent[b] = min((distance - constants[1]) / constants[2], 40.0)
-            exponentials(exponent[a + 1 :], out[a + 1 :], size - a)
-            for b in range(a + 1, size + 1):
-                reach[i, a, b] = 1.0 / (constants[0] * constants[0] * (1.0 + out[b]))
+                far[b] = constants[9] * square / (square + distance * distance)
+            exponentials(exponent, out, a + 1)
+            for b in range(a + 1):
+                reach[i, a, b] = weight * (1.0 / (1.0 + out[b]) + far[b])
+                reach[i, b, a] = reach[i, a, b]
 
 
-@njit(types.void(_f3, _i8, WORKSPACE), cache=True, nogil=True)
-def _load_reach(reach, count, work):  # type: ignore[no-untyped-def]
+@njit(_f8(_i1, _f3, PROBLEM, WORKSPACE), cache=True, nogil=True)
+def reach_bound(level, reach, problem, work):  # type: ignore[no-untyped-def]
+    """Return c_T(w^R): no admissible control can cost less. Leaves the topology in the workspace."""
+    load_topology(level, problem, work)
     sensor = reach.shape[1] - 1
-    for e in range(count):
-        a, b = work.edges[e, 0], work.edges[e, 1]
-        low, high = (b, sensor) if a < 0 else (min(a, b), max(a, b))
-        for i in range(reach.shape[0]):
-            work.weights[i, e] = reach[i, low, high]
+    for row in range(work.order.shape[0]):
+        observer = work.order[row - 1] if row > 0 else sensor
+        shift = work.rows[row, 2] - work.rows[row, 0]
+        for b in range(work.rows[row, 0], work.rows[row, 1]):
+            subject = work.order[b]
+            for i in range(reach.shape[0]):
+                work.weights[i, b + shift] = reach[i, observer, subject]
+    return weighted_cost(problem, work)
 
 
-@njit(_f8(_f3, _i8, PROBLEM, WORKSPACE), cache=True, nogil=True)
-def reach_bound(reach, count, problem, work):  # type: ignore[no-untyped-def]
-    """Return c_T(w^R) for the workspace's edges: no admissible control can cost less."""
-    _load_reach(reach, count, work)
-    return weighted_cost(count, problem, work)
-
-
-@njit(types.void(_f3, PROBLEM, WORKSPACE, _f2), cache=True, nogil=True, fastmath=True)
+@njit(types.void(_f3, PROBLEM, WORKSPACE, _f2), cache=True, nogil=True, fastmath={"contract", "reassoc"})
 def pair_sensitivities(reach, problem, work, pairs):  # type: ignore[no-untyped-def]
-    """Write B_ab (n + 2, n + 2; upper triangle) after `reach_bound` of the topology at the tangent point."""
-    adjoint_columns(
-        work.prior, work.factor, problem.constants[5], work.columns, work.carried, problem.addresses, work.integers
-    )
+    """Write B_ab (n + 2, n + 2; symmetric) after `reach_bound` of the topology at the tangent point."""
+    adjoint_columns(work.prior, work.factor, work.variance, problem.constants[5], work.columns)
     size = problem.mean.shape[0]
-    pairs[:] = 0.0
-    row = np.empty(size)
+    y, row = np.zeros((problem.steps, size + 1)), np.empty(size + 1)
+    pairs[:, :] = 0.0
     for i in range(problem.steps):
-        for a in range(size):
-            row[:] = 0.0
-            own = 0.0
-            for c in range(problem.steps - i):
-                y = work.columns[i, c]
-                own += y[a] * y[a]
-                for b in range(size):
-                    row[b] += (y[b] - y[a]) ** 2
-            for b in range(a + 1, size):
+        used = problem.steps - i
+        for c in range(used):
+            for a in range(size):
+                y[c, work.order[a]] = work.columns[i, c, a]
+        for a in range(size + 1):
+            for b in range(a + 1):
+                row[b] = 0.0
+            for c in range(used):
+                own = y[c, a]
+                for b in range(a + 1):
+                    row[b] += (y[c, b] - own) * (y[c, b] - own)
+            for b in range(a + 1):
                 pairs[a, b] -= reach[i, a, b] * row[b]
-            pairs[a, size] -= reach[i, a, size] * own
+    for a in range(size + 1):
+        for b in range(a):
+            pairs[b, a] = pairs[a, b]
 
 
-@njit(_f8(_f2, _i8, WORKSPACE), cache=True, nogil=True)
-def summed_sensitivity(pairs, count, work):  # type: ignore[no-untyped-def]
-    """Return the sum of B over the workspace's edges."""
+@njit(_f8(_i1, _f2, WORKSPACE), cache=True, nogil=True)
+def summed_sensitivity(level, pairs, work):  # type: ignore[no-untyped-def]
+    """Return the sum of B over a topology's edges."""
+    sort_team(level, work.order, work.rows)
     total, sensor = 0.0, pairs.shape[0] - 1
-    for e in range(count):
-        a, b = work.edges[e, 0], work.edges[e, 1]
-        total += pairs[b, sensor] if a < 0 else pairs[min(a, b), max(a, b)]
+    for row in range(work.order.shape[0]):
+        observer = work.order[row - 1] if row > 0 else sensor
+        for b in range(work.rows[row, 0], work.rows[row, 1]):
+            total += pairs[observer, work.order[b]]
     return total
+
+
+@njit(types.void(_i2, _i8, _f3, PROBLEM, WORKSPACE, _f1), cache=True, nogil=True)
+def tangent_bounds(levels, total, reach, problem, work, bounds):  # type: ignore[no-untyped-def]
+    """Write the reach bound of levels[0] and the tangent bounds of levels[1..total - 1] [m^2]."""
+    size = problem.mean.shape[0]
+    pairs = np.empty((size + 1, size + 1))
+    bounds[0] = reach_bound(levels[0], reach, problem, work)
+    pair_sensitivities(reach, problem, work, pairs)
+    base = bounds[0] - summed_sensitivity(levels[0], pairs, work)
+    for t in range(1, total):
+        bounds[t] = base + summed_sensitivity(levels[t], pairs, work)

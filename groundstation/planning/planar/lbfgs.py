@@ -22,7 +22,7 @@ def projected_gradient_norm(x, gradient):  # type: ignore[no-untyped-def]
     return largest
 
 
-@njit(types.void(_f1, _f1, _f2, _f2, _i8, _f1), cache=True, nogil=True)
+@njit(types.void(_f1, _f1, _f2, _f2, _i8, _f1), cache=True, nogil=True, fastmath={"contract", "reassoc"})
 def _direction(x, gradient, steps, changes, used, direction):  # type: ignore[no-untyped-def]
     """Write the quasi-Newton descent direction in the subspace of variables that are free to move.
 
@@ -88,19 +88,20 @@ def _remember(x, trial, gradient, trial_gradient, steps, changes, used):  # type
 
 
 @njit(
-    types.Tuple((_f8, _i8, _i8))(_f1, _i8, PROBLEM, WORKSPACE, _f8, _f8, _i8),
+    types.Tuple((_f8, _i8, _i8))(_f1, PROBLEM, WORKSPACE, _f8, _f8, _i8, types.int64[::1]),
     cache=True,
     nogil=True,
 )
-def minimise(x, count, problem, work, scale, tolerance, budget):  # type: ignore[no-untyped-def]
-    """Minimise cost / scale over the workspace's edges from x, in place; scale 0 stands for the cost at x.
+def minimise(x, problem, work, scale, tolerance, budget, stop):  # type: ignore[no-untyped-def]
+    """Minimise cost / scale of the workspace's topology from x, in place; scale 0 stands for the cost at x.
 
-    Returns (cost [m^2], evaluations, status); stops when max |clip(x - g) - x| <= tolerance.
+    Returns (cost [m^2], evaluations, status); stops when max |clip(x - g) - x| <= tolerance, and out of budget when
+    stop[0] != 0.
     """
     m = x.shape[0]
     gradient, trial, trial_gradient, direction = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     steps, changes = np.empty((MEMORY, m)), np.empty((MEMORY, m))
-    value = cost_and_gradient(x, count, problem, work, gradient)
+    value = cost_and_gradient(x, problem, work, gradient)
     if value < 0.0:
         return value, 1, FAILED
     scale = value if scale == 0.0 else scale
@@ -111,13 +112,13 @@ def minimise(x, count, problem, work, scale, tolerance, budget):  # type: ignore
         length = 1.0 if used > 0 else 0.5 / np.max(np.abs(direction))
         accepted = False
         for _ in range(20):
-            if evaluations >= budget:
+            if evaluations >= budget or stop[0] != 0:
                 return value, evaluations, OUT_OF_BUDGET
             slope = 0.0
             for k in range(m):
                 trial[k] = min(1.0, max(-1.0, x[k] + length * direction[k]))
                 slope += gradient[k] * (trial[k] - x[k])
-            trial_value = cost_and_gradient(trial, count, problem, work, trial_gradient)
+            trial_value = cost_and_gradient(trial, problem, work, trial_gradient)
             evaluations += 1
             if trial_value >= 0.0 and (trial_value - value) / scale <= ARMIJO * slope:
                 accepted = True

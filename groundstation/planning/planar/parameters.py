@@ -16,6 +16,9 @@ class PlanarParameters:
     sigma_m: std of a relative position reading; range_m, softness_m: where and how softly readings end;
     epsilon_m: rounds the distance at zero; robot_noise_m2_s, target_noise_m2_s: process variance rates;
     step_s, steps, discount: the horizon; max_speed_m_s: bound per axis; target_velocity_m_s: predicted mean motion.
+    tail: share of a reading's information that is pretended to decay slowly, as r^2 / (r^2 + d^2), so that what is
+    out of range still attracts.
+    PAPER: has no tail; with 0 a lost target or robot gives no gradient and is never looked for.
     Raises ValueError for values without meaning.
     """
 
@@ -30,6 +33,7 @@ class PlanarParameters:
     discount: float = 0.9
     max_speed_m_s: float = 0.25
     target_velocity_m_s: tuple[float, float] = (0.0, 0.0)
+    tail: float = 0.0
 
     def __post_init__(self) -> None:
         positive = ("sigma_m", "range_m", "softness_m", "robot_noise_m2_s", "target_noise_m2_s", "step_s", "discount")
@@ -37,6 +41,10 @@ class PlanarParameters:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be positive and finite (got {value})")
+        if not (0.0 <= self.tail < 1.0 and 0.0 <= self.epsilon_m < math.inf):
+            raise ValueError(
+                f"tail must lie in [0, 1) and epsilon_m not be negative (got {self.tail}, {self.epsilon_m})"
+            )
         if self.steps < 1:
             raise ValueError(f"steps must be at least 1 (got {self.steps})")
 
@@ -54,6 +62,7 @@ class PlanarParameters:
                 self.max_speed_m_s,
                 vx,
                 vy,
+                self.tail,
             ]
         )
 

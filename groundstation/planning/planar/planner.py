@@ -1,19 +1,24 @@
 """The planar planner: one decision per call, with a certificate for every topology it dropped."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.planning.planar.candidates import all_topologies, merges, neighbours, radial_cuts
+from groundstation.planning.planar.candidates import MOST_CUTS, all_topologies, candidate_list
+from groundstation.planning.planar.lbfgs import FAILED
 from groundstation.planning.planar.parameters import PlanarParameters
 from groundstation.planning.planar.problem import Problem, Workspace, make_problem, make_workspace
 from groundstation.planning.planar.search import (
     DROPPED_BY_REACH,
     DROPPED_BY_TANGENT,
+    SKIPPED,
     SOLVED,
     certified_search,
+    solve_topology,
 )
 
 Array = NDArray[np.float64]
@@ -34,7 +39,7 @@ class Mode(StrEnum):
 
 
 class Fate(StrEnum):
-    """What became of a candidate: solved, proved unable to win by its tangent or reach bound, or not reached."""
+    """What became of a candidate: solved, proved unable to win by its tangent or reach bound, or not finished."""
 
     SOLVED = "solved"
     TANGENT_BOUND = "tangent bound"
@@ -55,6 +60,36 @@ class Considered:
     fate: Fate
 
 
+class Certificate(Sequence[Considered]):
+    """All candidates of one decision, the current topology first; rows are made when they are asked for."""
+
+    def __init__(self, levels: Levels, costs: Array, bounds: Array, fates: Levels) -> None:
+        self._levels, self._costs, self._bounds, self._fates = levels, costs, bounds, fates
+
+    def __len__(self) -> int:
+        return len(self._costs)
+
+    @overload
+    def __getitem__(self, index: int) -> Considered: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Considered]: ...
+    def __getitem__(self, index: int | slice) -> Considered | list[Considered]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        cost, level = float(self._costs[index]), tuple(int(k) for k in self._levels[index])
+        fate = _FATES.get(int(self._fates[index]), Fate.SKIPPED)
+        return Considered(level, None if np.isnan(cost) else cost, float(self._bounds[index]), fate)
+
+    def count(self, value: object) -> int:
+        """Return how many candidates met a fate."""
+        return sum(int((self._fates == code).sum()) for code, fate in _FATES.items() if fate == value)
+
+    @property
+    def complete(self) -> bool:
+        """Return whether every candidate was solved or dropped with proof."""
+        return bool((self._fates != SKIPPED).all())
+
+
 @dataclass(frozen=True, slots=True)
 class PlanarPlan:
     """A decision: level vector (n), velocities (segments, n, 2) [m/s], cost [m^2], and why.
@@ -67,20 +102,22 @@ class PlanarPlan:
     cost: float
     switched: bool
     evaluations: int
-    certificate: tuple[Considered, ...] = field(repr=False)
+    certificate: Certificate = field(repr=False)
 
     @property
     def complete(self) -> bool:
         """Return whether every candidate was solved or dropped with proof (False: the budget ran out)."""
-        return all(candidate.fate is not Fate.SKIPPED for candidate in self.certificate)
+        return self.certificate.complete
 
 
 @dataclass(frozen=True, slots=True)
 class SearchOptions:
-    """hysteresis: relative gain a switch must bring (not in PAPER mode); tolerance: scaled projected gradient;
+    """How long and how widely to search; raises ValueError for values without meaning.
 
-    budget: cost evaluations; segments: piecewise-constant controls over the horizon; starts: random multi-starts of
-    the winner beside the warm start.
+    hysteresis: share of the current cost that a switch must save (not in PAPER mode); tolerance: scaled projected
+    gradient; budget: cost evaluations; segments: piecewise-constant controls over the horizon; starts: random
+    multi-starts of the winner beside the warm start; wide: radial cuts and merges in CERTIFIED mode; prune: False
+    solves every candidate instead of dropping with proof.
     """
 
     mode: Mode = Mode.CERTIFIED
@@ -89,19 +126,35 @@ class SearchOptions:
     budget: int = 1_000_000
     segments: int = 1
     starts: int = 0
+    wide: bool = True
+    prune: bool = True
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.hysteresis < 1.0 and self.tolerance > 0.0 and self.budget >= 1 and self.starts >= 0):
+            raise ValueError(f"hysteresis must lie in [0, 1), tolerance above 0, budget from 1, starts from 0: {self}")
 
 
 class PlanarPlanner:
     """Plans for a fixed team size; keeps scratch memory and the last controls as warm start."""
 
-    def __init__(self, robots: int, parameters: PlanarParameters, options: SearchOptions | None = None) -> None:
+    def __init__(
+        self,
+        robots: int,
+        parameters: PlanarParameters,
+        options: SearchOptions | None = None,
+        generator: np.random.Generator | None = None,
+    ) -> None:
+        """The generator draws multi-starts; without one they are the same in every planner."""
         if robots < 1:
             raise ValueError(f"a team has at least one robot (got {robots})")
         self.parameters = parameters
         self.options = options or SearchOptions()
+        self._generator = generator or np.random.default_rng(0)
         self._work: Workspace = make_workspace(robots, parameters.steps)
-        self._neighbours = np.empty((2 * robots, robots), dtype=np.int64)
         self._all = all_topologies(robots) if self.options.mode is Mode.GLOBAL else None
+        rows = len(self._all) if self._all is not None else 3 * robots + MOST_CUTS + 1
+        self._rows = np.empty((rows, robots), dtype=np.int64)
+        self._controls = np.empty((rows, 2 * robots * self.options.segments))
         self._warm = np.zeros(2 * robots * self.options.segments)
         self.stop = np.zeros(1, dtype=np.int64)
 
@@ -114,67 +167,65 @@ class PlanarPlanner:
         Set `stop[0]` from another thread to end early with the best so far. Raises ValueError for a belief that is not
         finite or not positive definite, or a level vector with gaps.
         """
-        level = _checked(level, len(self._neighbours) // 2)
+        level = _checked(level, self._rows.shape[1])
         problem = make_problem(mean, covariance, self.parameters, self.options.segments)
+        if len(problem.mean) != len(level) + 1:
+            raise ValueError(f"the planner was made for {len(level)} robots (got {len(problem.mean) - 1})")
         if target_velocity_m_s is not None:
             problem.constants[7:9] = target_velocity_m_s
-        candidates = self._candidates(problem.mean, level)
-        total = len(candidates)
-        bounds, costs = np.empty(total), np.empty(total)
-        fates, controls = np.empty(total, dtype=np.int64), np.empty((total, len(self._warm)))
-        prune = self.options.mode is not Mode.PAPER
+        options, total = self.options, self._candidates(problem.mean, level)
+        bounds, costs, fates = np.empty(total), np.empty(total), np.empty(total, dtype=np.int64)
+        paper = options.mode is Mode.PAPER
         best, evaluations = certified_search(
-            candidates,
+            self._rows,
+            total,
             self._warm,
             problem,
             self._work,
-            self.options.tolerance,
-            self.options.budget,
+            options.tolerance,
+            options.budget,
+            0.0 if paper else options.hysteresis,
             self.stop,
-            prune,
+            options.prune and not paper,
             bounds,
             costs,
             fates,
-            controls,
+            self._controls,
         )
         if best < 0:
             raise ValueError("the predicted covariance is not positive definite")
-        chosen = 0 if prune and costs[best] > (1.0 - self.options.hysteresis) * costs[0] else best
-        certificate = tuple(
-            Considered(tuple(int(k) for k in row), _known(cost), float(bound), _FATES.get(int(fate), Fate.SKIPPED))
-            for row, cost, bound, fate in zip(candidates, costs, bounds, fates, strict=True)
-        )
-        self._warm = controls[chosen].copy()
-        return self._plan(problem, candidates[chosen], float(costs[chosen]), chosen != 0, evaluations, certificate)
+        self._warm = self._controls[best].copy()
+        cost, more = self._restart(problem, self._rows[best], float(costs[best]), options.budget - evaluations)
+        velocity = self._warm.reshape(options.segments, len(level), 2) * self.parameters.max_speed_m_s
+        certificate = Certificate(self._rows[:total].copy(), costs, bounds, fates)
+        return PlanarPlan(self._rows[best].copy(), velocity, cost, best != 0, int(evaluations) + more, certificate)
 
-    def _candidates(self, mean: Array, level: Levels) -> Levels:
+    def _candidates(self, mean: Array, level: Levels) -> int:
+        """Put the candidates into `_rows`, the current topology first; return how many."""
         if self._all is not None:
-            others = self._all[(self._all != level).any(axis=1)]
-            return np.concatenate([level[None], others])
+            own = int((self._all == level).all(axis=1).argmax())
+            self._rows[0], self._rows[1 : own + 1], self._rows[own + 1 :] = level, self._all[:own], self._all[own + 1 :]
+            return len(self._rows)
         if self.options.mode is Mode.FIXED:
-            return level[None]
-        near = self._neighbours[: neighbours(level, self._neighbours)]
-        if self.options.mode is Mode.PAPER:
-            return np.concatenate([level[None], near])
-        rows = np.concatenate([level[None], near, radial_cuts(mean), merges(level)])
-        _, first = np.unique(rows, axis=0, return_index=True)
-        return np.ascontiguousarray(rows[np.sort(first)])
+            self._rows[0] = level
+            return 1
+        wide = self.options.wide and self.options.mode is Mode.CERTIFIED
+        return int(candidate_list(level, mean, wide, self._rows))
 
-    def _plan(
-        self,
-        problem: Problem,
-        level: Levels,
-        cost: float,
-        switched: bool,
-        evaluations: int,
-        certificate: tuple[Considered, ...],
-    ) -> PlanarPlan:
-        velocity = self._warm.reshape(self.options.segments, len(level), 2) * self.parameters.max_speed_m_s
-        return PlanarPlan(level.copy(), velocity, cost, switched, int(evaluations), certificate)
-
-
-def _known(cost: float) -> float | None:
-    return None if np.isnan(cost) else float(cost)
+    def _restart(self, problem: Problem, level: Levels, cost: float, budget: int) -> tuple[float, int]:
+        """Solve the winner from random starts too; keep the best controls as `_warm`. Returns cost and evaluations."""
+        spent = 0
+        for _ in range(self.options.starts):
+            if self.stop[0] or spent >= budget:
+                break
+            start, found = self._generator.uniform(-1.0, 1.0, len(self._warm)), np.empty(len(self._warm))
+            value, used, status = solve_topology(
+                level, start, problem, self._work, cost, self.options.tolerance, budget - spent, self.stop, found
+            )
+            spent += used
+            if status != FAILED and value < cost:
+                cost, self._warm = float(value), found
+        return cost, int(spent)
 
 
 def _checked(level: Levels, robots: int) -> Levels:

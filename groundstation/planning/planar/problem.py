@@ -3,11 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
+from numba import njit, types
 from numpy.typing import NDArray
 
-from groundstation.planning.planar.lapack import lapack_addresses
+from groundstation.planning.planar.dense import cholesky_upper, padded
+from groundstation.planning.planar.edges import sort_team
 from groundstation.planning.planar.parameters import PlanarParameters
+from groundstation.planning.planar.rollout import predicted_information
 
 Array = NDArray[np.float64]
 
@@ -18,9 +20,9 @@ STABLE_ABOVE = 1e6
 class Problem(NamedTuple):
     """Belief and constants of one control step.
 
-    mean (n + 1, 2) [m; target last]; information (n + 1, n + 1): (P + Q)^-1 per axis, shared by all topologies;
+    mean (n + 1, 2) [m; target last]; information (m, m): (P + Q)^-1 per axis, shared by all topologies;
     variance (n + 1): Q; constants: see PlanarParameters.packed; segments: controls held over the horizon;
-    stable: predict through the covariance; addresses: LAPACK.
+    stable: predict through the covariance.
     """
 
     mean: Array
@@ -30,55 +32,107 @@ class Problem(NamedTuple):
     steps: int
     segments: int
     stable: bool
-    addresses: NDArray[np.int64]
 
 
 class Workspace(NamedTuple):
-    """Scratch arrays of the kernels, sized for n robots and h steps."""
+    """Scratch arrays of the kernels for n robots and h steps, and the topology at hand, its team sorted by level.
 
+    order (n + 1): which entity stands at each sorted place; rows (n + 2, 3): see `sort_team`; mean (2, m) and
+    variance (n + 1) in sorted order; all others are filled by the rollout. m: n + 1 padded to the vector width.
+    """
+
+    order: NDArray[np.int64]
+    rows: NDArray[np.uint64]
+    mean: Array
+    variance: Array
     prior: Array
     factor: Array
     square: Array
+    panel: Array
     columns: Array
-    carried: Array
-    edges: NDArray[np.int64]
     distance: Array
     weights: Array
-    exponent: Array
+    scratch: Array
     position: Array
-    step_gradient: Array
-    integers: NDArray[np.int32]
+    gradient: Array
 
 
 _f1, _f2, _f3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
-PROBLEM = types.NamedTuple(
-    [_f2, _f2, _f1, _f1, types.int64, types.int64, types.boolean, types.int64[::1]],
-    Problem,
-)
-WORKSPACE = types.NamedTuple(
-    [_f3, _f3, _f2, _f3, _f2, types.int64[:, ::1], _f2, _f2, _f1, _f3, _f3, types.int32[::1]],
-    Workspace,
-)
+_i1, _i8 = types.int64[::1], types.int64
+PROBLEM = types.NamedTuple([_f2, _f2, _f1, _f1, _i8, _i8, types.boolean], Problem)
+_u2 = types.uint64[:, ::1]
+WORKSPACE = types.NamedTuple([_i1, _u2, _f2, _f1, _f3, _f3, _f2, _f2, _f3, _f2, _f2, _f1, _f3, _f3], Workspace)
 
 
 def make_workspace(robots: int, steps: int) -> Workspace:
     """Return scratch memory; edges of n robots never exceed those of two equal levels, n^2 / 4 + n + 1."""
     size = robots + 1
-    edges = robots * robots // 4 + robots + 2
+    m, edges = padded(size), robots * robots // 4 + robots + 2
     return Workspace(
-        prior=np.empty((steps, size, size)),
-        factor=np.empty((steps, size, size)),
-        square=np.empty((size, size)),
-        columns=np.empty((steps, steps, size)),
-        carried=np.empty((steps, size)),
-        edges=np.empty((edges, 2), dtype=np.int64),
-        distance=np.empty((steps, edges)),
-        weights=np.empty((steps, edges)),
-        exponent=np.empty(edges),
-        position=np.empty((steps, size, 2)),
-        step_gradient=np.empty((steps, robots, 2)),
-        integers=np.zeros(4, dtype=np.int32),
+        order=np.arange(size),
+        rows=np.zeros((robots + 2, 3), dtype=np.uint64),
+        mean=np.zeros((2, m)),
+        variance=np.ones(size),
+        prior=np.tile(np.eye(m), (steps, 1, 1)),
+        factor=np.zeros((steps, m, m)),
+        square=np.zeros((m, m)),
+        panel=np.zeros((8, m)),
+        columns=np.zeros((steps, steps + 3, m)),
+        distance=np.zeros((steps, edges)),
+        weights=np.zeros((steps, edges)),
+        scratch=np.zeros(max(edges, m)),
+        position=np.zeros((steps, 2, m)),
+        gradient=np.zeros((steps, 2, m)),
     )
+
+
+@njit(_i8(_i1, PROBLEM, WORKSPACE), cache=True, nogil=True)
+def load_topology(level, problem, work):  # type: ignore[no-untyped-def]
+    """Sort the problem's team by the levels of a topology; return the number of its edges."""
+    count = sort_team(level, work.order, work.rows)
+    for a in range(work.order.shape[0]):
+        own = work.order[a]
+        work.mean[0, a], work.mean[1, a] = problem.mean[own, 0], problem.mean[own, 1]
+        work.variance[a] = problem.variance[own]
+        for b in range(work.order.shape[0]):
+            work.prior[0, a, b] = problem.information[own, work.order[b]]
+    return count
+
+
+FINE, NOT_FINITE, NOT_SYMMETRIC, NOT_PSD = 0, 1, 2, 3
+
+
+@njit(_i8(_f2, _f2, _f2), cache=True, nogil=True)
+def _judge(mean, covariance, scratch):  # type: ignore[no-untyped-def]
+    """Return what is wrong with a belief; positive semidefinite means to 1e-9 of the trace."""
+    size, trace, largest = mean.shape[0], 0.0, 0.0
+    for a in range(size):
+        trace += covariance[a, a]
+        if not (np.isfinite(mean[a, 0]) and np.isfinite(mean[a, 1])):
+            return NOT_FINITE
+        for b in range(size):
+            if not np.isfinite(covariance[a, b]):
+                return NOT_FINITE
+            largest = max(largest, abs(covariance[a, b]))
+    for a in range(size):
+        for b in range(a):
+            difference = abs(covariance[a, b] - covariance[b, a])
+            if difference > 1e-12 * largest + 1e-9 * abs(covariance[b, a]):
+                return NOT_SYMMETRIC
+            scratch[b, a] = covariance[a, b]
+        if covariance[a, a] < 0.0:
+            return NOT_PSD
+        scratch[a, a] = covariance[a, a] + 1e-9 * trace + 1e-300
+    for a in range(size, scratch.shape[0]):
+        scratch[a, a] = 1.0
+    return FINE if cholesky_upper(scratch) else NOT_PSD
+
+
+_WRONG = {
+    NOT_FINITE: "mean and covariance must be finite",
+    NOT_SYMMETRIC: "covariance is not symmetric",
+    NOT_PSD: "covariance is not positive semidefinite",
+}
 
 
 def make_problem(mean: Array, covariance: Array, parameters: PlanarParameters, segments: int = 1) -> Problem:
@@ -86,24 +140,20 @@ def make_problem(mean: Array, covariance: Array, parameters: PlanarParameters, s
 
     Raises ValueError for wrong shapes, numbers that are not finite, or a covariance that is not positive definite.
     """
-    from groundstation.planning.planar.rollout import predicted_information
-
-    mean, covariance = np.ascontiguousarray(mean, float), np.ascontiguousarray(covariance, float)
+    mean = np.ascontiguousarray(mean, dtype=np.float64)
+    covariance = np.ascontiguousarray(covariance, dtype=np.float64)
     size = len(mean)
     if size < 2 or mean.shape != (size, 2) or covariance.shape != (size, size):
         raise ValueError(f"need mean (n + 1, 2) and covariance (n + 1, n + 1), got {mean.shape}, {covariance.shape}")
-    if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
-        raise ValueError("mean and covariance must be finite")
-    if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=1e-12 * np.abs(covariance).max()):
-        raise ValueError("covariance is not symmetric")
     if not 1 <= segments <= parameters.steps:
         raise ValueError(f"segments must lie in 1..{parameters.steps} (got {segments})")
-    variance, addresses = parameters.process_variance(size - 1), lapack_addresses()
-    if np.diagonal(covariance).min() < 0 or np.linalg.eigvalsh(covariance).min() < -1e-9 * np.trace(covariance):
-        raise ValueError("covariance is not positive semidefinite")
-    information = np.empty((size, size))
-    if not predicted_information(covariance, variance, information, addresses, np.zeros(4, np.int32)):
+    m = padded(size)
+    information = np.zeros((m, m))
+    verdict = _judge(mean, covariance, information)
+    if verdict != FINE:
+        raise ValueError(_WRONG[verdict])
+    variance = parameters.process_variance(size - 1)
+    if not predicted_information(covariance, variance, information, np.zeros((8, m))):
         raise ValueError("covariance plus process noise is not positive definite")
-    stable = bool((np.diagonal(covariance) / variance).max() > STABLE_ABOVE)
-    packed = parameters.packed()
-    return Problem(mean, information, variance, packed, parameters.steps, segments, stable, addresses)
+    stable = bool((covariance.diagonal() / variance).max() > STABLE_ABOVE)
+    return Problem(mean, information, variance, parameters.packed(), parameters.steps, segments, stable)

@@ -3,15 +3,9 @@
 import numpy as np
 from numba import njit, types
 
-from groundstation.planning.planar.bounds import (
-    pair_sensitivities,
-    reach_bound,
-    reach_information,
-    summed_sensitivity,
-)
-from groundstation.planning.planar.edges import list_edges
-from groundstation.planning.planar.lbfgs import FAILED, minimise
-from groundstation.planning.planar.problem import PROBLEM, WORKSPACE
+from groundstation.planning.planar.bounds import reach_bound, reach_information, tangent_bounds
+from groundstation.planning.planar.lbfgs import FAILED, OUT_OF_BUDGET, minimise
+from groundstation.planning.planar.problem import PROBLEM, WORKSPACE, load_topology
 
 DROPPED_BY_TANGENT, DROPPED_BY_REACH, SOLVED, SKIPPED = 0, 1, 2, 3
 
@@ -28,69 +22,88 @@ _f1, _f2, _f8, _i1, _i2, _i8 = (
 )
 
 
-@njit(types.void(_i2, PROBLEM, WORKSPACE, types.float64[:, :, ::1], _f1), cache=True, nogil=True)
-def tangent_bounds(levels, problem, work, reach, bounds):  # type: ignore[no-untyped-def]
-    """Write the reach bound of levels[0] and the tangent bounds of all others [m^2]."""
-    size = problem.mean.shape[0]
-    pairs = np.empty((size + 1, size + 1))
-    count = list_edges(levels[0], work.edges)
-    bounds[0] = reach_bound(reach, count, problem, work)
-    pair_sensitivities(reach, problem, work, pairs)
-    base = bounds[0] - summed_sensitivity(pairs, count, work)
-    for t in range(1, levels.shape[0]):
-        count = list_edges(levels[t], work.edges)
-        bounds[t] = base + summed_sensitivity(pairs, count, work)
+@njit(types.void(_f1, _i8, WORKSPACE, _f1, types.boolean), cache=True, nogil=True)
+def reorder(source, robots, work, target, to_sorted):  # type: ignore[no-untyped-def]
+    """Copy controls (segments * n * 2) into, or out of, the sorted order of the workspace's topology."""
+    for first in range(0, source.shape[0], 2 * robots):
+        for place in range(robots):
+            a, b = first + 2 * work.order[place], first + 2 * place
+            if not to_sorted:
+                a, b = b, a
+            target[b], target[b + 1] = source[a], source[a + 1]
 
 
 @njit(
-    types.Tuple((_i8, _i8))(_i2, _f1, PROBLEM, WORKSPACE, _f8, _i8, _i1, types.boolean, _f1, _f1, _i1, _f2),
+    types.Tuple((_f8, _i8, _i8))(_i1, _f1, PROBLEM, WORKSPACE, _f8, _f8, _i8, _i1, _f1),
+    cache=True,
+    nogil=True,
+)
+def solve_topology(level, start, problem, work, scale, tolerance, budget, stop, controls):  # type: ignore[no-untyped-def]
+    """Minimise one topology's cost from `start` into `controls`; see `minimise` for the rest."""
+    robots = level.shape[0]
+    load_topology(level, problem, work)
+    x = np.empty(start.shape[0])
+    reorder(start, robots, work, x, True)
+    result = minimise(x, problem, work, scale, tolerance, budget, stop)
+    reorder(x, robots, work, controls, False)
+    return result
+
+
+@njit(
+    types.Tuple((_i8, _i8))(_i2, _i8, _f1, PROBLEM, WORKSPACE, _f8, _i8, _f8, _i1, types.boolean, _f1, _f1, _i1, _f2),
     cache=True,
     nogil=True,
 )
 def certified_search(  # type: ignore[no-untyped-def]
-    levels, start, problem, work, tolerance, budget, stop, prune, bounds, costs, fates, controls
+    levels, total, start, problem, work, tolerance, budget, hysteresis, stop, prune, bounds, costs, fates, controls
 ):
-    """Find the cheapest of levels (K, n), levels[0] being the current topology; return (best row, evaluations).
+    """Find the cheapest of levels[:total] (., n), levels[0] being the current topology; return (best row, evaluations).
 
-    start: scaled controls to begin from; stop[0] != 0 (set by another thread) ends the search with the incumbent.
-    Writes per topology: bounds, costs (NaN where not solved), fates, and scaled controls. With prune=False every
-    topology is solved from the current one's optimum (warm brute force).
+    start: scaled controls to begin from; hysteresis: share of the current topology's cost that another one must save;
+    stop[0] != 0 (set by another thread) ends the search with the incumbent. Writes per topology: bounds, costs (NaN
+    where not begun), fates (SKIPPED also where not finished), and scaled controls. With prune=False every topology is
+    solved from the current one's optimum (warm brute force). The row is -1 when the belief is numerically hopeless.
     """
-    total = levels.shape[0]
-    costs[:], fates[:], bounds[:] = np.nan, SKIPPED, -np.inf
-    controls[0] = start
-    count = list_edges(levels[0], work.edges)
-    costs[0], evaluations, status = minimise(controls[0], count, problem, work, 0.0, tolerance, budget)
+    costs[:total], fates[:total], bounds[:total] = np.nan, SKIPPED, -np.inf
+    costs[0], evaluations, status = solve_topology(
+        levels[0], start, problem, work, 0.0, tolerance, budget, stop, controls[0]
+    )
     if status == FAILED:
         return -1, evaluations
     scale = costs[0]
-    fates[0], best = SOLVED, 0
-    if total == 1:
+    best, limit = 0, costs[0] * (1.0 - hysteresis)
+    fates[0] = SKIPPED if status == OUT_OF_BUDGET else SOLVED
+    if total == 1 or stop[0] != 0 or evaluations >= budget:
         return best, evaluations
-    reach = np.empty((problem.steps, problem.mean.shape[0] + 1, problem.mean.shape[0] + 1))
+    size = problem.mean.shape[0]
+    reach = np.empty((problem.steps, size + 1, size + 1))
     if prune:
         reach_information(problem, reach)
-        tangent_bounds(levels, problem, work, reach, bounds)
+        tangent_bounds(levels, total, reach, problem, work, bounds)
         evaluations += 1
-    order = 1 + np.argsort(bounds[1:])
+    order = 1 + np.argsort(bounds[1:total], kind="mergesort")
     for k in range(total - 1):
         t = order[k]
-        if bounds[t] >= costs[best] * _ROUNDING:
-            fates[order[k:]] = DROPPED_BY_TANGENT
+        if bounds[t] >= limit * _ROUNDING:
+            for rest in range(k, total - 1):
+                fates[order[rest]] = DROPPED_BY_TANGENT
             break
         if stop[0] != 0 or evaluations >= budget:
             break
-        count = list_edges(levels[t], work.edges)
         if prune:
             evaluations += 1
-            bounds[t] = max(bounds[t], reach_bound(reach, count, problem, work))
-            if bounds[t] >= costs[best] * _ROUNDING:
+            bounds[t] = max(bounds[t], reach_bound(levels[t], reach, problem, work))
+            if bounds[t] >= limit * _ROUNDING:
                 fates[t] = DROPPED_BY_REACH
                 continue
-        controls[t] = controls[0]
-        costs[t], used, status = minimise(controls[t], count, problem, work, scale, tolerance, budget - evaluations)
+        costs[t], used, status = solve_topology(
+            levels[t], controls[0], problem, work, scale, tolerance, budget - evaluations, stop, controls[t]
+        )
         evaluations += used
-        fates[t] = SOLVED
-        if status != FAILED and costs[t] < costs[best]:
-            best = t
+        if status == FAILED:
+            costs[t] = np.nan
+            continue
+        fates[t] = SKIPPED if status == OUT_OF_BUDGET else SOLVED
+        if costs[t] < limit:
+            best, limit = t, costs[t]
     return best, evaluations

@@ -32,11 +32,15 @@ VERBS: dict[str, Verb] = {
     "hold": Verb("Stop", "groundstation.cli.stop:hold", "Hover where they are."),
     "land": Verb("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones."),
     "cut-motors": Verb("Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall."),
+    "deadman": Verb("Stop", "groundstation.cli.deadman:deadman", "Hold a key or button; let go: they hold, then land."),
     "monitor": Verb("Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station."),
-    "console": Verb("Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."),
+    "console": Verb(
+        "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."
+    ),
     "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
     "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
     "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
+    "mavlink": Verb("Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."),
     "version": Verb("Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."),
 }
 

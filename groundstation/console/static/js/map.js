@@ -4,7 +4,9 @@ import { bodyToWorld, ellipse95, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { ageS, droneNames, entities, entity, estimateAge, isSeen, store } from "./store.js";
 
-const ARROW_S = 1.5, STALE_S = 0.5;
+const ARROW_S = 1.5, STALE_S = 0.5, OLD_S = 2;
+// Who has not been seen for long is greyed even while the tracker speaks.
+const fade = (body) => (body.age_s > OLD_S ? 0.45 : 1);
 export const layers = { footprints: true, graph: true, trails: true, velocities: true, truth: true };
 export const drawn = { draws: 0, ms: 0, ellipses: {}, latencies: [] };
 
@@ -238,7 +240,8 @@ function drawArrow(g, [x0, y0], [x1, y1], width, colour, gap = 0, hollow = false
 function drawEllipses(g, view) {
   const alpha = g.globalAlpha;
   drawn.ellipses = {};
-  for (const { name, mean, cov, converged } of entities()) {
+  for (const body of entities()) {
+    const { name, mean, cov, converged } = body;
     const { major, minor, angle } = ellipse95(cov), [x, y] = view.point(mean[0], mean[1]);
     drawn.ellipses[name] = { x: mean[0], y: mean[1], major, minor };
     g.beginPath();
@@ -246,16 +249,19 @@ function drawEllipses(g, view) {
     g.fillStyle = g.strokeStyle = colourOf(name);
     g.globalAlpha = alpha * 0.16;
     g.fill();
-    g.globalAlpha = alpha;
+    g.globalAlpha = alpha * fade(body);
     g.lineWidth = 1.5;
     g.setLineDash(converged ? [] : [4, 3]);
     g.stroke();
     g.setLineDash([]);
   }
+  g.globalAlpha = alpha;
 }
 
 function drawBodies(g, view, stale) {
+  const alpha = g.globalAlpha;
   for (const body of entities()) {
+    g.globalAlpha = alpha * fade(body);
     const [x, y] = view.point(body.mean[0], body.mean[1]);
     if (body.kind === "robot") drawDrone(g, x, y, body.mean[3], Math.max(13, 0.27 * view.scale), colourOf(body.name));
     else drawTarget(g, x, y, body.velocity, Math.max(9, 0.18 * view.scale), ink().target);
@@ -263,6 +269,7 @@ function drawBodies(g, view, stale) {
     const suffix = stale || age > 1 ? ` ${age.toFixed(1)} s old` : "";
     label(g, `${body.name}${suffix}`, x, y - Math.max(20, 0.36 * view.scale), body.kind === "robot" ? colourOf(body.name) : ink().text, 13, 700);
   }
+  g.globalAlpha = alpha;
 }
 
 function drawDrone(g, x, y, yaw, r, colour) {

@@ -90,7 +90,7 @@ function showBelief(name, { root, values, mode, drone }) {
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   text(values.seen, body ? `${seconds(age)} ago` : "not yet");
-  values.seen.className = age > 3 ? "empty" : age > 1 ? "low" : "";
+  values.seen.className = !body ? "" : age > 3 ? "empty" : age > 1 ? "low" : "";
   text(values.by, seenBy(name).join(", ") || "nobody");
   if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
   const { major, minor } = ellipse95(body.cov);

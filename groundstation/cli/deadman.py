@@ -1,0 +1,155 @@
+"""`groundstation deadman`: hold a key or a gamepad's button; let go, and the drones hold, then land."""
+
+import os
+import select
+import struct
+import sys
+import termios
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import click
+
+from groundstation.bus.messages import CommandAck, Verb
+from groundstation.bus.topics import COMMAND_ACK
+from groundstation.bus.zenoh_bus import open_bus
+from groundstation.cli.exits import ExitCode, UnreachableError
+from groundstation.cli.stop import choose_run
+from groundstation.console.dead_man import DeadMan, Grip
+from groundstation.console.orders import OrderDesk
+
+if TYPE_CHECKING:
+    from groundstation.bus.api import Bus
+
+_ME = "deadman"
+_TURN_S = 0.02
+_FAREWELL_NS = 2_000_000_000
+_NS_PER_MS = 1_000_000
+_KEYBOARD_PATIENCE_NS = 900 * _NS_PER_MS
+_GAMEPAD_PATIENCE_NS = 1 << 62  # it says itself when it is let go
+# WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
+_EVENT = struct.Struct("<IhBB")
+_BUTTON = 1
+_LAND_BUTTON = 1
+
+
+@dataclass(slots=True)
+class Handle:
+    """Where the grip is felt: a terminal (any repeating space) or a gamepad (any button but the second)."""
+
+    descriptor: int
+    gamepad: bool
+
+    def feel(self, man: DeadMan, now_ns: int) -> tuple[Verb | None, bool]:
+        """Read what there is; returns the stop that it asks for, and whether the user wants to leave."""
+        if not select.select([self.descriptor], [], [], _TURN_S)[0]:
+            return None, False
+        try:
+            data = os.read(self.descriptor, 512)
+        except OSError:
+            data = b""
+        if not data:
+            return man.release(now_ns), True  # unplugged, or the terminal is gone
+        return self._buttons(man, data, now_ns) if self.gamepad else self._keys(man, data, now_ns)
+
+    def _keys(self, man: DeadMan, data: bytes, now_ns: int) -> tuple[Verb | None, bool]:
+        if b"l" in data.lower():
+            return man.land(), False
+        if b"q" in data.lower() or b"\x03" in data:
+            return man.release(now_ns), True
+        if b" " in data:
+            man.press(now_ns)
+        return None, False
+
+    def _buttons(self, man: DeadMan, data: bytes, now_ns: int) -> tuple[Verb | None, bool]:
+        asked: Verb | None = None
+        for _, value, kind, number in _EVENT.iter_unpack(data[: len(data) // _EVENT.size * _EVENT.size]):
+            if kind != _BUTTON:
+                continue
+            if number == _LAND_BUTTON and value:
+                return man.land(), False
+            if value:
+                man.press(now_ns)
+            elif number != _LAND_BUTTON:
+                asked = man.release(now_ns) or asked
+        return asked, False
+
+
+@click.command(epilog="\b\nExamples:\n  groundstation deadman\n  groundstation deadman --gamepad /dev/input/js0")
+@click.option("--run", "name", metavar="NAME", help="Which ground station, if several run here.")
+@click.option("--gamepad", type=click.Path(exists=True), help="A joystick device; without it the space bar is held.")
+def deadman(name: str | None, gamepad: str | None) -> int:
+    """Hold on, and the flight goes on; let go, and the drones hold at once and land 5 s later. No emergency stop."""
+    record = choose_run(name)
+    bus = open_bus(record.endpoint, record.site, f"deadman_{os.getpid()}", timeout_s=2.0)
+    grip = "any button (the second lands)" if gamepad else "the space bar"
+    click.echo(f"{record.name}: hold {grip}. Let go: HOLD, 5 s later LAND. l: LAND now. q: HOLD and leave.")
+    try:
+        with _opened(gamepad) as handle:
+            patience_ns = _GAMEPAD_PATIENCE_NS if handle.gamepad else _KEYBOARD_PATIENCE_NS
+            watch(bus, record.drones, handle, DeadMan(patience_ns), lambda: record.supervisor.alive)
+    finally:
+        bus.close()
+    return ExitCode.OK
+
+
+def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
+    """Obey the handle until the user leaves and what he asked for last is settled, or until `go_on` says no."""
+    desk, answers = OrderDesk(bus, drones), bus.subscribe([COMMAND_ACK])
+    shown, left_ns = "", 0
+    while go_on():
+        now_ns = time.monotonic_ns()
+        if left_ns:
+            time.sleep(_TURN_S)
+            if now_ns - left_ns > _FAREWELL_NS or _settled(desk):
+                break
+        else:
+            asked, leaves = handle.feel(man, now_ns)
+            verb = asked or man.step(now_ns)
+            if verb is not None:
+                desk.give(verb, (), _ME, 0.0, "", now_ns)
+            left_ns = now_ns if leaves else 0
+        for received in answers.drain():
+            if isinstance(received.message, CommandAck):
+                desk.hear(received.message, now_ns)
+        desk.step(now_ns)
+        line = _line(desk, man)
+        if line != shown:
+            shown = line
+            click.echo(f"\r{line:<78}", nl=False)
+    click.echo("")
+
+
+def _settled(desk: OrderDesk) -> bool:
+    return all(order["state"] not in ("sent", "heard") for order in desk.summary() if order["by"] == _ME)
+
+
+def _line(desk: OrderDesk, man: DeadMan) -> str:
+    words = {"sent": "NOT CONFIRMED", "heard": "acknowledged", "not_confirmed": "NOT CONFIRMED"}
+    orders = [f"{o['verb']} {words.get(o['state'], o['state'])}" for o in desk.summary() if o["by"] == _ME]
+    grip = {Grip.DISARMED: "not armed: hold it", Grip.HELD: "held", Grip.LOOSE: "LET GO", Grip.LANDED: "landing"}
+    return "  ".join([grip[man.grip], *orders[:1]])
+
+
+@contextmanager
+def _opened(gamepad: str | None) -> Iterator[Handle]:
+    if gamepad is not None:
+        descriptor = os.open(gamepad, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            yield Handle(descriptor, gamepad=True)
+        finally:
+            os.close(descriptor)
+        return
+    if not sys.stdin.isatty():
+        raise UnreachableError("no keyboard here: run it in a terminal, or give --gamepad")
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+    try:
+        tty.setcbreak(descriptor)
+        yield Handle(descriptor, gamepad=False)
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

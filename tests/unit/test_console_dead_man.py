@@ -1,0 +1,100 @@
+"""The dead man's handle: states, keys, a gamepad's bytes, and what goes out on the bus."""
+
+import contextlib
+import os
+import struct
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import Command, Verb
+from groundstation.cli.deadman import Handle, watch
+from groundstation.console.dead_man import DeadMan, Grip
+
+NS = 1_000_000_000
+
+
+def test_it_does_nothing_before_it_is_held() -> None:
+    man = DeadMan(NS)
+    assert [man.step(k * NS) for k in range(100)] == [None] * 100
+
+
+def test_let_go_it_holds_and_then_lands_once() -> None:
+    man = DeadMan(NS)
+    man.press(10 * NS)
+    assert man.step(11 * NS) is None
+    assert man.step(11 * NS + 1) is Verb.HOLD
+    assert man.step(12 * NS) is None
+    assert man.step(17 * NS) is Verb.LAND
+    assert man.step(90 * NS) is None and man.grip is Grip.LANDED
+
+
+def test_held_again_in_time_it_does_not_land() -> None:
+    man = DeadMan(NS)
+    man.press(0)
+    assert man.release(1) is Verb.HOLD
+    assert man.release(2) is None
+    man.press(3 * NS)
+    assert man.step(4 * NS) is None and man.grip is Grip.HELD
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    ends = os.pipe()
+    yield ends
+    for end in ends:
+        with contextlib.suppress(OSError):
+            os.close(end)
+
+
+def button(number: int, value: int, kind: int = 1) -> bytes:
+    return struct.pack("<IhBB", 0, value, kind, number)
+
+
+@pytest.mark.parametrize(
+    ("data", "grip", "verb", "leaves"),
+    [
+        (b"   ", Grip.HELD, None, False),
+        (b"x", Grip.DISARMED, None, False),
+        (b" l", Grip.LANDED, Verb.LAND, False),
+        (b"q", Grip.DISARMED, None, True),
+    ],
+)
+def test_keys(pipe: tuple[int, int], data: bytes, grip: Grip, verb: Verb | None, leaves: bool) -> None:
+    man = DeadMan(NS)
+    os.write(pipe[1], data)
+    assert Handle(pipe[0], gamepad=False).feel(man, 5) == (verb, leaves)
+    assert man.grip is grip
+
+
+def test_gamepad(pipe: tuple[int, int]) -> None:
+    man, handle = DeadMan(1 << 62), Handle(pipe[0], gamepad=True)
+
+    def feel(*events: bytes) -> Verb | None:
+        os.write(pipe[1], b"".join(events))
+        return handle.feel(man, 5)[0]
+
+    assert feel(button(5, 1, kind=0x81), button(0, 300, kind=2)) is None and man.grip is Grip.DISARMED
+    assert feel(button(5, 1)) is None and man.grip is Grip.HELD
+    assert feel(button(5, 0)) is Verb.HOLD
+    assert feel(button(5, 1), button(1, 1)) is Verb.LAND
+    man.press(5)
+    os.close(pipe[1])
+    assert handle.feel(man, 6) == (Verb.HOLD, True)  # pulled out
+
+
+def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None:
+    exchange = MemoryExchange()
+    bus, drone = MemoryBus(exchange, "lab", "deadman_1"), MemoryBus(exchange, "lab", "drone_1")
+    commands = drone.subscribe([t.COMMAND])
+    os.write(pipe[1], b" q")
+    man = DeadMan(NS)
+    man.press(time.monotonic_ns())
+    began = time.monotonic()
+    watch(bus, ("drone_1",), Handle(pipe[0], gamepad=False), man, lambda: time.monotonic() - began < 0.8)
+    sent = [received.message for received in commands.drain()]
+    assert len(sent) >= 2
+    assert all(isinstance(c, Command) and c.verb is Verb.HOLD and c.scope == () for c in sent)

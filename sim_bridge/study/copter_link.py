@@ -13,14 +13,15 @@ from sim_bridge.world.world import TICK_S
 Vector3 = tuple[float, float, float]
 _PERIOD_TICKS = 4  # 50 Hz
 _VISION_TICKS = 7  # 28.6 Hz
-_MAX_AGE_S = 1.0
+_MAX_AGE_S = 3.0
+_LAND_AFTER_S = 2.0  # without a pose
 _STAND_S, _TAKE_OFF_M, _CLIMB_M_S = 2.0, 0.8, 0.4
 _COVARIANCE = (0.0225, 0.0, 0.0, 0.0, 0.0225, 0.0, 0.0, 0.0, 0.05)
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
 class CopterLink:
-    """One vehicle's driver in short; call `step` once per tick."""
+    """One vehicle's driver in short; call `step` once per tick. landed: it came down because no camera saw it."""
 
     def __init__(self, name: str, copter: Copter, clock: str, lifetime_s: float) -> None:
         self._name, self._copter, self._clock, self._lifetime_s = name, copter, clock, lifetime_s
@@ -28,13 +29,14 @@ class CopterLink:
         self._ticks = self._seq = self._resets = 0
         self._heading = 0.0
         self._climbing = True
+        self.landed = False
         self._fed: Vector3 | None = None
         body = copter.airframe
         self._pad, self._pad_yaw = (body.x, body.y, body.z), body.yaw
 
     def obey(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
         """Take a setpoint [base_stabilized]."""
-        if not self._climbing:
+        if not self._climbing and not self.landed:
             self._copter.fly(velocity, yaw_rate)
             self._until_s = now_s + self._lifetime_s
 
@@ -51,8 +53,13 @@ class CopterLink:
             copter.fly((0.0, 0.0, _CLIMB_M_S), 0.0)
             if copter.estimate.position[2] > _TAKE_OFF_M:
                 self._climbing = False
-        elif not self._climbing and now_s > self._until_s:
+        elif copter.airborne and copter.estimate.aided_s > _LAND_AFTER_S:
+            copter.steer(Steering.LAND)
+            self.landed = True
+        elif not self._climbing and not self.landed and now_s > self._until_s:
             copter.fly(_STILL, 0.0)
+        elif self.landed and not copter.airborne:
+            copter.steer(Steering.OFF)
 
     def _feed(self, estimates: tuple[EntityEstimate, ...]) -> None:
         position, yaw = self._pad, self._pad_yaw

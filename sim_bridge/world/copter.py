@@ -132,6 +132,8 @@ class Copter:
             case Steering.HOLD:
                 self._pursue(self._towards_held(), 0.0, wake)
             case Steering.LAND:
+                if body.on_ground:
+                    return  # the landing detector has cut the thrust
                 self._pursue((0.0, 0.0, -(_DESCENT_M_S if body.z > _FLARE_M else _TOUCH_DOWN_M_S)), 0.0, wake)
             case Steering.LEVEL:
                 vx, vy = body.velocity_stabilized()

@@ -83,6 +83,8 @@ class InertialEstimate:
         vx, vy, vz = _sum(self.velocity, _sum(accelerations, self._bias, 1.0), dt)
         # The barometer keeps the climb rate from drifting; nothing does so for the horizontal ones.
         self.velocity = (vx, vy, vz + _BAROMETER_GAIN * dt * (body.vz + 0.1 * draw() - vz))
+        if body.on_ground:
+            self.velocity = (0.0, 0.0, 0.0)  # the landing detector tells the filter so
         self.position = _sum(self.position, self.velocity, dt)
 
     def aid(self, position: Vector3, yaw: float, resets: int) -> bool:

@@ -1,0 +1,96 @@
+"""Who is on a link: listens, asks each vehicle what it is, and tells what it needs to be flown."""
+
+import time
+from dataclasses import dataclass, field
+
+from drivers.mavlink.link import Link
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.frames import id_of
+from drivers.mavlink.wire.names import ARMED, Command, Flavour, mode_name
+from drivers.mavlink.wire.telemetry import (
+    AutopilotVersion,
+    Heartbeat,
+    LocalPositionNed,
+    Statustext,
+    SysStatus,
+    VideoStreamInformation,
+)
+
+_HEARTBEAT_S = 0.5
+_OURS = Heartbeat(6, 8, 0, 0, 4)
+
+
+@dataclass(slots=True)
+class Found:
+    """What one vehicle said of itself."""
+
+    system: int
+    autopilot: int
+    mode: str = ""
+    armed: bool = False
+    version: str = ""
+    battery: str = ""
+    video: str = ""
+    located: bool = False
+    texts: list[str] = field(default_factory=list)
+    frames: int = 0
+
+    @property
+    def flavour(self) -> str:
+        """Return its autopilot in words."""
+        return {3: "ardupilot", 12: "px4"}.get(self.autopilot, f"autopilot {self.autopilot}")
+
+
+def probe(link: Link, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int, Found]:
+    """Return the vehicles that answer within some seconds, by system id; nothing is changed on them.
+
+    greet: systems to speak to first, where the link has to.
+    """
+    found: dict[int, Found] = {}
+    deadline, next_s = time.monotonic() + seconds, 0.0
+    while time.monotonic() < deadline:
+        if time.monotonic() >= next_s:
+            next_s = time.monotonic() + _HEARTBEAT_S
+            for system in {*greet, *found}:
+                link.send(system, _OURS)
+            for vehicle in found.values():
+                _ask(link, vehicle)
+        for _, frame in link.receive():
+            message = frame.message
+            if isinstance(message, Heartbeat) and frame.component == 1 and message.autopilot != 8:
+                vehicle = found.setdefault(frame.system, Found(frame.system, message.autopilot))
+                vehicle.autopilot, vehicle.armed = message.autopilot, bool(message.base_mode & ARMED)
+                vehicle.mode = _mode(message)
+            if frame.system in found:
+                found[frame.system].frames += 1
+                _note(found[frame.system], message)
+    return found
+
+
+def _ask(link: Link, vehicle: Found) -> None:
+    for kind, known in ((AutopilotVersion, vehicle.version), (VideoStreamInformation, vehicle.video)):
+        if not known:
+            link.send(vehicle.system, CommandLong(vehicle.system, 1, Command.REQUEST_MESSAGE, 0, float(id_of(kind))))
+    if not vehicle.battery:
+        interval = (float(id_of(SysStatus)), 500_000.0)
+        link.send(vehicle.system, CommandLong(vehicle.system, 1, Command.SET_MESSAGE_INTERVAL, 0, *interval))
+
+
+def _mode(message: Heartbeat) -> str:
+    known = message.autopilot in (Flavour.PX4, Flavour.ARDUPILOT)
+    return mode_name(Flavour(message.autopilot), message.custom_mode) if known else f"mode {message.custom_mode}"
+
+
+def _note(vehicle: Found, message: object) -> None:
+    match message:
+        case AutopilotVersion():
+            raw = message.flight_sw_version
+            vehicle.version = f"{raw >> 24}.{raw >> 16 & 255}.{raw >> 8 & 255}"
+        case SysStatus() if message.battery_remaining >= 0:
+            vehicle.battery = f"{message.battery_remaining} %"
+        case VideoStreamInformation():
+            vehicle.video = message.uri
+        case LocalPositionNed():
+            vehicle.located = True
+        case Statustext() if message.text not in vehicle.texts:
+            vehicle.texts.append(message.text)

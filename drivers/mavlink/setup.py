@@ -1,0 +1,85 @@
+"""Reads the parameters that indoor flight needs, tells each difference, and writes them if asked to."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from drivers.mavlink.link import Link
+from drivers.mavlink.parameters import Needed, difference, needed
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.names import ARMED, Flavour
+from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
+from drivers.mavlink.wire.service import ParamRequestRead, ParamSet, ParamValue
+from drivers.mavlink.wire.telemetry import Heartbeat
+from groundstation.errors import DriverError
+
+_TRIES = 5
+_ANSWER_S = 0.6
+_CONNECT_S = 5.0
+_OURS = Heartbeat(6, 8, 0, 0, 4)
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One parameter that is not as needed; found None: the vehicle does not answer for it."""
+
+    wanted: Needed
+    found: float | None
+    text: str
+
+
+class Setup:
+    """The parameters of one vehicle on an open link that nobody else reads."""
+
+    def __init__(self, link: Link, system: int, flavour: Flavour, our_system: int) -> None:
+        self._link, self._system, self._flavour = link, system, flavour
+        self._needed = needed(flavour, our_system)
+
+    def connect(self) -> None:
+        """Wait for the vehicle; raises DriverError if it does not answer, is another kind, or has its motors on."""
+        deadline = time.monotonic() + _CONNECT_S
+        while time.monotonic() < deadline:
+            self._link.send(self._system, _OURS)
+            for _, frame in self._link.receive():
+                message = frame.message
+                if frame.system != self._system or frame.component != 1 or not isinstance(message, Heartbeat):
+                    continue
+                if message.autopilot != self._flavour:
+                    raise DriverError(
+                        f"system {self._system} is autopilot {message.autopilot}, not {self._flavour.name}"
+                    )
+                if message.base_mode & ARMED:
+                    raise DriverError(f"system {self._system} is armed: parameters are not touched")
+                return
+        heard = ", ".join(f"{reason} {n}" for reason, n in self._link.rejected.items())
+        raise DriverError(f"system {self._system} does not answer{f' (refused: {heard})' if heard else ''}")
+
+    def differences(self) -> Iterator[Difference]:
+        """Yield what is not as needed."""
+        for wanted in self._needed:
+            value = self._exchange(wanted, ParamRequestRead(self._system, 1, wanted.name, -1))
+            text = difference(wanted, {} if value is None else {wanted.name: value})
+            if text:
+                yield Difference(wanted, value, text)
+
+    def apply(self, wanted: Needed) -> bool:
+        """Write one parameter; returns whether the vehicle confirmed it."""
+        carried = carried_from_value(self._flavour, wanted.value, wanted.kind)
+        value = self._exchange(wanted, ParamSet(self._system, 1, wanted.name, carried, wanted.kind))
+        return value is not None and not difference(wanted, {wanted.name: value})
+
+    def _exchange(self, wanted: Needed, message: ParamRequestRead | ParamSet) -> float | None:
+        for _ in range(_TRIES):
+            self._link.send(self._system, message)
+            deadline = time.monotonic() + _ANSWER_S
+            while time.monotonic() < deadline:
+                for _, frame in self._link.receive():
+                    answer = frame.message
+                    if frame.system != self._system or not isinstance(answer, ParamValue):
+                        continue
+                    if answer.param_id == wanted.name:
+                        try:
+                            return value_from_carried(self._flavour, answer.param_value, answer.param_type)
+                        except WireError:
+                            return None
+        return None

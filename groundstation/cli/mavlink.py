@@ -1,0 +1,112 @@
+"""`groundstation mavlink`: who is on a link, and whether a vehicle is set for indoor flight."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.errors import GroundStationError
+
+
+@click.group()
+def mavlink() -> None:
+    """Meet MAVLink vehicles: probe a link, check and set their parameters."""
+
+
+@mavlink.command(
+    epilog="\b\nExamples:\n  groundstation mavlink probe udpin:0.0.0.0:14550\n"
+    "  groundstation mavlink probe udpout:192.168.1.12:14550 --seconds 5\n"
+    "  groundstation mavlink probe serial:/dev/ttyUSB0:57600"
+)
+@click.argument("link")
+@click.option("--seconds", type=click.FloatRange(0.5, 60), default=3.0, show_default=True, help="How long to listen.")
+@click.option("--key-file", default="", help="Signing key, for a signed link.")
+@click.option("--mavsdk", "with_mavsdk", is_flag=True, help="Look through MAVSDK instead of pymavlink.")
+def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
+    """List the vehicles that answer on LINK (udpin:, udpout: or serial:), without changing anything on them."""
+    from drivers.mavlink.link import open_link
+    from drivers.mavlink.probe import probe as look
+
+    opened = open_link(_link_settings(link, key_file, "mavsdk" if with_mavsdk else "pymavlink"))
+    try:
+        found = look(opened, seconds)
+    finally:
+        opened.close()
+    for system, vehicle in sorted(found.items()):
+        facts = [vehicle.flavour, vehicle.version, vehicle.mode, "ARMED" if vehicle.armed else "disarmed"]
+        facts += [f"battery {vehicle.battery}" if vehicle.battery else "", "has a position" if vehicle.located else ""]
+        click.echo(f"system {system:3d}: {', '.join(filter(None, facts))}; {vehicle.frames / seconds:.0f} messages/s")
+        if vehicle.video:
+            click.echo(f"  video {vehicle.video}")
+        for text in vehicle.texts:
+            click.echo(f"  says: {text}")
+    for reason, count in sorted(opened.rejected.items()):
+        click.echo(f"refused: {count} x {reason.replace('_', ' ')}")
+    if not found:
+        click.echo(f"nobody answers on {link} within {seconds:g} s", err=True)
+        return ExitCode.FAILED
+    return ExitCode.OK
+
+
+@mavlink.command(
+    epilog="\b\nExamples:\n  groundstation mavlink setup --check lab.yaml drone_2\n"
+    "  groundstation mavlink setup --apply lab.yaml drone_2\n\n"
+    "Exit codes: 0 all as needed, 1 differences are left, 2 wrong settings."
+)
+@click.argument("field", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("drone")
+@click.option("--check/--apply", default=True, help="Only tell the differences, or write them as well.")
+@click.option("--address", help="Where it is, if not where the field file says: ADDRESS:PORT.")
+def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
+    """Compare the parameters of DRONE in FIELD with what indoor flight needs; with --apply, write what differs."""
+    from drivers.mavlink.link import open_link
+    from drivers.mavlink.setup import Setup
+    from drivers.mavlink.wire.names import Flavour
+
+    settings, vehicle = _vehicle(field, drone)
+    link = settings.link
+    if address is not None:
+        link = _link_settings(f"udpout:{address}", link.key_file, link.kind)
+    opened = open_link(link)
+    left = 0
+    try:
+        work = Setup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id)
+        work.connect()
+        for found in work.differences():
+            taken = not check and work.apply(found.wanted)
+            left += not taken
+            click.echo(found.text + ("" if check else ": set" if taken else ": NOT TAKEN"))
+    finally:
+        opened.close()
+    if not left:
+        click.echo(f"{drone}: all parameters as needed" + ("" if check else "; restart it before the first flight"))
+    return ExitCode.FAILED if left else ExitCode.OK
+
+
+def _link_settings(target: str, key_file: str, kind: str) -> Any:
+    from pydantic import ValidationError
+
+    from drivers.mavlink.settings import LinkSettings
+
+    try:
+        return LinkSettings.model_validate({"kind": kind, "target": target, "key_file": key_file})
+    except ValidationError:
+        like = "udpin:0.0.0.0:14550, udpout:ADDRESS:PORT, serial:DEVICE:BAUD"
+        raise GroundStationError(f"{target}: must be like {like}; MAVSDK cannot sign") from None
+
+
+def _vehicle(path: Path, name: str) -> tuple[Any, Any]:
+    from drivers.mavlink.settings import MavlinkDriverSettings
+    from groundstation.settings.load import load_field
+    from groundstation.settings.sections import DriverKind, driver_sections
+
+    field = load_field(path)
+    for section in driver_sections(field):
+        if section.kind is DriverKind.MAVLINK:
+            settings = MavlinkDriverSettings.model_validate_json(section.section)
+            for vehicle in settings.vehicles:
+                if vehicle.name == name:
+                    return settings, vehicle
+    known = [n for n, drone in field.drones.items() if drone.mavlink is not None]
+    raise GroundStationError(f"{name} is no MAVLink vehicle of {path}; there are: {', '.join(known) or 'none'}")

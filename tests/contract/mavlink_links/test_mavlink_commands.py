@@ -1,0 +1,112 @@
+"""`groundstation mavlink probe` and `setup` against emulated vehicles on loopback; refusals on a link by name."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from drivers.mavlink.link import UdpLink, open_link, signing_of
+from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.wire import telemetry
+from drivers.mavlink.wire.frames import Encoder
+from groundstation.cli.mavlink import mavlink
+from groundstation.errors import DriverError
+
+FIELD = Path(__file__).parents[3] / "config" / "mixed-team.yaml"
+
+
+def run(*arguments):
+    return CliRunner().invoke(mavlink, [str(a) for a in arguments], standalone_mode=False)
+
+
+def test_probe_names_who_answers(hangar):
+    _, _, (address, port) = hangar.add("ardupilot", 12, aided=True, video="http://127.0.0.1:8080/video.mjpg")
+    result = run("probe", f"udpout:{address}:{port}", "--seconds", 2)
+    assert result.return_value == 0, result.output
+    assert "system  12: ardupilot, 4.6.2, STABILIZE, disarmed, battery" in result.output
+    assert "video http://127.0.0.1:8080/video.mjpg" in result.output
+
+
+def test_probe_of_nobody_fails(port):
+    result = run("probe", f"udpin:127.0.0.1:{port}", "--seconds", 0.5)
+    assert result.return_value == 1 and "nobody answers" in result.output
+
+
+@pytest.mark.parametrize(("flavour", "drone", "system"), [("px4", "drone_2", 11), ("ardupilot", "drone_3", 12)])
+def test_setup_tells_and_sets_what_differs(hangar, flavour, drone, system):
+    emulator, _, (address, port) = hangar.add(flavour, system, configured=False)
+    place = ("--address", f"{address}:{port}")
+    result = run("setup", "--check", FIELD, drone, *place)
+    assert result.return_value == 1, result.output
+    name = "EKF2_GPS_CTRL is 7, needs 0" if flavour == "px4" else "GUID_TIMEOUT is 3, needs 0.5"
+    assert name in result.output
+    assert not emulator.firmware.parameters.indoor
+    result = run("setup", "--apply", FIELD, drone, *place)
+    assert result.return_value == 0, result.output
+    assert emulator.firmware.parameters.indoor
+    assert "all parameters as needed" in run("setup", "--check", FIELD, drone, *place).output
+
+
+def test_setup_refuses_another_autopilot_and_an_armed_one(hangar):
+    emulator, _, (address, port) = hangar.add("px4", 12)
+    result = run("setup", "--check", FIELD, "drone_3", "--address", f"{address}:{port}")
+    assert isinstance(result.exception, DriverError) and "not ARDUPILOT" in str(result.exception)
+    emulator, _, (address, port) = hangar.add("ardupilot", 12)
+    emulator.firmware.armed = True
+    result = run("setup", "--apply", FIELD, "drone_3", "--address", f"{address}:{port}")
+    assert isinstance(result.exception, DriverError) and "armed" in str(result.exception)
+
+
+def test_signed_link_hears_only_who_has_the_key(hangar, tmp_path):
+    key = tmp_path / "key"
+    key.write_text(bytes(range(32)).hex())
+    signing = signing_of(LinkSettings(target="udpout:127.0.0.1:1", key_file=str(key)))
+    emulator, _, (address, port) = hangar.add("ardupilot", 9, signing=signing)
+    target = f"udpout:{address}:{port}"
+    link = open_link(LinkSettings(target=target, key_file=str(key)))
+    plain = open_link(LinkSettings(target=target))
+    other = tmp_path / "other"
+    other.write_bytes(os.urandom(32))
+    wrong = open_link(LinkSettings(target=target, key_file=str(other)))
+    try:
+        deadline, heard = time.monotonic() + 4, []
+        while not heard and time.monotonic() < deadline:
+            for each in (plain, wrong, link):
+                each.send(9, telemetry.Heartbeat(6, 8, 0, 0, 4))
+            heard = link.receive()
+        assert heard and heard[0].frame.system == 9
+        assert emulator.rejected["unsigned"] and emulator.rejected["signature"]
+        assert plain.receive() == [] and wrong.receive() == []
+    finally:
+        for each in (link, plain, wrong):
+            each.close()
+
+
+@pytest.mark.parametrize("content", [b"", b"short", b"zz" * 32])
+def test_a_bad_key_is_named_but_not_shown(tmp_path, content):
+    key = tmp_path / "key"
+    key.write_bytes(content)
+    with pytest.raises(DriverError, match="32 bytes") as refused:
+        signing_of(LinkSettings(target="udpout:127.0.0.1:1", key_file=str(key)))
+    assert content.decode() not in str(refused.value) or not content
+
+
+def test_duplicates_strangers_and_rubbish_are_refused_by_name():
+    link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"))
+    beat = Encoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
+    now = time.monotonic_ns()
+    assert len(link._judge(now, beat, ("127.0.0.2", 1))) == 1
+    assert link._judge(now + 1, beat, ("127.0.0.3", 1)) == []
+    # Its address may change once the old one is silent (a new lease, another radio).
+    assert len(link._judge(now + 4_000_000_000, beat, ("127.0.0.3", 1))) == 1
+    assert link._judge(now, b"rubbish", ("127.0.0.3", 1)) == []
+    assert len(link._judge(now, beat + beat[:-3], ("127.0.0.3", 1))) == 1
+    own = Encoder(255, 190).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
+    assert link._judge(now, own, ("127.0.0.9", 1)) == []
+    assert link.rejected == {"duplicate_system": 1, "no_frame": 1, "truncated": 1}
+    link.close()
+    out = UdpLink(LinkSettings(target="udpout:127.0.0.2:5"))
+    assert out._judge(now, beat, ("127.0.0.7", 5)) == [] and out.rejected == {"foreign_address": 1}
+    out.close()

@@ -7,6 +7,7 @@ import click
 # name -> (module:function, line in the help); a new bench is one row here and one module beside this one.
 BENCHES = {
     "demo": ("groundstation.cli.bench_demo:demo", "Fly many seeds of the demo and judge each."),
+    "planner": ("groundstation.cli.bench_planner:planner", "Time the planar planner against brute force and peers."),
 }
 
 

@@ -1,9 +1,11 @@
 """What a lab would write first: a textbook EKF rollout over all 2(n + 1) coordinates, finite differences, SciPy."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.planning.peers.step import Objective, PeerStep, brute_force, edges_of
+from groundstation.planning.peers.step import Objective, PeerStep, brute_force, edges_of, never
 from groundstation.planning.planar.parameters import PlanarParameters
 
 Array = NDArray[np.float64]
@@ -48,7 +50,13 @@ def _stacked_readings(
     return h, r
 
 
-def solve(mean: Array, covariance: Array, level: tuple[int, ...], parameters: PlanarParameters) -> PeerStep:
+def solve(
+    mean: Array,
+    covariance: Array,
+    level: tuple[int, ...],
+    parameters: PlanarParameters,
+    should_stop: Callable[[], bool] = never,
+) -> PeerStep:
     """Return one control step for a belief with per-axis covariance (N, N)."""
     full: Array = np.kron(covariance, np.eye(2)).astype(np.float64)
 
@@ -56,4 +64,4 @@ def solve(mean: Array, covariance: Array, level: tuple[int, ...], parameters: Pl
         edges = edges_of(candidate)
         return lambda x: rollout_cost(x, mean, full, edges, parameters)
 
-    return brute_force(level, objective_of, 2 * len(level), gradient=False)
+    return brute_force(level, objective_of, 2 * len(level), False, should_stop)

@@ -1,11 +1,12 @@
 """The same mathematics as the compiled planner in plain numpy: reduced state, information form, exact adjoint."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.planning.peers.step import Objective, PeerStep, brute_force, edges_of
+from groundstation.planning.peers.step import Objective, PeerStep, brute_force, edges_of, never
 from groundstation.planning.planar.parameters import PlanarParameters
 
 Array = NDArray[np.float64]
@@ -78,10 +79,16 @@ class Rollout:
         return np.asarray(d - d @ np.linalg.inv(posterior + d) @ d)
 
 
-def solve(mean: Array, covariance: Array, level: tuple[int, ...], parameters: PlanarParameters) -> PeerStep:
+def solve(
+    mean: Array,
+    covariance: Array,
+    level: tuple[int, ...],
+    parameters: PlanarParameters,
+    should_stop: Callable[[], bool] = never,
+) -> PeerStep:
     """Return one control step for a belief with per-axis covariance (N, N)."""
 
     def objective_of(candidate: tuple[int, ...]) -> Objective:
         return Rollout(mean, covariance, candidate, parameters).cost_and_gradient
 
-    return brute_force(level, objective_of, 2 * len(level), gradient=True)
+    return brute_force(level, objective_of, 2 * len(level), True, should_stop)

@@ -13,12 +13,18 @@ Objective = Callable[[Array], Any]
 
 
 class PeerStep(NamedTuple):
-    """The winner's levels and cost [m^2], and what it took."""
+    """The winner's levels and cost [m^2], and what it took; solved < topologies when the peer was stopped."""
 
     level: tuple[int, ...]
     cost: float
     evaluations: int
     topologies: int
+    solved: int
+
+
+def never() -> bool:
+    """Return that there is no hurry."""
+    return False
 
 
 def edges_of(level: tuple[int, ...]) -> list[tuple[int, int]]:
@@ -43,15 +49,22 @@ def neighbours_of(level: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 
 def brute_force(
-    level: tuple[int, ...], objective_of: Callable[[tuple[int, ...]], Objective], size: int, gradient: bool
+    level: tuple[int, ...],
+    objective_of: Callable[[tuple[int, ...]], Objective],
+    size: int,
+    gradient: bool,
+    should_stop: Callable[[], bool] = never,
 ) -> PeerStep:
-    """Return the cheapest of a topology and its neighbours.
+    """Return the cheapest of a topology and its neighbours, or of those solved before `should_stop` says so.
 
     Objectives take controls scaled to [-1, 1] and return the cost, or (cost, gradient) with `gradient`.
     """
-    best, evaluations = (np.inf, level), 0
+    best, evaluations, solved = (np.inf, level), 0, 0
     candidates = [level, *neighbours_of(level)]
     for candidate in candidates:
+        if solved and should_stop():
+            break
+        solved += 1
         objective = objective_of(candidate)
         first = objective(np.zeros(size))
         scale = first[0] if isinstance(first, tuple) else first
@@ -70,4 +83,4 @@ def brute_force(
         )
         evaluations += int(result.nfev) + 1
         best = min(best, (float(result.fun) * scale, candidate))
-    return PeerStep(best[1], best[0], evaluations, len(candidates))
+    return PeerStep(best[1], best[0], evaluations, len(candidates), solved)

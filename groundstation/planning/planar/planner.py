@@ -158,6 +158,10 @@ class PlanarPlanner:
         self._warm = np.zeros(2 * robots * self.options.segments)
         self.stop = np.zeros(1, dtype=np.int64)
 
+    def reset(self) -> None:
+        """Forget the last controls: the next plan starts from rest."""
+        self._warm = np.zeros_like(self._warm)
+
     def plan(
         self, mean: Array, covariance: Array, level: Levels, target_velocity_m_s: Array | None = None
     ) -> PlanarPlan:

@@ -1,0 +1,81 @@
+"""`groundstation bench planner`: one control step of the planar planner, timed against brute force and peers."""
+
+import json
+import os
+import sys
+from typing import Any
+
+import click
+
+from groundstation.process import numba_cache
+
+_LAYOUTS = ("two-level", "random", "string", "flat")
+_PEERS = ("naive", "numpy", "jax")
+
+
+def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:
+    """Return a comma-separated option as a list; raises UsageError for what is not allowed."""
+    chosen = [part.strip() for part in value.split(",") if part.strip()]
+    for part in chosen:
+        if part not in allowed:
+            raise click.UsageError(f"{option}: {part!r} is none of {', '.join(allowed)}")
+    return chosen
+
+
+def numbers(value: str, option: str, low: int, high: int) -> list[int]:
+    """Return a comma-separated option as integers within a range; raises UsageError."""
+    try:
+        found = [int(part) for part in value.split(",") if part.strip()]
+    except ValueError:
+        raise click.UsageError(f"{option}: {value!r} is not a list of whole numbers") from None
+    if not found or min(found) < low or max(found) > high:
+        raise click.UsageError(f"{option}: numbers from {low} to {high}, separated by commas")
+    return found
+
+
+@click.command()
+@click.option("--robots", default="2,5,10,20,30,50,100", show_default=True, help="Team sizes.")
+@click.option("--layout", default="two-level,random,string", show_default=True, help=f"Of {', '.join(_LAYOUTS)}.")
+@click.option("--peer", default="", help=f"Also time {', '.join(_PEERS)} (comma-separated), each in a child process.")
+@click.option("--repeats", type=click.IntRange(1, 1000), default=9, show_default=True, help="Rounds; each runs all.")
+@click.option("--seed", type=click.IntRange(0), default=3, show_default=True, help="Of the beliefs.")
+@click.option("--limit", "limit_s", type=click.FloatRange(0.1), default=20.0, show_default=True, help="Seconds a peer "
+              "may take for one step; beyond it the rest is extrapolated and marked.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
+def planner(robots: str, layout: str, peer: str, repeats: int, seed: int, limit_s: float, as_json: bool) -> None:
+    """Time one control step of the planar planner: CPU time of one core, median of interleaved rounds."""
+    sizes, layouts = numbers(robots, "--robots", 1, 500), choices(layout, _LAYOUTS, "--layout")
+    peers = choices(peer, _PEERS, "--peer")
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    numba_cache.activate()
+    from groundstation.experiments.planner_bench import run_bench
+
+    terminal = sys.stderr.isatty()
+
+    def tell(text: str) -> None:
+        if terminal:
+            click.echo(f"\r\033[K{text}", err=True, nl=False)
+
+    result = run_bench(sizes, layouts, peers, repeats, seed, limit_s, tell)
+    tell("")
+    click.echo(json.dumps(result, indent=1) if as_json else _table(result))
+
+
+def _table(result: dict[str, Any]) -> str:
+    header = f"{'layout':10} {'robots':>6} {'method':14} {'CPU ms':>11} {'min':>10} {'max':>10} {'topol.':>6} "
+    lines = [header + f"{'solved':>6} {'eval.':>9} {'same':>5} {'MB':>5}"]
+    for row in result["rows"]:
+        if row["cpu_ms_median"] is None:
+            lines.append(f"{row['layout']:10} {row['robots']:6} {row['method']:14} {row['failure']}")
+            continue
+        star = "*" if row["extrapolated"] else " "
+        same = {True: "yes", False: "no", None: "-"}[row["matches_brute_force"]]
+        lines.append(
+            f"{row['layout']:10} {row['robots']:6} {row['method']:14} {row['cpu_ms_median']:10.3f}{star} "
+            f"{row['cpu_ms_min']:10.3f} {row['cpu_ms_max']:10.3f} {row['topologies']:6} {row['survivors']:6} "
+            f"{row['evaluations']:9} {same:>5} {row['peak_memory_mb']:5.0f}"
+        )
+    for layout, slopes in result["exponent"].items():
+        lines.append(f"exponent {layout}: " + ", ".join(f"{method} {value:.2f}" for method, value in slopes.items()))
+    return "\n".join([*lines, "* partly extrapolated: some topologies or one evaluation, times exact counts"])

@@ -97,6 +97,7 @@ class ConsoleServer:
             self.app.asgi,
             log_config=None,
             access_log=False,
+            log_level="warning",
             lifespan="off",
             ws="websockets-sansio",
             http="h11",

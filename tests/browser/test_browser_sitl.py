@@ -75,7 +75,8 @@ def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord
     try:
         witness = Witness(bus)
         page: Seen = open_page(served)
-        eventually(lambda: _aloft(witness.look()), 150.0, "both drones fly")
+        eventually(lambda: not flight.supervisor.alive or _aloft(witness.look()), 150.0, "both drones fly")
+        assert flight.supervisor.alive, "the run has ended before its time"
         page.wait(lambda s: {"drone_1", "drone_2"} <= set(s["ellipses"]), 60.0)
         page.page.wait_for_timeout(1500)
         page.shot("sitl_flying")

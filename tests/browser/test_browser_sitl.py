@@ -1,5 +1,6 @@
 """LAND ALL in the page, and what reaches the emulated drones on the wire."""
 
+import json
 import os
 import re
 import signal
@@ -13,13 +14,14 @@ from typing import Any
 
 import pytest
 from seen_page import Seen, eventually
+from serve_fake import field_json
 
 from groundstation.bus import topics as t
 from groundstation.bus.messages import TruthState
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.supervisor import runtime_file
 
-pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(600)]
 
 _FLY, _LAND = 290718208, 290717696
 _REF = re.compile(rb"AT\*REF=\d+,(\d+)")
@@ -46,8 +48,19 @@ class Witness:
         return self
 
 
+@pytest.fixture(scope="module")
+def kernels() -> None:
+    """Compile the tracker's kernels before the run: on a busy machine that takes longer than a run waits for it."""
+    script = (
+        "import json, sys; from groundstation.process import numba_cache; numba_cache.activate();"
+        "from groundstation.runtime.warm_up import warm_up; warm_up(json.load(sys.stdin))"
+    )
+    field = json.dumps(field_json(8765)).encode()
+    subprocess.run([sys.executable, "-c", script], input=field, timeout=280, check=True)
+
+
 @pytest.fixture
-def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
+def flight(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
     process = subprocess.Popen([sys.executable, "-m", "groundstation.cli.main", *arguments], stdout=subprocess.DEVNULL)

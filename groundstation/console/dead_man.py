@@ -1,0 +1,56 @@
+"""A dead man's handle: while it is held all goes on; let go, and the team holds, then lands. No web server involved."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from groundstation.bus.messages import Verb
+
+_NS = 1_000_000_000
+_LAND_AFTER_NS = 5 * _NS
+
+
+class Grip(StrEnum):
+    """DISARMED until it is held for the first time; HELD while it is; then LOOSE, and at last LANDED by us."""
+
+    DISARMED = "DISARMED"
+    HELD = "HELD"
+    LOOSE = "LOOSE"
+    LANDED = "LANDED"
+
+
+@dataclass(slots=True)
+class DeadMan:
+    """Pure: `press` when the handle is felt, `step` often; it answers with the stop that is due, if one is.
+
+    patience_ns: how long the handle may not be felt. A keyboard repeats a held key, but only after some 0.5 s.
+    """
+
+    patience_ns: int
+    grip: Grip = Grip.DISARMED
+    _felt_ns: int = 0
+    _loose_ns: int = 0
+
+    def press(self, now_ns: int) -> None:
+        """The handle is held. What was stopped stays stopped: going on is the operator's RESUME."""
+        self._felt_ns = now_ns
+        self.grip = Grip.HELD
+
+    def release(self, now_ns: int) -> Verb | None:
+        """The handle is known to be let go (a gamepad says so, or is gone)."""
+        if self.grip is not Grip.HELD:
+            return None
+        self.grip, self._loose_ns = Grip.LOOSE, now_ns
+        return Verb.HOLD
+
+    def step(self, now_ns: int) -> Verb | None:
+        """Let time pass."""
+        if self.grip is Grip.HELD and now_ns - self._felt_ns > self.patience_ns:
+            return self.release(now_ns)
+        if self.grip is Grip.LOOSE and now_ns - self._loose_ns > _LAND_AFTER_NS:
+            return self.land()
+        return None
+
+    def land(self) -> Verb:
+        """Land at once."""
+        self.grip = Grip.LANDED
+        return Verb.LAND

@@ -43,13 +43,14 @@ class Safety(_Section):
 class Vision(_Section):
     """What of the tracker's estimate is fed back to the autopilot, and what its loss does.
 
-    rate_hz: of the messages; max_std_m: a worse known position is none; max_age_s: an estimate that no camera has
-    confirmed for so long is none; hover_after_s, land_after_s: without any; jump_m: beyond what it can have flown.
+    rate_hz: of the messages; max_std_m: a worse known position is none (what no camera keeps sharp gets there within
+    some 5 s); max_age_s: nor is one of a vehicle that itself was not seen for so long; hover_after_s, land_after_s:
+    without any; jump_m: beyond what it can have flown.
     """
 
     rate_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
-    max_std_m: Positive = 0.4
-    max_age_s: Positive = 3.0
+    max_std_m: Positive = 0.12
+    max_age_s: Positive = 10.0
     hover_after_s: Positive = 0.5
     land_after_s: Positive = 2.0
     jump_m: Positive = 0.3

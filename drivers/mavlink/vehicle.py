@@ -24,7 +24,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, FlightState, Vector3
 
 _FRESH_NS = 300_000_000
-_HEARTBEAT_NS = 3_000_000_000
+_HEARTBEAT_NS = 4_000_000_000
 _FAULTS = Sensor.GYRO | Sensor.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
 
@@ -189,7 +189,7 @@ class MavlinkVehicle:
         """Tell the vehicle what the decision means to it, feed its estimator, and ask what is still unknown."""
         known = self.telemetry
         self._take_answers(now_ns)
-        silence_ns = now_ns - known.heartbeat_ns if known.heartbeat_ns else 1 << 62
+        silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else 1 << 62
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         height = known.position_m[2] if known.position_m else 0.0

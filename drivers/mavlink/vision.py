@@ -1,7 +1,8 @@
 """What the tracker believes of a vehicle, fed back to its autopilot; and how long it has had nothing to feed. Pure.
 
 Before take-off no camera's word counts (landed robots are not in the belief): the pad of the field file is fed instead.
-An estimate that no camera has confirmed for a while is not fed: it would be the autopilot's own dead reckoning.
+A position that observations do not keep sharp is not fed: it would be the autopilot's own dead reckoning. What counts
+is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well.
 """
 
 import math

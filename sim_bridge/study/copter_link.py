@@ -13,7 +13,7 @@ from sim_bridge.world.world import TICK_S
 Vector3 = tuple[float, float, float]
 _PERIOD_TICKS = 4  # 50 Hz
 _VISION_TICKS = 7  # 28.6 Hz
-_MAX_AGE_S = 3.0
+_MAX_AGE_S, _MAX_STD_M = 10.0, 0.12
 _LAND_AFTER_S = 2.0  # without a pose
 _STAND_S, _TAKE_OFF_M, _CLIMB_M_S = 2.0, 0.8, 0.4
 _COVARIANCE = (0.0225, 0.0, 0.0, 0.0, 0.0225, 0.0, 0.0, 0.0, 0.05)
@@ -64,7 +64,7 @@ class CopterLink:
     def _feed(self, estimates: tuple[EntityEstimate, ...]) -> None:
         position, yaw = self._pad, self._pad_yaw
         if self._copter.airborne:
-            mine = [e for e in estimates if e.name == self._name and e.converged and e.age_s <= _MAX_AGE_S]
+            mine = [e for e in estimates if e.name == self._name and _is_good(e)]
             if not mine:
                 return
             position, yaw = (mine[0].mean[0], mine[0].mean[1], mine[0].mean[2]), mine[0].mean[3]
@@ -97,3 +97,8 @@ class CopterLink:
     def _header(self, stamp_ns: int) -> Header:
         self._seq += 1
         return Header(stamp_ns, self._clock, self._name, self._name, self._seq)
+
+
+def _is_good(estimate: EntityEstimate) -> bool:
+    worst = max(estimate.covariance[i] for i in (0, 5, 10))
+    return estimate.converged and estimate.age_s <= _MAX_AGE_S and worst <= _MAX_STD_M**2

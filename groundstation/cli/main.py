@@ -39,6 +39,9 @@ VERBS: dict[str, Verb] = {
     ),
     "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
     "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
+    "experiment": Verb(
+        "Look", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."
+    ),
     "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
     "mavlink": Verb("Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."),
     "version": Verb("Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."),

@@ -18,10 +18,12 @@ Levels = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class SimulationSettings:
-    """range_m: beyond it a reading does not exist; noise_growth: reading std sigma * sqrt(1 + growth d^4) [1/m^4];
+    """What the world and the filter do besides the planner's parameters.
 
+    range_m: beyond it a reading does not exist; noise_growth: reading variance sigma^2 (1 + growth d^4) [1/m^4];
     dropout: share of readings lost; kidnap: chance per step that the target jumps by up to kidnap_m; target_q: variance
-    per step that the filter gives the target; target_velocity: whether the filter models it.
+    per step that the filter gives the target; target_velocity: whether the filter models it; fuse_all: fuse every
+    reading within range, not only those along the topology's edges.
     """
 
     steps: int
@@ -33,6 +35,7 @@ class SimulationSettings:
     initial_variance: float = 1e-4
     target_q: float | None = None
     target_velocity: bool = False
+    fuse_all: bool = False
 
 
 class Step(NamedTuple):
@@ -113,6 +116,12 @@ def edges_of(level: Levels) -> list[tuple[int, int]]:
     return [(a - 1, b - 1) for a, upper in enumerate(ends) for b, lower in enumerate(ends) if lower == upper + 1]
 
 
+def all_pairs(robots: int) -> list[tuple[int, int]]:
+    """Return all (observer, subject) pairs; the global sensor never observes the target."""
+    pairs = [(-1, b) for b in range(robots)]
+    return pairs + [(a, b) for a in range(robots) for b in range(robots + 1) if a != b]
+
+
 def observe(
     belief: PlanarBelief,
     truth: Array,
@@ -123,10 +132,10 @@ def observe(
 ) -> tuple[PlanarBelief, int]:
     """Fuse one reading for every edge of the topology whose ends are within range; return how many there were.
 
-    PAPER: the filter uses the edges of the selected topology only.
+    PAPER: the filter uses the edges of the selected topology only; with `fuse_all` it uses whatever is seen.
     """
     readings = 0
-    for observer, subject in edges_of(level):
+    for observer, subject in all_pairs(len(level)) if settings.fuse_all else edges_of(level):
         true = truth[subject] - (truth[observer] if observer >= 0 else 0.0)
         distance = float(np.hypot(*true))
         variance = parameters.sigma_m**2 * (1.0 + settings.noise_growth * distance**4)

@@ -1,0 +1,110 @@
+"""Runs many tasks: one after the other or on a dask cluster, one result file per task, so that nothing is run twice."""
+
+import json
+import os
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from groundstation.experiments.tasks import Task, execute
+
+Tell = Callable[[int, int], None]
+
+
+class SweepError(RuntimeError):
+    """A sweep that cannot go on: no scheduler, or tasks that failed. Finished results stay."""
+
+
+def result_file(folder: Path, task: Task) -> Path:
+    """Return where the result of a task is kept."""
+    return folder / f"{task.key}.json"
+
+
+def read_result(path: Path) -> dict[str, Any] | None:
+    """Return a finished result; None where there is none or it is not whole."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) and {"task", "merits", "timing"} <= content.keys() else None
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a file that is either whole or not there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)
+
+
+def run_tasks(
+    tasks: Sequence[Task],
+    folder: Path | None = None,
+    scheduler: str = "",
+    workers: int = 0,
+    tell: Tell = lambda done, total: None,
+) -> list[dict[str, Any]]:
+    """Return the rows of all tasks, in their order; those whose result is in `folder` are read instead of run.
+
+    scheduler: address of a dask cluster, `local` for one of our own with `workers` processes, empty for none.
+    Raises SweepError when a cluster cannot be reached or a task fails.
+    """
+    rows: dict[Task, dict[str, Any]] = {}
+    if folder is not None:
+        found = {task: read_result(result_file(folder, task)) for task in tasks}
+        rows = {task: row for task, row in found.items() if row is not None}
+    missing = [task for task in dict.fromkeys(tasks) if task not in rows]
+    tell(len(rows), len(tasks))
+    source = _on_cluster(missing, scheduler, workers) if scheduler and missing else _one_by_one(missing)
+    for task, row in source:
+        rows[task] = row
+        if folder is not None:
+            write_atomically(result_file(folder, task), json.dumps(row))
+        tell(len(rows), len(tasks))
+    return [rows[task] for task in tasks]
+
+
+def dask_is_there() -> bool:
+    """Return whether the optional extra `sweep` is installed."""
+    return find_spec("distributed") is not None
+
+
+def _one_by_one(tasks: Sequence[Task]) -> Iterator[tuple[Task, dict[str, Any]]]:
+    for task in tasks:
+        yield task, execute(task)
+
+
+def _on_cluster(tasks: Sequence[Task], scheduler: str, workers: int) -> Iterator[tuple[Task, dict[str, Any]]]:
+    """Yield results as they come; a worker that dies is replaced by another one, its tasks are run again."""
+    if not dask_is_there():
+        raise SweepError("a cluster needs dask: pip install 'skein-groundstation[sweep]', or leave out --scheduler")
+    from distributed import Client, LocalCluster, as_completed
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # dask warns of its own ports and of workers that leave
+        if scheduler == "local":
+            # Silent: its log would fill the terminal with every worker that leaves.
+            cluster = LocalCluster(
+                n_workers=workers or os.cpu_count() or 1,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,
+                silence_logs=50,
+            )
+        try:
+            client = Client(cluster if scheduler == "local" else scheduler, timeout="20s")
+        except (OSError, TimeoutError, ValueError) as error:
+            raise SweepError(f"no dask scheduler answers at {scheduler}: {error}") from error
+        try:
+            futures = {client.submit(execute, task, pure=False, retries=3): task for task in tasks}
+            for future in as_completed(list(futures)):
+                if future.status != "finished":
+                    raise SweepError(f"task {futures[future].key} failed: {future.exception()}")
+                yield futures[future], future.result()
+                future.release()
+        finally:
+            client.close()
+            if scheduler == "local":
+                cluster.close()

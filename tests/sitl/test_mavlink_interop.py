@@ -1,0 +1,178 @@
+"""Clients of others fly our emulated vehicles: MAVSDK's own plugins, and MAVProxy from an environment of its own."""
+
+import asyncio
+import importlib.util
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
+_SPEC = importlib.util.spec_from_file_location(
+    "mavlink_hangar", Path(__file__).parents[1] / "contract" / "mavlink_links" / "conftest.py"
+)
+_hangar = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(_hangar)
+hangar, port = _hangar.hangar, _hangar.port
+
+
+async def fly_with_mavsdk(port, ardupilot):
+    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+    from mavsdk.asyncio.plugins.action import ActionAsync
+    from mavsdk.asyncio.plugins.info import InfoAsync
+    from mavsdk.asyncio.plugins.offboard import OffboardAsync
+    from mavsdk.asyncio.plugins.param import ParamAsync
+    from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+    from mavsdk.plugins.offboard import VelocityBodyYawspeed
+
+    facts = {}
+    async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
+        system = await mavsdk.first_autopilot(timeout_s=10.0)
+        assert system is not None
+        facts["autopilot"] = int(await system.autopilot_type())
+        telemetry, action, offboard = TelemetryAsync(system), ActionAsync(system), OffboardAsync(system)
+        param, info = ParamAsync(system), InfoAsync(system)
+        await asyncio.sleep(2.5)
+        facts["version"] = (await info.get_version()).flight_sw_major
+        name = "SYSID_MYGCS" if ardupilot else "MAV_SYS_ID"
+        facts["parameter"] = await param.get_param_int(name)
+        if ardupilot:
+            await param.set_param_int(name, 245)
+            await telemetry.set_rate_position_velocity_ned(20.0)
+            await telemetry.set_rate_health(2.0)
+        await param.set_param_float("GUID_TIMEOUT" if ardupilot else "COM_OF_LOSS_T", 0.75)
+        await asyncio.sleep(1.5)
+        if ardupilot:
+            await action.set_takeoff_altitude(1.0)
+            await offboard.set_velocity_body(VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0))
+            await offboard.start()  # GUIDED: it does not arm in STABILIZE without a stick
+            await action.arm()
+            await offboard.stop()
+            await action.takeoff()
+            await asyncio.sleep(8.0)
+            await offboard.set_velocity_body(VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0))
+            await offboard.start()
+        else:
+            await offboard.set_velocity_body(VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0))
+            await offboard.start()
+            await asyncio.sleep(1.5)
+            await action.arm()
+            await offboard.set_velocity_body(VelocityBodyYawspeed(0.0, 0.0, -0.6, 0.0))
+            await asyncio.sleep(3.5)
+        await offboard.set_velocity_body(VelocityBodyYawspeed(0.5, 0.0, 0.0, 20.0))
+        await asyncio.sleep(3.0)
+        async for sample in telemetry.subscribe_position_velocity_ned():
+            velocity = sample.velocity
+            facts["speed"] = (velocity.north_m_s**2 + velocity.east_m_s**2) ** 0.5
+            facts["height"] = -sample.position.down_m
+            break
+        await offboard.stop()
+        await action.land()
+        deadline = time.monotonic() + 20
+        while await telemetry.armed() and time.monotonic() < deadline:
+            await asyncio.sleep(0.2)
+        facts["armed"] = await telemetry.armed()
+    return facts
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
+    emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
+    facts = asyncio.run(fly_with_mavsdk(port, flavour == "ardupilot"))
+    assert facts["autopilot"] == (2 if flavour == "ardupilot" else 1)
+    assert facts["version"] == (4 if flavour == "ardupilot" else 1)
+    assert facts["parameter"] == (255 if flavour == "ardupilot" else 5)
+    assert 0.3 < facts["speed"] < 0.6 and facts["height"] > 0.5
+    assert facts["armed"] is False and not copter.airborne
+    assert emulator.firmware.parameters["GUID_TIMEOUT" if flavour == "ardupilot" else "COM_OF_LOSS_T"] == 0.75
+
+
+def mavproxy():
+    """The MAVProxy of `$GROUNDSTATION_MAVPROXY` (an environment of its own: it pulls another OpenCV), or a skip."""
+    python = os.environ.get("GROUNDSTATION_MAVPROXY", "")
+    if not python or not Path(python).exists():
+        pytest.skip("GROUNDSTATION_MAVPROXY does not name the mavproxy.py of an environment with MAVProxy 1.8.75")
+    return python
+
+
+def test_mavproxy_flies_our_ardupilot(hangar, tmp_path):
+    program = mavproxy()
+    emulator, copter, (address, port) = hangar.add("ardupilot", 5, aided=True)
+    interpreter = Path(program).parent / "python"
+    command = [str(interpreter), program, f"--master=udpout:{address}:{port}", "--target-system=5"]
+    command += ["--default-modules=mode,arm,cmdlong,param", "--state-basedir", str(tmp_path)]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=tmp_path)
+
+    def say(line):
+        process.stdin.write(line + "\n")
+        process.stdin.flush()
+
+    def until(condition, seconds=20.0):
+        deadline = time.monotonic() + seconds
+        while not condition() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        return condition()
+
+    try:
+        assert until(lambda: emulator._ground_ns is not None), "no heartbeat from MAVProxy"
+        time.sleep(2.0)
+        say("mode GUIDED")
+        assert until(lambda: emulator.firmware.mode == 4)
+        say("arm throttle")
+        assert until(lambda: emulator.firmware.armed)
+        say("takeoff 1")
+        assert until(lambda: copter.airframe.z > 0.8)
+        say("param set GUID_TIMEOUT 0.75")
+        assert until(lambda: emulator.firmware.parameters["GUID_TIMEOUT"] == 0.75)
+        say("mode LAND")
+        assert until(lambda: not emulator.firmware.armed)
+    finally:
+        process.terminate()
+        print(process.communicate(timeout=10)[0])
+
+
+def real_vehicle(variable, folder, port):
+    """Start the SITL binary that a variable names, on loopback, in a folder of its own; a skip where it names none."""
+    binary = os.environ.get(variable, "")
+    if not binary:
+        pytest.skip(f"{variable} names no SITL binary: none is in a package registry (see drivers/mavlink/README.md)")
+    if variable == "GROUNDSTATION_ARDUCOPTER":
+        quiet = [item for n in range(1, 9) for item in (f"--serial{n}", "none:")]
+        command = [binary, "--model", "quad", "--home", "47.4,8.5,488,0", "--sysid", "5", "-w"]
+        command += ["--serial0", f"udpclient:127.0.0.1:{port}", *quiet]
+        return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    sih = {"PX4_SYS_AUTOSTART": "10040", "PX4_SIM_MODEL": "sihsim_quadx", "PX4_SIMULATOR": "sihsim"}
+    command = [binary, "-d", str(Path(binary).parents[1] / "etc")]
+    environment = {**os.environ, **sih, "PX4_PARAM_MAV_SYS_ID": "5"}
+    return subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@pytest.mark.parametrize(
+    ("variable", "flavour"), [("GROUNDSTATION_ARDUCOPTER", "ardupilot"), ("GROUNDSTATION_PX4", "px4")]
+)
+def test_real_firmware_is_met_and_set_up(variable, flavour, port, tmp_path):
+    """Probes a real autopilot, writes what indoor flight needs and reads it back."""
+    from drivers.mavlink.link import open_link
+    from drivers.mavlink.probe import probe
+    from drivers.mavlink.settings import LinkSettings
+    from drivers.mavlink.setup import Setup
+    from drivers.mavlink.wire.names import Flavour
+
+    port = 14540 if flavour == "px4" else port
+    process = real_vehicle(variable, tmp_path, port)
+    link = open_link(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+    try:
+        found = probe(link, 10.0)
+        assert list(found) == [5] and found[5].flavour == flavour
+        setup = Setup(link, 5, Flavour[flavour.upper()], 255)
+        setup.connect()
+        assert all(setup.apply(difference.wanted) for difference in setup.differences())
+        assert list(setup.differences()) == []
+    finally:
+        link.close()
+        process.terminate()
+        process.wait(10)

@@ -1,0 +1,63 @@
+"""`export --tlog`: what was recorded is what pymavlink's own reader finds, in order and in time."""
+
+import os
+
+import pytest
+from click.testing import CliRunner
+
+from drivers.datagrams import DatagramLog
+from drivers.mavlink.wire import telemetry
+from drivers.mavlink.wire.frames import Encoder
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.topics import RAW_RX, RAW_TX
+from groundstation.cli.export import export, write_tlogs
+from groundstation.recording.capture import Capture
+from groundstation.recording.mcap_file import McapFile, Preamble
+from groundstation.recording.timeline import Timeline
+
+S = 1_000_000_000
+OFFSET = 1_700_000_000 * S
+
+
+@pytest.fixture
+def run_dir(tmp_path):
+    exchange = MemoryExchange()
+    bus = MemoryBus(exchange, "lab", "mavlink")
+    queue = bus.subscribe([RAW_RX, RAW_TX])
+    log, encoder = DatagramLog(bus, "drone_2"), Encoder(11, 1)
+    for second in range(5):
+        log.received(second * S, encoder.encode(telemetry.ExtendedSysState(0, second)))
+        log.sent(second * S + S // 2, encoder.encode(telemetry.Heartbeat(6, 8, 0, 0, 4)))
+    log.flush()
+    other = DatagramLog(bus, "drone_1")
+    other.received(S, b"\x88\x77\x66\x55 an AR.Drone's")
+    other.flush()
+    capture = Capture(Timeline(clock.clock_id(), OFFSET))
+    file = McapFile(tmp_path / "raw.mcap", Preamble({"run": {}}, {}, OFFSET))
+    for sample in queue.drain_samples():
+        entry = capture.entry(sample, S)
+        assert entry is not None
+        file.write(entry)
+    file.close()
+    return tmp_path
+
+
+def test_tlog_is_read_by_pymavlink(run_dir):
+    os.environ["MAVLINK20"] = "1"
+    from pymavlink import mavutil
+
+    written = write_tlogs(run_dir)
+    assert {path.name: count for path, count in written.items()} == {"drone_2.tlog": 10}
+    log = mavutil.mavlink_connection(str(run_dir / "drone_2.tlog"))
+    found = []
+    while (message := log.recv_match()) is not None:
+        found.append((message.get_type(), message._timestamp))
+    log.close()
+    assert [name for name, _ in found] == ["EXTENDED_SYS_STATE", "HEARTBEAT"] * 5
+    assert [stamp - 1_700_000_000 for _, stamp in found] == pytest.approx([n / 2 for n in range(10)], abs=1e-3)
+
+
+def test_nothing_to_export_is_an_error(tmp_path):
+    result = CliRunner().invoke(export, ["--tlog", str(tmp_path)], standalone_mode=False)
+    assert "no MAVLink datagrams" in str(result.exception)

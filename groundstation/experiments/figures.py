@@ -145,7 +145,7 @@ def save_trajectories(path: Path, steps: Sequence[Step], title: str) -> None:
     truth = np.array([step.truth[-1] for step in steps])
     mean = np.array([step.mean[-1] for step in steps])
     with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(11, 5.2))
+        figure = plt.figure(figsize=(11, 5.2), layout="constrained")
         grid = figure.add_gridspec(3, 2, width_ratios=(1.5, 1.0))
         axes = figure.add_subplot(grid[:, 0])
         for robot in range(len(steps[0].level)):
@@ -157,9 +157,8 @@ def save_trajectories(path: Path, steps: Sequence[Step], title: str) -> None:
         axes.plot([], [], color=FAINT, label="robots")
         axes.plot(0.0, 0.0, marker="s", color=TRUTH, linestyle="", label="global sensor")
         axes.set(xlabel="x [m]", ylabel="y [m]", title=title, aspect="equal")
-        axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=4)
+        figure.legend(*axes.get_legend_handles_labels(), frameon=False, loc="outside lower left", ncols=4)
         _histories(figure, grid, steps)
-        figure.tight_layout()
         save_figure(figure, path)
 
 
@@ -183,7 +182,7 @@ def save_animation(path: Path, steps: Sequence[Step], parameters: PlanarParamete
     x, y = _limits(steps)
     with plt.rc_context({**STYLE, "figure.dpi": 80, "savefig.dpi": 80}):
         height = 6.4 * (y[1] - y[0]) / (x[1] - x[0])
-        figure, axes = plt.subplots(figsize=(6.4, min(max(height, 2.4), 6.4)))
+        figure, axes = plt.subplots(figsize=(6.4, min(max(height, 2.8), 6.4)), layout="constrained")
 
         def frame(index: int) -> list[Any]:
             axes.clear()

@@ -88,7 +88,8 @@ def _serve(name: str, pipe: Connection, limit_s: float) -> None:
 
 
 def _measure(name: str, robots: int, layout: str, seed: int, parameters: PlanarParameters, limit_s: float) -> Measured:
-    from groundstation.planning.peers import jax_reduced, naive, numpy_adjoint
+    from groundstation.experiments import peer_jax
+    from groundstation.planning.peers import naive, numpy_adjoint
     from groundstation.planning.planar.scenarios import bench_belief
 
     mean, covariance, level = bench_belief(robots, layout, seed, parameters)
@@ -97,7 +98,7 @@ def _measure(name: str, robots: int, layout: str, seed: int, parameters: PlanarP
         guess = _naive_guess(mean, covariance, levels, parameters, limit_s)
         if guess is not None:
             return guess
-    solve = {"naive": naive.solve, "numpy": numpy_adjoint.solve, "jax": jax_reduced.solve}[name]
+    solve = {"naive": naive.solve, "numpy": numpy_adjoint.solve, "jax": peer_jax.solve}[name]
     if name == "jax":
         solve(mean, covariance, levels, parameters)  # compiles
     before, begin = time.process_time(), time.monotonic()

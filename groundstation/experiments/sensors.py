@@ -131,16 +131,30 @@ def _fuse(
         residual = actual[0] + np.sqrt(np.diag(actual[2])) * draw[: len(actual[0])] - model[0]
         if own.kind == "bearing":
             residual = np.remainder(residual + math.pi, 2.0 * math.pi) - math.pi
-        h = np.zeros((len(residual), len(covariance)))
-        h[:, 2 * subject : 2 * subject + 2] = model[1]
+        difference = np.zeros((2, len(covariance)))
+        difference[:, 2 * subject : 2 * subject + 2] = np.eye(2)
         if observer >= 0:
-            h[:, 2 * observer : 2 * observer + 2] = -model[1]
-        gain = np.linalg.solve(h @ covariance @ h.T + actual[2], h @ covariance).T
+            difference[:, 2 * observer : 2 * observer + 2] = -np.eye(2)
+        h = model[1] @ difference
+        noise = actual[2] + np.eye(len(residual)) * _curvature(own, believed, difference @ covariance @ difference.T)
+        gain = np.linalg.solve(h @ covariance @ h.T + noise, h @ covariance).T
         keep = np.eye(len(covariance)) - gain @ h
-        covariance = keep @ covariance @ keep.T + gain @ actual[2] @ gain.T
+        covariance = keep @ covariance @ keep.T + gain @ noise @ gain.T
         mean = mean + (gain @ residual).reshape(-1, 2)
         seen += 1
     return mean, covariance, seen
+
+
+def _curvature(sensor: Sensor, offset: Array, relative: Array) -> float:
+    """Return the variance that the second derivative of a bearing or range adds where the offset is uncertain.
+
+    Without it, robots that come close to what they see make the filter certain of a wrong position.
+    """
+    if sensor.kind == "position":
+        return 0.0
+    square = float(offset @ offset) + 1e-6
+    ratio = float(np.trace(relative)) / square
+    return 0.5 * ratio**2 * (1.0 if sensor.kind == "bearing" else square)
 
 
 def compare(robots: int, seeds: Sequence[int], sensors: Sequence[Sensor] = SENSORS) -> list[dict[str, Any]]:

@@ -203,7 +203,10 @@ class Tracker:
         if self.holding:
             return {name: Limited(HOVER, ("hold",)) for name in airborne}
         belief = self._belief.core()
-        wanted = setpoints_from_plan(self.current, belief, airborne, self.target_age_s(), p.control, p.sensors)
+        unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
+        wanted = setpoints_from_plan(
+            self.current, belief, airborne, self.target_age_s(), p.control, p.sensors, unseen_s
+        )
         velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
         return {
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities)

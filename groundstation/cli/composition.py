@@ -100,6 +100,9 @@ def process_table(
         recorder = "groundstation.runtime.recorder:run"
         table.append(_client("recorder", recorder, core, stop_order=StopOrder.RECORDS, stop_limit_s=8.0))
     table += [_driver(section, field) for section in driver_sections(field)]
+    if field.console.enabled:
+        page = json.dumps(json.loads(core) | {"truth": simulation is not None})
+        table.append(_client("console", "groundstation.console.process:run", page, required=False))
     if monitor:
         screen = "groundstation.runtime.monitor:run"
         table.append(_client("monitor", screen, core, on_terminal=True, stop_order=StopOrder.DECIDES))

@@ -9,7 +9,7 @@ class Phase(StrEnum):
 
     GROUNDED = "GROUNDED"  # not airborne: no setpoint is published
     UNKNOWN = "UNKNOWN"  # airborne, not in the belief: hover until a camera has seen it
-    RETURN = "RETURN"  # badly localised and outside the world-fixed cameras' view: back to its middle
+    RETURN = "RETURN"  # badly localised or unseen for too long: back to the middle of the world-fixed cameras' view
     SEARCH = "SEARCH"  # localised, but no target: look around
     TRACK = "TRACK"  # obey the plan
 

@@ -15,6 +15,7 @@ class ControlParameters:
 
     search_height_m: slot while searching or returning; column_m: horizontal distance within which nobody changes
     height; return_std_m: a robot outside the world-fixed views that is known worse than this flies back;
+    return_unseen_s: one that no camera has seen for so long flies back too, well before it would have to land;
     hint_std_m: up to this uncertainty the predicted target is where the search looks.
     """
 
@@ -26,6 +27,8 @@ class ControlParameters:
     column_m: float = 1.0
     side_step_m_s: float = 0.25
     return_std_m: float = 0.35
+    return_unseen_s: float = 7.0
+    return_speed_m_s: float = 0.5
     search_speed_m_s: float = 0.35
     search_yaw_rate_rad_s: float = 0.5
     search_stand_off_m: float = 0.9
@@ -65,6 +68,7 @@ def control_from_field(resolved: Mapping[str, Any]) -> ControlParameters:
         limits=limits_from_field(resolved),
         lost_after_s=resolved["estimator"]["lost_after_s"],
         return_std_m=0.6 * resolved["safety"]["max_position_std_m"],
+        return_unseen_s=0.7 * resolved["safety"]["unseen_land_after_s"],
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.bus.messages import Vector3
 from groundstation.control.frames import stabilized_from_world, world_from_stabilized
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
@@ -19,10 +20,11 @@ PASSES = 4
 
 @dataclass(frozen=True, slots=True)
 class Limited:
-    """A setpoint that may be sent, and the names of what changed it."""
+    """A setpoint that may be sent, the names of what changed it, and the velocity that was wanted, if finite."""
 
     setpoint: Setpoint
     limited_by: tuple[str, ...] = ()
+    wanted_m_s: Vector3 | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +70,12 @@ def limit_setpoint(
     limited = replace(
         setpoint, velocity_m_s=(float(body[0]), float(body[1]), float(body[2])), yaw_rate_rad_s=float(rate)
     )
-    return Limited(limited, tuple(dict.fromkeys(names)))
+    return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
 
 
 def _hover(setpoint: Setpoint, reason: str) -> Limited:
-    return Limited(replace(setpoint, velocity_m_s=(0.0, 0.0, 0.0), yaw_rate_rad_s=0.0), (reason,))
+    wanted = setpoint.velocity_m_s if all(map(math.isfinite, setpoint.velocity_m_s)) else None
+    return Limited(replace(setpoint, velocity_m_s=(0.0, 0.0, 0.0), yaw_rate_rad_s=0.0), (reason,), wanted)
 
 
 def _unfit(robot: str, setpoint: Setpoint, belief: JointBelief, now_ns: int, parameters: SafetyParameters) -> str:

@@ -31,6 +31,7 @@ class Setpoint:
     blocked: str = ""
 
 
+NEVER_UNSEEN: Mapping[str, float] = {}
 HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, Phase.UNKNOWN)
 
 
@@ -41,10 +42,12 @@ def setpoints_from_plan(
     target_age_s: float | None,
     parameters: ControlParameters,
     sensors: SensorSuite,
+    unseen_s: Mapping[str, float] = NEVER_UNSEEN,
 ) -> dict[str, Setpoint]:
     """Return a setpoint for every airborne robot.
 
-    plan: the last valid one, or None; target_age_s: since any target was last observed, None if never.
+    plan: the last valid one, or None; target_age_s: since any target was last observed, None if never;
+    unseen_s: since a camera last saw each robot.
     """
     fresh = target_age_s is not None and target_age_s <= parameters.lost_after_s and bool(belief.layout.targets)
     robots = [name for name in belief.layout.robots if name in airborne]
@@ -53,7 +56,10 @@ def setpoints_from_plan(
             Situation(
                 airborne=True,
                 in_belief=name in robots,
-                lost=name in robots and is_lost(name, belief, parameters, sensors),
+                lost=name in robots
+                and (
+                    unseen_s.get(name, 0.0) > parameters.return_unseen_s or is_lost(name, belief, parameters, sensors)
+                ),
                 target_fresh=fresh,
                 planned=plan is not None and name in plan.controls,
             )
@@ -95,7 +101,8 @@ def _towards(
     mean = belief.mean_of(name)
     velocity = 0.6 * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
-    velocity *= min(1.0, parameters.search_speed_m_s / max(speed, 1e-9))
+    most = parameters.return_speed_m_s if phase is Phase.RETURN else parameters.search_speed_m_s
+    velocity *= min(1.0, most / max(speed, 1e-9))
     for other in robots:
         away = mean[:2] - belief.mean_of(other)[:2]
         distance = float(np.linalg.norm(away))

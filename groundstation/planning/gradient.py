@@ -131,6 +131,8 @@ def evaluate(
                 A[x, x] += discount
                 A[x + 1, x + 1] += discount
             for r in range(n):
+                A[3 * r, 3 * r] += discount * options[13]
+                A[3 * r + 1, 3 * r + 1] += discount * options[13]
                 for axis in range(2):
                     state[r, axis] += discount * penalties[i, r, axis]
             undo_edges(A, edges, n, entries[i], gains[i], yaw_rows[i], state, work)

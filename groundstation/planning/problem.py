@@ -106,6 +106,7 @@ class ProblemBuilder:
                 *(p.weights.repulsion, p.separation_m, p.weights.fence),
                 *(p.fence.x_m[0] + low, p.fence.x_m[1] + high, p.fence.y_m[0] + low, p.fence.y_m[1] + high),
                 p.weights.effort,
+                p.weights.robots,
             ]
         )
 

@@ -32,6 +32,7 @@ OPTIONS = (
     "fence_y0",
     "fence_y1",
     "effort_weight",
+    "robot_weight",
 )
 
 # Columns of a tape's edge entry: w, v and their derivatives by the relative position and by the observer's yaw.
@@ -152,7 +153,7 @@ def roll_out(
     yaw_rows: Array,
     penalties: Array,
 ) -> tuple[float, float]:
-    """Return (expected uncertainty of the targets, penalties) of held controls u (3 n) and fill the tape."""
+    """Return (expected uncertainty of the targets, all other costs) of held controls u (3 n) and fill the tape."""
     n, k, h, m = poses.shape[0], targets.shape[0], heights.shape[0], edges.shape[0]
     P, work, buffer = prior.copy(), np.empty(prior.shape[0]), np.empty(8)
     for r in range(n):
@@ -186,6 +187,8 @@ def roll_out(
         for t in range(k):
             x = 3 * n + 4 * t
             uncertainty += discount * (P[x, x] + P[x + 1, x + 1])
+        for x in range(0, 3 * n, 3):
+            extra += discount * options[13] * (P[x, x] + P[x + 1, x + 1])
         penalties[i, :, :] = 0.0
         extra += discount * penalty(path[i + 1], options, penalties[i])
     return uncertainty, extra

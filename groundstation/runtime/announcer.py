@@ -66,7 +66,9 @@ class Announcer:
     def plan(self, plan: PlanResult, limited: Mapping[str, Limited], mode: str) -> None:
         """Publish a plan that was adopted, with what safety makes of it now."""
         controls = tuple(
-            Control(name, entry.setpoint.velocity_m_s, entry.setpoint.yaw_rate_rad_s, entry.limited_by)
+            Control(
+                name, entry.setpoint.velocity_m_s, entry.setpoint.yaw_rate_rad_s, entry.limited_by, entry.wanted_m_s
+            )
             for name, entry in limited.items()
         )
         message = Plan(

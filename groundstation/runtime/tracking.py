@@ -16,7 +16,6 @@ from groundstation.runtime.plan_worker import PlanWorker
 from groundstation.tracker import Notice, Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
-_PATIENCE = 3.0  # times unseen_land_after_s, for a robot whose position is known all the same
 _PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
 _EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
 
@@ -40,8 +39,7 @@ class Tracking:
         self.notices: list[Notice] = []
         self._bus = bus
         self._announcer = Announcer(bus, field["safety"]["setpoint_lifetime_ms"])
-        self._unseen_limit_s: float = field["safety"]["unseen_land_after_s"]
-        self._unseen = UnseenWatch(self._unseen_limit_s)
+        self._unseen = UnseenWatch(field["safety"]["unseen_land_after_s"])
         plan_hz = field["planner"]["rate_hz"]
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
@@ -82,23 +80,12 @@ class Tracking:
     def _watch(self, now_ns: int) -> None:
         tracker = self.tracker
         self.notices += tracker.take_notices()
-        for name in self._unseen.step(now_ns, {name: self._unseen_s(name) for name in tracker.airborne}):
+        for name in self._unseen.step(now_ns, {name: tracker.filter.age_s(name) for name in tracker.airborne}):
             self._announcer.land(name, tracker.epoch)
             text = "flies, but no camera has seen it for too long: ordered to land"
             self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
         if self._tick % self.rate_hz == 0:
             self._report_refusals()
-
-    def _unseen_s(self, name: str) -> float:
-        """Return for how long nobody has seen a robot, as far as that matters.
-
-        Beyond the fixed cameras' view a robot is known through what it sees itself: as long as that keeps its position
-        within the limit of safety, it may stay unseen three times as long.
-        """
-        age_s = self.tracker.filter.age_s(name)
-        if self.tracker.converged(name) and age_s < _PATIENCE * self._unseen_limit_s:
-            return 0.0
-        return age_s
 
     def _report_refusals(self) -> None:
         """Say once of each kind that messages are refused; their numbers are in the log of the process."""

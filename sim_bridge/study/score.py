@@ -30,10 +30,14 @@ class Score:
     topologies: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     switches: int = 0
     separation_m: float = math.inf
+    unseen_s: float = 0.0
     _last: str = ""
 
-    def take(self, belief: JointBelief, truth: dict[str, Array], target: str, topology: str) -> None:
-        """Compare a belief with the truth (rows of the truth board) at one time."""
+    def take(
+        self, belief: JointBelief, truth: dict[str, Array], target: str, topology: str, ages_s: dict[str, float]
+    ) -> None:
+        """Compare a belief with the truth (rows of the truth board) at one time; ages_s: since each robot was seen."""
+        self.unseen_s = max(self.unseen_s, *ages_s.values(), 0.0)
         for block in belief.layout.blocks:
             if block.kind is EntityKind.CAMERA:
                 continue
@@ -73,6 +77,7 @@ class Score:
             "robot_rmse_m": {k: round(math.sqrt(float(np.mean(v))), 4) for k, v in self.squares.items()},
             "topology_seconds": {"flat": round(flat, 1), "string": round(string, 1)},
             "topology_switches": self.switches,
+            "longest_unseen_s": round(self.unseen_s, 1),
             "min_separation_m": round(self.separation_m, 3),
             "anees": {k: round(float(np.mean(v)), 3) for k, v in self.nees.items()},
             "nis": {k: round(float(np.mean(v)), 3) for k, v in sorted(self.nis.items())},

@@ -171,7 +171,8 @@ class FixedLagFilter:
         gain = self._rows[index, s.VELOCITY_GAIN] * self._mean[start + s.SCALE]
         c, n = math.cos(self._mean[start + s.YAW]) * gain, math.sin(self._mean[start + s.YAW]) * gain
         vx, vy = aux[s.HELD_VX], aux[s.HELD_VY]
-        return float(c * vx - n * vy), float(n * vx + c * vy), float(self._mean[start + s.CLIMB])
+        climb = self._mean[start + s.CLIMB] + self._rows[index, s.HAS_CLIMB_RATE] * aux[s.HELD_VZ]
+        return float(c * vx - n * vy), float(n * vx + c * vy), float(climb)
 
     def _build_tables(self) -> None:
         models, parameters = self._models, self.parameters

@@ -72,6 +72,8 @@ def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
         height_std_m=odometry["height_std_m"],
         height_delay_s=odometry["height_delay_ms"] / 1000,
         climb_std_m_s=0.2 * drone["limits"]["max_climb_m_s"],
+        # A vehicle that flies on our position has no height of its own to report, but a climb rate.
+        reports_climb=drone["kind"] == "mavlink",
     )
 
 

@@ -9,7 +9,10 @@ from groundstation.cli.exits import ExitCode
 from groundstation.errors import GroundStationError
 
 
-@click.group()
+@click.group(
+    epilog="\b\nExamples:\n  groundstation mavlink probe udpin:0.0.0.0:14550\n"
+    "  groundstation mavlink setup --check lab.yaml drone_2"
+)
 def mavlink() -> None:
     """Meet MAVLink vehicles: probe a link, check and set their parameters."""
 

@@ -38,6 +38,7 @@ VERBS: dict[str, Verb] = {
         "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."
     ),
     "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
+    "export": Verb("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
     "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
     "experiment": Verb(
         "Look", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."

@@ -94,7 +94,7 @@ def _on_cluster(tasks: Sequence[Task], scheduler: str, workers: int) -> Iterator
                 silence_logs=50,
             )
         try:
-            client = Client(cluster if scheduler == "local" else scheduler, timeout="20s")
+            client = Client(cluster if scheduler == "local" else scheduler, timeout="10s")
         except (OSError, TimeoutError, ValueError) as error:
             raise SweepError(f"no dask scheduler answers at {scheduler}: {error}") from error
         try:

@@ -92,8 +92,11 @@ def edge_information(i, position, rows, constants, distance, work, information):
     exponentials(work, information[i], np.int64(count))
     weight, square = 1.0 / (sigma * sigma), reach * reach
     for e in range(count):
-        d = distance[i, e]
-        information[i, e] = weight * (1.0 / (1.0 + information[i, e]) + tail * square / (square + d * d))
+        information[i, e] = weight / (1.0 + information[i, e])
+    if tail > 0.0:
+        for e in range(count):
+            d = distance[i, e]
+            information[i, e] += weight * tail * square / (square + d * d)
 
 
 @njit("void(f8[:, ::1], u8[:, ::1], f8[:, ::1], i8)", cache=True, nogil=True, fastmath={"contract", "reassoc"})
@@ -132,23 +135,33 @@ def position_gradient(  # type: ignore[no-untyped-def]
     gradient[i, :, :] = 0.0
     for row in range(rows.shape[0] - 1):
         first, end, shift = rows[row, 0], rows[row, 1], rows[row, 2] - rows[row, 0]
-        x, y, own = 0.0, 0.0, 0.0
+        x, y = 0.0, 0.0
         if row > 0:
             x, y = position[i, 0, row - 1], position[i, 1, row - 1]
+        # Two columns at a time, the odd one first: levels are short, and each loop over one costs its start.
+        odd = used % 2
         for b in range(first, end):
-            work[b] = 0.0
-        for c in range(used):
+            difference = columns[i, 0, b] - (columns[i, 0, row - 1] if row > 0 else 0.0)
+            work[b] = odd * difference * difference
+        for c in range(odd, used, 2):
             own = columns[i, c, row - 1] if row > 0 else 0.0
+            other = columns[i, c + 1, row - 1] if row > 0 else 0.0
             for b in range(first, end):
                 difference = columns[i, c, b] - own
-                work[b] += difference * difference
+                work[b] += difference * difference + (columns[i, c + 1, b] - other) * (columns[i, c + 1, b] - other)
         sum_x, sum_y = 0.0, 0.0
+        if tail > 0.0:
+            for b in range(first, end):
+                d = distance[i, b + shift]
+                beyond = 1.0 / (square + d * d)
+                w = information[i, b + shift] - tail * beyond
+                work[b] *= w * (1.0 - sigma2 * w) * steepness / d + 2.0 * tail * beyond * beyond
+        else:
+            for b in range(first, end):
+                w = information[i, b + shift]
+                work[b] *= w * (1.0 - sigma2 * w) * steepness / distance[i, b + shift]
         for b in range(first, end):
-            d = distance[i, b + shift]
-            beyond = 1.0 / (square + d * d)
-            w = information[i, b + shift] - tail * beyond
-            slope = w * (1.0 - sigma2 * w) * steepness / d + 2.0 * tail * beyond * beyond
-            factor = scale * work[b] * slope
+            factor = scale * work[b]
             fx, fy = factor * (position[i, 0, b] - x), factor * (position[i, 1, b] - y)
             gradient[i, 0, b] += fx
             gradient[i, 1, b] += fy

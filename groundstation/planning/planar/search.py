@@ -12,6 +12,9 @@ DROPPED_BY_TANGENT, DROPPED_BY_REACH, SOLVED, SKIPPED = 0, 1, 2, 3
 # A bound must beat the incumbent by more than rounding before a topology is dropped with it.
 _ROUNDING = 1.0 + 1e-9
 
+# Where a topology is solved with so few evaluations, a reach bound to avoid the next one costs as much.
+_CHEAP = 2
+
 _f1, _f2, _f8, _i1, _i2, _i8 = (
     types.float64[::1],
     types.float64[:, ::1],
@@ -82,6 +85,7 @@ def certified_search(  # type: ignore[no-untyped-def]
         tangent_bounds(levels, total, reach, problem, work, bounds)
         evaluations += 1
     order = 1 + np.argsort(bounds[1:total], kind="mergesort")
+    used = budget
     for k in range(total - 1):
         t = order[k]
         if bounds[t] >= limit * _ROUNDING:
@@ -90,7 +94,7 @@ def certified_search(  # type: ignore[no-untyped-def]
             break
         if stop[0] != 0 or evaluations >= budget:
             break
-        if prune:
+        if prune and used > _CHEAP:
             evaluations += 1
             bounds[t] = max(bounds[t], reach_bound(levels[t], reach, problem, work))
             if bounds[t] >= limit * _ROUNDING:

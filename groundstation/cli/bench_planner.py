@@ -13,6 +13,12 @@ _LAYOUTS = ("two-level", "random", "string", "flat")
 _PEERS = ("naive", "numpy", "jax")
 
 
+def use_kernel_cache() -> None:
+    """Let compiled kernels be kept and found again; say so when this start has to compile them."""
+    if not numba_cache.activate().exists():
+        click.echo("compiling kernels (once per version, some 30 s)", err=True)
+
+
 def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:
     """Return a comma-separated option as a list; raises UsageError for what is not allowed."""
     chosen = [part.strip() for part in value.split(",") if part.strip()]
@@ -48,7 +54,7 @@ def planner(robots: str, layout: str, peer: str, repeats: int, seed: int, limit_
     peers = choices(peer, _PEERS, "--peer")
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    numba_cache.activate()
+    use_kernel_cache()
     from groundstation.experiments.planner_bench import run_bench
 
     terminal = sys.stderr.isatty()

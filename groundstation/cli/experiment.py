@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from groundstation.cli.bench_planner import choices, numbers
+from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
 from groundstation.errors import GroundStationError
-from groundstation.process import numba_cache
 
 if TYPE_CHECKING:
     from groundstation.experiments.tasks import Task
@@ -96,7 +95,7 @@ def sensors(robots: int, seeds: int, **world: Any) -> None:
     """Which topology wins with which sensor: ranges, growing noise, bearings, ranges only, displaced disc."""
     if world["dropout"] or world["kidnap"]:
         raise click.UsageError("sensors knows neither --dropout nor --kidnap")
-    numba_cache.activate()
+    use_kernel_cache()
     from groundstation.experiments.runner import write_atomically
     from groundstation.experiments.sensors import compare
     from groundstation.experiments.tasks import csv_text
@@ -166,7 +165,7 @@ def _tasks(
 
 def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: str = "", workers: int = 0) -> None:
     """Run the tasks, write the tables and pictures, and say what came out."""
-    numba_cache.activate()
+    use_kernel_cache()
     from groundstation.experiments.runner import SweepError, run_tasks, write_atomically
     from groundstation.experiments.summary import add_ratios, summarise, timings
     from groundstation.experiments.tasks import csv_text

@@ -117,8 +117,15 @@ def _limits(steps: Sequence[Step], margin: float = 0.12) -> tuple[tuple[float, f
 
 
 def save_topologies(path: Path, steps: Sequence[Step], parameters: PlanarParameters, range_m: float) -> None:
-    """Save the run at four moments: levels above, map below (the paper's Fig. 1)."""
-    moments = [0, 2, len(steps) // 2, len(steps) - 1]
+    """Save the run at four moments: levels above, map below (the paper's Fig. 1).
+
+    The first and third decision, then where the target is farthest in the first half and in the whole run.
+    """
+    distance = [float(np.hypot(*step.truth[-1])) for step in steps]
+    half = len(steps) // 2 + 1
+    moments = [0, min(2, len(steps) - 1), int(np.argmax(distance[:half])), len(steps) - 1]
+    if distance[-1] < max(distance) / 2.0:
+        moments[3] = half - 1 + int(np.argmax(distance[half - 1 :]))
     with plt.rc_context(STYLE):
         figure, grid = plt.subplots(2, 4, figsize=(11, 6.2), height_ratios=(1.0, 1.0))
         x, y = _limits(steps)

@@ -65,7 +65,8 @@ def test_near_the_centre_flat_wins_and_far_away_string() -> None:
 def test_a_plan_names_controls_slots_edges_and_alternatives() -> None:
     result = plan(NEAR, FLAT)
     assert set(result.controls) == {"drone_1", "drone_2"}
-    assert result.heights == {"drone_1": 1.5, "drone_2": 1.5}
+    (slot,) = PARAMETERS.level_heights_m[0]
+    assert result.heights == {"drone_1": slot, "drone_2": slot}
     assert {(e.observer, e.subject) for e in result.edges} == {
         ("ceiling", "drone_1"), ("ceiling", "drone_2"), ("drone_1", "turtlebot"), ("drone_2", "turtlebot")
     }  # fmt: skip
@@ -130,7 +131,7 @@ def test_robots_that_are_not_in_the_belief_are_left_out() -> None:
     at = belief({"drone_2": (-0.9, 0.0, 1.5, 0.0)}, (0.0, 0.0, 0.0, 0.0))
     result = plan(at, STRING)
     assert str(result.topology) == "drone_2"
-    assert result.heights == {"drone_2": 1.5}
+    assert result.heights == {"drone_2": PARAMETERS.level_heights_m[0][0]}
 
 
 def test_calibration_entries_do_not_change_the_plan() -> None:

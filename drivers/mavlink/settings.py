@@ -49,7 +49,7 @@ class Vision(_Section):
     """
 
     rate_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
-    max_std_m: Positive = 0.09
+    max_std_m: Positive = 0.07
     max_age_s: Positive = 10.0
     hover_after_s: Positive = 0.5
     land_after_s: Positive = 2.0

@@ -13,7 +13,7 @@ from sim_bridge.world.world import TICK_S
 Vector3 = tuple[float, float, float]
 _PERIOD_TICKS = 4  # 50 Hz
 _VISION_TICKS = 7  # 28.6 Hz
-_MAX_AGE_S, _MAX_STD_M = 10.0, 0.09
+_MAX_AGE_S, _MAX_STD_M = 10.0, 0.07
 _LAND_AFTER_S = 2.0  # without a pose
 _STAND_S, _TAKE_OFF_M, _CLIMB_M_S = 2.0, 0.8, 0.4
 _COVARIANCE = (0.0225, 0.0, 0.0, 0.0, 0.0225, 0.0, 0.0, 0.0, 0.05)

@@ -201,7 +201,7 @@ class Rig:
             x, y, z = (
                 v + o + sd * self.rng.standard_normal() for v, o in zip((b.x, b.y, b.z), self.offset_m, strict=True)
             )
-            covariance = np.diag([sd**2 + 1e-4 + 0.0025 * self.seen_s] * 3 + [1e-3]).ravel().tolist()
+            covariance = np.diag([sd**2 + 1e-4 + 0.0014 * self.seen_s] * 3 + [1e-3]).ravel().tolist()
             entities = (
                 EntityEstimate(
                     name="v", kind="robot", mean=(x, y, z, b.yaw), covariance=tuple(covariance),

@@ -36,7 +36,7 @@ def test_one_short_flight_is_near_consistent():
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
 def test_fifty_flights_with_the_loop_closed():
-    """50 flights of 20 s: the 95 % interval of the mean over the drones; positions 0.6..1.3, with z and heading 0.45."""
+    """50 flights of 20 s, the 95 % interval of the mean over the drones: positions 0.6..1.3, whole poses 0.45..1.3."""
     reports = fly(range(100, 150), 20.0)
     for suffix, low in ((" xy", 0.6), ("", 0.45)):
         values = anees(reports, suffix)

@@ -22,5 +22,5 @@ def test_every_kind_is_a_package_with_a_driver():
 
 
 def test_an_unknown_kind_is_named_with_the_known_ones():
-    with pytest.raises(DriverError, match="mavlnk.*ardrone"):
+    with pytest.raises(DriverError, match=r"mavlnk.*ardrone"):
         registry.entry_point("mavlnk")

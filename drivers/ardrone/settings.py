@@ -38,15 +38,10 @@ class Limits(_Section):
 
 
 class OdometryCalibration(_Section):
-    """True velocity = scale x reported velocity. The delays and the rest are for the estimator; unused here."""
+    """True velocity = scale x reported velocity; one sigma of it. Delays and the rest concern the estimator alone."""
 
     velocity_scale: Annotated[float, Field(ge=0.2, le=5)] = 1.0
     velocity_std_m_s: Positive = 0.05
-    velocity_delay_ms: NotNegative = 30.0
-    height_std_m: Positive = 0.04
-    height_delay_ms: NotNegative = 85.0
-    attitude_std_deg: Positive = 1.0
-    yaw_rate_std_deg_s: Positive = 1.0
 
 
 class Safety(_Section):

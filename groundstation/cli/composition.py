@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.ardrone.wire import at
+from drivers.registry import entry_point
 from groundstation.errors import GroundStationError
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, DriverSection, core_section, driver_sections, rerouted
@@ -114,14 +115,15 @@ def _client(name: str, entry: str, section: str, **options: Any) -> ProcessSpec:
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:
+    entry = entry_point(section.kind)
     if section.kind is DriverKind.CAMERA:
         return ProcessSpec(
-            section.name, "camera", entry=section.entry, section=section.section, required=False, hang_limit_s=2.0
+            section.name, "camera", entry=entry, section=section.section, required=False, hang_limit_s=2.0
         )
     return ProcessSpec(
         section.name,
         "driver",
-        entry=section.entry,
+        entry=entry,
         section=section.section,
         required=False,
         stop_limit_s=12.0,

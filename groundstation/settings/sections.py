@@ -26,17 +26,12 @@ class DriverKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DriverSection:
-    """One driver process: its name, what it drives (a drone or a camera of the field), its entry point and section."""
+    """One driver process: its name, its kind, what it drives (a drone or a camera of the field), and its section."""
 
     name: str
     kind: DriverKind
     entity: str
     section: str
-
-    @property
-    def entry(self) -> str:
-        """Return the entry point of the process."""
-        return f"drivers.{self.kind}.driver:run"
 
 
 def camera_name(drone: str) -> str:
@@ -113,7 +108,7 @@ def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
             "name": name,
             "address": drone.address,
             "limits": drone.limits.model_dump(),
-            "odometry": drone.odometry.model_dump(),
+            "odometry": drone.odometry.model_dump(include={"velocity_scale", "velocity_std_m_s"}),
             "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
             # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
             "flight": {"altitude_max_m": max(0.5, field.room.fence.z_m[1]), "ultrasound_freq": 7 + index % 2},

@@ -7,11 +7,16 @@ import pytest
 
 from drivers import registry
 from groundstation.errors import DriverError
+from groundstation.settings.sections import DriverKind
 
 
 def test_vehicle_entry_points_exist():
     module, _, function = registry.entry_point("ardrone").partition(":")
     assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_it_knows_every_kind_that_a_field_can_name():
+    assert set(registry.ENTRY_POINTS) == set(DriverKind)
 
 
 def test_every_kind_is_a_package_with_a_driver():

@@ -78,11 +78,3 @@ class Layout:
         if name in self:
             raise ValueError(f"{name} is already in the state")
         return Layout((*self.blocks, Block(name, kind, self.dim, labels)))
-
-    def without(self, name: str) -> "Layout":
-        """Return the layout with an entity's block taken out and the later ones moved up."""
-        layout = Layout()
-        for block in self.blocks:
-            if block.name != name:
-                layout = layout.with_entity(block.name, block.kind, block.labels)
-        return layout

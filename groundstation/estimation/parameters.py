@@ -37,7 +37,6 @@ class EstimatorParameters:
     wild_gates: float = 6.0
     divergence_count: int = 5
     divergence_s: float = 0.25
-    max_position_std_m: float = 0.6
 
 
 def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
@@ -56,7 +55,6 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
         cameras,
         max_lateness_s=estimator["max_lateness_s"],
         gate_probability=estimator["gate_probability"],
-        max_position_std_m=resolved["safety"]["max_position_std_m"],
     )
 
 

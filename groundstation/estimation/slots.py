@@ -90,4 +90,3 @@ OUT_COLUMNS = 25
 
 # Filter settings handed to the kernels.
 SETTING_STEP, SETTING_WILD, SETTING_STREAK, SETTING_STREAK_S, SETTING_GATE = range(5)  # gates by rows follow
-SETTING_COLUMNS = 10

@@ -13,8 +13,3 @@ IMAGE_TOPICS: tuple[Topic, ...] = tuple(
 DATAGRAM_TOPICS: tuple[Topic, ...] = tuple(
     topic for topic in TOPICS.values() if topic.type is None and topic not in IMAGE_TOPICS
 )
-
-
-def stem_of(topic: Topic) -> str:
-    """Return the stem of the file that a topic is recorded in."""
-    return STATE if topic.type is not None else RAW

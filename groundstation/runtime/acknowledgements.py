@@ -1,6 +1,5 @@
 """How far one command has come at each drone: sent, received, accepted, effective, refused, or not confirmed."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from groundstation.bus.messages import AckStage, Command, CommandAck
@@ -68,10 +67,3 @@ class AckBook:
     def confirmed(self) -> bool:
         """Whether the command took effect on every drone."""
         return all(progress.stage is AckStage.EFFECTIVE for progress in self.progress.values())
-
-    def reached(self, stage: AckStage) -> Iterable[str]:
-        """Return the drones that came at least this far and did not refuse."""
-        wanted = _ORDER.index(stage)
-        for name, progress in self.progress.items():
-            if progress.stage in _ORDER and _ORDER.index(progress.stage) >= wanted:
-                yield name

@@ -83,11 +83,6 @@ class OdometryCalibration(Section):
         """Return the error of roll and pitch [rad]."""
         return math.radians(self.attitude_std_deg)
 
-    @property
-    def yaw_rate_std_rad_s(self) -> float:
-        """Return the error of the turn rate [rad/s]."""
-        return math.radians(self.yaw_rate_std_deg_s)
-
 
 class Mavlink(Section):
     """How a MAVLink vehicle is met: PX4 or ArduPilot, its system id, and the way to it.

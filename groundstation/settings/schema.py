@@ -30,9 +30,3 @@ class Field(Section):
     safety: Safety = Safety()
     recording: Recording = Recording()
     console: Console = Console()
-
-    @property
-    def marker_codes(self) -> dict[int, str]:
-        """Return who carries which marker."""
-        codes = {drone.marker.code: name for name, drone in self.drones.items()}
-        return codes | {self.target.marker.code: self.target.name}

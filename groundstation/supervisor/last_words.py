@@ -18,11 +18,6 @@ class LastWordsSender:
         self._speaking: dict[str, tuple[LastWords, int]] = {}
         self._next_ns = 0
 
-    @property
-    def speaking_for(self) -> frozenset[str]:
-        """Names of the drivers that are spoken for now."""
-        return frozenset(self._speaking)
-
     def begin(self, name: str, words: LastWords, now_ns: int) -> bool:
         """Start to speak for a driver, at once; returns whether that is news."""
         if name in self._speaking:

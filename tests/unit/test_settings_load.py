@@ -40,7 +40,7 @@ def test_levels_are_merged_and_calibrations_read_in(field: Field) -> None:
     assert (drone.limits.max_speed_m_s, drone.odometry.velocity_scale) == (0.6, 1.18)
     assert (drone.marker.code, drone.marker.square_mm, drone.marker.position_m) == (2, 44, (0, 0, 0.08))
     assert (drone.camera.calibration.fx_px, drone.camera.source) == (460, "http://192.168.1.52:8080/video.mjpg")
-    assert field.marker_codes == {1: "drone_1", 2: "drone_2", 5: "turtlebot"}
+    assert {name: drone.marker.code for name, drone in field.drones.items()} == {"drone_1": 1, "drone_2": 2}
 
 
 @pytest.mark.parametrize(

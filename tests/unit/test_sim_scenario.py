@@ -22,6 +22,10 @@ def test_the_default_scenario_is_honest() -> None:
     assert weaker_than_reality(parse_scenario(json.dumps(read("realistic.yaml")))) == []
 
 
+def test_what_a_scenario_leaves_out_is_as_honest_as_the_default_one() -> None:
+    assert parse_scenario(json.dumps(read("realistic.yaml"))) == Scenario()
+
+
 def test_the_default_scenario_names_every_figure() -> None:
     data = read("realistic.yaml")
     for section in ("drones", "cameras", "target"):

@@ -45,8 +45,9 @@ ALOFT = FREE | {Mode.TAKING_OFF}
 class AuthorityLimits:
     """Times and limits of the watchdog [s].
 
-    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; gap_s: a pause of our own loop
-    after which it does; brake_s: hover before landing where nobody knows what the vehicle was doing.
+    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
+    of the tracker, whatever broke on the way from it; gap_s: a pause of our own loop after which it does; brake_s:
+    hover before landing where nobody knows what the vehicle was doing.
     """
 
     hover_after_s: float = 0.3
@@ -55,6 +56,7 @@ class AuthorityLimits:
     battery_min: float = 0.15
     battery_hold_s: float = 3.0
     resume_within_s: float = 1.0
+    tracker_resume_within_s: float = 0.5
     gap_s: float = 0.5
     brake_s: float = 1.0
     take_off_s: float = 10.0

@@ -8,6 +8,8 @@ from groundstation.bus.messages import Command, Lease, Verb
 STARTING_VERBS = frozenset({Verb.TAKEOFF, Verb.TRACK, Verb.RESUME})
 # A lease may not claim to live longer than this after it was heard.
 _LONGEST_NS = 5_000_000_000
+# Both ends read the same clock; only the order of reading may differ.
+_FUTURE_NS = 1_000_000_000
 
 
 @dataclass(slots=True)
@@ -20,9 +22,11 @@ class LeaseBook:
     stamp_ns: int = -1
 
     def accept(self, now_ns: int, lease: Lease) -> str:
-        """Take a lease message; returns "" or why it is ignored (other_clock, held, old)."""
+        """Take a lease message; returns "" or why it is ignored (other_clock, future, held, old)."""
         if lease.header.clock != self.clock:
             return "other_clock"
+        if lease.header.stamp_ns > now_ns + _FUTURE_NS:
+            return "future"  # it would make every true lease look old
         if lease.header.stamp_ns <= self.stamp_ns:
             return "old"
         if now_ns < self.expires_ns and lease.holder != self.holder:

@@ -25,10 +25,13 @@ class SetpointGate:
     expires_ns: int = 0
 
     def accept(self, now_ns: int, setpoint: VelocitySetpoint) -> str:
-        """Take a setpoint; returns "" or why it is ignored (old_epoch, old_sequence, expired)."""
+        """Take a setpoint; returns "" or why it is ignored (old_epoch, other_source, old_sequence, expired)."""
         if self.newest is not None:
             if setpoint.epoch < self.newest.epoch:
                 return "old_epoch"
+            # An epoch is one life of one tracker: whoever else claims it is none, and its numbers mean nothing.
+            if setpoint.epoch == self.newest.epoch and setpoint.header.source != self.newest.header.source:
+                return "other_source"
             if setpoint.epoch == self.newest.epoch and setpoint.header.seq <= self.newest.header.seq:
                 return "old_sequence"
         expires_ns = self._expiry(now_ns, setpoint)

@@ -228,6 +228,7 @@ class Watchdog:
             (not up.supervisor_alive, "the supervisor is dead"),
             (frozen_s >= limits.resume_within_s, "the supervisor does not answer"),
             (lost_s >= limits.resume_within_s, "no telemetry from the vehicle"),
+            (self._tracker_paused(now_ns), "no setpoint from the tracker"),
         )
         for applies, reason in suspensions:
             if applies and self.mode is Mode.TRACK:
@@ -251,6 +252,14 @@ class Watchdog:
         if heard_ns is None:
             return now_ns >= unseen_until_ns
         return now_ns - heard_ns >= self.limits.land_after_s * NS_PER_S
+
+    def _tracker_paused(self, now_ns: int) -> bool:
+        heard_ns = self.gate.last_heard_ns
+        if heard_ns is None:
+            return False
+        # Whoever orders TRACK before the tracker speaks again means it: the pause counts from that order.
+        silent_ns = now_ns - max(heard_ns, self._mode_since_ns)
+        return silent_ns >= self.limits.tracker_resume_within_s * NS_PER_S
 
     def _obeyed_setpoint(self, now_ns: int) -> VelocitySetpoint | None:
         heard = self.vehicle.fresh and self.upstream.supervisor_fresh and self.upstream.supervisor_alive

@@ -101,6 +101,8 @@ def test_a_live_lease_is_not_taken_over_nor_replayed(new_bench):
     assert accept(bench.now, replay) == "old"
     foreign = Lease(header=bench.header(clock="elsewhere"), holder="op", expires_ns=bench.now + 2 * S)
     assert accept(bench.now, foreign) == "other_clock"
+    prophecy = Lease(header=bench.header(bench.now + 3600 * S), holder="op", expires_ns=bench.now + 2 * S)
+    assert accept(bench.now, prophecy) == "future", "it would make every true lease look old"
     eternal = Lease(header=bench.header(), holder="op", expires_ns=bench.now + 3600 * S)
     assert accept(bench.now, eternal) == ""
     bench.now += 6 * S

@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.authority import Action, Upstream
-from groundstation.bus.messages import AckStage, FlightState, Verb
+from groundstation.bus.messages import AckStage, FlightState, Header, VelocitySetpoint, Verb
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -20,10 +20,26 @@ def test_lost_setpoints_hover_after_300_ms_and_land_after_3_s(new_bench):
     assert times[Action.LAND] == pytest.approx(3.0, abs=0.04)
 
 
-def test_the_same_epoch_may_resume_before_the_landing(new_bench):
+def test_only_a_short_pause_of_the_tracker_is_forgiven(new_bench):
     bench = new_bench().fly()
     bench.tracker_speaks = False
-    assert bench.run(2.5)[-1] is Action.HOVER
+    assert bench.run(0.4)[-1] is Action.HOVER
+    bench.tracker_speaks = True
+    assert bench.step().action is Action.FLY
+    bench.tracker_speaks = False
+    assert bench.run(0.7)[-1] is Action.HOVER
+    bench.tracker_speaks = True
+    assert set(bench.run(5)) == {Action.HOVER}, "moved by itself, as after a dead router came back"
+    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.FLY
+
+
+def test_an_order_to_track_gives_a_silent_tracker_time_to_speak(new_bench):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    bench.run(1.0)
+    assert bench.order(Verb.TRACK).stage is AckStage.ACCEPTED
+    assert set(bench.run(0.3)) == {Action.HOVER}
     bench.tracker_speaks = True
     assert bench.step().action is Action.FLY
 
@@ -87,6 +103,19 @@ def test_replayed_setpoints_are_ignored(new_bench):
     number = next(bench.numbers)
     assert bench.setpoint(seq=number) == ""
     assert bench.setpoint(seq=number) == "old_sequence"
+
+
+def test_nobody_else_speaks_for_the_epoch_of_a_tracker(new_bench):
+    bench = new_bench().fly()
+    forged = VelocitySetpoint(
+        header=Header(bench.now, "clock", "drone_1", "stranger", 10**9),
+        velocity_m_s=(2.0, 0.0, 0.0),
+        yaw_rate_rad_s=0.0,
+        lifetime_ms=300,
+        epoch=bench.epoch,
+    )
+    assert bench.watchdog.accept_setpoint(bench.now, forged) == "other_source"
+    assert bench.setpoint() == "", "its number does not make the true ones old"
 
 
 def test_an_unseen_drone_lands_after_10_s(new_bench):

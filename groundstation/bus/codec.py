@@ -41,7 +41,7 @@ def decode_header(key: Key, attachment: bytes) -> Header:
     """Return the header that accompanies raw bytes; raises MessageError as `decode` does."""
     try:
         header = _header_decoder.decode(attachment)
-    except (msgspec.DecodeError, ValueError) as error:
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise MessageError("malformed", f"{key}: {error}") from error
     _check_header(key, header)
     return header

@@ -32,7 +32,8 @@ def expression(site: str, topic: Topic, entity: str = "*", source: str = "*") ->
 def parse(text: str) -> Key:
     """Return the parts of a concrete key.
 
-    Raises MessageError for wildcards and for keys outside the table: any peer may put on a wildcard (zenoh.md 1.2).
+    Raises MessageError for wildcards, keys outside the table and names that are none: any peer may put on a wildcard
+    (zenoh.md 1.2), and a name may end on the operator's terminal.
     """
     if "*" in text:
         raise MessageError("wildcard_key", text)
@@ -44,4 +45,6 @@ def parse(text: str) -> Key:
         topic = TOPICS[Plane(plane[0] if plane else ""), name]
     except (ValueError, KeyError):
         raise MessageError("unknown_topic", text) from None
+    if not (NAME_PATTERN.fullmatch(entity) and NAME_PATTERN.fullmatch(source)):
+        raise MessageError("foreign_key", text)
     return Key(site, entity, topic, source)

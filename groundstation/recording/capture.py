@@ -75,7 +75,7 @@ class Capture:
     def _learn(self, payload: bytes) -> None:
         try:
             self._timeline.learn(_clock_offset.decode(payload))
-        except (msgspec.DecodeError, ValueError):
+        except (msgspec.DecodeError, ValueError, RecursionError):
             self.refused["malformed"] += 1
 
 

@@ -92,6 +92,9 @@ def test_a_header_that_contradicts_its_key_is_refused(entity: str, source: str) 
         ("gs/@v1/lab/drone_1/nonsense/x", "unknown_topic"),
         ("gs/@v1/lab/@other/drone_1/odometry/x", "unknown_topic"),
         ("gs/@v1/lab/@truth/drone_1/odometry/x", "unknown_topic"),
+        ("gs/@v1/lab//odometry/x", "foreign_key"),
+        ("gs/@v1/lab/drone_1/odometry/", "foreign_key"),
+        ("gs/@v1/lab/drone_1/odometry/\x1b[2J", "foreign_key"),
     ],
 )
 def test_a_foreign_key_is_refused_by_name(text: str, reason: str) -> None:
@@ -115,6 +118,35 @@ def test_every_prefix_of_a_message_is_refused(data: st.DataObject) -> None:
     cut = data.draw(st.integers(0, len(payload) - 1))
     with pytest.raises(MessageError):
         codec.decode(key_of(topics.ODOMETRY), payload[:cut])
+
+
+_DEEP = b'{"x":' + b"[" * 100_000 + b"]" * 100_000 + b"}"
+
+
+@pytest.mark.parametrize("payload", [_DEEP, _DEEP[:1000], b'{"header":' + _DEEP, b"[" * 100_000])
+def test_nesting_without_end_is_refused_in_messages_and_in_attachments(payload: bytes) -> None:
+    for topic in (topics.ODOMETRY, topics.IMAGE):
+        decode = codec.decode if topic.type else codec.decode_header
+        with pytest.raises(MessageError) as caught:
+            decode(key_of(topic), payload)  # type: ignore[operator]
+        assert caught.value.reason == "malformed"
+
+
+@pytest.mark.parametrize("number", [2**63, -(2**63) - 1, 10**30])
+def test_whole_numbers_beyond_64_bits_are_refused(number: int) -> None:
+    text = codec.encode(odometry()).decode()
+    for field in (f'"stamp_ns":{HEADER.stamp_ns}', f'"seq":{HEADER.seq}'):
+        assert field in text
+        wrong = text.replace(field, f"{field.partition(':')[0]}:{number}").encode()
+        with pytest.raises(MessageError):
+            codec.decode(key_of(topics.ODOMETRY), wrong)
+    attachment = codec.encode(HEADER).replace(str(HEADER.stamp_ns).encode(), str(number).encode(), 1)
+    with pytest.raises(MessageError):
+        codec.decode_header(key_of(topics.IMAGE), attachment)
+    with pytest.raises(ValueError, match="rejected is not finite"):
+        messages.VehicleStatus(
+            header=HEADER, flight_state=messages.FlightState.LANDED, mode="", rejected={"replayed": 2**64}
+        )
 
 
 def test_a_number_that_is_not_finite_is_found_inside_nested_parts() -> None:

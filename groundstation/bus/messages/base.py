@@ -1,7 +1,7 @@
 """Header, finiteness and shapes that every message shares."""
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -9,13 +9,22 @@ Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
+_WHOLE_LIMIT = 2**63
+# JSON carries whole numbers of any length, but numpy, MCAP and our own encoder end at 64 bits.
+Whole = Annotated[int, msgspec.Meta(ge=-_WHOLE_LIMIT, le=_WHOLE_LIMIT - 1)]
+
+
 def _is_finite(value: Any) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
+    if isinstance(value, int):
+        return -_WHOLE_LIMIT <= value < _WHOLE_LIMIT
     if isinstance(value, tuple):
         return all(_is_finite(item) for item in value)
     if isinstance(value, msgspec.Struct):
         return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
+    if isinstance(value, dict):
+        return all(map(_is_finite, value.values()))
     return True
 
 
@@ -26,15 +35,15 @@ class Header(msgspec.Struct, frozen=True, gc=False):
     source: who says so; seq: rises by one per (key, sender).
     """
 
-    stamp_ns: int
+    stamp_ns: Whole
     clock: str
     entity: str
     source: str
-    seq: int
+    seq: Whole
 
 
 class Message(msgspec.Struct, frozen=True, kw_only=True):
-    """Base of all messages: a header, and fields whose floats are finite (ValueError otherwise)."""
+    """Base of all messages: a header, and fields whose numbers are finite and fit 64 bits (ValueError otherwise)."""
 
     header: Header
 

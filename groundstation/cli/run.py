@@ -14,13 +14,26 @@ import click
 from groundstation.cli.exits import ExitCode
 
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def _refuse_nan(_context: click.Context, _parameter: click.Parameter, value: float | None) -> float | None:
+    if value != value:  # a range lets nan pass, and a flight of nan seconds would never end
+        raise click.BadParameter("nan is no number of seconds.")
+    return value
+
+
 _SETTINGS = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
 _HEADLESS = click.option("--headless", is_flag=True, help="Plain lines instead of the live table.")
 _SIMULATED: tuple[Option, ...] = (
     click.option(
         "--scenario", default="realistic", show_default=True, help="A scenario file, or a shipped one's name."
     ),
-    click.option("--duration", type=click.FloatRange(1, 86_400), help="Seconds of tracking (default: until Ctrl-C)."),
+    click.option(
+        "--duration",
+        type=click.FloatRange(1, 86_400),
+        callback=_refuse_nan,
+        help="Seconds of tracking (default: until Ctrl-C).",
+    ),
     click.option("--seed", type=click.IntRange(0), help="Seed of all noise (default: the scenario's)."),
     click.option(
         "--report", type=click.Path(file_okay=False, path_type=Path), help="Folder for the run (default: in runs/)."

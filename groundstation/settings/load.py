@@ -78,7 +78,7 @@ def _worded(
     """Return a line for each error but those that only follow from a missing calibration or an unknown type."""
 
     def follows(error: Any) -> bool:
-        lacks_type = error["type"] == "missing" and error["loc"][0] == "drones" and error["loc"][1] in untyped
+        lacks_type = error["type"] == "missing" and error["loc"][:2] in {("drones", name) for name in untyped}
         return lacks_type or tree.origin_of(error["loc"]) in failed
 
     return [problem_of_error(error, tree, model) for error in errors if not follows(error)]

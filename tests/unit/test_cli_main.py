@@ -49,6 +49,12 @@ def test_each_verb_is_where_the_table_says() -> None:
             assert command is not None, f"{name}: {function}"
 
 
+@pytest.mark.parametrize("seconds", ["nan", "inf", "-1", "0", "soon"])
+def test_a_duration_that_never_ends_is_refused(seconds: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["sitl", "lab", "--duration", seconds]) == ExitCode.SETTINGS
+    assert "--duration" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", sorted(cli.VERBS))
 def test_each_verb_has_examples_in_its_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     module = cli.VERBS[name].target.partition(":")[0]

@@ -87,6 +87,12 @@ def test_all_mistakes_are_named_at_once_in_the_order_of_lines() -> None:
 
 
 @pytest.mark.usefixtures("lab")
+def test_a_file_without_any_section_names_all_that_are_missing() -> None:
+    Path("lab.yaml").write_text("schema_version: 1\n", encoding="utf-8")
+    assert {problem.split(": ")[1] for problem in problems()} >= {"room", "drones"}
+
+
+@pytest.mark.usefixtures("lab")
 def test_a_fault_of_one_drone_does_not_hide_those_between_drones() -> None:
     text = GOOD.replace("pad_m: [-0.9, -0.45]", "pad_m: [-0.9, 0.25]\n    colour: red")
     Path("lab.yaml").write_text(text.replace("battery_min: 0.15", "battery_min: 15"), encoding="utf-8")

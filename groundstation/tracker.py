@@ -90,6 +90,7 @@ class Tracker:
         self.rejected: Counter[str] = Counter()
         self._intake = Intake(self.filter, parameters.estimator.cameras, clock)
         self._topology = Topology(())
+        self._plan_stale = False
         self._belief = self.filter.belief()
         self._corrections: list[Correction] = []
         self._notices: list[Notice] = []
@@ -143,6 +144,7 @@ class Tracker:
         self._topology = self._topology_now()
         if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):
             self.holding = False
+        self._watch_plan(now_ns)
         return self._belief
 
     def take_corrections(self) -> list[Correction]:
@@ -200,8 +202,8 @@ class Tracker:
         """Return what each airborne robot is told, limited last on the newest belief; unknown robots hover."""
         p = self.parameters
         airborne = self.airborne
-        if self.holding:
-            return {name: Limited(HOVER, ("hold",)) for name in airborne}
+        if self.holding or self._is_plan_stale(now_ns):
+            return {name: Limited(HOVER, ("hold" if self.holding else "stale plan",)) for name in airborne}
         belief = self._belief.core()
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         wanted = setpoints_from_plan(
@@ -212,6 +214,18 @@ class Tracker:
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities)
             for name, setpoint in wanted.items()
         }
+
+    def _is_plan_stale(self, now_ns: int) -> bool:
+        """Return whether the planner has been silent for too long; its held controls must not be flown for ever."""
+        limit_ns = self.parameters.control.max_plan_age_s * 1e9
+        return self.current is not None and now_ns - self.current.stamp_ns > limit_ns
+
+    def _watch_plan(self, now_ns: int) -> None:
+        stale = self._is_plan_stale(now_ns)
+        if stale and not self._plan_stale:
+            text = f"no new plan for {self.parameters.control.max_plan_age_s:g} s: drones hover"
+            self._notices.append(Notice(Severity.ERROR, text, "they go on with the next plan; land them if none comes"))
+        self._plan_stale = stale
 
     def _topology_now(self) -> Topology:
         flying = [name for name in self._belief.layout.robots if self.filter.airborne(name)]

@@ -16,7 +16,8 @@ class ControlParameters:
     search_height_m: slot while searching or returning; column_m: horizontal distance within which nobody changes
     height; return_std_m: a robot outside the world-fixed views that is known worse than this flies back;
     return_unseen_s: one that no camera has seen for so long flies back too, well before it would have to land;
-    hint_std_m: up to this uncertainty the predicted target is where the search looks.
+    hint_std_m: up to this uncertainty the predicted target is where the search looks; max_plan_age_s: held controls
+    of an older plan are not flown any more.
     """
 
     search_height_m: float
@@ -33,6 +34,7 @@ class ControlParameters:
     search_yaw_rate_rad_s: float = 0.5
     search_stand_off_m: float = 0.9
     hint_std_m: float = 1.5
+    max_plan_age_s: float = 1.0
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
@@ -69,6 +71,7 @@ def control_from_field(resolved: Mapping[str, Any]) -> ControlParameters:
         lost_after_s=resolved["estimator"]["lost_after_s"],
         return_std_m=0.6 * resolved["safety"]["max_position_std_m"],
         return_unseen_s=0.7 * resolved["safety"]["unseen_land_after_s"],
+        max_plan_age_s=max(1.0, 3.0 / resolved["planner"]["rate_hz"]),
     )
 
 

@@ -69,7 +69,7 @@ class Tracking:
         announcer.innovations(tracker.take_corrections(), now_ns)
         announcer.journal(entry_of(self._bus.header(TEAM, now_ns), self._tick, now_ns, ingested, adopted))
         if adopted is not None and adopted.stop_reason == FAULT:
-            self.notices.append(Notice(Severity.ERROR, "planning failed", "the last plan stays in force"))
+            self.notices.append(Notice(Severity.ERROR, "planning failed", "the last plan stays in force for a while"))
         self._watch(now_ns)
         self._tick += 1
 

@@ -15,7 +15,7 @@ _PEERS = ("naive", "numpy", "jax")
 
 def use_kernel_cache() -> None:
     """Let compiled kernels be kept and found again; say so when this start has to compile them."""
-    if not numba_cache.activate().exists():
+    if not numba_cache.activate(numba_cache.EVERYTHING).exists():
         click.echo("compiling kernels (once per version, some 30 s)", err=True)
 
 

@@ -6,19 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from groundstation.bus.messages import Estimate, Plan, TruthState
+from groundstation.geometry.ellipse import semi_axes_95
 
 _TRAIL_POINTS = 300
 _TRAIL_NS = 200_000_000
 _SAMPLES = 240
 _SAMPLE_NS = 500_000_000
-_CHI2_95_2D = -2.0 * math.log(0.05)
-
-
-def semi_axis_95(covariance: tuple[float, ...], size: int) -> float:
-    """Return the major semi-axis [m] of the horizontal 95 % ellipse of a row-major (size, size) covariance."""
-    a, b, c = covariance[0], covariance[1], covariance[size + 1]
-    largest = (a + c) / 2 + math.hypot((a - c) / 2, b)
-    return math.sqrt(max(0.0, largest) * _CHI2_95_2D)
 
 
 class History:
@@ -67,7 +60,8 @@ class History:
         target = next((entity for entity in entities if entity.name == self._target), None)
         error = axis = None
         if target is not None:
-            axis = round(semi_axis_95(target.covariance, len(target.mean)), 4)
+            covariance, size = target.covariance, len(target.mean)
+            axis = round(semi_axes_95(covariance[0], covariance[1], covariance[size + 1])[0], 4)
             there = truth.get(self._target)
             if there is not None:
                 error = round(math.dist(target.mean[:2], there.position_m[:2]), 4)

@@ -1,12 +1,11 @@
 """The state as a rich renderable; pure: the same state and time give the same picture."""
 
-import math
-
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
+from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.state import MonitorState, Seen
 
@@ -14,7 +13,6 @@ _SEEN_S = 0.6
 _EVENTS = 6
 _ALARMS = 5
 _COMMAND_SHOWN_S = 10.0
-_CHI2_95_2D = -2.0 * math.log(0.05)
 _MODE_STYLES = {
     "TRACK": "bold green",
     "HOVER": "cyan",
@@ -114,10 +112,8 @@ def _belief(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Te
 
 def _ellipse(entity: EntityEstimate) -> str:
     size = len(entity.mean)
-    a, b, c = entity.covariance[0], entity.covariance[1], entity.covariance[size + 1]
-    middle, spread = (a + c) / 2, math.hypot((a - c) / 2, b)
-    axes = (math.sqrt(max(0.0, value) * _CHI2_95_2D) for value in (middle + spread, middle - spread))
-    return " x ".join(f"{axis:.2f}" for axis in axes)
+    major, minor, _ = semi_axes_95(entity.covariance[0], entity.covariance[1], entity.covariance[size + 1])
+    return f"{major:.2f} x {minor:.2f}"
 
 
 def _seen_by(state: MonitorState, name: str, now_ns: int) -> Text:

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
+from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report.accuracy import STALE_S
-from groundstation.report.ellipse import semi_axes_95
 from groundstation.report.interval import tracking_interval
 from groundstation.report.plot_style import INK, MUTED, color_of
 from groundstation.report.tracks import EstimateTrack, RunData
@@ -77,7 +77,7 @@ def _draw_estimate(axes: Axes, estimate: EstimateTrack, color: str, start: float
     for index in estimate.latest_at(np.linspace(start, end, _ELLIPSES), STALE_S):
         if index < 0:
             continue
-        major, minor, angle = semi_axes_95(estimate.covariance[index, :2, :2])
+        major, minor, angle = semi_axes_95(*estimate.covariance[index, [0, 0, 1], [0, 1, 1]].tolist())
         x, y = estimate.mean[index, :2]
         ellipse = Ellipse((x, y), 2 * major, 2 * minor, angle=math.degrees(angle), fc=color, ec=color, lw=0.8, zorder=3)
         ellipse.set_facecolor((*ellipse.get_facecolor()[:3], 0.12))

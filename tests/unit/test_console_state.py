@@ -15,7 +15,7 @@ from groundstation.bus.api import Received
 from groundstation.bus.topics import Topic
 from groundstation.console.board import Board
 from groundstation.console.health import Health, chi_square_bounds
-from groundstation.console.history import History, semi_axis_95
+from groundstation.console.history import History
 from groundstation.console.pictures import PictureDesk, frame_of
 from groundstation.console.scene import bare_scene, lenses_of, scene_from_field
 from groundstation.console.section import port_of
@@ -140,12 +140,6 @@ def test_history_keeps_trails_and_samples_within_bounds() -> None:
     assert len(kept["samples"]) == 240
     assert sum(sample is not None for sample in samples) == pytest.approx(400, abs=2)
     assert kept["samples"][-1]["axis_m"] == pytest.approx(0.1 * math.sqrt(5.991), abs=1e-3)
-
-
-def test_the_95_percent_ellipse_holds_95_percent() -> None:
-    covariance = np.array([[0.04, 0.015], [0.015, 0.02]])
-    largest = float(np.linalg.eigvalsh(covariance)[-1])
-    assert semi_axis_95(tuple(covariance.ravel()), 2) == pytest.approx(math.sqrt(largest * 5.991), rel=1e-3)
 
 
 @pytest.mark.parametrize("degrees", [5, 20, 200])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from groundstation.bus import messages as m
+from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
 from groundstation.report.arena import Arena
-from groundstation.report.ellipse import semi_axes_95
 from groundstation.report.interval import tracking_interval
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.safety import all_airborne_s, fence_violation_m
@@ -129,9 +129,13 @@ def test_a_singular_covariance_gives_no_ratio_and_no_crash() -> None:
 
 
 def test_ellipse_holds_95_percent() -> None:
-    major, minor, angle = semi_axes_95(np.array([[1.0, 0.0], [0.0, 4.0]]))
+    major, minor, angle = semi_axes_95(1.0, 0.0, 4.0)
     assert (major, minor) == (pytest.approx(2 * 2.4477, abs=1e-3), pytest.approx(2.4477, abs=1e-3))
     assert abs(np.sin(angle)) == pytest.approx(1.0)
+    assert semi_axes_95(2.0, 1.0, 2.0)[2] == pytest.approx(np.pi / 4)
+    smallest, largest = np.linalg.eigvalsh([[0.04, 0.015], [0.015, 0.02]])
+    axes = semi_axes_95(0.04, 0.015, 0.02)[:2]
+    assert axes == pytest.approx((np.sqrt(largest * 5.991), np.sqrt(smallest * 5.991)), rel=1e-3)
     samples = np.random.default_rng(1).normal(size=(20000, 2)) * [1.0, 2.0]
     inside = (samples[:, 1] / major) ** 2 + (samples[:, 0] / minor) ** 2 <= 1
     assert np.mean(inside) == pytest.approx(0.95, abs=0.006)

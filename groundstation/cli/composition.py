@@ -81,6 +81,8 @@ def process_table(
             section=json.dumps({"endpoint": endpoint}),
             stop_order=StopOrder.CONNECTS,
             hang_limit_s=1.0,
+            # Drones go on by themselves after pauses below 0.5 s; no router must come back so soon.
+            restart_delay_s=0.5,
             on_bus=False,
         )
     ]
@@ -94,6 +96,7 @@ def process_table(
             section=core,
             numbered=True,
             hang_limit_s=0.5,
+            start_limit_s=180.0,  # kernels that are compiled for the first time, on a busy machine, need minutes
             stop_order=StopOrder.DECIDES,
         )
     )

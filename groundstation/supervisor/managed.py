@@ -92,7 +92,7 @@ class ManagedProcess:
         """Plan the next start, later after each failure in a row; returns the delay [s]."""
         if self.ready_ns and now_ns - self.ready_ns > _FORGIVEN_AFTER_NS:
             self._failures = 0
-        delay_s = _BACK_OFF_S[min(self._failures, len(_BACK_OFF_S) - 1)]
+        delay_s = max(self.spec.restart_delay_s, _BACK_OFF_S[min(self._failures, len(_BACK_OFF_S) - 1)])
         self._failures += 1
         self.restart_due_ns = now_ns + int(delay_s * NS_PER_S)
         return delay_s

@@ -42,7 +42,8 @@ class ProcessSpec:
     entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of
     a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
     silence_limit_s: heartbeat older than this starts the last words; hang_limit_s: it is killed (both after READY).
-    required: the run cannot start without it. on_terminal: it writes to the operator's terminal.
+    restart_delay_s: pause before even the first restart. required: the run cannot start without it.
+    on_terminal: it writes to the operator's terminal.
     """
 
     name: str
@@ -52,6 +53,7 @@ class ProcessSpec:
     section: str = "{}"
     numbered: bool = False
     restart: Restart = Restart.ALWAYS
+    restart_delay_s: float = 0.0
     required: bool = True
     silence_limit_s: float = 0.4
     hang_limit_s: float = 0.8

@@ -22,6 +22,8 @@ _AIRBORNE = {
     FlightState.LANDED: False,
     FlightState.EMERGENCY: False,
 }
+# No vehicle here moves so fast or so far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
+_ABSURD = 1e3
 _REMEMBERED = 512  # message identities per key against which duplicates are looked for
 
 REASONS = {
@@ -30,7 +32,7 @@ REASONS = {
     Verdict.UNKNOWN_ENTITY: "observer, camera or subject is not in the field",
     Verdict.DUPLICATE: "already had this message",
     Verdict.NOT_PERMITTED: "this camera must not observe targets",
-    Verdict.IMPLAUSIBLE: "not finite, or from the future",
+    Verdict.IMPLAUSIBLE: "not finite, absurdly large, or from the future",
 }
 
 
@@ -67,13 +69,13 @@ class Intake:
         return self._filter.set_airborne(message.header.entity, airborne, stamp_ns, now_ns)
 
     def _odometry(self, message: Odometry, stamp_ns: int, now_ns: int) -> Verdict:
-        if not _finite(*message.velocity_m_s, message.yaw_rad, message.height_m or 0.0):
+        if not _plausible(*message.velocity_m_s, message.yaw_rad, message.height_m or 0.0):
             return Verdict.IMPLAUSIBLE
         motion = Motion(stamp_ns, message.velocity_m_s, message.yaw_rad, message.height_m, message.reset)
         return self._filter.add_motion(message.header.entity, motion, now_ns)
 
     def _observation(self, key: str, message: RelativeObservation, stamp_ns: int, now_ns: int) -> Verdict:
-        if not _finite(*message.position_m, message.yaw_rad or 0.0, *message.covariance):
+        if not (_plausible(*message.position_m, message.yaw_rad or 0.0) and _finite(*message.covariance)):
             return Verdict.IMPLAUSIBLE
         if message.header.entity != message.observer:
             return Verdict.UNKNOWN_ENTITY
@@ -110,3 +112,7 @@ class Intake:
 
 def _finite(*values: float) -> bool:
     return all(map(math.isfinite, values))
+
+
+def _plausible(*values: float) -> bool:
+    return all(abs(value) < _ABSURD for value in values)  # nan compares false

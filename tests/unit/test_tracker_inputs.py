@@ -159,10 +159,15 @@ def test_bad_inputs_are_verdicts_and_leave_the_belief_untouched(tracking: Flight
     nan_odometry, nan_sight = t.odometry("drone_1"), t.ceiling("drone_1")
     bad(nan_odometry, "yaw_rad", math.nan)
     bad(nan_sight, "position_m", (math.inf, 0.0, 3.0))
+    huge_odometry, huge_sight = t.odometry("drone_1"), t.ceiling("drone_1")
+    bad(huge_odometry, "velocity_m_s", (1e308, 0.0, 0.0))
+    bad(huge_sight, "position_m", (0.0, -1e308, 3.0))
     repeated = t.ceiling("drone_1", age_ms=400)
     cases = [
         (nan_odometry, Verdict.IMPLAUSIBLE),
         (nan_sight, Verdict.IMPLAUSIBLE),
+        (huge_odometry, Verdict.IMPLAUSIBLE),
+        (huge_sight, Verdict.IMPLAUSIBLE),
         (t.sighting("ceiling", "stranger", (0, 0, 3), 0.0, 50), Verdict.UNKNOWN_ENTITY),
         (t.sighting("stranger", "drone_1", (0, 0, 3), 0.0, 50), Verdict.UNKNOWN_ENTITY),
         (t.sighting("drone_1", "drone_1", (0, 0, 3), 0.0, 50), Verdict.UNKNOWN_ENTITY),

@@ -1,6 +1,7 @@
 """One AR.Drone, one PX4 and one ArduPilot vehicle track the target together, as processes on loopback."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,9 @@ from pathlib import Path
 import pytest
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(300)]
+if "SKEIN_MIXED_TEAM" not in os.environ:
+    reason = "the mixed team has not yet been accepted on a quiet machine; set SKEIN_MIXED_TEAM=1 to fly it"
+    pytest.skip(reason, allow_module_level=True)
 FIELD = Path(__file__).parents[2] / "config" / "mixed-team.yaml"
 
 

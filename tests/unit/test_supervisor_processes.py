@@ -146,6 +146,16 @@ def test_restarts_a_killed_process_with_a_new_epoch(make: Callable[..., Supervis
     assert "epoch 7\n" in log and "epoch 8\n" in log
 
 
+def test_even_a_first_restart_waits_where_the_table_says_so(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("relay", "obedient", restart_delay_s=0.5))
+    supervisor.start()
+    relay = supervisor.processes[1]
+    pid, killed_ns = relay.pid, time.monotonic_ns()
+    os.kill(pid, signal.SIGKILL)
+    until(supervisor, lambda: relay.is_up and relay.pid != pid)
+    assert relay.started_ns - killed_ns >= 500_000_000
+
+
 def test_frozen_process_gets_last_words_then_is_replaced(make: Callable[..., Supervisor]) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
         drone.bind(("127.0.0.1", 0))

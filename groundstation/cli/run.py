@@ -118,9 +118,8 @@ def run_simulated(
 
 
 def _limits(field: Any) -> Any:
-    from groundstation.runtime.take_off import TakeOffLimits, require_separation
+    from groundstation.runtime.take_off import TakeOffLimits
 
-    require_separation({name: drone.pad_m for name, drone in field.drones.items()}, field.safety.min_separation_m)
     return TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
 
 

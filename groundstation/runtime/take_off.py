@@ -3,14 +3,10 @@
 A state machine without clock or bus: `step` gets the time and returns what to order.
 """
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from itertools import combinations
 
 from groundstation.bus.messages import AckStage, Verb
-from groundstation.errors import GroundStationError
 from groundstation.runtime.acknowledgements import Progress
 from groundstation.runtime.team import Team
 
@@ -40,17 +36,6 @@ class _Step(Enum):
     CONNECT = auto()
     LIFT_OFF = auto()
     BE_SEEN = auto()
-
-
-def require_separation(pads: Mapping[str, tuple[float, float]], separation_m: float) -> None:
-    """Raise GroundStationError naming every pair of pads that is too close."""
-    close = [
-        f"{a} and {b} stand {math.dist(pads[a], pads[b]):.2f} m apart"
-        for a, b in combinations(pads, 2)
-        if math.dist(pads[a], pads[b]) < separation_m
-    ]
-    if close:
-        raise GroundStationError(f"{'; '.join(close)}: move their pads (pad_m) to at least {separation_m:g} m")
 
 
 class TakeOff:

@@ -16,10 +16,9 @@ from groundstation.bus.messages import (
     Verb,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, OBSERVATION, VEHICLE_STATUS
-from groundstation.errors import GroundStationError
 from groundstation.runtime.acknowledgements import AckBook
 from groundstation.runtime.operator import Operator, Phase
-from groundstation.runtime.take_off import TakeOffLimits, require_separation
+from groundstation.runtime.take_off import TakeOffLimits
 
 MS = 1_000_000
 LIMITS = TakeOffLimits(connect_s=5, lift_off_s=15, unseen_s=10)
@@ -231,13 +230,6 @@ def test_landed_means_all_say_so(scene: Scene) -> None:
     two.state = FlightState.LOST
     scene.pass_(0.2)
     assert not scene.operator.landed(scene.now_ns), "a lost drone is not known to stand"
-
-
-def test_pads_too_close_are_all_named() -> None:
-    pads = {"a": (0.0, 0.0), "b": (0.3, 0.0), "c": (2.0, 0.0), "d": (2.1, 0.0)}
-    with pytest.raises(GroundStationError, match=r"a and b stand 0.30 m apart; c and d stand 0.10 m"):
-        require_separation(pads, 0.6)
-    require_separation({"a": (0.0, 0.0), "b": (0.7, 0.0)}, 0.6)
 
 
 def test_ack_book_takes_only_news_from_who_was_asked() -> None:

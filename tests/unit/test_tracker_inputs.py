@@ -300,22 +300,6 @@ def test_plan_and_setpoints_follow_from_the_belief(tracking: Flight) -> None:
         assert math.hypot(*entry.setpoint.velocity_m_s[:2]) <= 0.6 + 1e-9
 
 
-def test_drones_hover_while_the_planner_is_silent(tracking: Flight) -> None:
-    tracking.tracker.plan(tracking.now)
-    tracking.run(0.9)
-    assert {entry.setpoint.phase for entry in tracking.tracker.setpoints(tracking.now).values()} == {Phase.TRACK}
-    tracking.run(0.2)
-    limited = tracking.tracker.setpoints(tracking.now)
-    assert {entry.limited_by for entry in limited.values()} == {("stale plan",)}
-    assert {entry.setpoint.velocity_m_s for entry in limited.values()} == {(0.0, 0.0, 0.0)}
-    tracking.run(0.2)
-    assert [notice.text for notice in tracking.notices if "no new plan" in notice.text] == [
-        "no new plan for 1 s: drones hover"
-    ]
-    tracking.tracker.plan(tracking.now)
-    assert {entry.setpoint.phase for entry in tracking.tracker.setpoints(tracking.now).values()} == {Phase.TRACK}
-
-
 def test_an_airborne_robot_nobody_has_seen_hovers(flight: Flight) -> None:
     flight.fly("drone_1")
     flight.run(0.1, look=False, onboard=False)

@@ -141,6 +141,17 @@ def test_everything_that_others_wait_for_is_published(lab: Lab) -> None:
     assert {c.robot for c in plans[-1].controls} == set(PLACES)
 
 
+def test_drones_hover_once_the_planner_is_silent(lab: Lab) -> None:
+    lab.run(60, pause_s=0.002)
+    lab.tracking.close()  # as good as a planner that hangs: what is submitted never comes back
+    lab.messages()
+    lab.run(75)
+    setpoints: list[VelocitySetpoint] = lab.messages()["setpoint"]
+    assert any(any(m.velocity_m_s) for m in setpoints[:20]), "the last plan's controls are flown on at first"
+    assert {m.velocity_m_s for m in setpoints[-20:]} == {(0.0, 0.0, 0.0)}
+    assert [n.text for n in lab.tracking.notices if "plan" in n.text] == ["no new plan for 1 s: drones hover"]
+
+
 def test_a_replayed_journal_gives_the_same_beliefs_to_the_bit(lab: Lab, lab_field: dict[str, Any]) -> None:
     lab.run(80, pause_s=0.002)
     journal: list[JournalEntry] = lab.messages()["journal"]

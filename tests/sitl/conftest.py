@@ -1,5 +1,6 @@
 """A real `groundstation sitl` in a process of its own: watch it over the bus, break it, judge it by the truth."""
 
+import json
 import os
 import signal
 import subprocess
@@ -13,10 +14,13 @@ from pathlib import Path
 import pytest
 
 from groundstation.bus.api import Received
-from groundstation.bus.messages import Message, ProcessStatus, TruthState, VehicleStatus
+from groundstation.bus.messages import Event, Message, ProcessStatus, TruthState, VehicleStatus
 from groundstation.bus.topics import EVENT, PROCESS_STATUS, SETPOINT, TRUTH, VEHICLE_STATUS
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.supervisor import runtime_file
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+from wire_tap import WireTap
 
 COMMAND = [sys.executable, "-m", "groundstation.cli.main"]
 
@@ -24,17 +28,21 @@ COMMAND = [sys.executable, "-m", "groundstation.cli.main"]
 class SitlRun:
     """One run. `history` holds (time of arrival [s], message) by (topic, entity); `text` is all it printed."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, terminal: int | None = None) -> None:
         self.folder = folder
         self.output = folder / "output.txt"
+        report = () if "--report" in arguments else ("--report", str(folder))
+        screen = ("--headless",) if terminal is None else ()
+        command = [*COMMAND, *arguments, *screen, *report]
         with self.output.open("wb") as sink:
             self.process = subprocess.Popen(
-                [*COMMAND, *arguments, "--headless", "--report", str(folder)],
-                stdin=subprocess.DEVNULL,
-                stdout=sink,
+                # With a terminal, `setsid --ctty` makes it the run's own: closing it hangs up.
+                command if terminal is None else ["setsid", "--ctty", *command],
+                stdin=subprocess.DEVNULL if terminal is None else terminal,
+                stdout=sink if terminal is None else terminal,
                 stderr=subprocess.STDOUT,
                 cwd=folder,
-                start_new_session=True,
+                start_new_session=terminal is None,
             )
         self.history: defaultdict[tuple[str, str], list[tuple[float, Message]]] = defaultdict(list)
         self._bus: ZenohBus | None = None
@@ -128,6 +136,17 @@ class SitlRun:
         message = heard[-1][1] if heard else None
         return isinstance(message, ProcessStatus) and message.pid != former_pid and message.state == "READY"
 
+    def address(self, drone: str) -> str:
+        """Return where the emulator of a drone listens."""
+        order = json.loads((self.run_dir / "sim_bridge.json").read_text())
+        return str(order["addresses"][drone])
+
+    def events(self) -> list[str]:
+        """Return every event that came, as "SEVERITY entity: text"."""
+        heard = [entry for (topic, _), entries in self.history.items() if topic == EVENT.name for entry in entries]
+        heard.sort(key=lambda entry: entry[0])
+        return [f"{m.severity} {m.header.entity}: {m.text}" for _, m in heard if isinstance(m, Event)]
+
     def until_tracking(self, limit_s: float = 90.0) -> float:
         """Wait until every drone obeys the tracker."""
         drones = self.record.drones
@@ -179,13 +198,24 @@ def sitl(tmp_path: Path) -> Iterator[Callable[..., SitlRun]]:
     """Start a run: `sitl("--duration", "10")`; its field is the lab unless the first argument names a verb."""
     runs: list[SitlRun] = []
 
-    def start(*arguments: str) -> SitlRun:
+    def start(*arguments: str, terminal: int | None = None) -> SitlRun:
         folder = tmp_path / f"run{len(runs)}"
         folder.mkdir()
         verb = arguments if arguments[:1] == ("demo",) else ("sitl", "lab", *arguments)
-        runs.append(SitlRun(folder, *verb))
+        runs.append(SitlRun(folder, *verb, terminal=terminal))
         return runs[-1]
 
     yield start
     for run in runs:
         run.close()
+
+
+@pytest.fixture
+def tap() -> Iterator[WireTap]:
+    """What reaches the drones' command ports."""
+    try:
+        made = WireTap()
+    except PermissionError:
+        pytest.skip("listening to the loopback interface needs CAP_NET_RAW")
+    yield made
+    made.close()

@@ -82,25 +82,12 @@ def test_second_ctrl_c_stops_at_once(sitl: Start) -> None:
 
 
 @FAULTS
-def test_closed_terminal_does_not_kill_the_landing(sitl: Start) -> None:
-    run = sitl()
-    run.until_tracking()
-    for _ in range(3):
-        run.process.send_signal(signal.SIGHUP)
-        time.sleep(0.7)
-    run.until_landed(20)
-    run.wait(30)
-    run.until_gone(5)
-
-
-@FAULTS
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
-def test_broken_tracker_drones_hover_then_land(sitl: Start, number: int) -> None:
+def test_restarted_tracker_moves_nothing(sitl: Start) -> None:
     run = sitl()
     run.until_tracking()
     epochs_before = {m.epoch for _, m in run.history[SETPOINT.name, "drone_1"] if isinstance(m, VelocitySetpoint)}
     pid = run.pid("tracker")
-    os.kill(pid, number)
+    os.kill(pid, signal.SIGKILL)
     broken = time.monotonic()
     run.until(lambda: all(run.mode(n) == "LANDING" for n in run.record.drones), 6, "all landing")
     run.until(lambda: run.restarted("tracker", pid), 40, "tracker back")
@@ -111,57 +98,6 @@ def test_broken_tracker_drones_hover_then_land(sitl: Start, number: int) -> None
         assert "TRACK" not in run.modes_since(name, broken + 5.0)
     epochs = {m.epoch for _, m in run.history[SETPOINT.name, "drone_1"] if isinstance(m, VelocitySetpoint)}
     assert all(epoch > max(epochs_before) for epoch in epochs - epochs_before)
-
-
-@FAULTS
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
-def test_broken_driver_its_drone_stops_and_lands(sitl: Start, number: int) -> None:
-    run = sitl()
-    run.until_tracking()
-    pid = run.pid("drone_1")
-    os.kill(pid, number)
-    broken = time.monotonic()
-    run.until(lambda: run.restarted("drone_1", pid), 15, "driver back")
-    run.until(lambda: run.on_ground("drone_1"), 20, "drone_1 on the ground")
-    assert "TRACK" not in run.modes_since("drone_1", broken + 1.0)
-    assert run.speed_between("drone_1", broken + 2.0, broken + 2.5) < 0.4
-
-
-@FAULTS
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
-def test_broken_router_comes_back(sitl: Start, number: int) -> None:
-    run = sitl()
-    run.until_tracking()
-    pid = run.pid("router")
-    os.kill(pid, number)
-    run.until(lambda: run.pid("router") != pid, 5, "router back")
-    heard = time.monotonic() + 1.0
-    run.until(lambda: bool(run.modes_since("drone_1", heard)), 10, "drivers reconnected")
-    assert cli("land", "--run", run.record.name).returncode == 0
-    run.until_landed(10)
-
-
-@FAULTS
-def test_killed_supervisor_drones_land_and_no_orphan_remains(sitl: Start) -> None:
-    run = sitl()
-    run.until_tracking()
-    run.process.kill()
-    run.process.wait()
-    deadline = time.monotonic() + 25
-    while not all(run.on_ground(name) for name in run.record.drones) and time.monotonic() < deadline:
-        run.listen()
-        time.sleep(0.05)
-    assert all(run.on_ground(name) for name in run.record.drones)
-    run.until_gone(30)
-
-
-@FAULTS
-def test_frozen_supervisor_drones_hover_and_land(sitl: Start) -> None:
-    run = sitl()
-    run.until_tracking()
-    os.kill(run.process.pid, signal.SIGSTOP)
-    run.until_landed(25)
-    os.kill(run.process.pid, signal.SIGCONT)
 
 
 @FAULTS

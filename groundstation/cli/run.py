@@ -186,15 +186,27 @@ def _log_to(run_dir: Path) -> None:
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logging.getLogger().addHandler(handler)
     logging.getLogger().setLevel(logging.INFO)
+    logging.raiseExceptions = False  # a full disk must not fill the terminal with tracebacks
+
+
+def _build(run_dir: Path) -> Any:
+    from groundstation.report.build import build_report, judge
+    from groundstation.report.gather import gather
+
+    try:
+        return build_report(run_dir)
+    except OSError as error:  # the disk is full: what was recorded can still be judged and shown
+        click.echo(f"the report cannot be written to {run_dir}: {error.strerror}", err=True)
+        return judge(gather(run_dir), run_dir)
 
 
 def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
     """Write and print the report; None when there is nothing to judge. Never lets a closed terminal hide it."""
     from groundstation.errors import GroundStationError
-    from groundstation.report.build import JSON_NAME, PLOT_NAME, build_report
+    from groundstation.report.build import JSON_NAME, PLOT_NAME
 
     try:
-        built = build_report(run_dir)
+        built = _build(run_dir)
     except GroundStationError as error:
         click.echo(f"no report: {error}", err=True)
         return False
@@ -210,4 +222,4 @@ def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
     except OSError:
         # The terminal was closed; the interpreter would fail once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return built.passed
+    return bool(built.passed)

@@ -1,0 +1,204 @@
+"""Strangers on the bus, on the drone's port and in the scenario: named, counted, and without consequence."""
+
+import json
+import random
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from groundstation.bus import clock, keys
+from groundstation.bus.messages import CommandAck
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE, ODOMETRY, SETPOINT, TOPICS
+from groundstation.bus.zenoh_bus import open_bus
+
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(240)]
+Start = Callable[..., Any]
+NS_PER_S = 1_000_000_000
+_NESTED = b'{"header":' + b"[" * 5000
+GARBAGE = (
+    b"",
+    b"null",
+    b"[]",
+    b"{",
+    b"\xff\xfe",
+    b'{"header":{}}',
+    _NESTED,
+    b'{"header":{"stamp_ns":1e400}}',
+    b"0" * 20_000,
+)
+
+
+class Stranger:
+    """A client of the router that keeps to no rule."""
+
+    def __init__(self, endpoint: str, site: str) -> None:
+        settings = {
+            "mode": "client",
+            "connect": {"endpoints": [endpoint]},
+            "scouting": {"multicast": {"enabled": False}},
+        }
+        self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+        self._site = site
+
+    def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
+        self._session.put(key, payload, attachment=attachment)
+
+    def garbage(self) -> None:
+        """Put everything that is no message under keys of every topic, also under names of our own processes."""
+        for topic in TOPICS.values():
+            for entity in ("drone_1", "team", "tracker", "nobody"):
+                for source in ("stranger", "tracker", "drone_1"):
+                    key = keys.expression(self._site, topic, entity, source)
+                    for payload in GARBAGE:
+                        self.put(key, payload, random.choice(GARBAGE) or None)
+
+    def say(
+        self, topic: Any, entity: str, source: str, seq: int, fields: str, key: str = "", stamp_ns: int = 0
+    ) -> None:
+        header = {"stamp_ns": stamp_ns or clock.now_ns(), "clock": clock.clock_id(), "entity": entity, "source": source}
+        text = f'{{"header":{json.dumps(header | {"seq": seq})},{fields}}}'
+        self.put(key or keys.expression(self._site, topic, entity, source), text.encode())
+
+    def close(self) -> None:
+        self._session.close()
+
+
+@pytest.fixture
+def stranger() -> Iterator[Callable[..., Stranger]]:
+    made: list[Stranger] = []
+
+    def appear(run: Any) -> Stranger:
+        made.append(Stranger(run.record.endpoint, run.record.site))
+        return made[-1]
+
+    yield appear
+    for one in made:
+        one.close()
+
+
+def _command(verb: str, issuer: str, expires_ns: int) -> str:
+    fields = {"id": f"forged-{verb}-{issuer}-{expires_ns}", "verb": verb, "scope": [], "issuer": issuer}
+    return json.dumps(fields | {"expires_ns": expires_ns})[1:-1]
+
+
+def _pids(run: Any) -> dict[str, int]:
+    run.listen()
+    return {process.name: process.pid for process in run.record.processes}
+
+
+def test_a_stranger_on_the_bus_changes_nothing(sitl: Start, stranger: Callable[..., Stranger]) -> None:
+    run = sitl()
+    run.until_tracking()
+    before, started = _pids(run), time.monotonic()
+    rogue = stranger(run)
+    rogue.garbage()
+    time.sleep(0.5)  # the queues of leases are short: what follows must not be lost among the garbage
+    _numbers_that_are_none(rogue)
+    _forge_starts(run, rogue)
+    for pattern in ("**", f"gs/@v1/{run.record.site}/*/command/*", f"gs/@v1/{run.record.site}/team/command/*"):
+        rogue.say(COMMAND, "team", "stranger", 1, _command("CUT_MOTORS", "stranger", 0), key=pattern)
+    run.until(lambda: time.monotonic() > started + 4, 10)
+    assert _pids(run) == before, "a process ended"
+    for drone in run.record.drones:
+        assert set(run.modes_since(drone, started)) == {"TRACK"}
+        rejected = run.status(drone).rejected
+        assert rejected["command_malformed"] and rejected["command_wildcard_key"]
+        assert {"lease_held", "lease_old"} & set(rejected) and rejected["lease_future"]
+    assert run.status("drone_1").rejected["setpoint_malformed"]
+    run.process.send_signal(signal.SIGTERM)
+    assert run.wait(40) == 0
+
+
+def _numbers_that_are_none(rogue: Stranger) -> None:
+    zeros = "[" + ",".join("0" * 9) + "]"
+    for seq, number in enumerate(("NaN", "Infinity", "1e999", "-1e999", "1e308", str(10**30)), 10**12):
+        motion = f'"velocity_m_s":[{number},0,0],"velocity_covariance":{zeros}'
+        rogue.say(ODOMETRY, "drone_1", "drone_1", seq, f'{motion},"yaw_rad":0,"roll_rad":0,"pitch_rad":0,"reset":0')
+        turn = f'"yaw_rate_rad_s":0,"lifetime_ms":300,"epoch":{10**30}'
+        rogue.say(SETPOINT, "drone_1", "stranger", seq, f'"velocity_m_s":[{number},0,0],{turn}')
+
+
+def _forge_starts(run: Any, rogue: Stranger) -> None:
+    now_ns = clock.now_ns()
+    soon_ns = now_ns + 5 * NS_PER_S
+    with closing(open_bus(run.record.endpoint, run.record.site, "listener")) as bus:
+        answers = bus.subscribe([COMMAND_ACK])
+        forged = (("TAKEOFF", "operator", 1), ("TAKEOFF", "stranger", soon_ns), ("TRACK", "stranger", soon_ns))
+        refused: set[tuple[str, str]] = set()
+        for seq in range(20):  # as every sender of ours repeats what is not answered: the garbage may push it out
+            if len(refused) == 3 * len(run.record.drones):
+                break
+            rogue.say(LEASE, "team", "stranger", seq, f'"holder":"stranger","expires_ns":{now_ns + 10**12}')
+            later = f'"holder":"operator","expires_ns":{soon_ns}'
+            rogue.say(LEASE, "team", "stranger", seq, later, stamp_ns=now_ns + 10**15)
+            for verb, issuer, expires_ns in forged:
+                rogue.say(COMMAND, "team", "stranger", seq, _command(verb, issuer, expires_ns))
+            time.sleep(0.2)
+            acks = [r.message for r in answers.drain() if isinstance(r.message, CommandAck)]
+            assert not [ack for ack in acks if ack.stage in ("ACCEPTED", "EFFECTIVE")]
+            refused |= {(ack.header.entity, ack.command_id) for ack in acks if ack.stage == "REFUSED"}
+        assert len(refused) == 3 * len(run.record.drones)
+
+
+FAULTS = """\
+faults:
+  - {kind: navdata_silent, entity: drone_2, start_s: 0}
+  - {kind: camera_cut, entity: drone_2, start_s: 0}
+  - {kind: camera_stall, entity: drone_1, start_s: 30, end_s: 33}
+  - {kind: camera_cut, entity: ceiling, start_s: 35, end_s: 37}
+"""
+
+
+def test_what_never_answers_is_named_and_the_rest_flies(sitl: Start, tmp_path: Path) -> None:
+    shipped = Path(__file__).parents[2] / "config" / "scenarios" / "realistic.yaml"
+    scenario = tmp_path / "faults.yaml"
+    scenario.write_text(shipped.read_text().replace("faults: []\n", FAULTS))
+    run = sitl("--scenario", str(scenario))
+    run.until(lambda: run.mode("drone_1") == "TRACK", 90, "drone_1 tracks")
+    assert "drone_2: left out" in run.text
+    assert any("ERROR drone_2: drone_2 does not answer at" in event for event in run.events())
+    assert any("drone_2_camera: camera drone_2_camera: no picture" in event for event in run.events())
+    flying = time.monotonic()
+    for camera in ("drone_1_camera", "ceiling"):
+        run.until(lambda camera=camera: _heals(run, camera, flying), 40, f"{camera} named, and heals")
+    assert run.mode("drone_1") == "TRACK"
+    assert not run.height("drone_2") > 0.1
+
+
+def _heals(run: Any, camera: str, since: float) -> bool:
+    heard = run.history[EVENT.name, camera]
+    told = "\n".join(event.text for at, event in heard if at > since)
+    return "no picture" in told and "pictures arrive" in told.partition("no picture")[2]
+
+
+def test_what_comes_to_a_drivers_port_from_elsewhere_is_counted(sitl: Start) -> None:
+    run = sitl()
+    run.until_tracking()
+    port = _navdata_port(run)
+    assert port, "no port found"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        rng = random.Random(1)
+        for size in (0, 1, 16, 500, 4096, 60_000):
+            other.sendto(rng.randbytes(size), ("127.0.0.1", port))
+    run.until(lambda: run.status("drone_1").rejected.get("foreign_address", 0) >= 5, 3, "counted")
+    assert run.mode("drone_1") == "TRACK"
+
+
+def _navdata_port(run: Any) -> int:
+    """Return the port to which the emulator streams: the first socket that the driver opened."""
+    inodes = set()
+    for link in Path(f"/proc/{run.pid('drone_1')}/fd").iterdir():
+        target = str(link.readlink())
+        if target.startswith("socket:["):
+            inodes.add(target[8:-1])
+    lines = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    ports = [int(fields[1].partition(":")[2], 16) for fields in lines if fields[9] in inodes]
+    return ports[0] if ports else 0

@@ -62,7 +62,7 @@ class Harness:
         while not self._child.stop_requested:
             self._child.sleep_until(self._clock.next_deadline())
             now_ns = time.monotonic_ns()
-            self._clock.begin(now_ns)
+            self._clock.begin(now_ns, matters=not self._all_landed())
             self.tick(self._clock.deadline_ns)
             self._child.beat()
             if self._clock.ticks % _COMMAND_TICKS == 0 and not self._child.supervisor_alive:
@@ -85,7 +85,7 @@ class Harness:
         if ticks % _COMMAND_TICKS == 0:
             self._obey()
             self._break_things()
-            self._child.tick_status(self._clock.ticks, self._clock.overruns)
+            self._child.tick_status(self._clock.judged, self._clock.overruns)
         if ticks % _STATUS_TICKS == 0:
             self._publish_status()
             self._judge()
@@ -147,7 +147,7 @@ class Harness:
         clock, bus = self._clock, self._child.bus
         status = SimStatus(
             header=bus.header(self._child.name),
-            ticks=clock.ticks,
+            ticks=clock.judged,
             overruns=clock.overruns,
             airborne=self.world.airborne,
         )

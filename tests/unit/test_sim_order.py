@@ -9,7 +9,7 @@ import pytest
 
 from groundstation.errors import GroundStationError, SettingsError
 from sim_bridge.cameras import render_specs
-from sim_bridge.clockwork import Clockwork
+from sim_bridge.clockwork import LATE_NS, Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.order import read_order
@@ -188,3 +188,11 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
     assert not emulators["drone_1"].silent
     for emulator in emulators.values():
         emulator.close()
+
+
+def test_late_ticks_before_anything_flies_do_not_count() -> None:
+    clock = Clockwork(0)
+    for matters in (False, True):
+        for late in (True, False):
+            clock.begin(clock.next_deadline() + (LATE_NS + 1 if late else 0), matters)
+    assert (clock.ticks, clock.judged, clock.overruns) == (4, 2, 1)

@@ -22,7 +22,7 @@ class SimCommand(Message, frozen=True, kw_only=True):
 
 
 class SimStatus(Message, frozen=True, kw_only=True):
-    """How well the simulator keeps real time: ticks, late ticks, and per-body contact."""
+    """How well the simulator keeps real time: ticks since something flew, late ones among them, and who is airborne."""
 
     ticks: int
     overruns: int

@@ -208,13 +208,15 @@ class Watchdog:
         dead_s = self._lasted("dead", not up.supervisor_alive, now_ns)
         frozen_s = self._lasted("frozen", not up.supervisor_fresh, now_ns)
         lost_s = self._lasted("lost", not vehicle.fresh, now_ns)
+        # Who is noticed to be silent has been silent for hover_after_s already.
+        noticed_s = limits.land_after_s - limits.hover_after_s
         low = vehicle.battery is not None and vehicle.battery < limits.battery_min
         low_s = self._lasted("battery", low, now_ns)
         landings = (
             (up.stop_requested, "the driver was told to stop"),
             (dead_s >= limits.brake_s, "the supervisor is dead"),
-            (frozen_s >= limits.land_after_s, "the supervisor does not answer"),
-            (lost_s >= limits.land_after_s, "no telemetry from the vehicle"),
+            (frozen_s >= noticed_s, "the supervisor does not answer"),
+            (lost_s >= noticed_s, "no telemetry from the vehicle"),
             (low and low_s >= limits.battery_hold_s, "battery below its limit"),
             (self._take_off_overdue(now_ns), "take-off took too long"),
             (self._tracker_silent(now_ns), "no setpoint from the tracker"),

@@ -85,7 +85,9 @@ def demo(seeds: int, first: int, duration: float | None, out: Path | None, as_js
     else:
         from rich.console import Console
 
-        Console().print(table(outcomes))
+        terminal = Console()
+        # In a file or a pipe rich assumes 80 columns, too few for the figures.
+        Console(width=terminal.width if terminal.is_terminal else 140).print(table(outcomes))
     return ExitCode.OK if len(outcomes) == seeds and all(outcome.passed for outcome in outcomes) else ExitCode.FAILED
 
 

@@ -11,7 +11,7 @@ from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, Demo, PhysMeasures
 from drivers.ardrone.wire.state import ControlState, StateBit, split_control_state
-from groundstation.bus.messages import FlightState, Quaternion, Vector3
+from groundstation.bus.messages import FlightState, Vector3
 from groundstation.geometry.angles import difference, wrap
 
 _RAD_FROM_MDEG = math.pi / 180_000
@@ -113,19 +113,6 @@ def flight_state_from_navdata(state: int, control_state: int | None) -> FlightSt
     if state & StateBit.FLY:
         return FlightState.FLYING if phase is None else _PHASES.get(phase, FlightState.FLYING)
     return FlightState.TAKING_OFF if phase is ControlState.TRANS_TAKEOFF else FlightState.LANDED
-
-
-def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
-    """Return wxyz of parent_from_body for intrinsic z-y-x angles."""
-    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
-    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
-    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
 
 
 class HeadingWatch:

@@ -1,10 +1,11 @@
 """Odometry and IMU samples on the bus, at most so often as the settings say."""
 
-from drivers.ardrone.convert import HeadingWatch, Motion, quaternion_from_euler
+from drivers.ardrone.convert import HeadingWatch, Motion
 from drivers.ardrone.settings import ArDroneDriverSettings
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry
 from groundstation.bus.topics import IMU, ODOMETRY
+from groundstation.geometry.angles import quaternion_from_euler
 
 # The climb rate is the derivative of an ultrasound altitude.
 _CLIMB_STD_M_S = 0.15

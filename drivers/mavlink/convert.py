@@ -14,7 +14,7 @@ from drivers.mavlink.wire.flight import SetPositionTargetLocalNed, VisionPositio
 from drivers.mavlink.wire.names import ARMED, ESTIMATOR_VISION, VELOCITY_AND_YAW_RATE, Flavour, Frame, Landed, land_mode
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
-from groundstation.geometry.angles import wrap
+from groundstation.geometry.angles import quaternion_from_euler, wrap
 
 _M_S2_FROM_MG = 9.80665 / 1000
 _RAD_S_FROM_MRAD_S = 0.001
@@ -182,7 +182,7 @@ def odometry_from_pose(pose: Pose, attitude: Attitude, resets: int) -> OdometryM
         frame_id=Frame.LOCAL_NED,
         child_frame_id=Frame.BODY_FRD,
         x=x, y=-y, z=-z,
-        q=_ned_from_frd(attitude.roll_rad, -attitude.pitch_rad, -pose.yaw_rad),
+        q=quaternion_from_euler(attitude.roll_rad, -attitude.pitch_rad, -pose.yaw_rad),
         vx=forward, vy=-left, vz=-pose.velocity_m_s[2],
         rollspeed=attitude.rates_rad_s[0], pitchspeed=-attitude.rates_rad_s[1], yawspeed=-attitude.rates_rad_s[2],
         pose_covariance=_upper((vx, vy, vz, _TILT_VARIANCE, _TILT_VARIANCE, vyaw)),
@@ -193,19 +193,6 @@ def odometry_from_pose(pose: Pose, attitude: Attitude, resets: int) -> OdometryM
     )  # fmt: skip
 
 
-def _ned_from_frd(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
-    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
-    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
-    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-
-
 def attitude_quaternion(attitude: Attitude) -> Quaternion:
     """Return wxyz of odom from base [FLU]."""
-    w, x, y, z = _ned_from_frd(attitude.roll_rad, attitude.pitch_rad, attitude.yaw_rad)
-    return w, x, y, z
+    return quaternion_from_euler(attitude.roll_rad, attitude.pitch_rad, attitude.yaw_rad)

@@ -12,3 +12,16 @@ def wrap(angle_rad: float) -> float:
 def difference(to_rad: float, from_rad: float) -> float:
     """Return the signed shortest turn from one direction to another, in (-pi, pi]."""
     return wrap(to_rad - from_rad)
+
+
+def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
+    """Return wxyz of parent_from_body for intrinsic z-y-x angles."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )

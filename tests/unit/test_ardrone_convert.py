@@ -9,7 +9,6 @@ from drivers.ardrone.convert import (
     Motion,
     flight_state_from_navdata,
     motion_from_navdata,
-    quaternion_from_euler,
 )
 from drivers.ardrone.orders import motion_from_attitude, orders_from_decision
 from drivers.ardrone.session import Scale
@@ -20,6 +19,7 @@ from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.state import ControlState, StateBit, join_control_state
 from drivers.authority import Action
 from groundstation.bus.messages import FlightState
+from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import rotation_from_euler
 
 FLY = int(StateBit.FLY)

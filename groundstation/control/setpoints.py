@@ -56,10 +56,7 @@ def setpoints_from_plan(
             Situation(
                 airborne=True,
                 in_belief=name in robots,
-                lost=name in robots
-                and (
-                    unseen_s.get(name, 0.0) > parameters.return_unseen_s or is_lost(name, belief, parameters, sensors)
-                ),
+                lost=name in robots and is_lost(name, belief, parameters, sensors, unseen_s.get(name, 0.0)),
                 target_fresh=fresh,
                 planned=plan is not None and name in plan.controls,
             )
@@ -80,8 +77,12 @@ def setpoints_from_plan(
     return wanted
 
 
-def is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite) -> bool:
-    """Return whether a robot is badly localised and believed outside every world-fixed camera's view."""
+def is_lost(
+    name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, unseen_s: float = 0.0
+) -> bool:
+    """Return whether no camera has seen a robot for too long, or it is badly localised outside every fixed view."""
+    if unseen_s > parameters.return_unseen_s:
+        return True
     spread = math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
     if spread <= parameters.return_std_m:
         return False

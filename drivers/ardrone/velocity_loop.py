@@ -7,7 +7,7 @@ The drone takes tilt angles, not velocities: it accelerates by g tan(tilt) and i
 import math
 from dataclasses import dataclass
 
-from drivers.ardrone.settings import Limits
+from drivers.ardrone.settings import ArDroneLimits
 from groundstation.bus.messages import Vector3
 
 _GRAVITY_M_S2 = 9.81
@@ -52,7 +52,7 @@ class VelocityLoop:
     The integral part acts on the difference to a model of the wanted response, so that a step does not wind it up.
     """
 
-    def __init__(self, limits: Limits, gains: Gains | None = None) -> None:
+    def __init__(self, limits: ArDroneLimits, gains: Gains | None = None) -> None:
         self._limits = limits
         self._max_acceleration = _GRAVITY_M_S2 * math.tan(limits.max_tilt_rad)
         self._gains = gains or Gains()

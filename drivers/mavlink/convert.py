@@ -7,7 +7,7 @@ is the world turned upside down about x: north = world x, east = -y, down = -z.
 import math
 from dataclasses import dataclass
 
-from drivers.mavlink.settings import Limits
+from drivers.limits import Limits
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import Odometry as OdometryMessage
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed, VisionPositionEstimate

@@ -1,7 +1,7 @@
 """What the supervisor tells a vehicle for a driver that died or hangs."""
 
+from drivers.limits import Limits
 from drivers.mavlink.convert import setpoint_from_velocity
-from drivers.mavlink.settings import Limits
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import Encoder
 from drivers.mavlink.wire.names import Command

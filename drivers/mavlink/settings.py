@@ -1,46 +1,14 @@
 """What the MAVLink driver is told; the composition root fills it from the field file."""
 
-import math
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from drivers.authority import AuthorityLimits
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Port = Annotated[int, Field(ge=1, le=65535)]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
+from drivers.limits import Limits, Name, Positive, Safety, Section
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Limits(_Section):
-    """What the vehicle is never asked to exceed."""
-
-    max_speed_m_s: Positive = 0.6
-    max_climb_m_s: Annotated[float, Field(gt=0, le=2)] = 0.4
-    max_yaw_rate_deg_s: Annotated[float, Field(gt=0, le=350)] = 60.0
-    battery_min: Annotated[float, Field(ge=0, le=1)] = 0.15
-    battery_hold_s: NotNegative = 3.0
-
-    @property
-    def max_yaw_rate_rad_s(self) -> float:
-        """Return the largest turn rate [rad/s]."""
-        return math.radians(self.max_yaw_rate_deg_s)
-
-
-class Safety(_Section):
-    """How long silence is borne; setpoint_lifetime_ms caps the lifetime that a setpoint may claim."""
-
-    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
-    land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
-    unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
-
-
-class Vision(_Section):
+class Vision(Section):
     """What of the tracker's estimate is fed back to the autopilot, and what its loss does.
 
     rate_hz: of the messages; max_std_m: a worse known position is none (what no camera keeps sharp gets there within
@@ -62,7 +30,7 @@ class Vision(_Section):
         return self
 
 
-class Origin(_Section):
+class Origin(Section):
     """Where on Earth the estimator is told to be; any place will do indoors."""
 
     latitude_deg: Annotated[float, Field(ge=-85, le=85)] = 47.397742
@@ -70,7 +38,7 @@ class Origin(_Section):
     altitude_m: Annotated[float, Field(ge=-500, le=9000)] = 488.0
 
 
-class LinkSettings(_Section):
+class LinkSettings(Section):
     """How a port is reached.
 
     target: `udpout:ADDRESS:PORT` speaks first; `udpin:ADDRESS:PORT` waits there, for many vehicles at once;
@@ -92,7 +60,7 @@ class LinkSettings(_Section):
         return self
 
 
-class VehicleSettings(_Section):
+class VehicleSettings(Section):
     """One vehicle on the link: who it is, where it stands before take-off [world], what it may do."""
 
     name: Name
@@ -108,7 +76,7 @@ class VehicleSettings(_Section):
     velocity_std_m_s: Positive = 0.15
 
 
-class MavlinkDriverSettings(_Section):
+class MavlinkDriverSettings(Section):
     """One port and the vehicles behind it."""
 
     link: LinkSettings
@@ -128,10 +96,4 @@ class MavlinkDriverSettings(_Section):
 
     def authority(self, vehicle: VehicleSettings) -> AuthorityLimits:
         """Return the limits of one vehicle's watchdog."""
-        return AuthorityLimits(
-            hover_after_s=self.safety.setpoint_lifetime_ms / 1000,
-            land_after_s=self.safety.land_after_s,
-            unseen_land_after_s=self.safety.unseen_land_after_s,
-            battery_min=vehicle.limits.battery_min,
-            battery_hold_s=vehicle.limits.battery_hold_s,
-        )
+        return self.safety.authority(vehicle.limits)

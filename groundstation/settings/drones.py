@@ -84,6 +84,14 @@ class OdometryCalibration(Section):
         return math.radians(self.attitude_std_deg)
 
 
+class ArDroneVideo(Section):
+    """What an AR.Drone is told to send over TCP 5555; bitrate [kbit/s], none: the drone's own choice."""
+
+    codec: Literal["h264_360p", "h264_720p"] = "h264_360p"
+    channel: Literal["front", "bottom"] = "front"
+    bitrate: Annotated[int, Field(ge=250, le=4000)] | None = None
+
+
 class Mavlink(Section):
     """How a MAVLink vehicle is met: PX4 or ArduPilot, its system id, and the way to it.
 
@@ -108,6 +116,7 @@ class Drone(Section):
 
     kind: Literal["ardrone", "mavlink"]
     mavlink: Mavlink | None = None
+    video: ArDroneVideo | None = None
     enabled: bool = True
     address: Address
     limits: Limits = Limits()

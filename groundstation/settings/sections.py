@@ -112,6 +112,7 @@ def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
             "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
             # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
             "flight": {"altitude_max_m": max(0.5, field.room.fence.z_m[1]), "ultrasound_freq": 7 + index % 2},
+            "video": None if drone.video is None else drone.video.model_dump(),
             "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
         }
     )

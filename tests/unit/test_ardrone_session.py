@@ -6,7 +6,7 @@ import pytest
 
 from drivers.ardrone.link import SequenceFilter
 from drivers.ardrone.session import Phase, Session, configuration, scale_from_settings
-from drivers.ardrone.settings import ArDroneDriverSettings, Flight, Limits
+from drivers.ardrone.settings import ArDroneDriverSettings, ArDroneLimits, Flight
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.state import StateBit
 
@@ -99,7 +99,7 @@ def test_what_is_configured_is_within_what_the_drone_accepts():
     settings = ArDroneDriverSettings(
         name="drone_1",
         address="127.0.0.1",
-        limits=Limits(max_tilt_deg=10, max_climb_m_s=0.1, max_yaw_rate_deg_s=20),
+        limits=ArDroneLimits(max_tilt_deg=10, max_climb_m_s=0.1, max_yaw_rate_deg_s=20),
         flight=Flight(ultrasound_freq=7, altitude_max_m=2.5),
     )
     keys = dict(configuration(settings))

@@ -6,7 +6,7 @@ from collections import deque
 
 import pytest
 
-from drivers.ardrone.settings import Limits
+from drivers.ardrone.settings import ArDroneLimits
 from drivers.ardrone.velocity_loop import VelocityLoop
 
 TICK_S = 0.005
@@ -30,7 +30,7 @@ class Tilt:
 
 def fly(wanted, seconds, gain=0.85, delay_s=0.03, drag=0.45, bias_deg=0.0, seed=0, scale=1.18):
     """Return the true velocities along x for a wanted velocity as a function of time."""
-    rng, loop, tilt = random.Random(seed), VelocityLoop(Limits()), Tilt()
+    rng, loop, tilt = random.Random(seed), VelocityLoop(ArDroneLimits()), Tilt()
     late = deque([0.0] * round(delay_s / TICK_S))
     speed, pitch, speeds, next_s = 0.0, 0.0, [], 0.0
     for i in range(round(seconds / TICK_S)):
@@ -85,7 +85,7 @@ def test_a_constant_tilt_error_is_integrated_away():
 
 def test_saturation_does_not_wind_up():
     """Held back by a wall for 10 s, then released: the speed must not overshoot wildly."""
-    loop = VelocityLoop(Limits())
+    loop = VelocityLoop(ArDroneLimits())
     for _ in range(300):
         loop.step((0.6, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 1 / 30)
     pitch = loop.step((0.6, 0.0, 0.0), 0.0, (0.6, 0.0, 0.0), 1 / 30).pitch_rad
@@ -93,7 +93,7 @@ def test_saturation_does_not_wind_up():
 
 
 def test_zero_hands_over_to_the_drones_own_hover_after_a_while():
-    loop = VelocityLoop(Limits())
+    loop = VelocityLoop(ArDroneLimits())
     zero = ((0.0, 0.0, 0.0), 0.0, (0.1, 0.0, 0.0), 1 / 30)
     outputs = [loop.step(*zero).hover for _ in range(60)]
     assert not outputs[0] and outputs.index(True) == pytest.approx(30, abs=1) and outputs[-1]
@@ -102,7 +102,7 @@ def test_zero_hands_over_to_the_drones_own_hover_after_a_while():
 
 
 def test_limits_hold_whatever_is_asked():
-    loop = VelocityLoop(Limits(max_tilt_deg=12, max_climb_m_s=0.4, max_yaw_rate_deg_s=60))
+    loop = VelocityLoop(ArDroneLimits(max_tilt_deg=12, max_climb_m_s=0.4, max_yaw_rate_deg_s=60))
     for wanted in ((50.0, -50.0, 9.0), (-50.0, 50.0, -9.0)):
         out = loop.step(wanted, 99.0, (0.0, 0.0, 0.0), 1 / 30)
         assert math.hypot(math.tan(out.roll_rad), math.tan(out.pitch_rad)) <= math.tan(math.radians(12)) + 1e-9
@@ -110,5 +110,5 @@ def test_limits_hold_whatever_is_asked():
 
 
 def test_left_is_negative_roll_and_forward_positive_pitch():
-    out = VelocityLoop(Limits()).step((0.3, 0.3, 0.0), 0.0, (0.0, 0.0, 0.0), 1 / 30)
+    out = VelocityLoop(ArDroneLimits()).step((0.3, 0.3, 0.0), 0.0, (0.0, 0.0, 0.0), 1 / 30)
     assert out.pitch_rad > 0 > out.roll_rad

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from drivers.limits import Limits
 from drivers.mavlink import convert
 from drivers.mavlink.convert import Attitude, Pose
-from drivers.mavlink.settings import Limits
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu

@@ -1,0 +1,52 @@
+"""What every vehicle driver is told of limits and patience; the kinds add their own to it."""
+
+import math
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from drivers.authority import AuthorityLimits
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Port = Annotated[int, Field(ge=1, le=65535)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
+
+
+class Section(BaseModel):
+    """A part of a driver's settings: closed, immutable, finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Limits(Section):
+    """What a vehicle is never asked to exceed."""
+
+    max_speed_m_s: Positive = 0.6
+    max_climb_m_s: Annotated[float, Field(gt=0, le=2)] = 0.4
+    max_yaw_rate_deg_s: Annotated[float, Field(gt=0, le=350)] = 60.0
+    battery_min: Annotated[float, Field(ge=0, le=1)] = 0.15
+    battery_hold_s: NotNegative = 3.0
+
+    @property
+    def max_yaw_rate_rad_s(self) -> float:
+        """Return the largest turn rate [rad/s]."""
+        return math.radians(self.max_yaw_rate_deg_s)
+
+
+class Safety(Section):
+    """How long silence is borne; setpoint_lifetime_ms caps the lifetime that a setpoint may claim."""
+
+    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
+    land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
+    unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
+
+    def authority(self, limits: Limits) -> AuthorityLimits:
+        """Return the limits of the shared watchdog for a vehicle with these limits."""
+        return AuthorityLimits(
+            hover_after_s=self.setpoint_lifetime_ms / 1000,
+            land_after_s=self.land_after_s,
+            unseen_land_after_s=self.unseen_land_after_s,
+            battery_min=limits.battery_min,
+            battery_hold_s=limits.battery_hold_s,
+        )

@@ -29,8 +29,8 @@ class Reading:
     margin: float
 
     def is_sure(self, least_margin: float) -> bool:
-        """Return whether this may be taken as an identity; blank and solid bars never are."""
-        return self.margin > least_margin and self.code in marker.VALID_CODES
+        """Return whether this may be taken as an identity; blank and solid bars leave no margin."""
+        return self.margin > least_margin
 
 
 def read_bar(picture: NDArray[np.uint8], find: Find, intrinsics: CameraIntrinsics) -> Reading | None:

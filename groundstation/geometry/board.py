@@ -33,33 +33,38 @@ EXTENT = (-SQUARES_X / 2 - MARGIN_X, _BAR_X + BAR_WIDTH + MARGIN_X, -SQUARES_Y /
 BLACK, WHITE = 25, 230
 
 
+# Without it, blank paper and a solid dark strip would be words of the code; with it each is two cells away from four
+# words at once, so neither can be read as an identity. Of all masks and orders of the cells these keep the words
+# farthest apart when small cells run into each other (README of drivers/camera).
+_MASK = np.array([1, 0, 0, 1, 0, 0, 0, 0], dtype=np.int8)
+CODES = 16
+
+
 def _code_words() -> NDArray[np.int8]:
-    words = np.zeros((16, CELLS), dtype=np.int8)
-    for code in range(16):
+    words = np.zeros((CODES, CELLS), dtype=np.int8)
+    for code in range(CODES):
         d = [code >> bit & 1 for bit in (3, 2, 1, 0)]
         parity = [d[0] ^ d[1] ^ d[3], d[0] ^ d[2] ^ d[3], d[1] ^ d[2] ^ d[3]]
-        words[code, :7] = d + parity
-        words[code, 7] = sum(words[code, :7]) % 2
-    return words
+        words[code] = [*d, sum(d + parity) % 2, *parity]
+    return np.asarray(words ^ _MASK)
 
 
-# Extended Hamming code (8, 4): any two words differ in at least four cells.
+# Extended Hamming code (8, 4), cells reordered and masked: any two words differ in at least four cells.
 CODE_WORDS = _code_words()
 CODE_WORDS.setflags(write=False)
-# Blank paper reads as word 0 and a dark strip as word 15: neither is an identity.
-VALID_CODES = tuple(range(1, 15))
+VALID_CODES = tuple(range(CODES))
 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """One printed marker: its code (1..14) and the side of its squares [mm]."""
+    """One printed marker: its code (0..15) and the side of its squares [mm]."""
 
     code: int
     square_mm: float
 
     def __post_init__(self) -> None:
         if self.code not in VALID_CODES:
-            raise ValueError(f"code must be in 1..14 (got {self.code})")
+            raise ValueError(f"code must be in 0..15 (got {self.code})")
         if not self.square_mm > 0.0:
             raise ValueError(f"square_mm must be positive (got {self.square_mm})")
 
@@ -106,7 +111,7 @@ def cell_centres() -> Array:
     return np.array([[_BAR_X + BAR_WIDTH / 2, SQUARES_Y / 2 - pitch * (cell + 0.5)] for cell in range(CELLS)])
 
 
-def _dark_rectangles(code: int) -> list[tuple[float, float, float, float]]:
+def dark_rectangles(code: int) -> list[tuple[float, float, float, float]]:
     """Return x0, x1, y0, y1 in squares of everything printed black."""
     centres, black = square_centres()
     rectangles = [(x - 0.5, x + 0.5, y - 0.5, y + 0.5) for x, y in centres[black]]
@@ -132,7 +137,7 @@ def raster(code: int, texels_per_square: float) -> tuple[NDArray[np.uint8], Arra
     rows = max(1, round((y1 - y0) * texels_per_square))
     x_edges, y_edges = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
     dark = np.zeros((rows, columns))
-    for low_x, high_x, low_y, high_y in _dark_rectangles(code):
+    for low_x, high_x, low_y, high_y in dark_rectangles(code):
         dark += np.outer(_coverage(y_edges, low_y, high_y), _coverage(x_edges, low_x, high_x))
     picture = np.rint(WHITE + (BLACK - WHITE) * np.clip(dark, 0.0, 1.0))[::-1].astype(np.uint8)
     scale_x, scale_y = columns / (x1 - x0), rows / (y1 - y0)

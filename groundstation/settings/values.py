@@ -53,6 +53,6 @@ Vector3 = Annotated[tuple[float, float, float], of_length(3)]
 Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]
-MarkerCode = Annotated[int, Field(ge=1, le=14)]  # geometry.board: 0 and 15 cannot be told from plain paper
+MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
 Source = Annotated[str, AfterValidator(_is_source)]
 Address = Annotated[str, AfterValidator(_is_address)]

@@ -1,0 +1,123 @@
+"""The records inside an MCAP file of ours: framing, chunks and messages, each taken as far as it is sound."""
+
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from typing import IO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk
+from mcap.writer import MCAP0_MAGIC
+
+from groundstation.bus import keys
+from groundstation.bus.keys import Key
+from groundstation.bus.topics import Topic
+from groundstation.errors import MessageError
+from groundstation.recording.viewers import VIEWER_CHANNELS
+
+RECORD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+# Nothing we write is longer; a longer length field is damage, not a reason to reserve the memory.
+_MAX_RECORD_BYTES = 1 << 30
+_MAX_CHUNK_BYTES = 1 << 28
+# What a damaged body of a record makes its parser raise.
+UNREADABLE = (ValueError, EOFError, struct.error, zstandard.ZstdError)
+
+Channels = dict[int, Key | None]
+
+
+@dataclass(frozen=True, slots=True)
+class RawRecord:
+    """One recorded message, undecoded; times in UNIX ns."""
+
+    key: Key
+    log_time_ns: int
+    publish_time_ns: int
+    sequence: int
+    data: bytes
+
+
+def frames(stream: IO[bytes], damage: list[str]) -> Iterator[tuple[int, bytes]]:
+    """Yield whole records as (opcode, body) until the footer, or until the file ends early."""
+    stream.seek(len(MCAP0_MAGIC))
+    while True:
+        at = stream.tell()
+        head = stream.read(RECORD.size)
+        opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, _MAX_RECORD_BYTES + 1)
+        body = stream.read(length) if length <= _MAX_RECORD_BYTES else b""
+        if len(body) < length:
+            damage.append(f"cut off at byte {at}" if at or head else "empty")
+            return
+        yield opcode, body
+        if opcode == Opcode.FOOTER:
+            return
+
+
+def chunk_data(body: bytes, damage: list[str]) -> bytes:
+    """Return the uncompressed records of a chunk, or nothing if it is damaged."""
+    try:
+        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+        if chunk.uncompressed_size > _MAX_CHUNK_BYTES:
+            raise ValueError(f"{chunk.uncompressed_size} bytes")
+        data = chunk.data
+        if chunk.compression == "zstd":
+            data = zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size)
+        elif chunk.compression:
+            raise ValueError(f"compression {chunk.compression}")
+        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+            raise ValueError("wrong checksum")
+    except UNREADABLE as error:
+        damage.append(f"damaged chunk: {error}")
+        return b""
+    return bytes(data)
+
+
+def chunk_records(
+    data: bytes, channels: Channels, wanted: Callable[[Topic], bool], damage: list[str]
+) -> Iterator[RawRecord]:
+    """Yield the messages of a chunk whose channel leads to a key; `channels` learns what the chunk declares."""
+    at = 0
+    while at + RECORD.size <= len(data):
+        opcode, length = RECORD.unpack_from(data, at)
+        at += RECORD.size
+        if opcode == Opcode.MESSAGE:
+            channel, sequence, logged, published = _MESSAGE.unpack_from(data, at)
+            key = channels.get(channel)
+            if key is not None:
+                yield RawRecord(key, logged, published, sequence, data[at + _MESSAGE.size : at + length])
+        elif opcode == Opcode.CHANNEL:
+            _learn_channel(data[at : at + length], channels, wanted, damage)
+        at += length
+
+
+def count_messages(data: bytes) -> Counter[int]:
+    """Return how many messages of each channel id a chunk holds."""
+    counts: Counter[int] = Counter()
+    at = 0
+    while at + RECORD.size <= len(data):
+        opcode, length = RECORD.unpack_from(data, at)
+        at += RECORD.size
+        if opcode == Opcode.MESSAGE:
+            counts[_MESSAGE.unpack_from(data, at)[0]] += 1
+        at += length
+    return counts
+
+
+def _learn_channel(body: bytes, channels: Channels, wanted: Callable[[Topic], bool], damage: list[str]) -> None:
+    channel = Channel.read(ReadDataStream(BytesIO(body)))
+    if channel.id in channels:
+        return
+    channels[channel.id] = None
+    if channel.topic in VIEWER_CHANNELS:
+        return  # said once more for viewers; the messages themselves are on their own channels
+    try:
+        key = keys.parse(channel.topic)
+    except MessageError:
+        damage.append(f"foreign channel {channel.topic}")
+        return
+    channels[channel.id] = key if wanted(key.topic) else None

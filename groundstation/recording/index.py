@@ -1,0 +1,107 @@
+"""Where in a file each time and each channel lies, found in one pass that decompresses next to nothing."""
+
+import struct
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
+from groundstation.bus.keys import Key
+from groundstation.bus.topics import Topic
+from groundstation.recording.chunks import RECORD, Channels, RawRecord, chunk_data, chunk_records, count_messages
+
+# WIRE (MCAP specification, records Chunk and Message Index): the fixed fields at their head.
+_CHUNK_HEAD = struct.Struct("<QQ")
+_INDEX_HEAD = struct.Struct("<HI")
+_INDEX_ENTRY_BYTES = 16
+# Large enough for the message indexes after a chunk, small beside the chunk that is skipped.
+_BUFFER_BYTES = 1 << 14
+
+
+@dataclass(slots=True)
+class Chunk:
+    """One chunk: where its record begins, how long its body is, its times [UNIX ns], messages per channel id."""
+
+    offset: int
+    length: int
+    start_ns: int
+    end_ns: int
+    counts: dict[int, int] = field(default_factory=dict)
+
+
+def _every(_topic: Topic) -> bool:
+    return True
+
+
+class FileIndex:
+    """The chunks and channels of one file, whole or cut anywhere; `damage` says what was wrong with it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage: list[str] = []
+        self.channels: Channels = {}
+        self.chunks: list[Chunk] = []
+        with path.open("rb", buffering=_BUFFER_BYTES) as stream:
+            self._scan(stream, path.stat().st_size)
+            self._complete(stream)
+        self.chunks = [chunk for chunk in self.chunks if chunk.counts]
+
+    def _scan(self, stream: IO[bytes], size: int) -> None:
+        at = len(MCAP0_MAGIC)
+        while True:
+            stream.seek(at)
+            head = stream.read(RECORD.size)
+            opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, size)
+            if at + RECORD.size + length > size:
+                self.damage.append(f"cut off at byte {at}")
+                return
+            if opcode == Opcode.CHUNK:
+                self.chunks.append(Chunk(at, length, *_CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))))
+            elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
+                channel, span = _INDEX_HEAD.unpack(stream.read(_INDEX_HEAD.size))
+                if span:
+                    self.chunks[-1].counts[channel] = span // _INDEX_ENTRY_BYTES
+            elif opcode in (Opcode.FOOTER, Opcode.DATA_END):
+                return
+            at += RECORD.size + length
+
+    def _complete(self, stream: IO[bytes]) -> None:
+        """Learn the channels, which stand in the chunk that first uses them, and count where no index says it."""
+        for chunk in self.chunks:
+            counted = chunk.counts and not (self.damage and chunk is self.chunks[-1])
+            if not counted or any(channel not in self.channels for channel in chunk.counts):
+                data = self._data(stream, chunk, self.damage if not counted else [])
+                for _ in chunk_records(data, self.channels, _every, self.damage):
+                    pass
+                if not counted:
+                    chunk.counts = dict(count_messages(data))
+
+    def _data(self, stream: IO[bytes], chunk: Chunk, damage: list[str]) -> bytes:
+        stream.seek(chunk.offset + RECORD.size)
+        return chunk_data(stream.read(chunk.length), damage)
+
+    def read(self, chunk: Chunk, wanted: Callable[[Topic], bool] = _every) -> list[RawRecord]:
+        """Return the messages of the wanted topics in one chunk, in file order; damage is noted and costs the chunk."""
+        channels = {id_: key for id_, key in self.channels.items() if key is None or wanted(key.topic)}
+        hidden: Channels = {id_: None for id_ in self.channels if id_ not in channels}
+        with self.path.open("rb") as stream:
+            data = self._data(stream, chunk, self.damage)
+        return list(chunk_records(data, channels | hidden, wanted, self.damage))
+
+    def holds(self, chunk: Chunk, wanted: Callable[[Topic], bool]) -> bool:
+        """Return whether a chunk has messages of wanted topics."""
+        return any((key := self.channels.get(id_)) is not None and wanted(key.topic) for id_ in chunk.counts)
+
+    def counts(self) -> dict[Key, int]:
+        """Return how many messages each key has."""
+        total: Counter[Key] = Counter()
+        for chunk in self.chunks:
+            for id_, count in chunk.counts.items():
+                key = self.channels.get(id_)
+                if key is not None:
+                    total[key] += count
+        return dict(total)

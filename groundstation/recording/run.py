@@ -1,0 +1,124 @@
+"""A whole run: all parts of all its files as one time line, from which any moment can be read at once."""
+
+import heapq
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.bus.clock import NS_PER_S
+from groundstation.bus.keys import Key
+from groundstation.bus.topics import Topic
+from groundstation.recording.chunks import RawRecord
+from groundstation.recording.index import Chunk, FileIndex
+from groundstation.recording.reader import RecordingError, open_recording, parts
+from groundstation.recording.selection import RAW, STATE
+
+Wanted = Callable[[Topic], bool]
+
+
+def _every(_topic: Topic) -> bool:
+    return True
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    index: FileIndex
+    chunk: Chunk
+
+
+class RecordedRun:
+    """The files of a run by time [UNIX ns]; cut files are taken as far as they are sound.
+
+    metadata and attachments are those of the first part that has any.
+    """
+
+    def __init__(self, paths: list[Path]) -> None:
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.indexes: list[FileIndex] = []
+        for path in paths:
+            opened = open_recording(path)
+            self.metadata = self.metadata or opened.metadata
+            self.attachments = self.attachments or opened.attachments
+            self.indexes.append(FileIndex(path))
+        self._places = sorted(
+            (_Place(index, chunk) for index in self.indexes for chunk in index.chunks),
+            key=lambda place: place.chunk.start_ns,
+        )
+        self.start_ns = self._places[0].chunk.start_ns if self._places else 0
+        self.end_ns = max((place.chunk.end_ns for place in self._places), default=0)
+
+    @property
+    def paths(self) -> list[Path]:
+        """Return the files, in order."""
+        return [index.path for index in self.indexes]
+
+    @property
+    def damage(self) -> list[str]:
+        """Return what was wrong so far, file by file; reading on may find more."""
+        return [f"{index.path.name}: {text}" for index in self.indexes for text in index.damage]
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time between first and last message."""
+        return (self.end_ns - self.start_ns) / NS_PER_S
+
+    def counts(self) -> dict[Key, int]:
+        """Return how many messages each key has in all files."""
+        total: dict[Key, int] = {}
+        for index in self.indexes:
+            for key, count in index.counts().items():
+                total[key] = total.get(key, 0) + count
+        return total
+
+    def records_from(self, time_ns: int, wanted: Wanted = _every, until_ns: int | None = None) -> Iterator[RawRecord]:
+        """Yield messages with time <= log time (< until), in order of log time across all files."""
+        waiting: list[tuple[int, int, RawRecord]] = []
+        number = 0
+        for place in self._places:
+            chunk = place.chunk
+            if until_ns is not None and chunk.start_ns >= until_ns:
+                break
+            if chunk.end_ns < time_ns or not place.index.holds(chunk, wanted):
+                continue
+            while waiting and waiting[0][0] < chunk.start_ns:
+                yield heapq.heappop(waiting)[2]
+            for record in place.index.read(chunk, wanted):
+                if record.log_time_ns >= time_ns and (until_ns is None or record.log_time_ns < until_ns):
+                    heapq.heappush(waiting, (record.log_time_ns, number, record))
+                    number += 1
+        while waiting:
+            yield heapq.heappop(waiting)[2]
+
+    def latest_before(self, time_ns: int, wanted: Wanted = _every) -> dict[Key, RawRecord]:
+        """Return for each wanted key its last message with log time < time: what was known at that moment."""
+        found: dict[Key, RawRecord] = {}
+        missing = {
+            key for index in self.indexes for key in index.channels.values() if key is not None and wanted(key.topic)
+        }
+        # Chunks overlap a little in time: a key is settled when no earlier chunk reaches its message's time.
+        for place in sorted(self._places, key=lambda place: place.chunk.end_ns, reverse=True):
+            if place.chunk.start_ns >= time_ns:
+                continue
+            open_keys = {key for key in missing if key not in found or found[key].log_time_ns < place.chunk.end_ns}
+            if not open_keys:
+                break
+            keys = {key for id_ in place.chunk.counts if (key := place.index.channels.get(id_)) in open_keys}
+            if not keys:
+                continue
+            for record in place.index.read(place.chunk, lambda topic: wanted(topic)):
+                if record.log_time_ns < time_ns and record.key in keys:
+                    before = found.get(record.key)
+                    if before is None or before.log_time_ns <= record.log_time_ns:
+                        found[record.key] = record
+        return found
+
+
+def open_run(path: Path) -> RecordedRun:
+    """Return a run folder (all its parts) or one file; raises RecordingError naming what is wrong with the path."""
+    if path.is_dir():
+        paths = [part for stem in (STATE, RAW) for part in parts(path, stem)]
+        if not paths:
+            raise RecordingError(f"{path}: no recording in this folder ({STATE}.mcap is missing); is it a run folder?")
+        return RecordedRun(paths)
+    return RecordedRun([path])

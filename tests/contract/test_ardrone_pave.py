@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.ardrone.wire.pave import Frame, FrameReader, FrameType
+from drivers.ardrone.wire.pave import Frame, FrameReader, FrameType, encode_frame
 
 DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "ardrone"
 
@@ -19,12 +19,16 @@ def frame(payload, number=7, header_size=64, kind=1):
     return head.ljust(header_size, b"\0") + payload
 
 
-def test_real_capture_has_five_h264_frames():
+def capture():
     path = DATA / "pave68-node-24971.bin"
     if not path.exists():
         pytest.skip(f"no capture at {path}; set GROUNDSTATION_DATA")
+    return path.read_bytes()
+
+
+def test_real_capture_has_five_h264_frames():
     reader = FrameReader()
-    frames = reader.feed(path.read_bytes())
+    frames = reader.feed(capture())
     assert reader.skipped == 0 and len(frames) >= 4
     assert [f.kind for f in frames].count(FrameType.IDR) == 1
     assert {(f.codec, f.width, f.height) for f in frames} == {(4, 640, 360)}
@@ -60,3 +64,33 @@ def test_random_bytes_neither_raise_nor_pile_up():
     for _ in range(300):
         reader.feed(rng.choice((b"PaVE", b"")) + rng.randbytes(rng.randrange(200)))
     assert len(reader._buffer) < 4_100_000
+
+
+def test_what_is_written_has_the_header_of_the_real_drone():
+    real = capture()
+    first = FrameReader().feed(real)[0]
+    assert (first.stream, first.slices, first.slice_index, first.parameter_sizes) == (1, 1, 0, (14, 10))
+    position = struct.unpack_from("<Q", real, 32)[0]
+    written = encode_frame(first, position)
+    assert written[:6] == real[:6] and written[8:52] == real[8:52]
+    assert struct.unpack_from("<H", written, 6) == (64,)
+    assert written[64:] == real[68 : 68 + len(first.payload)]
+
+
+def test_a_frame_of_damaged_length_does_not_swallow_those_behind_it():
+    torn = bytearray(frame(b"x" * 100, 1))
+    struct.pack_into("<I", torn, 8, 3_000_000)
+    stream = bytes(torn) + frame(b"good", 2) + frame(b"better", 3)
+    for step in (1, 50, len(stream)):
+        reader, frames = FrameReader(), []
+        for i in range(0, len(stream), step):
+            frames += reader.feed(stream[i : i + step])
+        assert [f.number for f in frames] == [2, 3], step
+        assert reader.skipped == len(torn)
+
+
+def test_nothing_follows_an_advertisement():
+    told = bytearray(frame(b"", 1))
+    struct.pack_into("<I", told, 8, 9000)
+    told[31] = 1
+    assert [f.number for f in FrameReader().feed(bytes(told) + frame(b"next", 2))] == [1, 2]

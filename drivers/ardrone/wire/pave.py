@@ -1,4 +1,4 @@
-"""PaVE frames of the AR.Drone 2's video stream (TCP 5555), found again after damage.
+"""PaVE frames of the AR.Drone 2's video stream (TCP 5555): written, and found again after damage.
 
 WIRE (AR.Drone sheet 6): header sizes of 64, 68 and 76 bytes occur; the payload begins where `header_size` says.
 """
@@ -11,7 +11,10 @@ from drivers.ardrone.wire.errors import WireError
 
 SIGNATURE = b"PaVE"
 HEADER_SIZE = 64
-_HEADER = struct.Struct("<4sBBHIHHHHIIBBBB")
+_HEADER = struct.Struct("<4sBBHIHHHHIIBBBBIIHBBBB2xI12x")
+_VERSION = 2
+_ADVERTISEMENT = 1
+_BLOCK_PX = 16
 _SIZES = range(HEADER_SIZE, 257)
 # Larger than any picture of the drone: a length beyond it is damage, not a frame.
 _LARGEST_PAYLOAD = 4_000_000
@@ -29,7 +32,11 @@ class FrameType(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame: codec 4 is H.264 (Annex B), size in pixels as displayed, time since power-on."""
+    """One frame: codec 4 is H.264 (Annex B), size in pixels as displayed, time since power-on.
+
+    slices, slice_index: a picture sent in several frames of one number; stream: which encoder it comes from;
+    parameter_sizes: bytes of SPS and PPS at the payload's beginning.
+    """
 
     codec: int
     width: int
@@ -38,6 +45,40 @@ class Frame:
     timestamp_ms: int
     kind: FrameType
     payload: bytes
+    slices: int = 1
+    slice_index: int = 0
+    stream: int = 0
+    parameter_sizes: tuple[int, int] = (0, 0)
+
+
+def encode_frame(frame: Frame, position: int = 0) -> bytes:
+    """Return a frame with its 64 bytes of header; position: bytes of the stream before it."""
+    # WIRE: pictures are encoded in whole blocks of 16 pixels: 640x368 for the 640x360 that are shown.
+    blocks = (-(-side // _BLOCK_PX) * _BLOCK_PX for side in (frame.width, frame.height))
+    header = _HEADER.pack(
+        SIGNATURE,
+        _VERSION,
+        frame.codec,
+        HEADER_SIZE,
+        len(frame.payload),
+        *blocks,
+        frame.width,
+        frame.height,
+        frame.number & 0xFFFF_FFFF,
+        frame.timestamp_ms & 0xFFFF_FFFF,
+        1,
+        0,
+        frame.kind,
+        0,
+        position & 0xFFFF_FFFF,
+        position >> 32 & 0xFFFF_FFFF,
+        frame.stream,
+        frame.slices,
+        frame.slice_index,
+        *frame.parameter_sizes,
+        len(frame.payload),
+    )
+    return header + frame.payload
 
 
 class FrameReader:
@@ -45,6 +86,7 @@ class FrameReader:
 
     def __init__(self) -> None:
         self._buffer = bytearray()
+        self._looked = 0
         self.skipped = 0
 
     def feed(self, data: bytes) -> list[Frame]:
@@ -58,10 +100,27 @@ class FrameReader:
                 self._skip(1)
                 continue
             if len(self._buffer) < end:
-                break
+                if not self._interrupted(start):
+                    break
+                continue
             frames.append(_frame(bytes(self._buffer[:end]), start))
+            self._looked = 0
             del self._buffer[:end]
         return frames
+
+    def _interrupted(self, start: int) -> bool:
+        # A frame whose length is damaged would swallow those behind it: a sound header inside says that it ended.
+        place = self._buffer.find(SIGNATURE, max(start, self._looked - len(SIGNATURE)))
+        while place >= 0 and len(self._buffer) - place >= HEADER_SIZE:
+            try:
+                _extent(self._buffer, place)
+            except WireError:
+                place = self._buffer.find(SIGNATURE, place + 1)
+                continue
+            self._skip(place)
+            return True
+        self._looked = len(self._buffer) if place < 0 else place
+        return False
 
     def _resync(self) -> bool:
         # Moves the buffer to the next signature; keeps a tail that may be the beginning of one.
@@ -74,18 +133,35 @@ class FrameReader:
 
     def _skip(self, count: int) -> None:
         self.skipped += count
+        self._looked = 0
         del self._buffer[:count]
 
 
-def _extent(data: bytearray) -> tuple[int, int]:
-    fields = _HEADER.unpack_from(data)
-    header_size, payload_size = fields[3], fields[4]
-    if header_size not in _SIZES or payload_size > _LARGEST_PAYLOAD:
+def _extent(data: bytearray, offset: int = 0) -> tuple[int, int]:
+    fields = _HEADER.unpack_from(data, offset)
+    header_size, payload_size, control = fields[3], fields[4], fields[14]
+    if version != _VERSION or header_size not in _SIZES or payload_size > _LARGEST_PAYLOAD:
         raise WireError("pave_size", f"header {header_size}, payload {payload_size}")
+    if control & _ADVERTISEMENT:  # WIRE: tells of a frame that is stored; nothing follows
+        return header_size, header_size
     return header_size, header_size + payload_size
 
 
 def _frame(data: bytes, start: int) -> Frame:
-    _, _, codec, _, _, _, _, width, height, number, timestamp_ms, _, _, kind, _ = _HEADER.unpack_from(data)
+    fields = _HEADER.unpack_from(data)
+    codec, width, height, number, timestamp_ms, kind = fields[2], *fields[7:11], fields[13]
+    stream, slices, slice_index, *parameter_sizes = fields[17:22]
     known = FrameType(kind) if kind in FrameType.__members__.values() else FrameType.UNKNOWN
-    return Frame(codec, width, height, number, timestamp_ms, known, data[start:])
+    return Frame(
+        codec,
+        width,
+        height,
+        number,
+        timestamp_ms,
+        known,
+        data[start:],
+        max(1, slices),
+        slice_index,
+        stream,
+        (parameter_sizes[0], parameter_sizes[1]),
+    )

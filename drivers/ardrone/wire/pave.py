@@ -140,7 +140,7 @@ class FrameReader:
 def _extent(data: bytearray, offset: int = 0) -> tuple[int, int]:
     fields = _HEADER.unpack_from(data, offset)
     header_size, payload_size, control = fields[3], fields[4], fields[14]
-    if version != _VERSION or header_size not in _SIZES or payload_size > _LARGEST_PAYLOAD:
+    if header_size not in _SIZES or payload_size > _LARGEST_PAYLOAD:
         raise WireError("pave_size", f"header {header_size}, payload {payload_size}")
     if control & _ADVERTISEMENT:  # WIRE: tells of a frame that is stored; nothing follows
         return header_size, header_size

@@ -17,6 +17,7 @@ _WANTED_PX_PER_SQUARE = 18.0
 _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT = 0.4, 6.0
 _FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 _REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005)
+_MOST_HALF_WINDOW_PX = 10
 _LEAST_CONTRAST = 20.0
 _MOST_WRONG_SQUARES = 1
 _GRID = marker.corner_grid()
@@ -89,31 +90,54 @@ def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
     """Return the board in the window, whose squares are about `spacing` pixels wide, or None."""
     part = picture[window.top : window.bottom, window.left : window.right]
     scale = float(np.clip(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT))
-    if abs(scale - 1.0) > 0.1:
-        interpolation = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_AREA
-        size = (max(12, round(part.shape[1] * scale)), max(12, round(part.shape[0] * scale)))
-        enlarged = cv2.resize(part, size, interpolation=interpolation)
-    else:
-        enlarged = part
+    enlarged, ratio = _resized(part, scale)
     found, raw = cv2.findChessboardCorners(enlarged, (marker.CORNERS_X, marker.CORNERS_Y), flags=_FLAGS)
     if not found or raw is None:
         return None
-    ratio = np.array([part.shape[1] / enlarged.shape[1], part.shape[0] / enlarged.shape[0]])
     coarse = (np.asarray(raw, dtype=np.float64).reshape(-1, 2) + 0.5) * ratio - 0.5 + (window.left, window.top)
     return ordered(picture, refined(picture, coarse))
 
 
-def refined(picture: Picture, corners: Array) -> Array:
-    """Return corners (12, 2) refined in the original picture; a window of 0.45 squares never sees a neighbour.
+def refined(picture: Picture, corners: Array, columns: int = marker.CORNERS_X) -> Array:
+    """Return lattice corners (n, 2) refined to sub-pixels; `columns` of them make a row.
 
-    A corner that would slip away by a good part of a square stays where the finder put it.
+    Small squares are enlarged first: a window of a whole number of pixels is too coarse for them. It reaches 0.55
+    squares, never a neighbour. A corner that would slip away by a good part of a square stays where it was.
     """
-    spacing = spacing_px(corners)
-    half = int(np.clip(0.45 * spacing, 1, 8))
-    start = corners.astype(np.float32).reshape(-1, 1, 2)
-    fine = np.asarray(cv2.cornerSubPix(picture, start, (half, half), (-1, -1), _REFINE), np.float64).reshape(-1, 2)
-    slipped = np.hypot(*(fine - corners).T) > max(1.5, 0.3 * spacing)
+    reach = _least_distance(corners, columns)
+    window = window_around(corners, reach + 2.0, picture.shape)
+    if window is None:
+        return corners
+    part = picture[window.top : window.bottom, window.left : window.right]
+    enlarged, ratio = _resized(part, float(np.clip(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0, _MOST_ENLARGEMENT)))
+    half = int(np.clip(round(0.55 * reach / ratio[0]), 1, _MOST_HALF_WINDOW_PX))
+    start = ((corners - (window.left, window.top) + 0.5) / ratio - 0.5).astype(np.float32).reshape(-1, 1, 2)
+    found = cv2.cornerSubPix(enlarged, start, (half, half), (-1, -1), _REFINE)
+    fine = (np.asarray(found, np.float64).reshape(-1, 2) + 0.5) * ratio - 0.5 + (window.left, window.top)
+    slipped = np.hypot(*(fine - corners).T) > max(1.5, 0.3 * reach)
     return np.where(slipped[:, None], corners, fine)
+
+
+def _resized(part: Picture, scale: float) -> tuple[Picture, Array]:
+    """Return a picture scaled by about `scale`, and the size of its pixels in pixels of the original (2)."""
+    if abs(scale - 1.0) <= 0.1:
+        return part, np.ones(2)
+    interpolation = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_AREA
+    size = (max(12, round(part.shape[1] * scale)), max(12, round(part.shape[0] * scale)))
+    scaled = np.asarray(cv2.resize(part, size, interpolation=interpolation), dtype=np.uint8)
+    return scaled, np.array([part.shape[1] / size[0], part.shape[0] / size[1]])
+
+
+def _least_distance(corners: Array, columns: int) -> float:
+    """Return the least distance of neighbours of a lattice [px], diagonal ones included: slanted views have them near."""
+    grid = corners.reshape(-1, columns, 2)
+    steps = (
+        grid[:, 1:] - grid[:, :-1],
+        grid[1:] - grid[:-1],
+        grid[1:, 1:] - grid[:-1, :-1],
+        grid[1:, :-1] - grid[:-1, 1:],
+    )
+    return float(min(np.hypot(step[..., 0], step[..., 1]).min() for step in steps))
 
 
 def ordered(picture: Picture, corners: Array) -> Find | None:

@@ -1,9 +1,11 @@
 """Settings of one camera driver, as the composition hands them over (JSON of `CameraDriverSettings`)."""
 
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal
+from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from groundstation.geometry.board import VALID_CODES
 from groundstation.geometry.calibration import intrinsics_from_mapping
@@ -11,6 +13,58 @@ from groundstation.geometry.lens import CameraIntrinsics
 
 _Positive = Annotated[float, Field(gt=0)]
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
+
+
+class SourceKind(StrEnum):
+    """What pictures can come from."""
+
+    HTTP = "http"
+    ARDRONE = "ardrone"
+    RTSP = "rtsp"
+    DEVICE = "device"
+    FILE = "file"
+
+
+_PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554}
+
+
+@dataclass(frozen=True, slots=True)
+class SourceAddress:
+    """A source taken apart; path: of the stream with its query, of the device, of the file or folder."""
+
+    kind: SourceKind
+    host: str = ""
+    port: int = 0
+    path: str = ""
+
+
+def parse_source(text: str) -> SourceAddress:
+    """Return what a source's address says; raises ValueError that names the forms there are."""
+    if text.startswith("/dev/"):
+        return SourceAddress(SourceKind.DEVICE, path=text)
+    if text.startswith(("/", "file:///")):
+        return SourceAddress(SourceKind.FILE, path=text.removeprefix("file://"))
+    kinds = {kind.value: kind for kind in _PORTS}
+    scheme, mark, rest = text.partition("://")
+    if not mark or scheme not in kinds or not rest or any(character.isspace() for character in text):
+        raise ValueError(
+            "must be an address such as http://192.168.1.50:8080/video.mjpg, ardrone://192.168.1.1, "
+            "rtsp://192.168.1.60/stream, /dev/video0 or /a/video.mp4"
+        )
+    parts = urlsplit(text)
+    try:
+        port = parts.port or _PORTS[kinds[scheme]]
+    except ValueError:
+        raise ValueError("the port is no number from 1 to 65535") from None
+    if not parts.hostname:
+        raise ValueError(f"must name a host, as in {scheme}://192.168.1.50")
+    path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+    return SourceAddress(kinds[scheme], parts.hostname, port, path)
+
+
+def _checked_source(text: str) -> str:
+    parse_source(text)
+    return text
 
 
 class _Section(BaseModel):
@@ -80,7 +134,7 @@ class DetectorSettings(_Section):
     expected marker is tracked; ambiguity_cost: cost difference (chi-square units) below which both poses are reported.
     """
 
-    corner_floor_px: Annotated[float, Field(ge=0.01, le=5)] = 0.1
+    corner_floor_px: Annotated[float, Field(ge=0.01, le=5)] = 0.02
     identity_margin: Annotated[float, Field(ge=1, le=4)] = 1.0
     tracked_search_rate_hz: Annotated[float, Field(gt=0, le=2)] = 0.5
     max_residual_px: _Positive = 1.5
@@ -97,7 +151,7 @@ class CameraDriverSettings(_Section):
     """
 
     name: _Name
-    source: Annotated[str, Field(min_length=1)]
+    source: Annotated[str, AfterValidator(_checked_source)]
     calibration: CalibrationSettings
     mount: MountSettings = MountSettings()
     video_delay_ms: Annotated[float, Field(ge=0, le=2000)] = 120.0

@@ -81,15 +81,15 @@ def test_ceiling_camera_by_hand():
 
 
 def test_drone_camera_by_hand():
-    """Camera 45 deg down at 2 m height; board 1.6 m ahead of it, 0.3 m to the left, 1.6 m below, turned left by 20 deg.
+    """Camera 45 deg down at 1.6 m height; board 1.2 m ahead of it, 0.3 m to the left, 1.2 m below, turned left by 20 deg.
 
-    Along the axis (1.6 + 1.6) / sqrt 2 = 2.263 m, down in the picture (1.6 - 1.6) / sqrt 2 = 0, right -0.3 m.
+    Along the axis (1.2 + 1.2) / sqrt 2 = 1.697 m, down in the picture (1.2 - 1.2) / sqrt 2 = 0, right -0.3 m.
     """
     renderer = make_renderer(scenario=CLEAN)
-    bot = state(0.09 + 1.6, 0.3, 0.0, math.radians(20))
-    seen = look(make_pipeline(), renderer, [state(0, 0, 2.0), AWAY, bot])["bot"].choice.best
-    assert seen.position_m == pytest.approx([-0.3, 0.0, 2.2627], abs=0.006)
-    assert math.degrees(seen.yaw_rad) == pytest.approx(20.0, abs=0.4)
+    bot = state(0.09 + 1.2, 0.3, 0.0, math.radians(20))
+    seen = look(make_pipeline(), renderer, [state(0, 0, 1.6), AWAY, bot])["bot"].choice.best
+    assert seen.position_m == pytest.approx([-0.3, 0.0, 1.6971], abs=0.004)
+    assert math.degrees(seen.yaw_rad) == pytest.approx(20.0, abs=0.3)
 
 
 def test_yaw_is_relative_to_the_observers_heading_even_when_it_is_tilted():

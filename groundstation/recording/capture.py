@@ -8,12 +8,12 @@ import msgspec
 
 from groundstation.bus import keys
 from groundstation.bus.api import Sample
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.keys import Key
 from groundstation.bus.messages import ClockOffset, Header
 from groundstation.bus.topics import CLOCK
 from groundstation.errors import MessageError
-from groundstation.recording.schemas import CompressedImage, recorded_type
+from groundstation.recording import viewers
+from groundstation.recording.schemas import Description, description_of, is_picture
 from groundstation.recording.timeline import Timeline
 
 
@@ -29,14 +29,26 @@ _clock_offset = msgspec.json.Decoder(ClockOffset)
 
 @dataclass(slots=True)
 class Entry:
-    """One message on its way into a file: JSON as it came (typed) or wrapped (raw bytes), times in UNIX ns."""
+    """One message on its way into a file, times in UNIX ns; `facts` go to its channel's metadata.
 
-    key: Key
+    derived: says for viewers what another entry says already; it counts neither as written nor as lost.
+    """
+
     channel: str
     log_time_ns: int
     publish_time_ns: int
     sequence: int
     data: bytes
+    description: Description
+    facts: dict[str, str]
+    derived: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Channel:
+    key: Key
+    description: Description
+    facts: dict[str, str]
 
 
 class Capture:
@@ -44,13 +56,14 @@ class Capture:
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline
-        self._keys: dict[str, Key] = {}
+        self._channels: dict[str, _Channel] = {}
         self.refused: Counter[str] = Counter()
 
     def entry(self, sample: Sample, arrival_ns: int) -> Entry | None:
         """Return what to write for a sample that arrived at a boot-clock time; None if it is refused."""
         try:
-            key = self._keys.get(sample.key) or self._parse(sample.key)
+            channel = self._channels.get(sample.key) or self._parse(sample.key)
+            key = channel.key
             raw = key.topic.type is None
             header = _header.decode(sample.attachment) if raw else _envelope.decode(sample.payload).header
         except MessageError as error:
@@ -66,11 +79,15 @@ class Capture:
             self._learn(sample.payload)
         logged, published = self._timeline.times(header.stamp_ns, header.clock, arrival_ns)
         data = _wrapped(key, header, sample, published) if raw else sample.payload
-        return Entry(key, sample.key, logged, published, header.seq & 0xFFFF_FFFF, data)
+        number = header.seq & 0xFFFF_FFFF
+        return Entry(sample.key, logged, published, number, data, channel.description, channel.facts)
 
-    def _parse(self, text: str) -> Key:
-        key = self._keys[text] = keys.parse(text)
-        return key
+    def _parse(self, text: str) -> _Channel:
+        key = keys.parse(text)
+        facts = {"site": key.site, "entity": key.entity, "topic": key.topic.name, "source": key.source}
+        facts["plane"] = str(key.topic.plane)
+        channel = self._channels[text] = _Channel(key, description_of(key.topic), facts)
+        return channel
 
     def _learn(self, payload: bytes) -> None:
         try:
@@ -80,14 +97,8 @@ class Capture:
 
 
 def _wrapped(key: Key, header: Header, sample: Sample, published_ns: int) -> bytes:
-    front = b""
-    if recorded_type(key.topic) is CompressedImage:
-        seconds, nanoseconds = divmod(published_ns, NS_PER_S)
-        kind = key.topic.encoding.removeprefix("image/")
-        front = b'"timestamp":{"sec":%d,"nsec":%d},"frame_id":"%s","format":"%s",' % (
-            seconds,
-            nanoseconds,
-            header.entity.encode(),
-            kind.encode(),
-        )
-    return b'{%s"header":%s,"data":"%s"}' % (front, sample.attachment, b64encode(sample.payload))
+    if is_picture(key.topic):
+        family, _, kind = key.topic.encoding.partition("/")
+        write = viewers.video if family == "video" else viewers.image
+        return write(published_ns, header.entity, kind, sample.attachment, sample.payload)
+    return b'{"header":%s,"data":"%s"}' % (sample.attachment, b64encode(sample.payload))

@@ -1,29 +1,17 @@
 """One MCAP file: a channel per key, schemas from the messages themselves, chunks closed at every flush."""
 
 import os
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.writer import CompressionType, IndexType, Writer
 
-from groundstation.bus.topics import Topic
 from groundstation.recording.capture import Entry
-from groundstation.recording.schemas import ENCODING, recorded_type, schema_name, viewer_schema
+from groundstation.recording.origin import PROFILE
+from groundstation.recording.preamble import Preamble
+from groundstation.recording.schemas import Description
 
-PROFILE = "skein"
-MESSAGE_ENCODING = "json"
 _CHUNK_BYTES = 1 << 20
-
-
-@dataclass(frozen=True, slots=True)
-class Preamble:
-    """What stands at the head of every file of a run: metadata records, and attachments as (media type, bytes)."""
-
-    metadata: Mapping[str, Mapping[str, str]]
-    attachments: Mapping[str, tuple[str, bytes]]
-    created_unix_ns: int
 
 
 class McapFile:
@@ -47,11 +35,7 @@ class McapFile:
 
     def _begin(self, preamble: Preamble) -> None:
         self._writer.start(profile=PROFILE, library="skein")
-        for name, entries in preamble.metadata.items():
-            self._writer.add_metadata(name, dict(entries))
-        created = preamble.created_unix_ns
-        for name, (media_type, data) in preamble.attachments.items():
-            self._writer.add_attachment(created, created, name, media_type, data)
+        write_preamble(self._writer, preamble)
         self.flush()
 
     def write(self, entry: Entry) -> None:
@@ -60,20 +44,23 @@ class McapFile:
         self._writer.add_message(channel, entry.log_time_ns, entry.data, entry.publish_time_ns, entry.sequence)
 
     def _add_channel(self, entry: Entry) -> int:
-        key = entry.key
-        facts = {"site": key.site, "entity": key.entity, "topic": key.topic.name, "source": key.source}
+        described = entry.description
         channel = self._writer.register_channel(
-            entry.channel, MESSAGE_ENCODING, self._schema(key.topic), facts | {"plane": str(key.topic.plane)}
+            entry.channel, described.message_encoding, self._schema(described), entry.facts
         )
         self._channels[entry.channel] = channel
         return channel
 
-    def _schema(self, topic: Topic) -> int:
-        kind = recorded_type(topic)
-        name = schema_name(kind)
+    def _schema(self, described: Description) -> int:
+        name = described.schema_name
         if name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(name, ENCODING, viewer_schema(kind))
+            self._schemas[name] = self._writer.register_schema(name, described.schema_encoding, described.schema)
         return self._schemas[name]
+
+    @property
+    def size(self) -> int:
+        """Return how many bytes are safe on the disk, as of the last flush."""
+        return self._sound_bytes
 
     def flush(self) -> None:
         """Close the chunk and hand everything to the kernel: what was written so far survives a kill -9."""
@@ -95,3 +82,12 @@ class McapFile:
                 os.truncate(self.path, self._sound_bytes)
             else:
                 self.path.unlink()
+
+
+def write_preamble(writer: Writer, preamble: Preamble) -> None:
+    """Write the metadata records and attachments that stand before the first message."""
+    for name, entries in preamble.metadata.items():
+        writer.add_metadata(name, dict(entries))
+    created = preamble.created_unix_ns
+    for name, (media_type, data) in preamble.attachments.items():
+        writer.add_attachment(created, created, name, media_type, data)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from itertools import count
 from pathlib import Path
 from typing import IO
 
@@ -11,15 +10,19 @@ import msgspec
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
+from mcap.records import Header as FileHeader
 from mcap.writer import MCAP0_MAGIC
 
 from groundstation.bus import codec
 from groundstation.bus.keys import Key
 from groundstation.bus.messages import Header, Message
 from groundstation.bus.topics import Topic
-from groundstation.errors import GroundStationError, MessageError
-from groundstation.recording.chunks import RawRecord, chunk_data, chunk_records, frames
-from groundstation.recording.series import part_path
+from groundstation.errors import MessageError
+from groundstation.recording.chunks import UNREADABLE, RawRecord, chunk_data, chunk_records, frames
+from groundstation.recording.origin import RecordingError, require_ours, require_readable
+from groundstation.recording.part_names import numbered_parts
+from groundstation.recording.schemas import is_picture
+from groundstation.recording.viewers import picture_parts
 
 __all__ = [
     "RawRecord",
@@ -31,10 +34,6 @@ __all__ = [
     "parts",
     "payload",
 ]
-
-
-class RecordingError(GroundStationError):
-    """The file is missing or no recording at all; damage inside a recording is never an error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +56,7 @@ class Recording:
     path: Path
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
+    media_types: dict[str, str] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
 
     def raw_records(self, wanted: Callable[[Topic], bool] = lambda _topic: True) -> Iterator[RawRecord]:
@@ -97,6 +97,9 @@ def payload(raw: RawRecord) -> tuple[Header, bytes]:
     Raises MessageError when the record does not fit.
     """
     try:
+        if is_picture(raw.key.topic) and not raw.data.startswith(b"{"):  # early recordings hold pictures in JSON
+            header, picture = picture_parts(raw.data, raw.key.topic.encoding.startswith("video/"))
+            return codec.decode_header(raw.key, header), picture
         wrapped = _wrapped.decode(raw.data)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise MessageError("malformed", f"{raw.key}: {error}") from error
@@ -104,38 +107,44 @@ def payload(raw: RawRecord) -> tuple[Header, bytes]:
 
 
 def parts(run_dir: Path, stem: str) -> list[Path]:
-    """Return the files of one stem in a run folder, in order."""
-    found: list[Path] = []
-    for number in count(1):
-        path = part_path(run_dir, stem, number)
-        if not path.exists():
-            return found
-        found.append(path)
-    raise AssertionError("count() never ends")
+    """Return the files of one stem in a run folder, in order; parts that were taken away are passed over."""
+    return [path for _, path in numbered_parts(run_dir, stem)]
 
 
 def open_recording(path: Path) -> Recording:
-    """Return a recording with its attachments and metadata; raises RecordingError if it is none."""
+    """Return a recording with its attachments and metadata; raises RecordingError if it is none of ours."""
     recording = Recording(path)
     try:
         with path.open("rb") as stream:
-            if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                raise RecordingError(f"{path}: not an MCAP recording")
-            stream.seek(0)
+            start = stream.read(len(MCAP0_MAGIC))
+            if start != MCAP0_MAGIC:
+                raise RecordingError(f"{path}: not an MCAP recording{'' if start else ' (the file is empty)'}")
             _read_preamble(stream, recording)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
+    require_readable(str(path), recording.metadata)
     return recording
 
 
 def _read_preamble(stream: IO[bytes], recording: Recording) -> None:
     for opcode, body in frames(stream, []):
-        source = ReadDataStream(BytesIO(body))
-        if opcode == Opcode.ATTACHMENT:
+        if opcode == Opcode.CHUNK:
+            return
+        try:
+            _take(opcode, ReadDataStream(BytesIO(body)), recording)
+        except UNREADABLE as error:
+            raise RecordingError(f"{recording.path}: damaged at its beginning: {error}") from error
+
+
+def _take(opcode: int, source: ReadDataStream, recording: Recording) -> None:
+    match opcode:
+        case Opcode.HEADER:
+            header = FileHeader.read(source)
+            require_ours(str(recording.path), header.profile, header.library)
+        case Opcode.ATTACHMENT:
             attachment = Attachment.read(source)
             recording.attachments[attachment.name] = attachment.data
-        elif opcode == Opcode.METADATA:
+            recording.media_types[attachment.name] = attachment.media_type
+        case Opcode.METADATA:
             metadata = Metadata.read(source)
             recording.metadata[metadata.name] = metadata.metadata
-        elif opcode == Opcode.CHUNK:
-            return

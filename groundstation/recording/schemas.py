@@ -6,6 +6,7 @@ channel stays unreadable. So references are written out, an optional field has i
 """
 
 import json
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -13,27 +14,11 @@ import msgspec
 
 from groundstation.bus.messages import Header, Message
 from groundstation.bus.topics import Topic
+from groundstation.recording.viewers import viewer_descriptor
 
 JsonSchema = dict[str, Any]
 ENCODING = "jsonschema"
 NAMESPACE = "skein"
-
-
-class Timestamp(msgspec.Struct, frozen=True):
-    """UNIX time as the viewers' image type wants it."""
-
-    sec: int
-    nsec: int
-
-
-class CompressedImage(msgspec.Struct, frozen=True):
-    """A picture as received, in the layout of the well-known type `foxglove.CompressedImage`, plus our header."""
-
-    timestamp: Timestamp
-    frame_id: str
-    format: str
-    header: Header
-    data: bytes
 
 
 class Datagram(msgspec.Struct, frozen=True):
@@ -43,19 +28,44 @@ class Datagram(msgspec.Struct, frozen=True):
     data: bytes
 
 
-RecordedType = type[Message] | type[CompressedImage] | type[Datagram]
+RecordedType = type[Message] | type[Datagram]
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """How a channel's messages are written, in the words of MCAP."""
+
+    message_encoding: str
+    schema_name: str
+    schema_encoding: str
+    schema: bytes
+
+
+def is_picture(topic: Topic) -> bool:
+    """Return whether the raw bytes of a topic are pictures."""
+    return topic.type is None and topic.encoding.startswith(("image/", "video/"))
 
 
 def recorded_type(topic: Topic) -> RecordedType:
-    """Return what a topic's entries in a recording are."""
-    if topic.type is not None:
-        return topic.type
-    return CompressedImage if topic.encoding.startswith("image/") else Datagram
+    """Return what the JSON entries of a topic are in a recording (pictures are no JSON)."""
+    return topic.type or Datagram
 
 
-def schema_name(kind: RecordedType) -> str:
-    """Return the name under which viewers find the type."""
-    return f"{'foxglove' if kind is CompressedImage else NAMESPACE}.{kind.__name__}"
+@cache
+def description_of(topic: Topic) -> Description:
+    """Return how a topic of the bus is written."""
+    if is_picture(topic):
+        return well_known(
+            "foxglove.CompressedVideo" if topic.encoding.startswith("video/") else "foxglove.CompressedImage"
+        )
+    kind = recorded_type(topic)
+    return Description("json", f"{NAMESPACE}.{kind.__name__}", ENCODING, viewer_schema(kind))
+
+
+@cache
+def well_known(name: str) -> Description:
+    """Return how a Foxglove type is written."""
+    return Description("protobuf", name, "protobuf", viewer_descriptor(name))
 
 
 @cache

@@ -1,15 +1,14 @@
 """Which topics go into which file of a run."""
 
 from groundstation.bus.topics import TOPICS, Topic
+from groundstation.recording.schemas import is_picture
 
 STATE = "state"
 RAW = "raw"
 
 # Typed messages are small and tell the whole story; pictures and datagrams are bulky and lie beside them.
 STATE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if topic.type is not None)
-IMAGE_TOPICS: tuple[Topic, ...] = tuple(
-    topic for topic in TOPICS.values() if topic.type is None and topic.encoding.startswith("image/")
-)
+IMAGE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if is_picture(topic))
 DATAGRAM_TOPICS: tuple[Topic, ...] = tuple(
     topic for topic in TOPICS.values() if topic.type is None and topic not in IMAGE_TOPICS
 )

@@ -2,13 +2,14 @@
 
 import errno
 from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import count
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from groundstation.bus.clock import NS_PER_MS, NS_PER_S
 from groundstation.recording.capture import Entry
-from groundstation.recording.mcap_file import McapFile, Preamble
+from groundstation.recording.mcap_file import McapFile
+from groundstation.recording.part_names import numbered_parts, part_path
+from groundstation.recording.preamble import Preamble
 
 # With one turn of the recorder (66 ms) on top, a kill -9 costs less than half a second.
 FLUSH_PERIOD_NS = 400 * NS_PER_MS
@@ -25,9 +26,16 @@ class Trouble:
     recovered: bool = False
 
 
-def part_path(folder: Path, stem: str, number: int) -> Path:
-    """Return the path of a part: `stem.mcap`, `stem-2.mcap`, ..."""
-    return folder / (f"{stem}.mcap" if number == 1 else f"{stem}-{number}.mcap")
+@dataclass(frozen=True, slots=True)
+class Rotation:
+    """When a part is full: size [bytes] and age [ns]; 0 is never."""
+
+    size_bytes: int = 0
+    age_ns: int = 0
+
+    def due(self, size_bytes: int, age_ns: int) -> bool:
+        """Return whether a part of that size and age is to be followed by the next."""
+        return 0 < self.size_bytes <= size_bytes or 0 < self.age_ns <= age_ns
 
 
 class FileSeries:
@@ -43,12 +51,15 @@ class FileSeries:
         preamble: Preamble,
         opener: Opener = McapFile,
         has_room: Callable[[], bool] = lambda: True,
+        rotation: Rotation = Rotation(),
     ) -> None:
         self._folder = folder
         self._stem = stem
         self._preamble = preamble
         self._opener = opener
         self._has_room = has_room
+        self._rotation = rotation
+        self._begun_ns = 0
         self._file: McapFile | None = None
         self._retry_ns = 0
         self._flush_ns = 0
@@ -62,9 +73,9 @@ class FileSeries:
         """Add an entry, or count it as lost."""
         file = self._file or self._open(now_ns)
         if file is None:
-            self.lost += 1
+            self.lost += not entry.derived
             return
-        self._pending += 1
+        self._pending += not entry.derived
         try:
             file.write(entry)
         except OSError as error:
@@ -77,6 +88,7 @@ class FileSeries:
         elif now_ns >= self._flush_ns:
             self._flush_ns = now_ns + FLUSH_PERIOD_NS
             self._settle(self._file.flush, now_ns)
+            self._rotate(now_ns)
 
     def close(self) -> None:
         """Finish the current part."""
@@ -98,22 +110,46 @@ class FileSeries:
             self.written += self._pending
             self._pending = 0
 
+    def _rotate(self, now_ns: int) -> None:
+        """Begin the next part when this one is full; where that is impossible, go on in this one."""
+        full = self._file
+        if full is None or not self._rotation.due(full.size, now_ns - self._begun_ns):
+            return
+        try:
+            self._begin(now_ns)
+        except OSError:
+            self._begun_ns = now_ns  # no second try at every flush; the disk's level is watched by the recorder
+            return
+        try:
+            full.close()
+        except OSError:
+            full.abandon()  # everything in it was flushed; only its index is missing
+
+    def _begin(self, now_ns: int) -> McapFile:
+        """Open the next part; raises OSError, and leaves the current one as it is, when there is no room."""
+        if not self._has_room():
+            raise OSError(errno.ENOSPC, "no space left on the disk")
+        number = 1 + max((number for number, _ in numbered_parts(self._folder, self._stem)), default=0)
+        part = {"part": {"stem": self._stem, "number": str(number)}}
+        preamble = replace(self._preamble, metadata={**self._preamble.metadata, **part})
+        self._file = self._opener(part_path(self._folder, self._stem, number), preamble)
+        self._begun_ns = now_ns
+        self._flush_ns = now_ns + FLUSH_PERIOD_NS
+        return self._file
+
     def _open(self, now_ns: int) -> McapFile | None:
         if now_ns < self._retry_ns:
             return None
-        path = next(part for n in count(1) if not (part := part_path(self._folder, self._stem, n)).exists())
         try:
-            if not self._has_room():
-                raise OSError(errno.ENOSPC, "no space left on the disk")
-            self._file = self._opener(path, self._preamble)
+            file = self._begin(now_ns)
         except OSError as error:
             self._fail(error, now_ns)
             return None
-        self._flush_ns = now_ns + FLUSH_PERIOD_NS
         if self.failing:
             self.failing = False
-            self._troubles.append(Trouble(f"recording goes on in {path.name}; {self.lost} messages are lost", True))
-        return self._file
+            text = f"recording goes on in {file.path.name}; {self.lost} messages are lost"
+            self._troubles.append(Trouble(text, recovered=True))
+        return file
 
     def _fail(self, error: OSError, now_ns: int) -> None:
         if self._file is not None:

@@ -1,6 +1,152 @@
-"""What viewers understand without knowing us: channels in the layout of well-known Foxglove types."""
+"""What viewers understand without knowing us: well-known Foxglove types, in protobuf as all of them read it.
+
+WIRE (foxglove/schemas, proto): names and numbers of the fields below. Pictures carry our header in a field of our own.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+from groundstation.bus.clock import NS_PER_S
+from groundstation.recording.protobuf import Field, Kind, Type, blob, descriptor_set, double, fields, integer
 
 TF_CHANNEL = "/tf"
 LOG_CHANNEL = "/log"
 # Derived from messages that are recorded on their own channels too; our reader passes them over.
 VIEWER_CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL))
+
+_HEADER_FIELD = 1000
+_STAMP = ".google.protobuf.Timestamp"
+_TIMESTAMP = Type("google.protobuf", "Timestamp", (Field("seconds", 1, Kind.INT64), Field("nanos", 2, Kind.INT32)))
+
+
+def _doubles(name: str, names: str) -> Type:
+    return Type("foxglove", name, tuple(Field(one, number + 1, Kind.DOUBLE) for number, one in enumerate(names)))
+
+
+_IMAGE = Type(
+    "foxglove",
+    "CompressedImage",
+    (
+        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
+        Field("data", 2, Kind.BYTES),
+        Field("format", 3, Kind.STRING),
+        Field("frame_id", 4, Kind.STRING),
+        Field("skein_header", _HEADER_FIELD, Kind.STRING),
+    ),
+)
+_VIDEO = Type(
+    "foxglove",
+    "CompressedVideo",
+    (
+        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
+        Field("frame_id", 2, Kind.STRING),
+        Field("data", 3, Kind.BYTES),
+        Field("format", 4, Kind.STRING),
+        Field("skein_header", _HEADER_FIELD, Kind.STRING),
+    ),
+)
+_LEVELS = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL")
+_LOG = Type(
+    "foxglove",
+    "Log",
+    (
+        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
+        Field("level", 2, Kind.ENUM, ".foxglove.Log.Level"),
+        Field("message", 3, Kind.STRING),
+        Field("name", 4, Kind.STRING),
+        Field("file", 5, Kind.STRING),
+        Field("line", 6, Kind.FIXED32),
+    ),
+    ("Level", _LEVELS),
+)
+_TRANSFORM = Type(
+    "foxglove",
+    "FrameTransform",
+    (
+        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
+        Field("parent_frame_id", 2, Kind.STRING),
+        Field("child_frame_id", 3, Kind.STRING),
+        Field("translation", 4, Kind.MESSAGE, ".foxglove.Vector3"),
+        Field("rotation", 5, Kind.MESSAGE, ".foxglove.Quaternion"),
+    ),
+)
+_TRANSFORMS = Type(
+    "foxglove",
+    "FrameTransforms",
+    (Field("transforms", 1, Kind.MESSAGE, ".foxglove.FrameTransform", repeated=True),),
+)
+_TYPES: dict[str, tuple[Type, ...]] = {
+    "foxglove.CompressedImage": (_TIMESTAMP, _IMAGE),
+    "foxglove.CompressedVideo": (_TIMESTAMP, _VIDEO),
+    "foxglove.Log": (_TIMESTAMP, _LOG),
+    "foxglove.FrameTransforms": (
+        _TIMESTAMP,
+        _doubles("Vector3", "xyz"),
+        _doubles("Quaternion", "xyzw"),
+        _TRANSFORM,
+        _TRANSFORMS,
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Pose of a frame in its parent: position [m] and unit quaternion (w, x, y, z)."""
+
+    parent: str
+    child: str
+    position_m: tuple[float, float, float]
+    rotation_wxyz: tuple[float, float, float, float]
+
+
+@cache
+def viewer_descriptor(name: str) -> bytes:
+    """Return the FileDescriptorSet of a well-known type."""
+    return descriptor_set(_TYPES[name])
+
+
+def stamp(time_ns: int) -> bytes:
+    """Return a protobuf Timestamp of a UNIX time [ns]."""
+    seconds, nanoseconds = divmod(time_ns, NS_PER_S)
+    return integer(1, seconds) + integer(2, nanoseconds)
+
+
+def image(time_ns: int, frame: str, kind: str, header: bytes, data: bytes) -> bytes:
+    """Return a CompressedImage (format `jpeg`, ...) with our header as JSON."""
+    front = blob(1, stamp(time_ns)) + blob(3, kind.encode()) + blob(4, frame.encode())
+    return front + blob(_HEADER_FIELD, header) + blob(2, data)
+
+
+def video(time_ns: int, frame: str, kind: str, header: bytes, data: bytes) -> bytes:
+    """Return a CompressedVideo (format `h264`, ...) with our header as JSON."""
+    front = blob(1, stamp(time_ns)) + blob(2, frame.encode()) + blob(4, kind.encode())
+    return front + blob(_HEADER_FIELD, header) + blob(3, data)
+
+
+def picture_parts(data: bytes, is_video: bool) -> tuple[bytes, bytes]:
+    """Return (header as JSON, picture) of `image` or `video`; raises ValueError when it is neither."""
+    found = dict(fields(data))
+    header, picture = found.get(_HEADER_FIELD), found.get(3 if is_video else 2)
+    if not isinstance(header, bytes) or not isinstance(picture, bytes):
+        raise ValueError("no picture of ours")
+    return header, picture
+
+
+def log_line(time_ns: int, level: str, name: str, text: str) -> bytes:
+    """Return a Log line; levels are those of `Severity`."""
+    front = blob(1, stamp(time_ns)) + integer(2, _LEVELS.index(level))
+    return front + blob(3, text.encode()) + blob(4, name.encode())
+
+
+def frame_transforms(time_ns: int, transforms: tuple[Transform, ...]) -> bytes:
+    """Return FrameTransforms of one moment."""
+    when = blob(1, stamp(time_ns))
+    return b"".join(blob(1, when + _transform(one)) for one in transforms)
+
+
+def _transform(one: Transform) -> bytes:
+    x, y, z = one.position_m
+    w, *vector = one.rotation_wxyz
+    rotation = b"".join(double(number + 1, value) for number, value in enumerate((*vector, w)))
+    place = double(1, x) + double(2, y) + double(3, z)
+    return blob(2, one.parent.encode()) + blob(3, one.child.encode()) + blob(4, place) + blob(5, rotation)

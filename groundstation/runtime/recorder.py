@@ -3,8 +3,7 @@
 Started as `groundstation.runtime.recorder:run`. See groundstation/recording for files and formats.
 """
 
-import platform
-from importlib.metadata import version
+import json
 from pathlib import Path
 
 import msgspec
@@ -15,9 +14,10 @@ from groundstation.bus.clock import NS_PER_MS, NS_PER_S
 from groundstation.bus.messages import Severity
 from groundstation.process.child import Child
 from groundstation.recording.capture import Capture
-from groundstation.recording.mcap_file import Preamble
+from groundstation.recording.derived import ViewerChannels, camera_frames
+from groundstation.recording.preamble import preamble_of_run
 from groundstation.recording.selection import DATAGRAM_TOPICS, IMAGE_TOPICS, RAW, STATE, STATE_TOPICS
-from groundstation.recording.series import FileSeries
+from groundstation.recording.series import FileSeries, Rotation
 from groundstation.recording.space import Space, assess, free_bytes
 from groundstation.recording.timeline import Timeline
 
@@ -35,10 +35,16 @@ class RecordingSettings(msgspec.Struct, frozen=True):
     """The part of the field's `recording` section that matters here."""
 
     raw_datagrams: bool = True
+    rotate_mb: float = 0.0
+    rotate_minutes: float = 0.0
+
+    @property
+    def rotation(self) -> Rotation:
+        """Return when a part is full."""
+        return Rotation(round(self.rotate_mb * 1e6), round(self.rotate_minutes * 60 * NS_PER_S))
 
 
 class _FieldPart(msgspec.Struct, frozen=True):
-    site: str = ""
     recording: RecordingSettings = RecordingSettings()
 
 
@@ -57,20 +63,21 @@ class Recorder:
         self._child = child
         self._folder = Path(section.run_dir)
         self._folder.mkdir(parents=True, exist_ok=True)
-        part = msgspec.json.decode(section.field, type=_FieldPart)
+        settings = msgspec.json.decode(section.field, type=_FieldPart).recording
         timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
-        preamble = _preamble(section, part.site, timeline, self._folder)
+        preamble = preamble_of_run(bytes(section.field), section.epoch, timeline, self._folder)
         self._capture = Capture(timeline)
         self._space = Space.AMPLE
         self._space_ns = 0
-        self._state = FileSeries(self._folder, STATE, preamble, has_room=self._has_room)
-        self._raw = FileSeries(self._folder, RAW, preamble, has_room=self._has_room)
+        self._viewers = ViewerChannels(camera_frames(json.loads(bytes(section.field))))
+        self._state, self._raw = (
+            FileSeries(self._folder, stem, preamble, has_room=self._has_room, rotation=settings.rotation)
+            for stem in (STATE, RAW)
+        )
         # Bounded in bytes as well as in number: a picture is a hundred times a state message.
         self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
         self._image_queue = child.bus.subscribe(IMAGE_TOPICS, capacity=64)
-        self._datagram_queue = child.bus.subscribe(
-            DATAGRAM_TOPICS if part.recording.raw_datagrams else (), capacity=4096
-        )
+        self._datagram_queue = child.bus.subscribe(DATAGRAM_TOPICS if settings.raw_datagrams else (), capacity=4096)
 
     def turn(self) -> None:
         """Write what has arrived, flush when due, watch the disk."""
@@ -87,11 +94,15 @@ class Recorder:
             self._report(series)
 
     def _write(self, queue: Subscription, series: FileSeries, now_ns: int) -> None:
-        entry_of, write = self._capture.entry, series.write
+        entry_of, derived, write = self._capture.entry, self._viewers.derived, series.write
         for sample in queue.drain_samples():
             entry = entry_of(sample, now_ns)
-            if entry is not None:
-                write(entry, now_ns)
+            if entry is None:
+                continue
+            write(entry, now_ns)
+            for_viewers = derived(entry)
+            if for_viewers is not None:
+                write(for_viewers, now_ns)
 
     def _report(self, series: FileSeries) -> None:
         for trouble in series.take_troubles():
@@ -143,30 +154,6 @@ class Recorder:
             self._child.event(Severity.WARNING, text, f"free space in {self._folder}")
         elif self._space < before:
             self._child.event(Severity.INFO, f"{free / 1e6:.0f} MB are free for recordings again")
-
-
-def _preamble(section: RecorderSection, site: str, timeline: Timeline, folder: Path) -> Preamble:
-    created = clock.now_ns() + timeline.unix_offset_ns
-    run = {
-        "site": site,
-        "epoch": str(section.epoch),
-        "clock": timeline.clock,
-        "unix_offset_ns": str(timeline.unix_offset_ns),
-        "created_unix_ns": str(created),
-    }
-    names = ("skein-groundstation", "mcap", "msgspec", "numpy", "eclipse-zenoh")
-    versions = {name: version(name) for name in names} | {"python": platform.python_version()}
-    conventions = {
-        "world": "z up, origin on the floor in the middle of the room, metres",
-        "base": "FLU; yaw counter-clockwise, radians",
-        "log_time": "UNIX ns of the measurement: header.stamp_ns of clock `run.clock` + run.unix_offset_ns",
-        "ellipses": "95 %",
-    }
-    attachments = {"field.json": ("application/json", bytes(section.field))}
-    resolved = folder / "resolved.yaml"
-    if resolved.is_file():
-        attachments["resolved.yaml"] = ("application/yaml", resolved.read_bytes())
-    return Preamble({"run": run, "versions": versions, "conventions": conventions}, attachments, created)
 
 
 def run(child: Child) -> int:

@@ -77,6 +77,8 @@ class Recording(Section):
     directory: Annotated[str, Field(min_length=1)] = "runs"
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
     raw_datagrams: bool = True
+    rotate_mb: Annotated[float, Field(ge=0, le=100_000)] = 1000.0
+    rotate_minutes: Annotated[float, Field(ge=0, le=1440)] = 60.0
 
 
 class Console(Section):

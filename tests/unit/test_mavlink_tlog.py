@@ -13,7 +13,8 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.topics import RAW_RX, RAW_TX
 from groundstation.cli.export import export, write_tlogs
 from groundstation.recording.capture import Capture
-from groundstation.recording.mcap_file import McapFile, Preamble
+from groundstation.recording.mcap_file import McapFile
+from groundstation.recording.preamble import Preamble
 from groundstation.recording.timeline import Timeline
 
 S = 1_000_000_000

@@ -1,7 +1,6 @@
 """Recording: times, refusals, files that survive write errors, cut files."""
 
 import errno
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,10 +10,11 @@ from mcap.reader import make_reader
 from groundstation.bus import messages as m
 from groundstation.bus.api import Sample
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.topics import IMAGE, ODOMETRY, RAW_RX, TRUTH
+from groundstation.bus.topics import IMAGE, ODOMETRY, RAW_RX, TRUTH, VIDEO
 from groundstation.recording.capture import Capture, Entry
-from groundstation.recording.mcap_file import McapFile, Preamble
-from groundstation.recording.reader import RecordingError, open_recording, parts
+from groundstation.recording.mcap_file import McapFile
+from groundstation.recording.preamble import Preamble
+from groundstation.recording.reader import RecordingError, open_recording, parts, payload
 from groundstation.recording.series import RETRY_PERIOD_NS, FileSeries
 from groundstation.recording.space import Space, assess
 from groundstation.recording.timeline import Timeline
@@ -113,12 +113,11 @@ def test_capture_refuses_a_header_that_contradicts_its_key() -> None:
 
 
 def test_pictures_and_datagrams_come_back_to_the_byte(tmp_path: Path) -> None:
-    import base64
-
     exchange = MemoryExchange()
     bus = MemoryBus(exchange, "lab", "tester")
-    queue = bus.subscribe([IMAGE, RAW_RX])
+    queue = bus.subscribe([IMAGE, VIDEO, RAW_RX])
     bus.publish_bytes(IMAGE, _header(3), bytes(range(256)))
+    bus.publish_bytes(VIDEO, _header(5), b"\0\0\0\1gE")
     bus.publish_bytes(RAW_RX, _header(4), b"\x88\x77\x66\x55")
     capture, file = Capture(Timeline("here", UNIX)), McapFile(tmp_path / "raw.mcap", PREAMBLE)
     for sample in queue.drain_samples():
@@ -126,11 +125,13 @@ def test_pictures_and_datagrams_come_back_to_the_byte(tmp_path: Path) -> None:
         assert entry is not None
         file.write(entry)
     file.close()
-    picture, datagram = (json.loads(raw.data) for raw in open_recording(tmp_path / "raw.mcap").raw_records())
-    assert base64.b64decode(picture["data"]) == bytes(range(256))
-    assert (picture["format"], picture["timestamp"]) == ("jpeg", {"sec": 1_700_000_001, "nsec": 0})
-    assert base64.b64decode(datagram["data"]) == b"\x88\x77\x66\x55"
-    assert datagram["header"]["seq"] == 4
+    found = {raw.key.topic: payload(raw) for raw in open_recording(tmp_path / "raw.mcap").raw_records()}
+    assert {topic: data for topic, (_, data) in found.items()} == {
+        IMAGE: bytes(range(256)),
+        VIDEO: b"\0\0\0\1gE",
+        RAW_RX: b"\x88\x77\x66\x55",
+    }
+    assert [header.seq for header, _ in found.values()] == [3, 5, 4]
 
 
 def test_the_ordinary_mcap_reader_opens_it(tmp_path: Path) -> None:

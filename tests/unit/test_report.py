@@ -15,7 +15,8 @@ from groundstation.bus.api import Sample
 from groundstation.bus.codec import encode
 from groundstation.bus.keys import expression
 from groundstation.recording.capture import Capture
-from groundstation.recording.mcap_file import McapFile, Preamble
+from groundstation.recording.mcap_file import McapFile
+from groundstation.recording.preamble import Preamble
 from groundstation.recording.reader import RecordingError
 from groundstation.recording.timeline import Timeline
 from groundstation.report import run_facts

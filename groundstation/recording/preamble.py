@@ -1,0 +1,73 @@
+"""What stands at the head of every file of a run, so that each part can be understood alone."""
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from groundstation.bus import clock
+from groundstation.recording.origin import MESSAGE_VERSION, VERSION_FIELD
+from groundstation.recording.timeline import Timeline
+
+FIELD_NAME = "field.json"
+CALIBRATIONS_NAME = "calibrations.json"
+_LIBRARIES = ("skein-groundstation", "mcap", "msgspec", "numpy", "numba", "scipy", "opencv-python-headless")
+# Written into the run folder before the recorder starts, where there is one.
+_FILES = {"resolved.yaml": "application/yaml", "run.json": "application/json"}
+_CONVENTIONS = {
+    "world": "z up, origin on the floor in the middle of the room, metres",
+    "base": "FLU; yaw counter-clockwise, radians",
+    "log_time": "UNIX ns of the measurement: header.stamp_ns of clock `run.clock` + run.unix_offset_ns",
+    "ellipses": "95 %",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Preamble:
+    """Metadata records, and attachments as (media type, bytes)."""
+
+    metadata: Mapping[str, Mapping[str, str]]
+    attachments: Mapping[str, tuple[str, bytes]]
+    created_unix_ns: int
+
+
+def preamble_of_run(field: bytes, epoch: int, timeline: Timeline, folder: Path) -> Preamble:
+    """Return the preamble for a resolved field (JSON) and what lies in the run folder."""
+    created = clock.now_ns() + timeline.unix_offset_ns
+    resolved = json.loads(field)
+    run = {
+        "site": str(resolved.get("site", "")),
+        "epoch": str(epoch),
+        "clock": timeline.clock,
+        "unix_offset_ns": str(timeline.unix_offset_ns),
+        "created_unix_ns": str(created),
+        VERSION_FIELD: str(MESSAGE_VERSION),
+    }
+    versions = {name: version(name) for name in (*_LIBRARIES, "eclipse-zenoh")} | {"python": platform.python_version()}
+    attachments = {FIELD_NAME: ("application/json", field)}
+    attachments[CALIBRATIONS_NAME] = ("application/json", json.dumps(_calibrations(resolved)).encode())
+    for name, media_type in _FILES.items():
+        if (folder / name).is_file():
+            attachments[name] = (media_type, (folder / name).read_bytes())
+    metadata = {"run": run, "versions": versions, "seeds": _seeds(attachments), "conventions": _CONVENTIONS}
+    return Preamble(metadata, attachments, created)
+
+
+def _calibrations(field: dict[str, Any]) -> dict[str, Any]:
+    """Return the calibration of each camera by its name on the bus."""
+    fixed = {name: camera["calibration"] for name, camera in field.get("cameras", {}).items()}
+    carried = {f"{name}_camera": drone["camera"]["calibration"] for name, drone in field.get("drones", {}).items()}
+    return fixed | carried
+
+
+def _seeds(attachments: Mapping[str, tuple[str, bytes]]) -> dict[str, str]:
+    """Return what the noise of a simulated run came from; empty for a real flight."""
+    _, text = attachments.get("run.json", ("", b"{}"))
+    try:
+        facts = json.loads(text)
+    except ValueError:
+        return {}
+    return {name: str(facts[name]) for name in ("scenario", "seed") if facts.get(name) is not None}

@@ -129,7 +129,7 @@ def _resized(part: Picture, scale: float) -> tuple[Picture, Array]:
 
 
 def _least_distance(corners: Array, columns: int) -> float:
-    """Return the least distance of neighbours of a lattice [px], diagonal ones included: slanted views have them near."""
+    """Return the least distance of neighbours of a lattice [px], diagonals included: slanted views have them near."""
     grid = corners.reshape(-1, columns, 2)
     steps = (
         grid[:, 1:] - grid[:, :-1],

@@ -81,7 +81,7 @@ def test_ceiling_camera_by_hand():
 
 
 def test_drone_camera_by_hand():
-    """Camera 45 deg down at 1.6 m height; board 1.2 m ahead of it, 0.3 m to the left, 1.2 m below, turned left by 20 deg.
+    """Camera 45 deg down at 1.6 m height; board 1.2 m ahead, 0.3 m to the left, 1.2 m below, turned left by 20 deg.
 
     Along the axis (1.2 + 1.2) / sqrt 2 = 1.697 m, down in the picture (1.2 - 1.2) / sqrt 2 = 0, right -0.3 m.
     """

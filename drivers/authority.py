@@ -65,12 +65,16 @@ class AuthorityLimits:
 
 @dataclass(frozen=True, slots=True)
 class VehicleView:
-    """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or ""."""
+    """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or "".
+
+    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before.
+    """
 
     flight_state: FlightState = FlightState.UNKNOWN
     fresh: bool = False
     battery: float | None = None
     not_ready: str = ""
+    configured: bool = True
 
 
 @dataclass(frozen=True, slots=True)

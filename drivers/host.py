@@ -4,7 +4,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 
-from drivers.authority import Ack, AuthorityLimits, Decision, Mode, Upstream, VehicleView
+from drivers.authority import AIRBORNE, Ack, AuthorityLimits, Decision, Mode, Upstream, VehicleView
 from drivers.base import HostProcess, Vehicle
 from drivers.watchdog import Watchdog
 from groundstation.bus import clock
@@ -23,6 +23,7 @@ RATE_HZ = 30.0
 _STATUS_PERIOD_NS = 200_000_000
 _FLUSH_PERIOD_NS = 100_000_000
 _UNANSWERED_NS = 5_000_000_000
+_UNCONFIGURED_NS = 15_000_000_000
 _SILENCE_EVENT_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
@@ -43,7 +44,7 @@ class VehicleHost:
         self._ignored: Counter[str] = Counter()
         self._started_ns = clock.now_ns()
         self._next_status_ns = self._next_flush_ns = 0
-        self._heard_ns = self._started_ns
+        self._heard_ns = self._unconfigured_ns = self._started_ns
         self._announced = (self.watchdog.mode, self.watchdog.reason)
         self._silent = False
 
@@ -144,8 +145,7 @@ class VehicleHost:
         name, address = self.vehicle.name, self.vehicle.address
         if view.fresh:
             self._heard_ns = now_ns
-            if self._silent or decision.mode is not Mode.CONNECTING:
-                self._child.ready(f"{name} at {address}")
+            self._announce_start(now_ns, view, decision)
             if self._silent:
                 self._event(Severity.INFO, f"{name} answers")
             self._silent = False
@@ -156,6 +156,16 @@ class VehicleHost:
             remedy = f"check that it is switched on and that this computer is in its network: ping {address}"
             self._event(Severity.ERROR, f"{name} does not answer at {address}; trying on", remedy)
             self._child.degrade(f"{name} does not answer at {address}")
+
+    def _announce_start(self, now_ns: int, view: VehicleView, decision: Decision) -> None:
+        """Say READY once the vehicle may take off, or at once when it flies: then it has to be spoken for."""
+        name, address = self.vehicle.name, self.vehicle.address
+        if view.configured or view.flight_state in AIRBORNE:
+            self._unconfigured_ns = now_ns
+            if self._silent or decision.mode is not Mode.CONNECTING:
+                self._child.ready(f"{name} at {address}")
+        elif now_ns - self._unconfigured_ns > _UNCONFIGURED_NS:
+            self._child.degrade(f"{name} at {address}: {view.not_ready}")
 
     def _event(self, severity: Severity, text: str, remedy: str = "") -> None:
         self._child.event(severity, text, remedy, self.vehicle.name)

@@ -4,30 +4,41 @@ import logging
 import threading
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 from pydantic import ValidationError
 
 from drivers.ardrone import convert, velocity_loop
+from drivers.ardrone.identity import Model, model_from_navdata
+from drivers.ardrone.inquiry import TcpInquirer
 from drivers.ardrone.link import ArDroneLink
 from drivers.ardrone.orders import orders_from_decision
 from drivers.ardrone.publisher import MotionPublisher
-from drivers.ardrone.session import Phase, Session, configuration, scale_from_settings
+from drivers.ardrone.rate_watch import RateWatch
+from drivers.ardrone.session import Notice, Phase, Session
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.velocity_loop import VelocityLoop
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO
 from drivers.ardrone.wire.state import StateBit, bit_names
+from drivers.ardrone.wishes import ids_of, scale_from_settings, wishes
 from drivers.authority import Action, Decision, VehicleView
 from drivers.base import Health, HostProcess
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import FlightState, Vector3
+from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.errors import SettingsError
 
 _FRESH_NS = 300_000_000
+_RATE_PERIOD_NS = 200_000_000
 _FAULTS = StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW
+_NO_AR1_VIDEO = Notice(
+    Severity.WARNING,
+    "this is an AR.Drone 1.0: its video (UVLC and P264 over UDP 5555) is out of scope and is left alone",
+    "take the video section out of the field file and give the drone a camera of its own",
+)
 _log = logging.getLogger(__name__)
 
 
@@ -42,6 +53,7 @@ class Telemetry:
     flight_state: FlightState = FlightState.UNKNOWN
     battery: float | None = None
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    model: Model = Model.UNKNOWN
 
 
 class ArDrone:
@@ -58,10 +70,14 @@ class ArDrone:
         self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
         self._link = ArDroneLink(settings, self._log)
         self._publisher = MotionPublisher(settings, bus)
-        self._session = Session(configuration(settings), settings.flight.flat_trim)
+        inquirer = TcpInquirer(settings.address, settings.ftp_port, settings.control_port)
+        self._session = Session(partial(wishes, settings), ids_of(settings.name), inquirer, settings.flight.flat_trim)
+        self._rate_watch = RateWatch()
+        self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
         self._loop = VelocityLoop(settings.limits)
         self._applied_ns = 0
+        self._video_refused = False
         self._refused: Counter[str] = Counter()
         self._closing = threading.Event()
         self._reader = threading.Thread(target=self._read, name="navdata", daemon=True)
@@ -93,6 +109,7 @@ class ArDrone:
                 control_state=demo.control_state,
                 battery=min(demo.battery_percent, 100) / 100,
                 velocity_m_s=motion.velocity_m_s,
+                model=self.telemetry.model if self.telemetry.model is not Model.UNKNOWN else model_from_navdata(packet),
             )
         flight_state = convert.flight_state_from_navdata(telemetry.state, telemetry.control_state)
         self.telemetry = replace(telemetry, flight_state=flight_state)
@@ -105,7 +122,8 @@ class ArDrone:
         """Return what the drone last said."""
         heard = self.telemetry
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
-        return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard))
+        configured = self._session.phase is Phase.READY
+        return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard), configured)
 
     def _not_ready(self, heard: Telemetry) -> str:
         if self._session.phase is not Phase.READY:
@@ -120,9 +138,31 @@ class ArDrone:
         if self._session.request_due(now_ns, silence_ns):
             self._link.request_navdata()
         attitude = self._attitude(now_ns, decision, heard)
-        commands = orders_from_decision(decision.action, attitude, heard.state, heard.flight_state, self._scale)
-        commands += self._session.step(heard.state, silence_ns)
+        action = decision.action
+        if action is Action.TAKE_OFF and self._session.phase is not Phase.READY:
+            action = Action.HOVER  # it was restarted since the order: what flies stays up, what stands stays there
+        commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
+        commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
         self._link.send(commands, restart=self._session.phase is Phase.SEARCHING)
+        self._watch_rate(now_ns)
+
+    def _watch_rate(self, now_ns: int) -> None:
+        if self._session.phase is not Phase.READY:
+            self._rate_watch.reset()
+        elif now_ns >= self._next_rate_ns:
+            self._next_rate_ns = now_ns + _RATE_PERIOD_NS
+            notice = self._rate_watch.step(now_ns, self._link.rates(now_ns)[0])
+            if notice is not None:
+                self._session.news.append(notice)
+
+    def news(self) -> list[Notice]:
+        """Return what the operator should hear, once."""
+        news = self._session.news
+        told = [news.popleft() for _ in range(len(news))]
+        if self._settings.video is not None and self._session.identity.model is Model.AR1 and not self._video_refused:
+            self._video_refused = True
+            told.append(_NO_AR1_VIDEO)
+        return told
 
     def _attitude(self, now_ns: int, decision: Decision, heard: Telemetry) -> velocity_loop.Attitude:
         dt_s = (now_ns - self._applied_ns) * 1e-9
@@ -137,7 +177,9 @@ class ArDrone:
     def health(self, now_ns: int) -> Health:
         """Return rates, losses and refusals of the link."""
         rate_hz, quality = self._link.rates(now_ns)
-        return Health(quality, rate_hz, dict(self._link.rejected + self._refused), self._session.detail)
+        heights = Counter({"height_jump": self._publisher.heights.refused})
+        rejected = dict(self._link.rejected + self._refused + heights)
+        return Health(quality, rate_hz, rejected, self._session.detail)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""
@@ -158,7 +200,12 @@ def run(child: HostProcess) -> int:
     except ValidationError as error:
         raise SettingsError([str(error)]) from error
     drone = ArDrone(settings, child.bus)
+
+    def tell(_now_ns: int) -> None:
+        for notice in drone.news():
+            child.event(notice.severity, f"{drone.name}: {notice.text}", notice.remedy, drone.name)
+
     try:
-        return run_hosts(child, [VehicleHost(child, drone, settings.authority)])
+        return run_hosts(child, [VehicleHost(child, drone, settings.authority)], before=tell)
     finally:
         drone.close()

@@ -13,6 +13,7 @@ from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.datagrams import DatagramLog
 from groundstation.bus import clock
+from groundstation.errors import DriverError
 
 # After this silence a lower sequence number is a new session of the drone, before it a replay.
 _RESTART_NS = 300_000_000
@@ -56,14 +57,17 @@ class SequenceFilter:
 
 
 class ArDroneLink:
-    """Sockets on ephemeral ports, so that many drones fit on one host. Nothing that arrives raises."""
+    """Sockets on free ports, unless the settings name some, so that many drones fit on one host.
+
+    Nothing that arrives raises; the constructor raises DriverError for a port or an address that cannot be had.
+    """
 
     def __init__(self, settings: ArDroneDriverSettings, log: DatagramLog) -> None:
         self._settings = settings
         self._log = log
         self._lock = threading.Lock()
-        self._navdata_socket = _open(settings.local_address)
-        self._at_socket = _open(settings.local_address)
+        self._navdata_socket = _open(settings.local_address, settings.local_navdata_port)
+        self._at_socket = _open(settings.local_address, settings.local_at_port)
         self._sequence = 1
         self._filter = SequenceFilter()
         self.rejected: Counter[str] = Counter()
@@ -129,8 +133,12 @@ class ArDroneLink:
         self._at_socket.close()
 
 
-def _open(local_address: str) -> socket.socket:
+def _open(local_address: str, port: int) -> socket.socket:
     channel = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    channel.bind((local_address, 0))
+    try:
+        channel.bind((local_address, port))
+    except OSError as error:
+        channel.close()
+        raise DriverError(f"cannot bind {local_address or '*'}:{port or 'any'} (UDP): {error.strerror}") from error
     channel.settimeout(_POLL_S)
     return channel

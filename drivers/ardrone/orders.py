@@ -5,11 +5,11 @@ rising edge. PCMD flag 0 lets the drone hold its place. phi > 0 right, theta > 0
 clockwise.
 """
 
-from drivers.ardrone.session import Scale
 from drivers.ardrone.velocity_loop import Attitude
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.state import StateBit
+from drivers.ardrone.wishes import Scale
 from drivers.authority import Action
 from groundstation.bus.messages import FlightState
 

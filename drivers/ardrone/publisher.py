@@ -1,6 +1,7 @@
 """Odometry and IMU samples on the bus, at most so often as the settings say."""
 
 from drivers.ardrone.convert import HeadingWatch, Motion
+from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.settings import ArDroneDriverSettings
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry
@@ -9,6 +10,8 @@ from groundstation.geometry.angles import quaternion_from_euler
 
 # The climb rate is the derivative of an ultrasound altitude.
 _CLIMB_STD_M_S = 0.15
+# It says nothing while the ultrasound hears another drone.
+_VOID_CLIMB_STD_M_S = 2.0
 
 
 class Decimator:
@@ -34,16 +37,21 @@ class MotionPublisher:
         self._name = settings.name
         self._bus = bus
         self._heading = HeadingWatch()
+        self.heights = HeightWatch()
         self._odometry = Decimator(settings.odometry_hz)
         self._imu = Decimator(settings.imu_hz)
-        horizontal, vertical = settings.odometry.velocity_std_m_s**2, _CLIMB_STD_M_S**2
-        self._covariance = (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical)
+        horizontal = settings.odometry.velocity_std_m_s**2
+        self._covariance, self._void_covariance = (
+            (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, std**2)
+            for std in (_CLIMB_STD_M_S, _VOID_CLIMB_STD_M_S)
+        )
 
     def publish(self, stamp_ns: int, motion: Motion) -> None:
         """Publish what is due; every motion counts for the heading's jumps."""
         reset = self._heading.update(stamp_ns, motion)
+        sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
         if self._odometry.is_due(stamp_ns):
-            self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset))
+            self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset, sound))
         if motion.rates_rad_s is not None and motion.specific_force_m_s2 is not None and self._imu.is_due(stamp_ns):
             sample = ImuSample(
                 header=self._bus.header(self._name, stamp_ns),
@@ -53,14 +61,14 @@ class MotionPublisher:
             )
             self._bus.publish(IMU, sample)
 
-    def _odometry_message(self, stamp_ns: int, motion: Motion, reset: int) -> Odometry:
+    def _odometry_message(self, stamp_ns: int, motion: Motion, reset: int, sound: bool) -> Odometry:
         return Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=motion.velocity_m_s,
-            velocity_covariance=self._covariance,
+            velocity_covariance=self._covariance if sound else self._void_covariance,
             yaw_rad=motion.yaw_rad,
             roll_rad=motion.roll_rad,
             pitch_rad=motion.pitch_rad,
-            height_m=motion.height_m,
+            height_m=motion.height_m if sound else None,
             reset=reset,
         )

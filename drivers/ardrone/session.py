@@ -1,30 +1,47 @@
-"""Bootstrap and configuration of the drone: what to send beside REF and PCMD. Pure.
+"""Bootstrap and configuration of the drone: what to send beside REF and PCMD. Pure but for the inquirer handed in.
 
-WIRE (AR.Drone sheet 3, 5.1): CONFIG until state bit 6 rises, CTRL 5 until it falls, then the next key. A CONFIG
-sent while bit 6 is still up is lost, therefore each key waits for the whole cycle of the one before.
+WIRE (AR.Drone sheet 3, 5.1): CONFIG until state bit 6 rises, CTRL 5 until it falls, then the next key. A CONFIG sent
+while bit 6 is still up is lost, therefore each key waits for the whole cycle of the one before. A late duplicate can
+still raise the bit for a key that was lost: so at the end everything is read back over the control port, where the
+drone has one, and what differs is written again, at most three times in all.
 """
 
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable
 from enum import StrEnum
+from typing import NamedTuple, Protocol
 
-from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.ardrone.dump import differences, parse_dump
+from drivers.ardrone.identity import Identity, Model, identity_from_dump, identity_from_version
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.at import AtCommand
-from drivers.ardrone.wire.configuration import CONFIGURATION, format_value
 from drivers.ardrone.wire.state import StateBit
+from drivers.ardrone.wishes import FULL_NAVDATA, Ids, Wish
+from groundstation.bus.messages import Severity
 
 _REQUEST_PERIOD_NS = 100_000_000
 _REQUEST_AFTER_NS = 1_000_000_000
 _DISCONNECTED_NS = 2_000_000_000
+_STAGE_NS = 1_000_000_000
+_DUMP_PERIOD_NS = 300_000_000
+# WIRE: a dump raises bit 6 as well. The text may be here before the packet that says so.
+_SETTLE_NS = 300_000_000
+_ROUNDS = 3
+_RETRY_NS = 5_000_000_000
 _FLAT_TRIMS = 3
+# A drone may say for a while that it is in the mode that it was told to leave.
+_FORGOTTEN_NS = 1_000_000_000
 
 
 class Phase(StrEnum):
-    """Where the session stands."""
+    """Where the session stands; FAILED: what is required was not confirmed, another attempt follows."""
 
     SEARCHING = "SEARCHING"
     CONFIGURING = "CONFIGURING"
+    VERIFYING = "VERIFYING"
+    TRIMMING = "TRIMMING"
     READY = "READY"
+    FAILED = "FAILED"
 
 
 class _Cycle(StrEnum):
@@ -33,66 +50,82 @@ class _Cycle(StrEnum):
     ACKNOWLEDGE = "ACKNOWLEDGE"
 
 
-@dataclass(frozen=True, slots=True)
-class Scale:
-    """What a fraction of 1 in PCMD means, as configured: tilt [rad], climb [m/s], yaw rate [rad/s]."""
+class Notice(NamedTuple):
+    """Something that the operator should hear of."""
 
-    tilt_rad: float
-    climb_m_s: float
-    yaw_rate_rad_s: float
-
-
-def scale_from_settings(settings: ArDroneDriverSettings) -> Scale:
-    """Return the limits to configure: the settings', within what the drone accepts."""
-    limits = settings.limits
-    return Scale(
-        _within("control:euler_angle_max", limits.max_tilt_rad),
-        _within("control:control_vz_max", limits.max_climb_m_s * 1000) / 1000,
-        _within("control:control_yaw", limits.max_yaw_rate_rad_s),
-    )
+    severity: Severity
+    text: str
+    remedy: str = ""
 
 
-def _within(name: str, value: float) -> float:
-    key = CONFIGURATION[name]
-    assert key.minimum is not None and key.maximum is not None
-    return min(max(value, key.minimum), key.maximum)
+class Inquirer(Protocol):
+    """Asks the drone over TCP, in a thread; an answer is None while it is awaited and empty when there is none.
 
-
-def configuration(settings: ArDroneDriverSettings) -> tuple[tuple[str, str], ...]:
-    """Return the keys to write at connect, in order.
-
-    WIRE: `outdoor` copies one of two sets of limits over the active ones, so it goes before them.
+    listening: the control port is connected, so that a dump may be asked for.
     """
-    scale, flight = scale_from_settings(settings), settings.flight
-    return (
-        ("general:navdata_demo", format_value(False)),
-        ("control:outdoor", format_value(flight.outdoor)),
-        ("control:flight_without_shell", format_value(flight.without_shell)),
-        ("control:euler_angle_max", f"{scale.tilt_rad:.6g}"),
-        ("control:control_vz_max", f"{scale.climb_m_s * 1000:.6g}"),
-        ("control:control_yaw", f"{scale.yaw_rate_rad_s:.6g}"),
-        ("control:altitude_max", f"{flight.altitude_max_m * 1000:.0f}"),
-        ("pic:ultrasound_freq", str(flight.ultrasound_freq)),
-    )
+
+    @property
+    def version(self) -> str | None:
+        """Text of version.txt."""
+
+    @property
+    def dump(self) -> bytes | None:
+        """Configuration dump."""
+
+    @property
+    def listening(self) -> bool:
+        """Whether a dump would be heard."""
+
+    def ask_version(self) -> None:
+        """Begin to read version.txt."""
+
+    def ask_dump(self) -> None:
+        """Connect to the control port and wait for a dump."""
 
 
 class Session:
     """Brings one drone from silence to full navdata with our limits, and back again when it forgets us."""
 
-    def __init__(self, keys: tuple[tuple[str, str], ...], flat_trim: bool = True) -> None:
-        self._keys = keys
-        self._index = 0
+    def __init__(
+        self,
+        wishes_for: Callable[[Identity, bool], tuple[Wish, ...]],
+        ids: Ids,
+        inquirer: Inquirer,
+        flat_trim: bool = True,
+    ) -> None:
+        self._wishes_for = wishes_for
+        self._ids = ids
+        self._inquirer = inquirer
+        self._trims = _FLAT_TRIMS if flat_trim else 0
+        self._trims_left = 0
+        self._next_request_ns = self._next_dump_ns = 0
+        self._stage_ns = self._began_ns = 0
+        self._round = 0
+        self._with_ids = False
         self._cycle = _Cycle.CLEAR
-        self._trims_left = self._trims = _FLAT_TRIMS if flat_trim else 0
-        self._next_request_ns = 0
+        self._queue: deque[Wish] = deque()
+        self._wanted: tuple[Wish, ...] = ()
+        self._doubtful: set[Wish] = set()
+        self._problem = self._told = ""
+        self._full_ns = 0
+        self.identity = Identity()
         self.phase = Phase.SEARCHING
+        self.news: deque[Notice] = deque(maxlen=32)
 
     @property
     def detail(self) -> str:
-        """Return what the session waits for, or ""."""
-        if self.phase is Phase.READY:
-            return ""
-        return "waiting for navdata" if self.phase is Phase.SEARCHING else f"configuring {self._keys[self._index][0]}"
+        """Return what the session waits for or misses, or ""."""
+        match self.phase:
+            case Phase.SEARCHING:
+                return "waiting for navdata"
+            case Phase.CONFIGURING:
+                return f"configuring {self._queue[0].key}" if self._queue else "asking for the firmware's version"
+            case Phase.VERIFYING:
+                return "reading the configuration back"
+            case Phase.TRIMMING:
+                return "trimming"
+            case _:
+                return self._problem
 
     def request_due(self, now_ns: int, silence_ns: int) -> bool:
         """Return whether to ask for navdata now: every 100 ms while there is none."""
@@ -102,33 +135,165 @@ class Session:
         self._next_request_ns = now_ns + _REQUEST_PERIOD_NS
         return True
 
-    def step(self, state: int, silence_ns: int) -> list[AtCommand]:
-        """Return the commands to add to the next datagram, given the newest state word and its age."""
+    def step(self, now_ns: int, state: int, silence_ns: int, seen: Model = Model.UNKNOWN) -> list[AtCommand]:
+        """Return the commands to add to the next datagram.
+
+        state, silence_ns: the newest state word and its age; seen: the generation as far as navdata tells.
+        """
         if silence_ns > _DISCONNECTED_NS:
             self.phase = Phase.SEARCHING
             return []
-        if self.phase is Phase.SEARCHING or (self.phase is Phase.READY and _has_forgotten(state)):
-            self.phase, self._index, self._cycle, self._trims_left = Phase.CONFIGURING, 0, _Cycle.CLEAR, self._trims
+        if self._must_begin(now_ns, state):
+            self._begin(now_ns)
+        pending = bool(state & StateBit.COMMAND)
         if self.phase is Phase.CONFIGURING:
-            return self._configure(bool(state & StateBit.COMMAND))
+            return self._configure(now_ns, pending, seen)
+        if self.phase is Phase.VERIFYING:
+            return self._verify(now_ns, pending)
+        if pending:
+            return [at.ctrl(at.CTRL_ACK)]  # a late duplicate raised it
+        return self._trim(state) if self.phase is Phase.TRIMMING else []
+
+    def _must_begin(self, now_ns: int, state: int) -> bool:
+        if not state & (StateBit.NAVDATA_BOOTSTRAP | StateBit.NAVDATA_DEMO):
+            self._full_ns = now_ns
+        forgotten = now_ns - self._full_ns > _FORGOTTEN_NS
+        match self.phase:
+            case Phase.SEARCHING:
+                return True
+            case Phase.FAILED:
+                return now_ns - self._stage_ns > _RETRY_NS
+            case Phase.CONFIGURING:
+                return forgotten and bool(self._wanted)  # it left the bootstrap once, and is back in it
+            case _:
+                return forgotten
+
+    def _begin(self, now_ns: int) -> None:
+        self.phase, self._problem = Phase.CONFIGURING, ""
+        self._began_ns = self._full_ns = now_ns
+        self._round = 0
+        self._trims_left = self._trims
+        self._wanted = ()
+        self._doubtful.clear()
+        self._queue = deque([FULL_NAVDATA])
+        self._with_ids = False
+        self.identity = Identity()
+        self._inquirer.ask_version()
+        self._enter(_Cycle.CLEAR, now_ns)
+
+    def _enter(self, cycle: _Cycle, now_ns: int) -> None:
+        self._cycle, self._stage_ns = cycle, now_ns
+
+    # -- writing ------------------------------------------------------------------------------------------------------
+
+    def _configure(self, now_ns: int, pending: bool, seen: Model) -> list[AtCommand]:
+        if not self._queue and not self._find_out(now_ns, seen):
+            return []
+        late = now_ns - self._stage_ns > _STAGE_NS
+        if self._cycle is _Cycle.CLEAR and not pending:
+            self._enter(_Cycle.SET, now_ns)
+        elif self._cycle is _Cycle.SET and (pending or late):
+            if late:
+                self._doubtful.add(self._queue[0])
+            self._enter(_Cycle.ACKNOWLEDGE, now_ns)
+        elif self._cycle is _Cycle.ACKNOWLEDGE and not pending:
+            self._queue.popleft()
+            self._enter(_Cycle.CLEAR, now_ns)
+            return (
+                self._configure(now_ns, pending, seen) if self._queue or not self._wanted else self._read_back(now_ns)
+            )
+        elif late:
+            self._fail(now_ns, f"the drone does not take back its acknowledgement of {self._queue[0].key}")
+            return []
+        return self._write(self._queue[0]) if self._cycle is _Cycle.SET else [at.ctrl(at.CTRL_ACK)]
+
+    def _write(self, wish: Wish) -> list[AtCommand]:
+        # WIRE: CONFIG_IDS goes right before each CONFIG, in the same datagram.
+        ids = [at.config_ids(*self._ids)] if self._with_ids else []
+        return [*ids, at.config(wish.key, wish.value)]
+
+    def _find_out(self, now_ns: int, seen: Model) -> bool:
+        """Decide what is to be written once the firmware is known, or will not be; returns whether that is so."""
+        version = self._inquirer.version
+        if version is None:
+            return False
+        identity = identity_from_version(version)
+        if identity.model is Model.UNKNOWN:
+            identity = Identity(seen)
+        self._want(identity, identity.has_ids)
+        self._queue = deque(self._wanted)
+        self._enter(_Cycle.CLEAR, now_ns)
+        return True
+
+    def _want(self, identity: Identity, with_ids: bool) -> None:
+        self.identity, self._with_ids = identity, with_ids
+        self._wanted = (FULL_NAVDATA, *self._wishes_for(identity, with_ids))
+
+    # -- reading back -------------------------------------------------------------------------------------------------
+
+    def _read_back(self, now_ns: int) -> list[AtCommand]:
+        self.phase = Phase.VERIFYING
+        self._round += 1
+        self._next_dump_ns = 0
+        self._inquirer.ask_dump()
+        self._stage_ns = now_ns
+        return []
+
+    def _verify(self, now_ns: int, pending: bool) -> list[AtCommand]:
+        dump = self._inquirer.dump
+        if dump is None:
+            if not self._inquirer.listening or now_ns < self._next_dump_ns:
+                return []
+            self._next_dump_ns, self._stage_ns = now_ns + _DUMP_PERIOD_NS, now_ns
+            return [at.ctrl(at.CTRL_CONFIG_GET)]
+        asked_ns = now_ns - self._stage_ns
+        if dump and (asked_ns < _SETTLE_NS or (pending and asked_ns < 2 * _STAGE_NS)):
+            return [at.ctrl(at.CTRL_ACK)]
+        self._judge(now_ns, parse_dump(dump))
+        return []
+
+    def _trim(self, state: int) -> list[AtCommand]:
         if self._trims_left and not state & StateBit.FLY:
             self._trims_left -= 1  # several times, since datagrams get lost and nothing acknowledges it
             return [at.ftrim()]
+        self.phase = Phase.READY
         return []
 
-    def _configure(self, pending: bool) -> list[AtCommand]:
-        if self._cycle is _Cycle.CLEAR and not pending:
-            self._cycle = _Cycle.SET
-        elif self._cycle is _Cycle.SET and pending:
-            self._cycle = _Cycle.ACKNOWLEDGE
-        elif self._cycle is _Cycle.ACKNOWLEDGE and not pending:
-            self._cycle = _Cycle.SET
-            self._index += 1
-            if self._index == len(self._keys):
-                self.phase = Phase.READY
-                return []
-        return [at.config(*self._keys[self._index]) if self._cycle is _Cycle.SET else at.ctrl(at.CTRL_ACK)]
+    def _judge(self, now_ns: int, stored: dict[str, str]) -> None:
+        """Write again what is missing, give up, or leave it at that."""
+        if stored:
+            told = identity_from_dump(stored)
+            self.identity = told if told.firmware or self.identity.model is Model.UNKNOWN else self.identity
+            differing = dict(differences(((wish.key, wish.value) for wish in self._wanted), stored))
+            wrong = {wish: differing[wish[:2]] for wish in self._wanted if wish[:2] in differing}
+        else:
+            wrong = dict.fromkeys(self._doubtful, "not known")
+        required = [wish for wish in wrong if wish.required]
+        if wrong and self._round < _ROUNDS:
+            if any(wish.key.startswith("custom:") for wish in wrong):
+                self._want(self.identity, with_ids=False)  # it keeps no sets: what was named for one was ignored
+                self._queue = deque(self._wanted)
+            else:
+                self._queue = deque(wish for wish in self._wanted if wish in wrong)
+            self._doubtful.clear()
+            self.phase = Phase.CONFIGURING
+            self._enter(_Cycle.CLEAR, now_ns)
+        elif required:
+            wish = required[0]
+            self._fail(now_ns, f"{wish.key} is {wrong[wish]} on the drone, and {wish.value} was written")
+        else:
+            self.phase = Phase.TRIMMING
+            self._confirm(now_ns, wrong)
 
+    def _confirm(self, now_ns: int, wrong: dict[Wish, str]) -> None:
+        elapsed_s = (now_ns - self._began_ns) * 1e-9
+        self.news.append(Notice(Severity.INFO, f"{self.identity.text}: configured in {elapsed_s:.1f} s"))
+        for wish, stored in wrong.items():
+            self.news.append(Notice(Severity.WARNING, f"{wish.key} stays {stored}, though {wish.value} was written"))
 
-def _has_forgotten(state: int) -> bool:
-    return bool(state & (StateBit.NAVDATA_BOOTSTRAP | StateBit.NAVDATA_DEMO))
+    def _fail(self, now_ns: int, problem: str) -> None:
+        if problem != self._told:
+            remedy = "restart the drone, and see that no other program speaks to it"
+            self.news.append(Notice(Severity.ERROR, f"not configured: {problem}", remedy))
+        self.phase, self._stage_ns = Phase.FAILED, now_ns
+        self._problem = self._told = problem

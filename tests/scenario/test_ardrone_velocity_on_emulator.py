@@ -1,16 +1,18 @@
 """The driver's velocity loop against the emulated drone, byte for byte and tick by tick, without sockets or clock."""
 
 import math
+from functools import partial
 
 import pytest
 
 from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata
 from drivers.ardrone.orders import orders_from_decision
-from drivers.ardrone.session import Session, configuration, scale_from_settings
+from drivers.ardrone.session import Session
 from drivers.ardrone.settings import ArDroneDriverSettings, OdometryCalibration
 from drivers.ardrone.velocity_loop import HOVER, VelocityLoop
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.options import DEMO
+from drivers.ardrone.wishes import ids_of, scale_from_settings, wishes
 from drivers.authority import Action
 from groundstation.bus.messages import FlightState
 from sim_bridge.devices.ardrone_control import FlightControl
@@ -23,6 +25,17 @@ from sim_bridge.world.quadrotor import Quadrotor
 TICK_S = 0.005
 TICK_NS = 5_000_000
 SENDER_TICKS = 20 / 3  # 30 Hz
+
+
+class NoTcp:
+    """A drone without FTP and control port."""
+
+    version, dump, listening = "", b"", False
+
+    def ask_version(self):
+        pass
+
+    ask_dump = ask_version
 
 
 class Flight:
@@ -38,7 +51,7 @@ class Flight:
         self.control = FlightControl(self.drone)
         self.control.session.request(("127.0.0.1", 1), 0)
         self.writer, self.state = NavdataWriter(), NavdataState()
-        self.session = Session(configuration(self.settings))
+        self.session = Session(partial(wishes, self.settings), ids_of("drone_1"), NoTcp())
         self.scale = scale_from_settings(self.settings)
         self.loop = VelocityLoop(self.settings.limits)
         self.ticks, self.next_send, self.sequence = 0, 0.0, 1
@@ -79,7 +92,7 @@ class Flight:
         else:
             self.loop.reset()
         commands = orders_from_decision(action, attitude, self.packet.state, self.flight_state, self.scale)
-        commands += self.session.step(self.packet.state, 0)
+        commands += self.session.step(self.ticks * TICK_NS, self.packet.state, 0)
         self.control.obey_datagram(at.encode_datagram(commands, self.sequence), self.ticks * TICK_NS)
         self.sequence += len(commands)
 

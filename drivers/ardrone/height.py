@@ -1,0 +1,42 @@
+"""Heights that the drone cannot have reached: echoes of another drone's ultrasound. Pure."""
+
+# The fastest a drone climbs, and the step that noise and the ultrasound's own jumps explain.
+_RATE_M_S = 2.0
+_STEP_M = 0.15
+# Readings that agree for so long are the truth: a table below, or a bad start.
+_INSIST_NS = 400_000_000
+# Nothing is known any more after a pause.
+_FORGET_NS = 1_000_000_000
+
+
+class HeightWatch:
+    """Lets a height through when the drone can have got there from the last good one.
+
+    refused: heights held back. steps: new levels believed because they stayed.
+    """
+
+    def __init__(self) -> None:
+        self.refused = self.steps = 0
+        self._good: tuple[int, float] | None = None
+        self._other: tuple[int, float] | None = None
+        self._other_since_ns = 0
+
+    def accept(self, stamp_ns: int, height_m: float) -> bool:
+        """Return whether a height [m; above ground] is to be believed."""
+        if self._good is None or stamp_ns - self._good[0] > _FORGET_NS or _reachable(self._good, stamp_ns, height_m):
+            self._good, self._other = (stamp_ns, height_m), None
+            return True
+        if self._other is None or not _reachable(self._other, stamp_ns, height_m):
+            self._other_since_ns = stamp_ns
+        self._other = (stamp_ns, height_m)
+        if stamp_ns - self._other_since_ns < _INSIST_NS:
+            self.refused += 1
+            return False
+        self._good, self._other = self._other, None
+        self.steps += 1
+        return True
+
+
+def _reachable(before: tuple[int, float], stamp_ns: int, height_m: float) -> bool:
+    elapsed_s = (stamp_ns - before[0]) * 1e-9
+    return abs(height_m - before[1]) <= _STEP_M + _RATE_M_S * elapsed_s

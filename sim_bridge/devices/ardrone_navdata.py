@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.ardrone.wire.options import OPTION_SIZES
+from drivers.ardrone.wire.tags import OPTION_SIZES
 from sim_bridge.world.airframe import GRAVITY_M_S2
 from sim_bridge.world.onboard import Onboard
 

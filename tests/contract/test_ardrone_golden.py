@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.ardrone.wire import at, navdata, options
+from drivers.ardrone.wire import ambient, at, navdata, options
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.state import ControlState, StateBit, bit_names, split_control_state
+from drivers.ardrone.wire.tags import OPTION_SIZES
 
 DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "ardrone"
 REAL = ("ar2-full-1916.bin", "ar2-demo-inflight-500.bin", "ar1-bootstrap-24.bin")
@@ -28,14 +29,15 @@ def test_real_packet_survives_decode_and_encode_byte_by_byte(name):
 
 
 @pytest.mark.parametrize("name", REAL)
-@pytest.mark.parametrize("layout", options.LAYOUTS, ids=lambda layout: layout.tag.name)
+@pytest.mark.parametrize("layout", options.LAYOUTS, ids=lambda layout: f"{layout.tag.name}-{layout.start}")
 def test_each_layout_reproduces_its_bytes_of_a_real_packet(name, layout):
     packet = navdata.decode(real(name))
     value = packet.read(layout)
     if value is None:
         return
     payload = dict(packet.options)[layout.tag]
-    assert layout.encode(value) == payload[: layout.size - 4]
+    own = slice(layout.start - 4, layout.size - 4)
+    assert layout.encode(value)[own] == payload[own]
 
 
 def test_full_packet_of_a_standing_drone():
@@ -46,7 +48,7 @@ def test_full_packet_of_a_standing_drone():
         "ACQ_THREAD", "COM_WATCHDOG",
     )  # fmt: skip
     assert [tag for tag, _ in packet.options] == list(range(28))
-    assert {tag: len(payload) + 4 for tag, payload in packet.options} == options.OPTION_SIZES["ar2-2.3"]
+    assert {tag: len(payload) + 4 for tag, payload in packet.options} == OPTION_SIZES["ar2-2.3"]
     demo = packet.read(options.DEMO)
     assert demo is not None
     assert split_control_state(demo.control_state) == (ControlState.LANDED, 0)
@@ -61,7 +63,7 @@ def test_full_packet_of_a_standing_drone():
     assert (raw.battery_mv, raw.accelerometers) == (11686, (2040, 2036, 2528))
     assert phys.accelerations_mg == pytest.approx((80.3, -33.3, -942.5), abs=0.05)
     altitude, pressure, magneto = (
-        packet.read(options.ALTITUDE), packet.read(options.PRESSURE_RAW), packet.read(options.MAGNETO)
+        packet.read(options.ALTITUDE), packet.read(ambient.PRESSURE_RAW), packet.read(ambient.MAGNETO)
     )  # fmt: skip
     assert altitude is not None and pressure is not None and magneto is not None
     assert altitude.raw_mm == 243
@@ -146,6 +148,9 @@ def test_float_arguments_of_the_sheet(value, bits):
         (at.comwdg(), b"AT*COMWDG=7\r"),
         (at.led(6, 2.0, 3), b"AT*LED=7,6,1073741824,3\r"),
         (at.anim(6, 5000), b"AT*ANIM=7,6,5000\r"),
+        (at.mtrim(0.1, -0.2, 0.0), b"AT*MTRIM=7,1036831949,-1102263091,0\r"),
+        (at.pmode(2), b"AT*PMODE=7,2\r"),
+        (at.misc(2, 20, 2000, 3000), b"AT*MISC=7,2,20,2000,3000\r"),
     ],
     ids=lambda value: value.name if isinstance(value, at.AtCommand) else "",
 )

@@ -177,6 +177,21 @@ def anim(animation: int, duration_ms: int) -> AtCommand:
     return AtCommand("ANIM", (animation, duration_ms))
 
 
+def mtrim(pitch: float, roll: float, yaw: float) -> AtCommand:
+    """Trim by hand; only with `control:manual_trim`."""
+    return AtCommand("MTRIM", (bits_from_float(pitch), bits_from_float(roll), bits_from_float(yaw)))
+
+
+def pmode(mode: int) -> AtCommand:
+    """Send what Parrot's programs begin with; its meaning is not documented."""
+    return AtCommand("PMODE", (mode,))
+
+
+def misc(*values: int) -> AtCommand:
+    """Send the four numbers that Parrot's programs send second; their meaning is not documented."""
+    return AtCommand("MISC", values)
+
+
 def encode(command: AtCommand, sequence: int) -> bytes:
     """Return one command line with its CR; raises WireError for strings that the grammar cannot carry."""
     arguments = "".join("," + _encode_argument(argument) for argument in command.arguments)

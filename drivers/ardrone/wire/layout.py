@@ -8,38 +8,61 @@ from typing import Any, Generic, TypeVar
 from drivers.ardrone.wire.errors import WireError
 
 Value = TypeVar("Value", bound=tuple[Any, ...])
+_HEAD = 4
 
 
 class Layout(Generic[Value]):
     """One option's number, value type and wire format.
 
     fields: one token per field of the value type in `struct` notation; a token with a count is a tuple field.
+    start: offset in the option, its 4-byte head included; beyond the head only newer firmwares have that part.
+    newer: only newer firmwares send it; exact: another size is another thing.
     """
 
-    def __init__(self, tag: IntEnum, value_type: type[Value], fields: str) -> None:
-        self.tag = tag
+    def __init__(
+        self,
+        tag: IntEnum,
+        value_type: type[Value],
+        fields: str,
+        *,
+        start: int = _HEAD,
+        newer: bool = False,
+        exact: bool = False,
+    ) -> None:
+        self.tag, self.start = tag, start
+        self._optional, self._exact = newer or exact or start > _HEAD, exact
         self._make: Any = value_type._make  # type: ignore[attr-defined]
         self._struct = struct.Struct("<" + fields.replace(" ", ""))
-        counts = [int(token[:-1] or 1) for token in fields.split()]
+        counts = [1 if token.endswith("s") else int(token[:-1] or 1) for token in fields.split()]
         ends = [sum(counts[: i + 1]) for i in range(len(counts))]
         self._slices = [(end - count, end, count) for end, count in zip(ends, counts, strict=True)]
         self._flat = len(counts) == ends[-1]
-        self.size = self._struct.size + 4
+        self._skip = start - _HEAD
+        self.size = start + self._struct.size
+
+    def is_in(self, payload: bytes) -> bool:
+        """Return whether a firmware that sent this payload knows the layout at all."""
+        if self._exact:
+            return len(payload) + _HEAD == self.size
+        return not self._optional or len(payload) + _HEAD >= self.size
 
     def decode(self, payload: bytes) -> Value:
-        """Return the value at the start of a payload (option without its 4-byte head); surplus is ignored.
+        """Return the value in a payload (option without its 4-byte head); surplus is ignored.
 
         Raises WireError (option_size) when the payload is shorter than this layout.
         """
-        if len(payload) < self._struct.size:
-            raise WireError("option_size", f"{self.tag.name} has {len(payload) + 4} bytes, {self.size} needed")
-        flat = self._struct.unpack_from(payload)
+        try:
+            flat = self._struct.unpack_from(payload, self._skip)
+        except struct.error:
+            raise WireError(
+                "option_size", f"{self.tag.name} has {len(payload) + _HEAD} bytes, {self.size} needed"
+            ) from None
         if self._flat:
             return self._make(flat)  # type: ignore[no-any-return]
         return self._make([flat[a:b] if n > 1 else flat[a] for a, b, n in self._slices])  # type: ignore[no-any-return]
 
     def encode(self, value: Value, size: int = 0) -> bytes:
-        """Return the payload, zero-filled to an option of `size` bytes (its head included).
+        """Return the payload, zero-filled to an option of `size` bytes (its head included) and before `start`.
 
         Raises WireError (value) when a field does not fit its type.
         """
@@ -47,7 +70,7 @@ class Layout(Generic[Value]):
         if not self._flat:
             flat = [item for field in value for item in (field if isinstance(field, tuple) else (field,))]
         try:
-            payload = self._struct.pack(*flat)
+            payload = bytes(self._skip) + self._struct.pack(*flat)
         except (struct.error, OverflowError) as error:
             raise WireError("value", f"{self.tag.name}: {error}") from error
-        return payload.ljust(size - 4, b"\0")
+        return payload.ljust(size - _HEAD, b"\0")

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.layout import Layout
-from drivers.ardrone.wire.options import Tag
+from drivers.ardrone.wire.tags import Tag
 
 MAGIC = 0x55667788
 MAX_SIZE = 4096  # WIRE: the SDK's receive buffer
@@ -37,13 +37,13 @@ class Navdata:
     magic: int = MAGIC
 
     def read(self, layout: Layout[Value]) -> Value | None:
-        """Return an option's value, or None when the packet does not carry it.
+        """Return an option's value, or None when the packet's firmware does not send it.
 
         Raises WireError (option_size) when it is there but shorter than the layout.
         """
         for tag, payload in self.options:
             if tag == layout.tag:
-                return layout.decode(payload)
+                return layout.decode(payload) if layout.is_in(payload) else None
         return None
 
 

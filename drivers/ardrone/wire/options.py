@@ -1,51 +1,21 @@
-"""Layouts of the navdata options, as one table of formats.
+"""Layouts of the navdata options of flight, and the table of all layouts.
 
-A layout covers the part of an option that all known firmwares share; what follows is surplus on decode and zeros on
-encode. WIRE: offsets from the Parrot SDK 2.0.1 headers, units from recordings of real drones (AR.Drone sheet 4.4).
+A layout covers the part of an option that all firmwares which send it share; what only newer ones append is a layout
+of its own, which reads as None where it is missing. Surplus is ignored on decode and zero on encode.
+
+WIRE: offsets from the Parrot SDK 2.0.1 headers, units from recordings of real drones (AR.Drone sheet 4.4).
 """
 
-from enum import IntEnum
 from typing import Any, NamedTuple
 
+from drivers.ardrone.wire.ambient import AMBIENT_LAYOUTS
 from drivers.ardrone.wire.layout import Layout
+from drivers.ardrone.wire.tags import Tag
+from drivers.ardrone.wire.vision import VISION_LAYOUTS
 
 Triple = tuple[float, float, float]
 Quad = tuple[int, int, int, int]
 _ZEROS: Triple = (0.0, 0.0, 0.0)
-
-
-class Tag(IntEnum):
-    """Numbers of the options, in their order on the wire."""
-
-    DEMO = 0
-    TIME = 1
-    RAW_MEASURES = 2
-    PHYS_MEASURES = 3
-    GYROS_OFFSETS = 4
-    EULER_ANGLES = 5
-    REFERENCES = 6
-    TRIMS = 7
-    RC_REFERENCES = 8
-    PWM = 9
-    ALTITUDE = 10
-    VISION_RAW = 11
-    VISION_OF = 12
-    VISION = 13
-    VISION_PERF = 14
-    TRACKERS_SEND = 15
-    VISION_DETECT = 16
-    WATCHDOG = 17
-    ADC_DATA_FRAME = 18
-    VIDEO_STREAM = 19
-    GAMES = 20
-    PRESSURE_RAW = 21
-    MAGNETO = 22
-    WIND = 23
-    KALMAN_PRESSURE = 24
-    HDVIDEO_STREAM = 25
-    WIFI = 26
-    GPS = 27
-    CHECKSUM = 0xFFFF
 
 
 class Demo(NamedTuple):
@@ -178,120 +148,78 @@ class Altitude(NamedTuple):
     estimator_state: int = 0
 
 
-class VisionDetect(NamedTuple):
-    """Up to four tags: picture position 0..1000, distance [cm], orientation [deg]."""
+class DemoDetection(NamedTuple):
+    """The end of DEMO: pose of a tag seen by the bottom camera (deprecated), camera type 3 when there is none."""
 
-    detected: int = 0
-    types: Quad = (0, 0, 0, 0)
-    x: Quad = (0, 0, 0, 0)
-    y: Quad = (0, 0, 0, 0)
-    width: Quad = (0, 0, 0, 0)
-    height: Quad = (0, 0, 0, 0)
-    distance_cm: Quad = (0, 0, 0, 0)
-
-
-class PressureRaw(NamedTuple):
-    """Barometer: counts, temperature [0.1 degC], pressure [Pa]."""
-
-    pressure_lsb: int = 0
-    temperature_lsb: int = 0
-    temperature_decidegree: int = 250
-    pressure_pa: int = 101325
+    camera_rotation: tuple[float, ...] = (0.0,) * 9
+    camera_translation: Triple = _ZEROS
+    tag_index: int = 0
+    camera_type: int = 3
+    drone_camera_rotation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    drone_camera_translation: Triple = _ZEROS
 
 
-class Magneto(NamedTuple):
-    """Magnetometer counts, fields [mG] and headings [deg, clockwise]; heading_fusion equals DEMO psi / 1000."""
+class RawEchoes(NamedTuple):
+    """AR.Drone 2: the end of RAW_MEASURES; altitude by ultrasound [mm]."""
 
-    counts: tuple[int, int, int] = (0, 0, 0)
-    raw_mg: Triple = _ZEROS
-    rectified_mg: Triple = _ZEROS
-    offset_mg: Triple = _ZEROS
-    heading_deg: float = 0.0
-    heading_gyro_deg: float = 0.0
-    heading_fusion_deg: float = 0.0
-    calibrated: int = 1
-    state: int = 0
-    radius_mg: float = 0.0
-    error_mean: float = 0.0
-    error_variance: float = 0.0
+    echoes: int = 0
+    echo_sum: int = 0
+    altitude_mm: int = 0
+    gradient: int = 0
 
 
-class Wind(NamedTuple):
-    """Wind estimate and the compensation angles made of it."""
+class SpeedReferences(NamedTuple):
+    """AR.Drone 2: velocity references [mm/s], and the last PCMD as it was understood with its sequence number."""
 
-    speed_m_s: float = 0.0
-    angle: float = 0.0
-    theta_compensation_rad: float = 0.0
-    phi_compensation_rad: float = 0.0
+    vx_mm_s: float = 0.0
+    vy_mm_s: float = 0.0
+    theta_model_rad: float = 0.0
+    phi_model_rad: float = 0.0
+    gain_x: float = 0.0
+    gain_y: float = 0.0
+    mode: int = 0
+    time: float = 0.0
+    theta: float = 0.0
+    phi: float = 0.0
+    psi: float = 0.0
+    psi_accuracy: float = 0.0
+    sequence: int = 0
 
 
-class Wifi(NamedTuple):
-    """Link quality as raw bits."""
+class RcReferences(NamedTuple):
+    """References of a radio control."""
 
-    link_quality: int = 0
+    pitch: int = 0
+    roll: int = 0
+    yaw: int = 0
+    climb: int = 0
+    agility: int = 0
+
+
+class PwmAltitude(NamedTuple):
+    """AR.Drone 2: terms of the altitude controller."""
+
+    proportional: float = 0.0
+    derivative: float = 0.0
 
 
 DEMO = Layout(Tag.DEMO, Demo, "I I f f f i f f f I")
+DEMO_DETECTION = Layout(Tag.DEMO, DemoDetection, "9f 3f I I 9f 3f", start=44)
 TIME = Layout(Tag.TIME, Time, "I")
 RAW_MEASURES = Layout(Tag.RAW_MEASURES, RawMeasures, "3H 3h 2h I H H H H H H H H")
+RAW_ECHOES = Layout(Tag.RAW_MEASURES, RawEchoes, "H I i h", start=40)
 PHYS_MEASURES = Layout(Tag.PHYS_MEASURES, PhysMeasures, "f H 3f 3f I I I")
 GYROS_OFFSETS = Layout(Tag.GYROS_OFFSETS, GyrosOffsets, "3f")
 EULER_ANGLES = Layout(Tag.EULER_ANGLES, EulerAngles, "f f")
 REFERENCES = Layout(Tag.REFERENCES, References, "i i i i i i i i")
+SPEED_REFERENCES = Layout(Tag.REFERENCES, SpeedReferences, "f f f f f f I f f f f f i", start=36)
 TRIMS = Layout(Tag.TRIMS, Trims, "f f f")
+RC_REFERENCES = Layout(Tag.RC_REFERENCES, RcReferences, "i i i i i")
 PWM = Layout(Tag.PWM, Pwm, "4B 4B f f f f i i i f i i i f 4H")
+PWM_ALTITUDE = Layout(Tag.PWM, PwmAltitude, "f f", start=68)
 ALTITUDE = Layout(Tag.ALTITUDE, Altitude, "i f i i f f 3f I 2f I")
-VISION_DETECT = Layout(Tag.VISION_DETECT, VisionDetect, "I 4I 4I 4I 4I 4I 4I")
-PRESSURE_RAW = Layout(Tag.PRESSURE_RAW, PressureRaw, "i h i i")
-MAGNETO = Layout(Tag.MAGNETO, Magneto, "3h 3f 3f 3f f f f B I f f f")
-WIND = Layout(Tag.WIND, Wind, "f f f f")
-WIFI = Layout(Tag.WIFI, Wifi, "I")
 
 LAYOUTS: tuple[Layout[Any], ...] = (
-    DEMO, TIME, RAW_MEASURES, PHYS_MEASURES, GYROS_OFFSETS, EULER_ANGLES, REFERENCES, TRIMS,
-    PWM, ALTITUDE, VISION_DETECT, PRESSURE_RAW, MAGNETO, WIND, WIFI,
+    DEMO, DEMO_DETECTION, TIME, RAW_MEASURES, RAW_ECHOES, PHYS_MEASURES, GYROS_OFFSETS, EULER_ANGLES, REFERENCES,
+    SPEED_REFERENCES, TRIMS, RC_REFERENCES, PWM, PWM_ALTITUDE, ALTITUDE, *VISION_LAYOUTS, *AMBIENT_LAYOUTS,
 )  # fmt: skip
-
-# Sizes with the 4-byte head (AR.Drone sheet 4.3). Decoders must not rely on them: they differ between firmwares.
-_AR2_2_3 = dict(
-    zip(
-        range(28),
-        (
-            148,
-            8,
-            52,
-            46,
-            16,
-            12,
-            88,
-            16,
-            24,
-            76,
-            56,
-            16,
-            44,
-            92,
-            108,
-            364,
-            328,
-            8,
-            40,
-            65,
-            12,
-            18,
-            75,
-            56,
-            72,
-            32,
-            8,
-            12,
-        ),
-        strict=True,
-    )
-)
-_AR1_1_7 = {tag: size for tag, size in _AR2_2_3.items() if tag <= Tag.GAMES} | {2: 40, 6: 36, 9: 68, 16: 120, 19: 29}
-OPTION_SIZES: dict[str, dict[int, int]] = {
-    "ar1-1.7": _AR1_1_7,
-    "ar2-2.3": _AR2_2_3,
-    "ar2-2.4.8": _AR2_2_3 | {9: 92, 22: 83, 23: 64, 27: 216},
-}

@@ -38,7 +38,7 @@ class Tag(IntEnum):
 
 
 # WIRE: sizes with the 4-byte head (AR.Drone sheet 4.3). Decoders must not rely on them: they differ between firmwares.
-_AR2_2_3 = {
+_AR2_2_3: dict[int, int] = {
     Tag.DEMO: 148, Tag.TIME: 8, Tag.RAW_MEASURES: 52, Tag.PHYS_MEASURES: 46, Tag.GYROS_OFFSETS: 16,
     Tag.EULER_ANGLES: 12, Tag.REFERENCES: 88, Tag.TRIMS: 16, Tag.RC_REFERENCES: 24, Tag.PWM: 76, Tag.ALTITUDE: 56,
     Tag.VISION_RAW: 16, Tag.VISION_OF: 44, Tag.VISION: 92, Tag.VISION_PERF: 108, Tag.TRACKERS_SEND: 364,

@@ -8,23 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from drivers.camera import convert
+from drivers.camera import convert, jpeg
 from drivers.camera.attitudes import AttitudeHistory
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.pose import Gravity
 from drivers.camera.settings import CameraDriverSettings, MarkerKind
-from drivers.camera.source import FrameSource, Packet, open_source
+from drivers.camera.sources.frames import FrameSource, Grey, Packet, Unit
+from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
 from groundstation.bus import clock
 from groundstation.bus.messages import CameraStatus, Odometry, Severity
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, VIDEO
 from groundstation.errors import SettingsError
 from groundstation.process.child import Child
 
 _log = logging.getLogger(__name__)
 _POLL_S = 0.02
 _STATUS_PERIOD_NS = 500_000_000
-_JPEG_END = b"\xff\xd9"
 _LEVEL = (0.0, 0.0)
 
 
@@ -36,7 +36,8 @@ def run(child: Child) -> int:
         problems = [f"camera: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
         raise SettingsError(problems) from None
     cv2.setNumThreads(1)
-    source = open_source(settings.source)
+    lens = settings.calibration
+    source = open_source(settings.source, (lens.width_px, lens.height_px))
     try:
         driver = CameraDriver(child, settings, source)
         while not child.stop_requested and child.supervisor_alive:
@@ -55,6 +56,7 @@ class CameraDriver:
     def __init__(self, child: Child, settings: CameraDriverSettings, source: FrameSource) -> None:
         self._child, self._settings, self._source = child, settings, source
         self._intrinsics = settings.calibration.intrinsics()
+        self._delay_ns = round(settings.video_delay_ms * clock.NS_PER_MS)
         self._pipeline = Pipeline(
             self._intrinsics,
             settings.expected_markers,
@@ -80,6 +82,7 @@ class CameraDriver:
     def turn(self) -> None:
         """Wait shortly for a picture, handle it, and keep up heartbeat, status and stream watch."""
         packet = self._source.take_newest(_POLL_S)
+        self._publish_video()
         self._read_attitudes()
         if packet is not None:
             self._handle(packet)
@@ -106,7 +109,7 @@ class CameraDriver:
                     self._attitudes.add(header.entity, header.stamp_ns, message.roll_rad, message.pitch_rad)
 
     def _handle(self, packet: Packet) -> None:
-        exposure_ns = packet.arrival_ns - round(self._settings.video_delay_ms * clock.NS_PER_MS)
+        exposure_ns = self._exposed(packet)
         picture = self._decoded(packet)
         if picture is None:
             return
@@ -122,22 +125,34 @@ class CameraDriver:
             return
         self._processed += 1
 
-    def _decoded(self, packet: Packet) -> NDArray[np.uint8] | None:
+    def _exposed(self, taken: Packet | Unit) -> int:
+        """Return when a picture was exposed: the calibrated delay before it came, or would have come usually [ns]."""
+        return min(taken.settled_ns - self._delay_ns, taken.arrival_ns)
+
+    def _decoded(self, packet: Packet) -> Grey | None:
         """Return the grey picture, or None when it is damaged or not of the calibrated size."""
-        whole = packet.data.rstrip(b"\r\n\x00").endswith(_JPEG_END)
-        picture = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if whole else None
-        if picture is None:
+        if packet.picture is not None:
+            picture = packet.picture.grey()
+            return picture if self._has_size(picture.shape[1], picture.shape[0], packet) else None
+        size = jpeg.size_of(packet.data)
+        if size is not None and not self._has_size(*size, packet):
+            return None
+        decoded = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if size else None
+        if decoded is None:
             self.counts["jpeg"] += 1
             return None
-        height, width = picture.shape
+        return np.asarray(decoded, dtype=np.uint8)
+
+    def _has_size(self, width: int, height: int, packet: Packet) -> bool:
+        """Return whether a picture has the calibrated size; one that has not is refused by name."""
         wanted = self._intrinsics
-        if (width, height) != (wanted.width_px, wanted.height_px):
-            self.counts["size"] += 1
-            reason = f"its pictures are {width}x{height}, its calibration is for {wanted.width_px}x{wanted.height_px}"
-            if self._watch.refused(reason, packet.arrival_ns):
-                self._announce()
-            return None
-        return np.asarray(picture, dtype=np.uint8)
+        if (width, height) == (wanted.width_px, wanted.height_px):
+            return True
+        self.counts["size"] += 1
+        reason = f"its pictures are {width}x{height}, its calibration is for {wanted.width_px}x{wanted.height_px}"
+        if self._watch.refused(reason, packet.arrival_ns):
+            self._announce()
+        return False
 
     def _observe(self, picture: NDArray[np.uint8], exposure_ns: int) -> None:
         settings = self._settings
@@ -156,14 +171,22 @@ class CameraDriver:
             self._detections += 1
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
-        """Pass the JPEG on as it came, at most `image_fps` times a second."""
+        """Pass a JPEG on, at most `image_fps` times a second: as it came, or made of what was decoded."""
         if self._settings.image_fps <= 0.0 or exposure_ns < self._next_image_ns:
             return
         period_ns = round(clock.NS_PER_S / self._settings.image_fps)
         # On the grid of the rate, so that 15 fps thin out to 5 and not to every fourth; anew after a pause.
         on_grid = exposure_ns - self._next_image_ns < period_ns
         self._next_image_ns = (self._next_image_ns if on_grid else exposure_ns) + period_ns
-        self._child.bus.publish_bytes(IMAGE, self._child.bus.header(self._settings.name, exposure_ns), packet.data)
+        data = packet.data or (packet.picture.jpeg() if packet.picture is not None else b"")
+        self._child.bus.publish_bytes(IMAGE, self._child.bus.header(self._settings.name, exposure_ns), data)
+
+    def _publish_video(self) -> None:
+        """Pass H.264 on as it came and all of it, for the recording: each picture needs those before it."""
+        for unit in self._source.take_video():
+            if self._settings.image_fps > 0.0:
+                header = self._child.bus.header(self._settings.name, self._exposed(unit))
+                self._child.bus.publish_bytes(VIDEO, header, unit.data)
 
     def _announce(self) -> None:
         """Tell lifecycle and operator what the stream does now."""

@@ -53,6 +53,7 @@ PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE)
 CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE)
 JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK)
 IMAGE = Topic("image", None, 5, Quality.BULK, encoding="image/jpeg")
+VIDEO = Topic("video", None, 30, Quality.BULK, encoding="video/h264")
 RAW_RX = Topic("raw_rx", None, 200, Quality.BULK, encoding="application/octet-stream")
 RAW_TX = Topic("raw_tx", None, 30, Quality.BULK, encoding="application/octet-stream")
 TRUTH = Topic("state", m.TruthState, 50, Quality.STATE, Plane.TRUTH)
@@ -80,6 +81,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         CLOCK,
         JOURNAL,
         IMAGE,
+        VIDEO,
         RAW_RX,
         RAW_TX,
         TRUTH,

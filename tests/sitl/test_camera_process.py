@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from drivers.camera.source import MjpegSource
+from drivers.camera.sources.opening import open_source
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from sim_bridge.render.process import run
@@ -51,7 +51,7 @@ def rendering(**scenario):
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=run, args=(make_spec(name, port, **scenario),))
     process.start()
-    source = MjpegSource(f"http://127.0.0.1:{port}/video.mjpg")
+    source = open_source(f"http://127.0.0.1:{port}/video.mjpg")
     try:
         yield truth, source, process
     finally:

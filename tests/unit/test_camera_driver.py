@@ -11,7 +11,7 @@ import pytest
 from drivers.camera import driver
 from drivers.camera.attitudes import AttitudeHistory
 from drivers.camera.settings import CameraDriverSettings
-from drivers.camera.source import Packet
+from drivers.camera.sources.frames import Packet
 from drivers.camera.stream_watch import StreamState, StreamWatch
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -57,10 +57,14 @@ class FakeSource:
 
     def push(self, data, arrival_ns=None):
         self.received += 1
-        self.packets.append(Packet(data, arrival_ns or clock.now_ns(), self.received))
+        arrival_ns = arrival_ns or clock.now_ns()
+        self.packets.append(Packet(data, arrival_ns, arrival_ns, self.received))
 
     def take_newest(self, timeout_s):
         return self.packets.popleft() if self.packets else None
+
+    def take_video(self):
+        return []
 
     def close(self):
         pass

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from drivers.camera.source import MjpegSource, open_source
+from drivers.camera.sources.opening import open_source
 from groundstation.errors import DriverError
 from sim_bridge.devices.camera_stream import CameraStream
 
@@ -103,7 +103,7 @@ def test_a_cut_ends_clients_and_refuses_new_ones_until_it_heals():
 
 @contextmanager
 def reading(port):
-    source = MjpegSource(f"http://127.0.0.1:{port}/video.mjpg")
+    source = open_source(f"http://127.0.0.1:{port}/video.mjpg")
     try:
         yield source
     finally:
@@ -172,7 +172,9 @@ def test_an_absent_camera_is_named():
         wait_for(lambda: f"127.0.0.1:{port}" in source.detail and "refused" in source.detail)
 
 
-@pytest.mark.parametrize("url", ["rtsp://127.0.0.1/x", "http:///nohost", "/dev/video0", "http://host:port/x"])
+@pytest.mark.parametrize(
+    "url", ["webcam", "ftp://127.0.0.1/x", "http:///nohost", "http://host:port/x", "ardrone://", "rtsp://h ost/x"]
+)
 def test_unknown_sources_are_refused_at_once(url):
     with pytest.raises(DriverError, match="camera source"):
         open_source(url)

@@ -1,0 +1,125 @@
+"""What ffmpeg opens for us: network cameras by RTSP, and the devices of this machine.
+
+The reader hands over packets as they come, H.264 and JPEG as received; nothing is decoded here.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+
+import av
+
+from drivers.camera.sources.drain import Decoder, Drain
+from drivers.camera.sources.frames import Unit
+from drivers.camera.sources.h264 import H264Decoder
+from drivers.camera.sources.raw import RawDecoder
+from drivers.camera.sources.settled import SettledClock
+from groundstation.bus import clock
+from groundstation.errors import DriverError
+
+_OPEN_LIMIT_S = 5.0
+_READ_LIMIT_S = 2.0
+_SEQUENCE_PARAMETERS = 7
+Choice = Mapping[str, str]
+
+
+class ContainerReader:
+    """Reads the first video stream of an address; `choices`: options of ffmpeg, the first set that works is taken."""
+
+    def __init__(self, address: str, name: str, choices: tuple[Choice, ...], form: str | None = None) -> None:
+        self.name = name
+        self.rejected: Counter[str] = Counter()
+        self.decoder: Decoder | None = None
+        self._address, self._choices, self._form = address, choices, form
+
+    def interrupt(self) -> None:
+        """Do nothing: every read ends by itself within 2 s."""
+
+    def read(self, drain: Drain) -> None:
+        """Hand over packets until told to stop."""
+        with self._open() as container:
+            stream = next(iter(container.streams.video), None)
+            if stream is None:
+                raise DriverError("there is no video in it")
+            prepared = self._prepare(stream)
+            drain.opened()
+            settled = SettledClock()
+            try:
+                for packet in container.demux(stream):
+                    if drain.closing:
+                        return
+                    drain.keep(_units(packet, prepared, settled))
+            except av.FFmpegError as error:
+                raise DriverError(error.strerror or str(error)) from None
+        raise DriverError("the camera closed the stream")
+
+    def _open(self) -> "av.container.InputContainer":
+        trouble = ""
+        for choice in self._choices:
+            try:
+                return av.open(
+                    self._address, format=self._form, options=dict(choice), timeout=(_OPEN_LIMIT_S, _READ_LIMIT_S)
+                )
+            except (av.FFmpegError, ValueError) as error:
+                trouble = getattr(error, "strerror", None) or str(error)
+        raise DriverError(trouble)
+
+    def _prepare(self, stream: av.VideoStream) -> Callable[[bytes, bool], bytes]:
+        codec = stream.codec_context
+        match codec.name:
+            case "h264":
+                self.decoder = H264Decoder(self.rejected)
+                parameters = codec.extradata or b""
+                return lambda data, is_key: parameters + data if is_key and not has_parameters(data) else data
+            case "mjpeg":
+                self.decoder = None
+            case "rawvideo" if codec.pix_fmt is not None:
+                self.decoder = RawDecoder(codec.pix_fmt, codec.width, codec.height)
+            case other:
+                raise DriverError(f"its video is {other}: only H.264, MJPEG and raw pictures are read")
+        return lambda data, _: data
+
+
+def _units(
+    packet: "av.Packet[av.VideoStream]", prepared: Callable[[bytes, bool], bytes], settled: SettledClock
+) -> list[Unit]:
+    if packet.size == 0:
+        return []
+    arrival_ns = clock.now_ns()
+    settled_ns = arrival_ns
+    if packet.pts is not None and packet.time_base is not None:
+        (settled_ns,) = settled.settle([round(packet.pts * packet.time_base * clock.NS_PER_S)], arrival_ns)
+    data = prepared(bytes(packet), packet.is_keyframe)
+    return [Unit(data, arrival_ns, settled_ns, starts=packet.is_keyframe, follows=not packet.is_corrupt)]
+
+
+def has_parameters(data: bytes) -> bool:
+    """Return whether an access unit (Annex B) begins with its own sequence parameters, as a decoder needs them."""
+    start = data.find(b"\x00\x00\x01")
+    while 0 <= start < len(data) - 3:
+        if data[start + 3] & 0x1F == _SEQUENCE_PARAMETERS:
+            return True
+        if data[start + 3] & 0x1F in (1, 5):  # the picture itself
+            return False
+        start = data.find(b"\x00\x00\x01", start + 3)
+    return False
+
+
+def rtsp(url: str, name: str) -> ContainerReader:
+    """Return the reader of a network camera: over TCP, for lost packets tear pictures, and without ffmpeg's buffers."""
+    options = {
+        "rtsp_transport": "tcp",
+        "fflags": "nobuffer",
+        "flags": "low_delay",
+        "max_delay": "0",
+        "reorder_queue_size": "0",
+        "probesize": "500000",
+        "analyzeduration": "0",
+    }
+    return ContainerReader(url, name, (options,))
+
+
+def device(path: str, size: tuple[int, int] | None) -> ContainerReader:
+    """Return the reader of a V4L2 device, asked for pictures of the calibrated size; JPEGs before raw pictures."""
+    wanted = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
+    choices: tuple[Choice, ...] = ({"input_format": "mjpeg", **wanted}, wanted, {})
+    return ContainerReader(path, path, choices, form="v4l2")

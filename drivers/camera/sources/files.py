@@ -1,0 +1,78 @@
+"""Pictures from the disk at the pace of a camera: a video file, or a folder of pictures."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+
+from drivers.camera.sources.drain import Decoder, Drain, EndOfStreamError
+from drivers.camera.sources.frames import Matrix, Picture, Unit
+from drivers.camera.sources.h264 import VideoPicture
+from drivers.camera.sources.raw import Decoded
+from groundstation.bus import clock
+from groundstation.errors import DriverError
+
+_FOLDER_FPS = 5.0
+_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp"})
+
+
+class FileReader:
+    """Plays a video file at its own frame rate, or the pictures of a folder by name at 5 a second; once."""
+
+    def __init__(self, path: str) -> None:
+        self._path = Path(path)
+        self.name = self._path.name
+        self.rejected: Counter[str] = Counter()
+        self.decoder: Decoder | None = Decoded()
+
+    def interrupt(self) -> None:
+        """Do nothing: a file never keeps its reader waiting."""
+
+    def read(self, drain: Drain) -> None:
+        """Hand over pictures, each when it is due; raises EndOfStreamError after the last."""
+        if not self._path.exists():
+            raise DriverError("there is no such file or folder")
+        pictures = self._folder() if self._path.is_dir() else self._video()
+        start_ns, count = clock.now_ns(), 0
+        for due_s, picture in pictures:
+            due_ns = start_ns + round(due_s * clock.NS_PER_S)
+            if drain.wait(max(0.0, (due_ns - clock.now_ns()) / clock.NS_PER_S)):
+                return
+            drain.opened()
+            drain.keep([Unit(b"", clock.now_ns(), due_ns, picture=picture)])
+            count += 1
+        if not count:
+            raise DriverError("there is no picture in it")
+        raise EndOfStreamError(f"ended after {count} pictures")
+
+    def _folder(self) -> Iterator[tuple[float, Picture]]:
+        paths = sorted(path for path in self._path.iterdir() if path.suffix.lower() in _SUFFIXES)
+        shown = 0
+        for path in paths:
+            try:
+                pixels = cv2.imread(str(path), cv2.IMREAD_COLOR)
+            except cv2.error:  # one that claims to be huge
+                pixels = None
+            if pixels is None:
+                self.rejected["unreadable"] += 1
+                continue
+            yield shown / _FOLDER_FPS, Matrix(np.asarray(pixels, dtype=np.uint8))
+            shown += 1
+
+    def _video(self) -> Iterator[tuple[float, Picture]]:
+        try:
+            with av.open(str(self._path)) as container:
+                stream = next(iter(container.streams.video), None)
+                if stream is None:
+                    raise DriverError("there is no video in it")
+                stream.codec_context.thread_count = 1
+                first_s: float | None = None
+                for index, frame in enumerate(container.decode(stream)):
+                    shown_s = frame.time if frame.time is not None else index / float(stream.average_rate or 25)
+                    first_s = shown_s if first_s is None else first_s
+                    yield shown_s - first_s, VideoPicture(frame)
+        except (av.FFmpegError, ValueError) as error:
+            raise DriverError(getattr(error, "strerror", None) or str(error)) from None

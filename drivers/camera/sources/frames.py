@@ -1,0 +1,98 @@
+"""What a source hands to the camera driver, and the seam that all kinds of sources share."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Grey = NDArray[np.uint8]
+_JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
+JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
+
+
+class Picture(Protocol):
+    """A picture that a source had to decode itself."""
+
+    def grey(self) -> Grey:
+        """Return its brightness (h, w)."""
+
+    def jpeg(self) -> bytes:
+        """Return it for eyes, in colour where it has any."""
+
+
+@dataclass(frozen=True, slots=True)
+class Matrix:
+    """A picture that is an OpenCV array, (h, w) or (h, w, 3) BGR."""
+
+    pixels: NDArray[np.uint8]
+
+    def grey(self) -> Grey:
+        """Return its brightness (h, w)."""
+        if self.pixels.ndim == 2:
+            return self.pixels
+        return np.asarray(cv2.cvtColor(self.pixels, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+    def jpeg(self) -> bytes:
+        """Return it compressed for eyes."""
+        return cv2.imencode(".jpg", self.pixels, _JPEG_QUALITY)[1].tobytes()
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """One compressed picture as it came, with its arrival [ns, boot clock].
+
+    settled_ns: when it would have come with the link's usual delay, where the stream tells times of its own; else the
+    arrival. starts: a decoder can begin here; follows: nothing is missing between its predecessor and it; picture:
+    where the reader has decoded it already.
+    """
+
+    data: bytes
+    arrival_ns: int
+    settled_ns: int
+    starts: bool = True
+    follows: bool = True
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """The newest picture of a source and its number in the stream; times as in `Unit`.
+
+    data: the JPEG as it came (empty: the source sends none); picture: given where the source decodes itself.
+    """
+
+    data: bytes
+    arrival_ns: int
+    settled_ns: int
+    number: int
+    picture: Picture | None = None
+
+
+class FrameSource(Protocol):
+    """Anything that delivers pictures, the newest first and only."""
+
+    rejected: Counter[str]
+
+    @property
+    def connected(self) -> bool:
+        """Return whether the source can deliver at the moment."""
+
+    @property
+    def detail(self) -> str:
+        """Return what is wrong when it cannot."""
+
+    @property
+    def received(self) -> int:
+        """Return how many pictures have arrived, taken or not."""
+
+    def take_newest(self, timeout_s: float) -> Packet | None:
+        """Return the newest picture not yet taken, waiting for one at most that long."""
+
+    def take_video(self) -> list[Unit]:
+        """Return the H.264 access units that came up to the picture taken last, as received; a JPEG source has none."""
+
+    def close(self) -> None:
+        """Stop reading; idempotent."""

@@ -1,0 +1,91 @@
+"""H.264 access units to pictures: from the newest key picture on, never across a gap."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import av
+import cv2
+import numpy as np
+from av.codec.context import Flags
+
+from drivers.camera.sources.frames import Grey, Picture, Unit
+
+# Larger than any camera that we know; ffmpeg refuses a stream that claims more before it takes the memory.
+_MOST_PIXELS = 4096 * 2304
+# Formats whose first plane is the brightness.
+_PLANAR = ("gray", "yuv4", "yuvj4", "nv12", "nv21")
+_JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
+
+
+@dataclass(frozen=True, slots=True)
+class VideoPicture:
+    """A picture of a video stream."""
+
+    frame: av.VideoFrame
+
+    def grey(self) -> Grey:
+        """Return its brightness (h, w) as the stream carries it."""
+        if not self.frame.format.name.startswith(_PLANAR):
+            return np.asarray(self.frame.to_ndarray(format="gray"), dtype=np.uint8)
+        plane = self.frame.planes[0]
+        rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+        return np.ascontiguousarray(rows[:, : plane.width])
+
+    def jpeg(self) -> bytes:
+        """Return it in colour, compressed for eyes."""
+        return cv2.imencode(".jpg", self.frame.to_ndarray(format="bgr24"), _JPEG_QUALITY)[1].tobytes()
+
+
+class H264Decoder:
+    """Decodes one stream (Annex B, parameter sets in the key pictures); `rejected` is the source's count."""
+
+    needs_all = True
+
+    def __init__(self, rejected: Counter[str]) -> None:
+        self.rejected = rejected
+        self._codec = _codec()
+        self._waiting = True
+
+    def newest(self, units: Sequence[Unit]) -> tuple[Unit, Picture] | None:
+        """Return the newest picture that can be decoded of these units, or None."""
+        found: tuple[Unit, Picture] | None = None
+        for unit in units[_newest_start(units) :]:
+            if unit.starts:
+                self._waiting = False
+            elif not unit.follows:
+                self._waiting = True
+            if self._waiting:
+                self.rejected["before_key_picture"] += 1
+                continue
+            frame = self._decode(unit)
+            if frame is not None:
+                found = unit, VideoPicture(frame)
+        return found
+
+    def _decode(self, unit: Unit) -> av.VideoFrame | None:
+        try:
+            frames = self._codec.decode(av.Packet(unit.data))
+            if not frames:
+                return None
+            if not frames[-1].is_corrupt:
+                return frames[-1]
+        except (av.FFmpegError, ValueError):
+            pass
+        # What follows refers to a picture that is not there: begin again at the next one that refers to none.
+        self.rejected["h264"] += 1
+        self._codec, self._waiting = _codec(), True
+        return None
+
+
+def _newest_start(units: Sequence[Unit]) -> int:
+    return max((index for index, unit in enumerate(units) if unit.starts), default=0)
+
+
+def _codec() -> av.VideoCodecContext:
+    codec = av.CodecContext.create("h264", "r")
+    assert isinstance(codec, av.VideoCodecContext)
+    codec.thread_count = 1
+    codec.flags |= Flags.low_delay
+    codec.options = {"max_pixels": str(_MOST_PIXELS)}
+    return codec

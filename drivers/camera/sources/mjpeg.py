@@ -1,0 +1,65 @@
+"""MJPEG over HTTP, as network cameras send it (`http://host:port/path`)."""
+
+import socket
+from collections import Counter
+
+from drivers.camera.multipart import MultipartParser, boundary_from_head
+from drivers.camera.sources.drain import Decoder, Drain
+from drivers.camera.sources.frames import Unit
+from drivers.camera.sources.tcp import Line
+from groundstation.bus import clock
+from groundstation.errors import DriverError
+
+_READ_BYTES = 1 << 16
+_MAX_HEAD_BYTES = 8192
+
+
+class MjpegReader:
+    """Asks for a stream and cuts it into JPEGs."""
+
+    decoder: Decoder | None = None
+
+    def __init__(self, host: str, port: int, path: str) -> None:
+        self._line = Line(host, port)
+        self._path = path
+        self.name = self._line.name
+        self.rejected: Counter[str] = Counter()
+
+    def interrupt(self) -> None:
+        """Make `read` return."""
+        self._line.interrupt()
+
+    def read(self, drain: Drain) -> None:
+        """Hand over pictures until told to stop."""
+        with self._line.open() as connection:
+            request = f"GET {self._path} HTTP/1.0\r\nHost: {self.name}\r\nAccept: multipart/x-mixed-replace\r\n\r\n"
+            connection.sendall(request.encode("ascii", "replace"))
+            boundary, data = _read_head(connection)
+            parser = MultipartParser(boundary)
+            drain.opened()
+            while not drain.closing:
+                arrival_ns = clock.now_ns()
+                drain.keep([Unit(jpeg, arrival_ns, arrival_ns) for jpeg in parser.feed(data)])
+                self.rejected["multipart"] += parser.rejected
+                parser.rejected = 0
+                data = connection.recv(_READ_BYTES)
+                if not data:
+                    raise DriverError("the camera closed the stream")
+
+
+def _read_head(connection: socket.socket) -> tuple[bytes, bytes]:
+    """Return the boundary and what follows the response head; raises DriverError when it is no MJPEG stream."""
+    head = b""
+    while b"\r\n\r\n" not in head:
+        data = connection.recv(4096)
+        if not data or len(head) > _MAX_HEAD_BYTES:
+            raise DriverError("no HTTP answer")
+        head += data
+    head, rest = head.split(b"\r\n\r\n", 1)
+    status = head.split(b"\r\n", 1)[0].split()
+    if len(status) < 2 or not status[0].startswith(b"HTTP/") or status[1] != b"200":
+        raise DriverError(f"the camera answered {b' '.join(status[:3]).decode('ascii', 'replace')!r}")
+    boundary = boundary_from_head(head)
+    if not boundary:
+        raise DriverError("the answer is no multipart stream")
+    return boundary, rest

@@ -1,0 +1,35 @@
+"""From a source's address to its reader."""
+
+from drivers.camera.settings import SourceAddress, SourceKind, parse_source
+from drivers.camera.sources.ardrone import ArDroneReader
+from drivers.camera.sources.container import device, rtsp
+from drivers.camera.sources.drain import Drain, Reader
+from drivers.camera.sources.files import FileReader
+from drivers.camera.sources.frames import FrameSource
+from drivers.camera.sources.mjpeg import MjpegReader
+from groundstation.errors import DriverError
+
+
+def open_source(source: str, size: tuple[int, int] | None = None) -> FrameSource:
+    """Return the reader of a source, already at work; raises DriverError for an address of no known kind.
+
+    size: (width, height) [px] that a camera of this machine is asked for; others send what they are set to.
+    """
+    try:
+        return Drain(_reader(parse_source(source), source, size))
+    except ValueError as error:
+        raise DriverError(f"camera source {source}: {error}") from None
+
+
+def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -> Reader:
+    match address.kind:
+        case SourceKind.HTTP:
+            return MjpegReader(address.host, address.port, address.path)
+        case SourceKind.ARDRONE:
+            return ArDroneReader(address.host, address.port)
+        case SourceKind.RTSP:
+            return rtsp(source, f"{address.host}:{address.port}")
+        case SourceKind.DEVICE:
+            return device(address.path, size)
+        case SourceKind.FILE:
+            return FileReader(address.path)

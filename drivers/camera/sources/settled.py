@@ -1,0 +1,38 @@
+"""Arrivals freed of the network's jitter by the times that a stream carries; pure.
+
+The sender's clock has an unknown offset to ours. Arrival minus sent is that offset plus the delay of each frame; the
+median over the last ten seconds or so is offset plus usual delay, and neither jitter nor a few late frames move it.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from statistics import median
+
+_FRAMES = 151
+# A sender that was started anew, or whose clock is of no use.
+_JUMP_NS = 5_000_000_000
+
+
+class SettledClock:
+    """Learns the usual delay of one stream."""
+
+    def __init__(self) -> None:
+        self._offsets: deque[int] = deque(maxlen=_FRAMES)
+        self._usual_ns = 0
+        self._last_sent_ns: int | None = None
+
+    def settle(self, sent_ns: Sequence[int], arrival_ns: int) -> list[int]:
+        """Return when frames that came together would have come with the usual delay, by their sender's stamps.
+
+        Only the newest of them says how late the link is: it held up the others. It is the arrival while the sender's
+        clock stands still or has just jumped.
+        """
+        newest = sent_ns[-1]
+        offset = arrival_ns - newest
+        stands = self._last_sent_ns is not None and newest <= self._last_sent_ns
+        if stands or (self._offsets and abs(offset - self._usual_ns) > _JUMP_NS):
+            self._offsets.clear()
+        self._last_sent_ns = newest
+        self._offsets.append(offset)
+        self._usual_ns = round(median(self._offsets))
+        return [sent + self._usual_ns for sent in sent_ns]

@@ -1,0 +1,39 @@
+"""A TCP connection as a reader of a stream needs it: bounded waits, and an end from another thread."""
+
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+_CONNECT_TIMEOUT_S = 2.0
+_READ_TIMEOUT_S = 2.0
+
+
+class Line:
+    """Opens one connection after the other to the same place."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.address = (host, port)
+        self._socket: socket.socket | None = None
+
+    @property
+    def name(self) -> str:
+        """Return host:port."""
+        return f"{self.address[0]}:{self.address[1]}"
+
+    @contextmanager
+    def open(self) -> Iterator[socket.socket]:
+        """Yield a fresh connection whose reads end after 2 s; raises OSError."""
+        with socket.create_connection(self.address, timeout=_CONNECT_TIMEOUT_S) as connection:
+            connection.settimeout(_READ_TIMEOUT_S)
+            self._socket = connection
+            try:
+                yield connection
+            finally:
+                self._socket = None
+
+    def interrupt(self) -> None:
+        """End the connection, whoever reads from it."""
+        connection = self._socket
+        if connection is not None:
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)

@@ -11,7 +11,7 @@ from typing import IO
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk
+from mcap.records import Channel, Chunk, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from groundstation.bus import keys
@@ -77,35 +77,56 @@ def chunk_data(body: bytes, damage: list[str]) -> bytes:
     return bytes(data)
 
 
+def inner_records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield (opcode, begin, end of the body) of the records in a chunk's data; what is cut short ends it."""
+    at, size = 0, len(data)
+    while at + RECORD.size <= size:
+        opcode, length = RECORD.unpack_from(data, at)
+        begin = at + RECORD.size
+        at = begin + length
+        if at > size:
+            return
+        yield opcode, begin, at
+
+
+def message_of(data: bytes, begin: int, end: int) -> tuple[int, int, int, int, bytes]:
+    """Return (channel id, sequence, log time, publish time, payload) of a message record."""
+    return (*_MESSAGE.unpack_from(data, begin), data[begin + _MESSAGE.size : end])
+
+
 def chunk_records(
     data: bytes, channels: Channels, wanted: Callable[[Topic], bool], damage: list[str]
 ) -> Iterator[RawRecord]:
     """Yield the messages of a chunk whose channel leads to a key; `channels` learns what the chunk declares."""
-    at = 0
-    while at + RECORD.size <= len(data):
-        opcode, length = RECORD.unpack_from(data, at)
-        at += RECORD.size
+    for opcode, begin, end in inner_records(data):
         if opcode == Opcode.MESSAGE:
-            channel, sequence, logged, published = _MESSAGE.unpack_from(data, at)
+            channel, sequence, logged, published = _MESSAGE.unpack_from(data, begin)
             key = channels.get(channel)
             if key is not None:
-                yield RawRecord(key, logged, published, sequence, data[at + _MESSAGE.size : at + length])
+                yield RawRecord(key, logged, published, sequence, data[begin + _MESSAGE.size : end])
         elif opcode == Opcode.CHANNEL:
-            _learn_channel(data[at : at + length], channels, wanted, damage)
-        at += length
+            _learn_channel(data[begin:end], channels, wanted, damage)
 
 
 def count_messages(data: bytes) -> Counter[int]:
     """Return how many messages of each channel id a chunk holds."""
-    counts: Counter[int] = Counter()
-    at = 0
-    while at + RECORD.size <= len(data):
-        opcode, length = RECORD.unpack_from(data, at)
-        at += RECORD.size
-        if opcode == Opcode.MESSAGE:
-            counts[_MESSAGE.unpack_from(data, at)[0]] += 1
-        at += length
-    return counts
+    return Counter(
+        _MESSAGE.unpack_from(data, begin)[0] for opcode, begin, _ in inner_records(data) if opcode == Opcode.MESSAGE
+    )
+
+
+def declarations(data: bytes) -> tuple[dict[int, Channel], dict[int, Schema]]:
+    """Return the channels and schemas that a chunk declares, by id."""
+    channels: dict[int, Channel] = {}
+    schemas: dict[int, Schema] = {}
+    for opcode, begin, end in inner_records(data):
+        if opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(data[begin:end])))
+            channels[channel.id] = channel
+        elif opcode == Opcode.SCHEMA:
+            schema = Schema.read(ReadDataStream(BytesIO(data[begin:end])))
+            schemas[schema.id] = schema
+    return channels, schemas
 
 
 def _learn_channel(body: bytes, channels: Channels, wanted: Callable[[Topic], bool], damage: list[str]) -> None:

@@ -1,5 +1,6 @@
 """Where in a file each time and each channel lies, found in one pass that decompresses next to nothing."""
 
+import re
 import struct
 from collections import Counter
 from collections.abc import Callable
@@ -8,11 +9,20 @@ from pathlib import Path
 from typing import IO
 
 from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from groundstation.bus.keys import Key
 from groundstation.bus.topics import Topic
-from groundstation.recording.chunks import RECORD, Channels, RawRecord, chunk_data, chunk_records, count_messages
+from groundstation.recording.chunks import (
+    RECORD,
+    Channels,
+    RawRecord,
+    chunk_data,
+    chunk_records,
+    count_messages,
+    declarations,
+)
 
 # WIRE (MCAP specification, records Chunk and Message Index): the fixed fields at their head.
 _CHUNK_HEAD = struct.Struct("<QQ")
@@ -44,6 +54,8 @@ class FileIndex:
         self.path = path
         self.damage: list[str] = []
         self.channels: Channels = {}
+        self.declared: dict[int, Channel] = {}
+        self.schemas: dict[int, Schema] = {}
         self.chunks: list[Chunk] = []
         with path.open("rb", buffering=_BUFFER_BYTES) as stream:
             self._scan(stream, path.stat().st_size)
@@ -59,9 +71,9 @@ class FileIndex:
             if at + RECORD.size + length > size:
                 self.damage.append(f"cut off at byte {at}")
                 return
-            if opcode == Opcode.CHUNK:
+            if opcode == Opcode.CHUNK and length >= _CHUNK_HEAD.size:
                 self.chunks.append(Chunk(at, length, *_CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))))
-            elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
+            elif opcode == Opcode.MESSAGE_INDEX and self.chunks and length >= _INDEX_HEAD.size:
                 channel, span = _INDEX_HEAD.unpack(stream.read(_INDEX_HEAD.size))
                 if span:
                     self.chunks[-1].counts[channel] = span // _INDEX_ENTRY_BYTES
@@ -73,8 +85,11 @@ class FileIndex:
         """Learn the channels, which stand in the chunk that first uses them, and count where no index says it."""
         for chunk in self.chunks:
             counted = chunk.counts and not (self.damage and chunk is self.chunks[-1])
-            if not counted or any(channel not in self.channels for channel in chunk.counts):
-                data = self._data(stream, chunk, self.damage if not counted else [])
+            if not counted or any(channel not in self.declared for channel in chunk.counts):
+                data = self._data(stream, chunk, [] if counted else self.damage)
+                channels, schemas = declarations(data)
+                self.declared |= channels
+                self.schemas |= schemas
                 for _ in chunk_records(data, self.channels, _every, self.damage):
                     pass
                 if not counted:
@@ -84,13 +99,24 @@ class FileIndex:
         stream.seek(chunk.offset + RECORD.size)
         return chunk_data(stream.read(chunk.length), damage)
 
+    @property
+    def stem(self) -> str:
+        """Return the name that all parts of this file share."""
+        return re.sub(r"-[0-9]+$", "", self.path.stem)
+
+    def data(self, chunk: Chunk) -> bytes:
+        """Return the records of a chunk, or nothing when it is damaged, which is noted once."""
+        noted: list[str] = []
+        with self.path.open("rb") as stream:
+            data = self._data(stream, chunk, noted)
+        self.damage += [place for text in noted if (place := f"{text} at byte {chunk.offset}") not in self.damage]
+        return data
+
     def read(self, chunk: Chunk, wanted: Callable[[Topic], bool] = _every) -> list[RawRecord]:
         """Return the messages of the wanted topics in one chunk, in file order; damage is noted and costs the chunk."""
         channels = {id_: key for id_, key in self.channels.items() if key is None or wanted(key.topic)}
         hidden: Channels = {id_: None for id_ in self.channels if id_ not in channels}
-        with self.path.open("rb") as stream:
-            data = self._data(stream, chunk, self.damage)
-        return list(chunk_records(data, channels | hidden, wanted, self.damage))
+        return list(chunk_records(self.data(chunk), channels | hidden, wanted, self.damage))
 
     def holds(self, chunk: Chunk, wanted: Callable[[Topic], bool]) -> bool:
         """Return whether a chunk has messages of wanted topics."""

@@ -1,0 +1,172 @@
+"""Valid files from recordings: all that is sound of a cut one, or a stretch of a run."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+from mcap.writer import CompressionType, Writer
+
+from groundstation.recording.chunks import RawRecord, inner_records, message_of
+from groundstation.recording.index import FileIndex
+from groundstation.recording.mcap_file import write_preamble
+from groundstation.recording.origin import PROFILE, RecordingError
+from groundstation.recording.preamble import Preamble
+from groundstation.recording.reader import Recording, open_recording
+from groundstation.recording.run import RecordedRun
+from groundstation.recording.selection import LATCHED_TOPICS
+
+_FOR_EVER = 1 << 63
+
+
+@dataclass(frozen=True, slots=True)
+class Copied:
+    """One message with the channel it came from; times in UNIX ns."""
+
+    channel: Channel
+    schema: Schema | None
+    sequence: int
+    log_time_ns: int
+    publish_time_ns: int
+    data: bytes
+
+
+def messages_of(index: FileIndex, from_ns: int = 0, until_ns: int = _FOR_EVER) -> Iterator[Copied]:
+    """Yield everything sound in a file with from <= log time < until, viewer channels included, in file order."""
+    for chunk in index.chunks:
+        if chunk.end_ns < from_ns or chunk.start_ns >= until_ns:
+            continue
+        data = index.data(chunk)
+        for opcode, begin, end in inner_records(data):
+            if opcode != Opcode.MESSAGE:
+                continue
+            number, sequence, logged, published, payload = message_of(data, begin, end)
+            channel = index.declared.get(number)
+            if channel is not None and from_ns <= logged < until_ns:  # else declared in a chunk that is damaged
+                yield Copied(channel, index.schemas.get(channel.schema_id), sequence, logged, published, payload)
+
+
+class CopyWriter:
+    """Writes a new file under a temporary name that becomes the real one only when it is complete.
+
+    Raises RecordingError when something is there already; OSError when the disk is full, and leaves nothing behind.
+    """
+
+    def __init__(self, path: Path, preamble: Preamble) -> None:
+        require_absent(path)
+        self._path = path
+        self._partial = path.with_name(f".{path.name}.partial")
+        self._preamble = preamble
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[tuple[str, bytes], int] = {}
+        self.written = 0
+
+    def __enter__(self) -> Self:
+        self._stream: IO[bytes] = self._partial.open("wb")
+        self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
+        try:
+            self._writer.start(profile=PROFILE, library="skein")
+            write_preamble(self._writer, self._preamble)
+        except OSError:
+            self._discard()
+            raise
+        return self
+
+    def write(self, message: Copied) -> None:
+        """Add a message under its channel's name, with the schema it was recorded with."""
+        channel = self._channels.get(message.channel.topic) or self._add_channel(message)
+        self._writer.add_message(channel, message.log_time_ns, message.data, message.publish_time_ns, message.sequence)
+        self.written += 1
+
+    def _add_channel(self, message: Copied) -> int:
+        channel, schema = message.channel, message.schema
+        number = 0
+        if schema is not None:
+            known = (schema.name, schema.data)
+            if known not in self._schemas:
+                self._schemas[known] = self._writer.register_schema(schema.name, schema.encoding, schema.data)
+            number = self._schemas[known]
+        added = self._writer.register_channel(channel.topic, channel.message_encoding, number, channel.metadata)
+        self._channels[channel.topic] = added
+        return added
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None:
+            self._discard()
+            return
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._stream.close()
+            require_absent(self._path)
+            self._partial.rename(self._path)
+        except (OSError, RecordingError):
+            self._discard()
+            raise
+
+    def _discard(self) -> None:
+        with suppress(OSError):
+            self._stream.close()
+        self._partial.unlink(missing_ok=True)
+
+
+def require_absent(path: Path) -> None:
+    """Raise RecordingError when there is something at a path that is to be written."""
+    if path.exists():
+        raise RecordingError(f"{path}: exists already; name another place with --output")
+
+
+def recover(path: Path, target: Path) -> tuple[int, list[str]]:
+    """Write all that is sound of a file into a new one; returns the number of messages and what was wrong.
+
+    Raises RecordingError when the file is none of ours, or when not a single message is left of it.
+    """
+    opened, index = open_recording(path), FileIndex(path)
+    with CopyWriter(target, _preamble(opened, {})) as writer:
+        for message in messages_of(index):
+            writer.write(message)
+        if not writer.written:
+            raise RecordingError(
+                f"{path}: nothing can be recovered: {'; '.join(index.damage) or 'it holds no messages'}"
+            )
+    return writer.written, index.damage
+
+
+def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) -> int:
+    """Write the messages with from <= log time < until of one stem's parts into a new file; returns how many.
+
+    It begins with the latched values: what was said last before `from`, logged at `from` and published when it was.
+    """
+    indexes = [index for index in run.indexes if index.stem == stem]
+    latched = run.latest_before(from_ns, LATCHED_TOPICS.__contains__)
+    opened = open_recording(indexes[0].path)
+    note = {"cut": {"from_unix_ns": str(from_ns), "until_unix_ns": str(until_ns)}}
+    with CopyWriter(target, _preamble(opened, note)) as writer:
+        for message in _latched_copies(indexes, latched.values(), from_ns):
+            writer.write(message)
+        for index in indexes:
+            for message in messages_of(index, from_ns, until_ns):
+                writer.write(message)
+    return writer.written
+
+
+def _preamble(opened: Recording, note: Mapping[str, Mapping[str, str]]) -> Preamble:
+    created = int(opened.metadata.get("run", {}).get("created_unix_ns", "0"))
+    typed = {name: (opened.media_types[name], data) for name, data in opened.attachments.items()}
+    return Preamble({**opened.metadata, **note}, typed, created)
+
+
+def _latched_copies(indexes: list[FileIndex], latched: Iterable[RawRecord], from_ns: int) -> Iterator[Copied]:
+    """Yield the latched values of these files under the channels that they were recorded with."""
+    waiting = {str(raw.key): raw for raw in latched}
+    for index in indexes:
+        for channel in index.declared.values():
+            raw = waiting.pop(channel.topic, None)
+            if raw is not None:
+                schema = index.schemas.get(channel.schema_id)
+                yield Copied(channel, schema, raw.sequence, from_ns, raw.publish_time_ns, raw.data)

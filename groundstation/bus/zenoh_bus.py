@@ -26,6 +26,10 @@ _PRIORITY = {
     Quality.STATE: ("DATA", False),
     Quality.BULK: ("DATA_LOW", False),
 }
+# Batches that wait for a link before what follows is dropped; 2 by default, and an express message is a batch of its own.
+# 16, the most there can be, spares the recorder what the tracker got: a replay needs every message. Set-points keep
+# the short queue: a late one is worth nothing.
+_QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
 
 
 def _configuration(mode: str, endpoint: str) -> zenoh.Config:
@@ -45,7 +49,10 @@ def _configuration(mode: str, endpoint: str) -> zenoh.Config:
                 "tx": {
                     "lease": 2000,
                     "keep_alive": 4,
-                    "queue": {"congestion_control": {"block": {"wait_before_close": 200000}}},
+                    "queue": {
+                        "size": _QUEUED_BATCHES,
+                        "congestion_control": {"block": {"wait_before_close": 200000}},
+                    },
                 }
             },
             "shared_memory": {"enabled": False},

@@ -1,16 +1,12 @@
-"""The tracker's journal: what each tick took in and which plan it adopted, and the replay that follows it."""
+"""The tracker's journal: what each tick took in and which plan it adopted (replayed by groundstation.replay)."""
 
-from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Header, JournalEntry, Message
-from groundstation.errors import EstimatorFault
-from groundstation.estimation.belief import JointBelief
 from groundstation.planning.plan import PlanResult
-from groundstation.tracker import PlanRequest, Tracker
 
 FAULT = "fault"
+STOPPED = "stopped"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,41 +43,3 @@ def entry_of(
         evaluations=adopted.evaluations,
         stop_reason=adopted.stop_reason,
     )
-
-
-def replay_journal(
-    entries: Iterable[JournalEntry], messages: Iterable[tuple[str, Message]], tracker: Tracker
-) -> Iterator[tuple[JournalEntry, JointBelief]]:
-    """Feed recorded messages to a fresh tracker in journal order; yields each tick with its belief.
-
-    Deterministic to the bit on the same machine and versions. Plans are made again where they were adopted, stopped
-    after the same number of evaluations. A message that is missing from the recording is left out, as is one that the
-    journal does not name.
-    """
-    recorded: defaultdict[tuple[str, int], deque[Message]] = defaultdict(deque)
-    for key, message in messages:
-        recorded[key, message.header.seq].append(message)
-    entries = list(entries)
-    planned = {entry.plan_tick for entry in entries}
-    requests: dict[int, PlanRequest] = {}
-    for entry in entries:
-        for name in entry.ingested:
-            if recorded[name]:
-                tracker.ingest(name[0], recorded[name].popleft(), entry.now_ns)
-        belief = tracker.advance(entry.now_ns)
-        if entry.plan_tick in requests:
-            _adopt_again(entry, requests.pop(entry.plan_tick), tracker)
-        if entry.tick in planned:
-            requests[entry.tick] = tracker.request()
-        yield entry, belief
-
-
-def _adopt_again(entry: JournalEntry, request: PlanRequest, tracker: Tracker) -> None:
-    if entry.stop_reason == FAULT:
-        return
-    budget = entry.evaluations if entry.stop_reason == "stopped" else None
-    try:
-        plan = tracker.planner.plan(request.belief, request.topology, request.warm_start, lambda: False, budget)
-    except EstimatorFault:
-        return
-    tracker.adopt(plan)

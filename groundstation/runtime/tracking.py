@@ -1,23 +1,26 @@
 """The tracker's loop: one tick takes in what arrived, advances the belief, and says what follows from it."""
 
 from collections import Counter
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import msgspec
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Severity
+from groundstation.bus.messages import Message, Severity
+from groundstation.planning.plan import Planner
 from groundstation.runtime.announcer import TEAM, Announcer
 from groundstation.runtime.health import UnseenWatch
 from groundstation.runtime.inbox import Inbox
-from groundstation.runtime.journal import FAULT, entry_of
+from groundstation.runtime.journal import FAULT, Adoption, entry_of
 from groundstation.runtime.plan_worker import PlanWorker
-from groundstation.tracker import Notice, Tracker, tracker_from_field
+from groundstation.tracker import Notice, PlanRequest, Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
 _PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
-_EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
+EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
 
 
 class TrackerSection(msgspec.Struct, frozen=True):
@@ -28,23 +31,70 @@ class TrackerSection(msgspec.Struct, frozen=True):
     epoch: int = 0
 
 
+class Arrivals(Protocol):
+    """What has come for the tracker since the last tick (see Inbox)."""
+
+    refused: Counter[str]
+
+    @property
+    def overflowed(self) -> int:
+        """Return how many messages were dropped because the loop did not drain in time."""
+
+    def pop_ready(self) -> list[tuple[str, Message]]:
+        """Return (key, message) of all that has arrived, in order."""
+
+
+class Worker(Protocol):
+    """Who plans on snapshots (see PlanWorker)."""
+
+    @property
+    def idle(self) -> bool:
+        """Return whether a request can be submitted."""
+
+    def submit(self, tick: int, request: PlanRequest) -> None:
+        """Start planning on the snapshot of a tick; only while `idle`."""
+
+    def poll(self) -> Adoption | None:
+        """Return and forget the finished plan, if there is one."""
+
+    def close(self) -> None:
+        """Stop planning."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """Where a tracker's messages and plans come from, and whose clock it reads: live ones, or those of a journal."""
+
+    arrivals: Arrivals
+    worker_of: Callable[[Planner], Worker]
+    clock: str
+    first_tick: int = 0
+
+
+def live_feed(bus: Bus, plan_hz: float) -> Feed:
+    """Return what arrives on a bus, planned on a thread of its own."""
+    budget_s = _PLAN_BUDGET_SHARE / plan_hz
+    return Feed(Inbox(bus), lambda planner: PlanWorker(planner, budget_s), clock.clock_id())
+
+
 class Tracking:
     """One tracker on one bus. Call `tick` at the estimator's rate; notices are left in `notices` for the process."""
 
-    def __init__(self, bus: Bus, section: TrackerSection) -> None:
+    def __init__(self, bus: Bus, section: TrackerSection, feed: Feed | None = None) -> None:
         field = section.field
+        plan_hz = field["planner"]["rate_hz"]
+        feed = feed or live_feed(bus, plan_hz)
         self.rate_hz: int = field["estimator"]["rate_hz"]
-        self.tracker: Tracker = tracker_from_field(field, clock.clock_id(), section.epoch * _EPOCHS_PER_LIFE)
-        self.inbox = Inbox(bus)
+        self.tracker: Tracker = tracker_from_field(field, feed.clock, section.epoch * EPOCHS_PER_LIFE)
+        self.inbox = feed.arrivals
         self.notices: list[Notice] = []
         self._bus = bus
         self._announcer = Announcer(bus, field["safety"]["setpoint_lifetime_ms"])
         self._unseen = UnseenWatch(field["safety"]["unseen_land_after_s"])
-        plan_hz = field["planner"]["rate_hz"]
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
-        self._worker = PlanWorker(self.tracker.planner, _PLAN_BUDGET_SHARE / plan_hz)
-        self._tick = 0
+        self._worker = feed.worker_of(self.tracker.planner)
+        self._tick = feed.first_tick
         self._known_refusals: Counter[str] = Counter()
 
     def tick(self, now_ns: int) -> None:

@@ -19,7 +19,12 @@ from groundstation.settings.wording import ordered, problem, problem_of_error
 def load_field(path: Path | str, options: Sequence[str] = ()) -> Field:
     """Return the resolved field of a file with `a.b=c` options applied; raises SettingsError with all problems."""
     path = Path(path)
-    tree, problems = _with_options(read(path), options)
+    return field_of_tree(read(path), options, path)
+
+
+def field_of_tree(tree: Node, options: Sequence[str], path: Path) -> Field:
+    """Return the resolved field of a document that came from `path`, as `load_field` does."""
+    tree, problems = _with_options(tree, options)
     _require_version(tree, problems)
     calibrations = Calibrations(path.parent, str(path))
     levels = Levels(tree, calibrations)

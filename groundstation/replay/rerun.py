@@ -1,0 +1,134 @@
+"""Today's tracker in the loop that flies, fed by a journal: same inputs, same ticks, plans where they were adopted."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from groundstation.bus.api import Subscription
+from groundstation.bus.messages import Header, JournalEntry, Message
+from groundstation.bus.sender import Sender
+from groundstation.bus.topics import Topic
+from groundstation.errors import EstimatorFault
+from groundstation.planning.plan import Planner
+from groundstation.replay.ticks import Tick
+from groundstation.runtime.journal import STOPPED, Adoption
+from groundstation.runtime.tracking import Feed, TrackerSection, Tracking
+from groundstation.tracker import Notice, PlanRequest
+
+Words = list[tuple[Topic, Message]]
+
+
+class JournalBus(Sender):
+    """Collects what a tracker publishes in a tick; its clock is the recorded one."""
+
+    def __init__(self, site: str, source: str, clock: str) -> None:
+        super().__init__(site, source)
+        self._clock = clock
+        self.now_ns = 0
+        self.said: Words = []
+
+    def header(self, entity: str, stamp_ns: int | None = None) -> Header:
+        """Return a header stamped with the tick's time unless another is given."""
+        stamp = self.now_ns if stamp_ns is None else stamp_ns
+        return Header(stamp, self._clock, entity, self.source, next(self._sequence[entity]))
+
+    def publish(self, topic: Topic, message: Message) -> None:
+        """Keep what was said."""
+        self.said.append((topic, message))
+
+    def publish_bytes(self, topic: Topic, header: Header, payload: bytes) -> None:
+        """Nothing: a tracker sends no raw bytes."""
+
+    def subscribe(
+        self, topics: Iterable[Topic], entity: str = "*", source: str = "*", capacity: int = 4096, newest: bool = False
+    ) -> Subscription:
+        """Return a queue that stays empty."""
+        return Subscription(capacity, newest)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class JournalArrivals:
+    """Hands out what the journal says has arrived."""
+
+    def __init__(self) -> None:
+        self.refused: Counter[str] = Counter()
+        self.ready: list[tuple[str, Message]] = []
+
+    @property
+    def overflowed(self) -> int:
+        """Return 0: what overflowed then is in no journal."""
+        return 0
+
+    def pop_ready(self) -> list[tuple[str, Message]]:
+        """Return and forget what is ready."""
+        ready, self.ready = self.ready, []
+        return ready
+
+
+class JournalWorker:
+    """Plans when the recorded plan came back, with as many evaluations as that one had time for.
+
+    Where settings differ and the journal knows no plan of a pending request, it comes back with the next recorded one.
+    """
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner = planner
+        self._pending: tuple[int, PlanRequest] | None = None
+        self.entry: JournalEntry | None = None
+
+    @property
+    def idle(self) -> bool:
+        """Return whether no request is pending."""
+        return self._pending is None
+
+    def submit(self, tick: int, request: PlanRequest) -> None:
+        """Keep a request until its plan is due."""
+        self._pending = (tick, request)
+
+    def poll(self) -> Adoption | None:
+        """Return the plan that is due in this tick."""
+        entry = self.entry
+        if entry is None or self._pending is None or entry.plan_tick < self._pending[0]:
+            return None
+        (tick, request), self._pending = self._pending, None
+        budget = entry.evaluations if entry.stop_reason == STOPPED else None
+        try:
+            plan = self._planner.plan(request.belief, request.topology, request.warm_start, lambda: False, budget)
+        except EstimatorFault:
+            return Adoption(tick, None)
+        return Adoption(tick, plan)
+
+    def close(self) -> None:
+        """Nothing to stop."""
+
+
+class Rerun:
+    """One life of the tracker, lived again with a field of choice. `notices` are what it would have told."""
+
+    def __init__(self, field: Mapping[str, Any], site: str, first: JournalEntry, epoch: int) -> None:
+        self._arrivals = JournalArrivals()
+        self._workers: list[JournalWorker] = []
+        self._bus = JournalBus(site, first.header.source, first.header.clock)
+        feed = Feed(self._arrivals, self._worker_of, first.header.clock, first.tick)
+        self._tracking = Tracking(self._bus, TrackerSection(dict(field), "", epoch), feed)
+
+    def _worker_of(self, planner: Planner) -> JournalWorker:
+        self._workers.append(JournalWorker(planner))
+        return self._workers[-1]
+
+    @property
+    def notices(self) -> list[Notice]:
+        """Return what the operator would have been told so far."""
+        return self._tracking.notices
+
+    def tick(self, tick: Tick) -> Words:
+        """Live one tick; returns what was published in it, in order."""
+        self._arrivals.ready = tick.inputs
+        self._bus.now_ns = tick.entry.now_ns
+        for worker in self._workers:
+            worker.entry = tick.entry
+        self._tracking.tick(tick.entry.now_ns)
+        said, self._bus.said = self._bus.said, []
+        return said

@@ -1,0 +1,85 @@
+"""What a RECORDING on the command line is: which files it has, whose field was flown, and what made it."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from groundstation.recording.reader import Recording, RecordingError, open_recording, parts
+from groundstation.recording.selection import RAW, STATE
+
+FIELD = "field.json"
+_TYPICAL = "a run folder holds state.mcap"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One recorded run.
+
+    state, raw: files in order of time; field: the resolved field as JSON; run, versions: what the recorder noted of
+    the run and of the programs; unix_offset_ns: UNIX time minus the run's boot clock.
+    """
+
+    name: str
+    state: tuple[Path, ...]
+    raw: tuple[Path, ...] = ()
+    field: bytes = b"{}"
+    run: dict[str, str] = dataclasses.field(default_factory=dict)
+    versions: dict[str, str] = dataclasses.field(default_factory=dict)
+    unix_offset_ns: int = 0
+
+    @property
+    def resolved(self) -> dict[str, Any]:
+        """Return the resolved field."""
+        decoded: dict[str, Any] = msgspec.json.decode(self.field)
+        return decoded
+
+
+def open_source(paths: Sequence[Path]) -> Source:
+    """Return the run of a folder, or of one or several parts; raises RecordingError that says what is wrong."""
+    if len(paths) == 1 and paths[0].is_dir():
+        folder = paths[0]
+        state, raw = parts(folder, STATE), parts(folder, RAW)
+        if not state:
+            raise RecordingError(f"{folder}: there is no recording in this folder ({_TYPICAL}){_nearby(folder)}")
+        return _source(folder.resolve().name, state, raw)
+    folders = [path for path in paths if path.is_dir()]
+    if folders:
+        raise RecordingError(f"{folders[0]}: name one run folder, or the parts of one recording, not both")
+    state = [path for path in paths if not path.name.startswith(RAW)]
+    raw = [path for path in paths if path.name.startswith(RAW)]
+    if not state:
+        raise RecordingError(f"{paths[0]}: holds pictures and datagrams only; name its run folder, or state.mcap too")
+    return _source(state[0].stem, state, raw)
+
+
+def _nearby(folder: Path) -> str:
+    inner = sorted(folder.glob("*/state.mcap"), key=lambda path: path.stat().st_mtime)
+    return f"; did you mean {inner[-1].parent}?" if inner else ""
+
+
+def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
+    opened = sorted((open_recording(path) for path in state), key=lambda recording: _created_ns(recording))
+    first = opened[0]
+    if FIELD not in first.attachments or "run" not in first.metadata:
+        raise RecordingError(f"{first.path}: no recording of a ground station (neither field nor run are in it)")
+    sites = {recording.metadata.get("run", {}).get("clock", "") for recording in opened}
+    if len(sites) > 1:
+        raise RecordingError(f"{', '.join(map(str, state))}: these are not parts of one recording")
+    run = first.metadata["run"]
+    try:
+        msgspec.json.decode(first.attachments[FIELD], type=dict[str, Any])
+        offset_ns = int(run.get("unix_offset_ns", "0"))
+    except (msgspec.DecodeError, ValueError) as error:
+        raise RecordingError(f"{first.path}: its field or run cannot be read ({error})") from error
+    files = tuple(recording.path for recording in opened)
+    versions = first.metadata.get("versions", {})
+    return Source(name, files, tuple(raw), first.attachments[FIELD], run, versions, offset_ns)
+
+
+def _created_ns(recording: Recording) -> int:
+    text = recording.metadata.get("run", {}).get("created_unix_ns", "")
+    return int(text) if text.isdigit() else 0

@@ -1,0 +1,194 @@
+"""The recorded run in, what the tracker said out, message by message to the bit."""
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from groundstation.bus import codec
+from groundstation.bus.messages import Estimate, Message
+from groundstation.bus.topics import ESTIMATE
+from groundstation.errors import MessageError
+from groundstation.recording.reader import RawRecord
+from groundstation.replay.difference import Difference, first_difference
+from groundstation.replay.rerun import Rerun, Words
+from groundstation.replay.source import Source
+from groundstation.replay.ticks import OUTPUTS, Tape, Tick
+from groundstation.runtime.tracking import EPOCHS_PER_LIFE
+
+_KEPT_DIFFERENCES = 200
+# A plan is stamped when it was begun; one that was begun shortly before the end may never have been adopted.
+_PLANNING_NS = 1_000_000_000
+_NAMES = frozenset(topic.name for topic in OUTPUTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A difference and where in the run it is: tick of the tracker's life, seconds since the recording began."""
+
+    tick: int
+    time_s: float
+    topic: str
+    entity: str
+    difference: Difference
+
+    def __str__(self) -> str:
+        return f"tick {self.tick}, {self.time_s:.2f} s: {self.topic} {self.entity} {self.difference}"
+
+
+@dataclass(slots=True)
+class Lived:
+    """One tick lived again: when [s since the recording began], and all that was said."""
+
+    tick: Tick
+    time_s: float
+    said: Words
+
+
+@dataclass(slots=True)
+class Comparison:
+    """How a re-run went.
+
+    same, unrecorded: messages by topic that were the same to the bit, or that the recording lacks; fragments: lives of
+    the tracker whose beginning is not in the journal, which nothing can repeat exactly; missing: inputs that the
+    journal names and the recording lacks; differing: number of differing messages, the first ones in `findings`.
+    """
+
+    ticks: int = 0
+    lives: int = 0
+    plans: int = 0
+    recorded_s: float = 0.0
+    cpu_s: float = 0.0
+    same: Counter[str] = field(default_factory=Counter)
+    unrecorded: Counter[str] = field(default_factory=Counter)
+    fragments: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+    missing_count: int = 0
+    differing: int = 0
+    findings: list[Finding] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+
+    @property
+    def identical(self) -> bool:
+        """Whether every recorded word of the tracker was repeated, and there were any."""
+        return not (self.differing or self.fragments or self.missing_count) and bool(self.same)
+
+    @property
+    def speed(self) -> float:
+        """Return recorded seconds per second of CPU."""
+        return self.recorded_s / self.cpu_s if self.cpu_s > 0 else 0.0
+
+
+class Repetition:
+    """Lives a recording again, tick by tick, and compares; `comparison` is complete when the ticks are through."""
+
+    def __init__(self, source: Source, resolved: Mapping[str, Any]) -> None:
+        self.comparison = Comparison()
+        self.tape = Tape(source.state)
+        self._source = source
+        self._resolved = resolved
+        self._began_ns: int | None = None
+        self._life: Rerun | None = None
+
+    def ticks(self) -> Iterator[Lived]:
+        """Yield every tick with what was said in it now."""
+        comparison = self.comparison
+        began_s, last_ns = time.process_time(), 0
+        for tick in self.tape.ticks():
+            if self._began_ns is None:
+                self._began_ns = tick.at_ns
+            last_ns = tick.at_ns
+            self._note_inputs(tick)
+            if tick.first or self._life is None:
+                self._life = self._new_life(tick)
+            said = self._life.tick(tick)
+            comparison.ticks += 1
+            comparison.plans += tick.entry.plan_tick >= 0
+            lived = Lived(tick, (tick.at_ns - self._began_ns) / 1e9, said)
+            self._compare(lived)
+            yield lived
+        self._find_unsaid(last_ns)
+        comparison.recorded_s = (last_ns - (self._began_ns or 0)) / 1e9
+        comparison.cpu_s = time.process_time() - began_s
+        comparison.damage = self.tape.damage
+
+    def _new_life(self, tick: Tick) -> Rerun:
+        comparison, entry = self.comparison, tick.entry
+        comparison.lives += 1
+        if entry.tick != 0:
+            at_s = (tick.at_ns - (self._began_ns or 0)) / 1e9
+            comparison.fragments.append(
+                f"the journal begins, or goes on after a gap, at tick {entry.tick} ({at_s:.2f} s)"
+            )
+        site = self._source.run.get("site", "lab")
+        return Rerun(self._resolved, site, entry, self._epoch(tick))
+
+    def _epoch(self, tick: Tick) -> int:
+        """Return the number of the tracker's life: its first estimate tells, else what the recorder was told."""
+        records = self.tape.said.get((ESTIMATE.name, "team", tick.at_ns))
+        first = _decoded(records[0]) if records else None
+        if isinstance(first, Estimate):
+            return first.epoch // EPOCHS_PER_LIFE
+        text = self._source.run.get("epoch", "0")
+        return int(text) if text.isdigit() else 0
+
+    def _note_inputs(self, tick: Tick) -> None:
+        self.comparison.missing_count += len(tick.missing)
+        for key, seq in tick.missing[: max(0, 20 - len(self.comparison.missing))]:
+            self.comparison.missing.append(f"tick {tick.entry.tick}: {key} number {seq}")
+
+    def _compare(self, lived: Lived) -> None:
+        """Compare what was said with what was recorded, group by group in the order in which they were said."""
+        groups: dict[tuple[str, str, int], list[Message]] = {}
+        for topic, message in lived.said:
+            if topic.name in _NAMES:
+                stamp_ns = message.header.stamp_ns + self._source.unix_offset_ns
+                groups.setdefault((topic.name, message.header.entity, stamp_ns), []).append(message)
+        for place, messages in groups.items():
+            records = self.tape.said.pop(place, [])
+            self._compare_group(lived, place[0], place[1], messages, records)
+
+    def _compare_group(
+        self, lived: Lived, topic: str, entity: str, messages: list[Message], records: list[RawRecord]
+    ) -> None:
+        records.sort(key=lambda record: record.sequence)
+        recorded = [message for record in records if (message := _decoded(record)) is not None]
+        lost = max(0, len(messages) - len(recorded))  # on their way to the recorder, at any place of the group
+        for message in messages:
+            difference = first_difference(recorded[0], message) if recorded else None
+            if not recorded or (difference and lost):
+                lost -= 1
+                self.comparison.unrecorded[topic] += 1
+                continue
+            recorded.pop(0)
+            if difference:
+                self._found(lived, topic, entity, difference)
+            else:
+                self.comparison.same[topic] += 1
+        for extra in recorded:
+            self._found(lived, topic, entity, Difference("message", type(extra).__name__, None))
+
+    def _found(self, lived: Lived, topic: str, entity: str, difference: Difference) -> None:
+        self._note_finding(Finding(lived.tick.entry.tick, lived.time_s, topic, entity, difference))
+
+    def _note_finding(self, finding: Finding) -> None:
+        self.comparison.differing += 1
+        if len(self.comparison.findings) < _KEPT_DIFFERENCES:
+            self.comparison.findings.append(finding)
+
+    def _find_unsaid(self, last_ns: int) -> None:
+        """What was recorded in a tick that is over, and was not said now, is a difference too."""
+        began_ns = self._began_ns or 0
+        for (topic, entity, stamp_ns), records in sorted(self.tape.said.items(), key=lambda item: item[0][2]):
+            if not began_ns <= stamp_ns <= last_ns - _PLANNING_NS:
+                continue
+            difference = Difference("message", f"{len(records)} recorded", None)
+            self._note_finding(Finding(-1, (stamp_ns - began_ns) / 1e9, topic, entity, difference))
+
+
+def _decoded(record: RawRecord) -> Message | None:
+    try:
+        return codec.decode(record.key, record.data)
+    except MessageError:
+        return None

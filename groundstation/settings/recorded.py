@@ -1,0 +1,34 @@
+"""The field that a recording was flown with, as today's program understands it, and what if it had been another."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from groundstation.errors import SettingsError
+from groundstation.settings.document import Node, parse, read
+from groundstation.settings.load import field_of_tree
+from groundstation.settings.schema import Field
+
+_NAME = "recorded field"
+_SECTION = "estimator"
+
+
+def recorded_field(content: bytes, options: Sequence[str] = (), estimator: Path | None = None) -> Field:
+    """Return a recorded field (JSON) with `a.b=c` options applied; raises SettingsError with all problems.
+
+    estimator: a field file, or a file with an `estimator:` section alone; that section then replaces the recorded one,
+    and what it leaves out has its default. Options come last. Keys that are younger than the recording have defaults.
+    """
+    tree = parse(content.decode("utf-8", "replace"), _NAME)
+    if estimator is not None:
+        tree = _with_section(tree, read(estimator), estimator)
+    return field_of_tree(tree, options, Path(_NAME))
+
+
+def _with_section(tree: Node, other: Node, path: Path) -> Node:
+    section = other.get(_SECTION)
+    if section is None:
+        raise SettingsError([f"{path}: has no `{_SECTION}:` section"])
+    if not isinstance(tree.value, dict):
+        return tree  # the loader says what is wrong with it
+    return replace(tree, value={**tree.value, _SECTION: section})

@@ -8,6 +8,7 @@ import click
 BENCHES = {
     "demo": ("groundstation.cli.bench_demo:demo", "Fly many seeds of the demo and judge each."),
     "planner": ("groundstation.cli.bench_planner:planner", "Time the planar planner against brute force and peers."),
+    "recording": ("groundstation.cli.bench_recording:recording", "CPU of writing, opening and seeking recordings."),
 }
 
 

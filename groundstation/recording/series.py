@@ -38,6 +38,9 @@ class Rotation:
         return 0 < self.size_bytes <= size_bytes or 0 < self.age_ns <= age_ns
 
 
+NO_ROTATION = Rotation()
+
+
 class FileSeries:
     """The parts of one recording in a run folder. Never raises; what could not be written is counted in `lost`.
 
@@ -51,7 +54,7 @@ class FileSeries:
         preamble: Preamble,
         opener: Opener = McapFile,
         has_room: Callable[[], bool] = lambda: True,
-        rotation: Rotation = Rotation(),
+        rotation: Rotation = NO_ROTATION,
     ) -> None:
         self._folder = folder
         self._stem = stem

@@ -3,23 +3,19 @@
 Started as `groundstation.runtime.recorder:run`. See groundstation/recording for files and formats.
 """
 
-import json
 from pathlib import Path
 
 import msgspec
 
 from groundstation.bus import clock
-from groundstation.bus.api import Subscription
 from groundstation.bus.clock import NS_PER_MS, NS_PER_S
 from groundstation.bus.messages import Severity
 from groundstation.process.child import Child
-from groundstation.recording.capture import Capture
-from groundstation.recording.derived import ViewerChannels, camera_frames
-from groundstation.recording.preamble import preamble_of_run
-from groundstation.recording.selection import DATAGRAM_TOPICS, IMAGE_TOPICS, RAW, STATE, STATE_TOPICS
+from groundstation.recording.selection import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
 from groundstation.recording.series import FileSeries, Rotation
 from groundstation.recording.space import Space, assess, free_bytes
 from groundstation.recording.timeline import Timeline
+from groundstation.recording.writing import RunWriter
 
 # 15 turns a second: the heartbeat needs 10, and each turn costs a wake-up of the interpreter.
 _PERIOD_NS = 66 * NS_PER_MS
@@ -65,15 +61,12 @@ class Recorder:
         self._folder.mkdir(parents=True, exist_ok=True)
         settings = msgspec.json.decode(section.field, type=_FieldPart).recording
         timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
-        preamble = preamble_of_run(bytes(section.field), section.epoch, timeline, self._folder)
-        self._capture = Capture(timeline)
         self._space = Space.AMPLE
         self._space_ns = 0
-        self._viewers = ViewerChannels(camera_frames(json.loads(bytes(section.field))))
-        self._state, self._raw = (
-            FileSeries(self._folder, stem, preamble, has_room=self._has_room, rotation=settings.rotation)
-            for stem in (STATE, RAW)
+        self._writer = RunWriter(
+            self._folder, bytes(section.field), section.epoch, timeline, self._has_room, settings.rotation
         )
+        self._series = (self._writer.state, self._writer.raw)
         # Bounded in bytes as well as in number: a picture is a hundred times a state message.
         self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
         self._image_queue = child.bus.subscribe(IMAGE_TOPICS, capacity=64)
@@ -83,26 +76,15 @@ class Recorder:
         """Write what has arrived, flush when due, watch the disk."""
         now_ns = clock.now_ns()
         self._check_space(now_ns)
-        self._write(self._state_queue, self._state, now_ns)
-        self._write(self._datagram_queue, self._raw, now_ns)
+        writer = self._writer
+        writer.write(self._state_queue.drain_samples(), writer.state, now_ns)
+        writer.write(self._datagram_queue.drain_samples(), writer.raw, now_ns)
+        pictures = self._image_queue.drain_samples()
         if self._space < Space.NO_IMAGES:
-            self._write(self._image_queue, self._raw, now_ns)
-        else:
-            self._image_queue.drain_samples()
-        for series in (self._state, self._raw):
-            series.tick(now_ns)
+            writer.write(pictures, writer.raw, now_ns)
+        writer.tick(now_ns)
+        for series in self._series:
             self._report(series)
-
-    def _write(self, queue: Subscription, series: FileSeries, now_ns: int) -> None:
-        entry_of, derived, write = self._capture.entry, self._viewers.derived, series.write
-        for sample in queue.drain_samples():
-            entry = entry_of(sample, now_ns)
-            if entry is None:
-                continue
-            write(entry, now_ns)
-            for_viewers = derived(entry)
-            if for_viewers is not None:
-                write(for_viewers, now_ns)
 
     def _report(self, series: FileSeries) -> None:
         for trouble in series.take_troubles():
@@ -116,26 +98,25 @@ class Recorder:
 
     def announce(self) -> None:
         """Say READY with the folder, unless a file still cannot be written."""
-        if not (self._state.failing or self._raw.failing):
+        if not any(series.failing for series in self._series):
             self._child.ready(str(self._folder))
 
     @property
     def dropped(self) -> int:
         """Return how many messages overflowed, were refused, or could not be written."""
         queues = (self._state_queue, self._image_queue, self._datagram_queue)
-        refused = sum(self._capture.refused.values())
-        return sum(queue.overflowed for queue in queues) + self._state.lost + self._raw.lost + refused
+        lost = sum(series.lost for series in self._series)
+        return sum(queue.overflowed for queue in queues) + lost + self._writer.refused
 
     @property
     def written(self) -> int:
         """Return how many messages are safe in the files."""
-        return self._state.written + self._raw.written
+        return sum(series.written for series in self._series)
 
     def close(self) -> None:
         """Write what is left and finish the files."""
         self.turn()
-        self._state.close()
-        self._raw.close()
+        self._writer.close()
 
     def _has_room(self) -> bool:
         return assess(free_bytes(self._folder)) < Space.FULL

@@ -7,6 +7,7 @@ import socket
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 import numpy as np
@@ -15,14 +16,25 @@ from groundstation.errors import GroundStationError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
+from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.faults import CAMERA_FAULTS
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, Outage, OutageKind, RenderSpec
+from sim_bridge.render.spec import (
+    BoardSpec,
+    BodyShape,
+    CameraScenario,
+    Mount,
+    Outage,
+    OutageKind,
+    RenderSpec,
+    StreamKind,
+)
 from sim_bridge.scenario import FaultKind, Scenario
 from sim_bridge.site import Lens, Site
 
 Stream = tuple[str, int]
 _START_LIMIT_S = 45.0
 _STOP_LIMIT_S = 1.5
+_ARDRONE_SOURCE = "ardrone://"
 # Picture right is world +x, picture down is world -y, the optical axis points at the floor.
 _WORLD_FROM_DOWN_OPTICAL = np.diag([1.0, -1.0, -1.0])
 
@@ -41,6 +53,7 @@ def render_specs(
             bodies=site.bodies,
             address=address,
             port=port,
+            kind=_kind(site, name),
             scenario=_camera_scenario(scenario, name),
             seed=seed,
             room_size_m=site.room.size_m,
@@ -48,6 +61,12 @@ def render_specs(
         )
         for name, (address, port) in streams.items()
     ]
+
+
+def _kind(site: Site, name: str) -> StreamKind:
+    drone = site.drones.get(name)
+    own = drone is not None and drone.camera is not None and drone.camera.source.startswith(_ARDRONE_SOURCE)
+    return StreamKind.ARDRONE if own else StreamKind.MJPEG
 
 
 def _lens(site: Site, name: str) -> Lens:
@@ -96,10 +115,10 @@ def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
     return CameraScenario(**scenario.cameras.model_dump(), outages=outages)
 
 
-def _render(spec: RenderSpec) -> None:
+def _render(spec: RenderSpec, modes: Connection | None) -> None:
     from sim_bridge.render.process import run
 
-    raise SystemExit(run(spec))
+    raise SystemExit(run(spec, modes))
 
 
 class Cameras:
@@ -110,10 +129,17 @@ class Cameras:
         context = multiprocessing.get_context("spawn")
         self._specs = tuple(specs)
         self._processes: dict[str, SpawnProcess] = {}
+        self._modes: dict[str, tuple[Connection, VideoMode]] = {}
         for spec in self._specs:
-            process = context.Process(target=_render, args=(spec,), name=f"render-{spec.camera}", daemon=True)
+            told: Connection | None = None
+            if spec.kind is StreamKind.ARDRONE:
+                told, teller = context.Pipe(duplex=False)
+                self._modes[spec.camera] = teller, VideoMode()
+            process = context.Process(target=_render, args=(spec, told), name=f"render-{spec.camera}", daemon=True)
             process.start()
             self._processes[spec.camera] = process
+            if told is not None:
+                told.close()  # the process has its own end: ours would hide that it is gone
 
     def wait_until_serving(self, should_stop: Callable[[], bool]) -> None:
         """Return when every stream accepts connections; raises GroundStationError naming the one that does not."""
@@ -125,6 +151,19 @@ class Cameras:
                         f"camera {spec.camera} does not serve {spec.address}:{spec.port}: is the port in use?"
                     )
                 time.sleep(0.05)
+
+    @property
+    def configurable(self) -> tuple[str, ...]:
+        """Return the drones whose own video is served."""
+        return tuple(self._modes)
+
+    def set_mode(self, drone: str, mode: VideoMode) -> None:
+        """Tell a drone's camera what the drone's configuration says; what it knows already is not repeated."""
+        teller, known = self._modes[drone]
+        if mode != known:
+            self._modes[drone] = teller, mode
+            with suppress(OSError):  # a process that has ended is reported by `ended`
+                teller.send(tuple(mode))
 
     def ended(self) -> list[str]:
         """Return the cameras whose process is gone."""

@@ -12,6 +12,7 @@ from groundstation.process.child import Child
 from sim_bridge.cameras import Cameras, render_specs
 from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.faults import FaultSchedule
@@ -85,6 +86,7 @@ class Harness:
         if ticks % _COMMAND_TICKS == 0:
             self._obey()
             self._break_things()
+            self._tell_cameras()
             self._child.tick_status(self._clock.judged, self._clock.overruns)
         if ticks % _STATUS_TICKS == 0:
             self._publish_status()
@@ -168,6 +170,13 @@ class Harness:
             command = received.message
             if isinstance(command, SimCommand) and not steer(self.world, command):
                 self._child.event(Severity.WARNING, f"order {command.action!r} to {received.key.entity} not understood")
+
+    def _tell_cameras(self) -> None:
+        """Hand what the drones' configurations say of their video to the processes that render it."""
+        for name in self._cameras.configurable if self._cameras is not None else ():
+            emulator = self.emulators[name]
+            if self._cameras is not None and isinstance(emulator, ArDroneEmulator):
+                self._cameras.set_mode(name, VideoMode.configured(emulator.control.configuration.integer))
 
     def _break_things(self) -> None:
         for line in self._faults.apply(self.world.time_s):

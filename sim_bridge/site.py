@@ -44,8 +44,9 @@ class Marker(_Part):
 
 
 class OnboardCamera(_Part):
-    """A drone's camera [base]."""
+    """A drone's camera [base]; source: where its driver looks for the pictures, which says how they travel."""
 
+    source: str = ""
     calibration: Lens
     position_m: tuple[float, float, float]
     tilt_down_deg: float

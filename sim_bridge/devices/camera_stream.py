@@ -1,16 +1,10 @@
-"""The network side of an emulated camera: MJPEG over HTTP, several clients, none of which can hold up another.
+"""The network side of an emulated camera: MJPEG over HTTP.
 
 WIRE: multipart/x-mixed-replace with a JPEG per part, Content-Type and Content-Length, as IP cameras and mjpg-streamer
 send it. Nothing tells the exposure time: the receiver has to know the camera's delay.
 """
 
-import errno
-import heapq
-import selectors
-import socket
-import threading
-import time
-from contextlib import suppress
+from sim_bridge.devices.stream_server import Client, StreamServer
 
 _BOUNDARY = b"skeinframe"
 PATH = "/video.mjpg"
@@ -22,9 +16,6 @@ _NOT_FOUND = (
     b"HTTP/1.0 404 Not Found\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\nthe picture is at /video.mjpg\n"
 )
 _MAX_REQUEST = 4096
-_MAX_CLIENTS = 8
-_MAX_QUEUED = 64
-_POLL_S = 0.25
 
 
 def part(jpeg: bytes) -> bytes:
@@ -33,140 +24,17 @@ def part(jpeg: bytes) -> bytes:
     return head + jpeg + b"\r\n"
 
 
-class _Client:
-    def __init__(self, connection: socket.socket) -> None:
-        self.connection = connection
-        self.request = b""
-        self.pending = memoryview(b"")
-        self.streaming = False
-        self.closing = False
-
-
-class CameraStream:
-    """Serves frames at http://address:port/video.mjpg from a thread of its own; `close` ends it.
-
-    A client that is still busy with an earlier frame misses the next one.
-    """
-
-    def __init__(self, address: str, port: int) -> None:
-        self._listener = socket.create_server((address, port), backlog=16)
-        self._listener.setblocking(False)
-        self.port: int = self._listener.getsockname()[1]
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._listener, selectors.EVENT_READ)
-        self._waker, self._wake_end = socket.socketpair()
-        self._wake_end.setblocking(False)
-        self._selector.register(self._wake_end, selectors.EVENT_READ)
-        self._clients: dict[int, _Client] = {}
-        self._queue: list[tuple[int, int, bytes]] = []
-        self._lock = threading.Lock()
-        self._count = 0
-        self._accepting = True
-        self._running = True
-        self.frames_sent = 0
-        self._thread = threading.Thread(target=self._serve, name="camera-stream", daemon=True)
-        self._thread.start()
-
-    @property
-    def clients(self) -> int:
-        """Return how many clients are connected."""
-        return len(self._clients)
+class CameraStream(StreamServer):
+    """Serves frames at http://address:port/video.mjpg."""
 
     def send_at(self, release_ns: int, jpeg: bytes) -> None:
         """Hand a frame to all clients at a monotonic time [ns]; frames leave in the order of their times."""
-        with self._lock:
-            self._count += 1
-            heapq.heappush(self._queue, (release_ns, self._count, part(jpeg)))
-            del self._queue[_MAX_QUEUED:]
-        self._wake()
+        self._hand_over(release_ns, part(jpeg), stands_alone=True)
 
-    def set_accepting(self, accepting: bool) -> None:
-        """Refuse new clients and cut the present ones (False), or serve again (True)."""
-        if accepting != self._accepting:
-            self._accepting = accepting
-            self._wake()
+    def _greet(self, client: Client) -> None:
+        """Wait for the request."""
 
-    def close(self) -> None:
-        """Stop serving and free the port; idempotent."""
-        if not self._running:
-            return
-        self._running = False
-        self._wake()
-        self._thread.join(timeout=2.0)
-        for client in list(self._clients.values()):
-            self._drop(client)
-        self._selector.close()
-        for end in (self._listener, self._waker, self._wake_end):
-            end.close()
-
-    def _wake(self) -> None:
-        with suppress(OSError):
-            self._waker.send(b"x")
-
-    def _serve(self) -> None:
-        while self._running:
-            for key, events in self._selector.select(self._patience_s()):
-                if key.fileobj is self._listener:
-                    self._accept()
-                elif key.fileobj is self._wake_end:
-                    with suppress(OSError):
-                        self._wake_end.recv(4096)
-                elif (client := self._clients.get(key.fd)) is not None:
-                    self._serve_client(client, events)
-            if not self._accepting:
-                for client in list(self._clients.values()):
-                    self._drop(client)
-            self._release_due()
-
-    def _patience_s(self) -> float:
-        with self._lock:
-            due_ns = self._queue[0][0] if self._queue else None
-        if due_ns is None:
-            return _POLL_S
-        return min(_POLL_S, max(0.0, (due_ns - time.monotonic_ns()) / 1e9))
-
-    def _release_due(self) -> None:
-        now_ns = time.monotonic_ns()
-        while True:
-            with self._lock:
-                if not self._queue or self._queue[0][0] > now_ns:
-                    return
-                payload = heapq.heappop(self._queue)[2]
-            self.frames_sent += 1
-            for client in list(self._clients.values()):
-                if client.streaming and not client.closing and not client.pending:
-                    client.pending = memoryview(payload)
-                    self._flush(client)
-
-    def _accept(self) -> None:
-        with suppress(BlockingIOError, ConnectionError):
-            connection, _ = self._listener.accept()
-            if not self._accepting or len(self._clients) >= _MAX_CLIENTS:
-                connection.close()
-                return
-            connection.setblocking(False)
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            # A small buffer in the kernel: a slow client sees few old frames, not seconds of them.
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
-            self._clients[connection.fileno()] = _Client(connection)
-            self._selector.register(connection, selectors.EVENT_READ)
-
-    def _serve_client(self, client: _Client, events: int) -> None:
-        if events & selectors.EVENT_READ and not self._read(client):
-            self._drop(client)
-        elif events & selectors.EVENT_WRITE:
-            self._flush(client)
-
-    def _read(self, client: _Client) -> bool:
-        """Take in what a client says; False when it has gone or talks too much."""
-        try:
-            data = client.connection.recv(4096)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
-        if not data:
-            return False
+    def _hear(self, client: Client, data: bytes) -> bool:
         if client.streaming or client.closing:
             return True
         client.request += data
@@ -177,24 +45,3 @@ class CameraStream:
             client.pending = memoryview(_HEAD if known else _NOT_FOUND)
             self._flush(client)
         return len(client.request) <= _MAX_REQUEST
-
-    def _flush(self, client: _Client) -> None:
-        try:
-            while client.pending:
-                client.pending = client.pending[client.connection.send(client.pending) :]
-        except OSError as error:
-            if error.errno not in (errno.EAGAIN, errno.EWOULDBLOCK):
-                self._drop(client)
-                return
-        if client.closing and not client.pending:
-            self._drop(client)
-            return
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if client.pending else 0)
-        with suppress(KeyError):
-            self._selector.modify(client.connection, events)
-
-    def _drop(self, client: _Client) -> None:
-        self._clients.pop(client.connection.fileno(), None)
-        with suppress(KeyError, ValueError):
-            self._selector.unregister(client.connection)
-        client.connection.close()

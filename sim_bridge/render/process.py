@@ -1,39 +1,43 @@
-"""One process per emulated camera: truth in by shared memory, MJPEG out over HTTP."""
+"""One process per emulated camera: truth in by shared memory, pictures out over the network."""
 
 import logging
 import os
 import signal
 import threading
 import time
+from multiprocessing.connection import Connection
 from types import FrameType
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from sim_bridge.devices.camera_stream import CameraStream
-from sim_bridge.render.renderer import Renderer
-from sim_bridge.render.spec import Outage, OutageKind, RenderSpec
+from sim_bridge.render.outputs import Output, open_output
+from sim_bridge.render.spec import Outage, OutageKind, RenderSpec, StreamKind
 from sim_bridge.truth import TruthBoard
 
 _log = logging.getLogger(__name__)
 _NS = 1_000_000_000
 _NS_PER_MS = 1_000_000
 _IDLE_S = 0.05
+# TCP: what is lost is sent again when its time-out has passed, at least 200 ms on Linux (RFC 6298 asks for more), and
+# what comes after it waits.
+_REPEATED_AFTER_MS = 200.0
 
 
-def run(spec: RenderSpec) -> int:
-    """Render and serve until SIGTERM or until the parent has gone; returns the exit code."""
+def run(spec: RenderSpec, modes: Connection | None = None) -> int:
+    """Render and serve until SIGTERM or until the parent has gone; returns the exit code.
+
+    modes: what an AR.Drone's configuration says of its video, as it changes.
+    """
     stop = threading.Event()
     _obey_signals(stop)
     cv2.setNumThreads(1)
     truth = TruthBoard.attach(spec.truth_name, spec.bodies)
-    renderer = Renderer(spec)
-    stream = CameraStream(spec.address, spec.port)
+    output = open_output(spec, modes)
     try:
-        _Exposures(spec, truth, renderer, stream).run(stop)
+        _Exposures(spec, truth, output).run(stop)
     finally:
-        stream.close()
+        output.close()
         truth.close()
     return 0
 
@@ -48,10 +52,14 @@ def _obey_signals(stop: threading.Event) -> None:
 
 
 class Link:
-    """What the network does to frames: loss, and a delay with jitter that keeps their order."""
+    """What the network does to frames: a delay with jitter that keeps their order, and loss.
+
+    A frame of an AR.Drone's video is never missing: what is lost of it comes late, and so does what waits behind it.
+    """
 
     def __init__(self, spec: RenderSpec) -> None:
         self._scenario = spec.scenario
+        self._repeats = spec.kind is StreamKind.ARDRONE
         self._random = np.random.default_rng([spec.seed, 7, *spec.camera.encode()])
         self._last_ns = 0
 
@@ -59,9 +67,9 @@ class Link:
         """Return when a frame arrives, or None when it is lost."""
         lost = self._random.random() < self._scenario.frame_loss
         jitter_ms = self._random.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
-        if lost:
+        if lost and not self._repeats:
             return None
-        delay_ms = max(0.0, self._scenario.video_delay_ms + jitter_ms)
+        delay_ms = max(0.0, self._scenario.video_delay_ms + jitter_ms) + lost * _REPEATED_AFTER_MS
         self._last_ns = max(self._last_ns, exposure_ns + round(delay_ms * _NS_PER_MS))
         return self._last_ns
 
@@ -75,8 +83,8 @@ def active_outage(outages: tuple[Outage, ...], seconds: float) -> OutageKind | N
 class _Exposures:
     """The camera's loop: exposures on an absolute schedule."""
 
-    def __init__(self, spec: RenderSpec, truth: TruthBoard, renderer: Renderer, stream: CameraStream) -> None:
-        self._spec, self._truth, self._renderer, self._stream = spec, truth, renderer, stream
+    def __init__(self, spec: RenderSpec, truth: TruthBoard, output: Output) -> None:
+        self._spec, self._truth, self._output = spec, truth, output
         self._link = Link(spec)
         self._first_ns = 0
         self._last_ns = 0
@@ -105,13 +113,8 @@ class _Exposures:
         self._first_ns = self._first_ns or exposure_ns
         self._last_ns = exposure_ns
         outage = active_outage(self._spec.scenario.outages, (exposure_ns - self._first_ns) / _NS)
-        self._stream.set_accepting(outage is not OutageKind.CUT)
+        self._output.set_accepting(outage is not OutageKind.CUT)
         release_ns = self._link.release_ns(exposure_ns)
-        if release_ns is None or outage is not None or not self._stream.clients:
+        if release_ns is None or outage is not None or not self._output.clients:
             return
-        self._stream.send_at(release_ns, self._jpeg(states))
-
-    def _jpeg(self, states: NDArray[np.float64]) -> bytes:
-        picture = self._renderer.render(states)
-        quality = [cv2.IMWRITE_JPEG_QUALITY, self._spec.scenario.jpeg_quality]
-        return cv2.imencode(".jpg", picture, quality)[1].tobytes()
+        self._output.show(states, exposure_ns, release_ns)

@@ -36,6 +36,13 @@ class BoardSpec:
     shape: BodyShape = BodyShape.DRONE
 
 
+class StreamKind(StrEnum):
+    """How a camera's pictures travel: MJPEG over HTTP, or H.264 over the video port of an AR.Drone."""
+
+    MJPEG = "mjpeg"
+    ARDRONE = "ardrone"
+
+
 class OutageKind(StrEnum):
     """How a stream fails: `STALL` keeps the connection but sends nothing, `CUT` closes it and refuses new ones."""
 
@@ -56,7 +63,8 @@ class Outage:
 class CameraScenario:
     """How good the camera and its link are.
 
-    video_delay_ms +- video_jitter_ms (uniform) from exposure to arrival; frame_loss: share of frames never sent;
+    video_delay_ms +- video_jitter_ms (uniform) from exposure to arrival; frame_loss: share of frames never sent, or,
+    where TCP repeats what is lost and nothing may be missing (AR.Drone), sent late;
     corner_noise_px: rms error of each board corner (print, lens model), pixel_noise: grey levels rms; blur_px: sigma
     of the defocus; exposure_ms: motion blur.
     """
@@ -78,7 +86,8 @@ class RenderSpec:
     """All that `sim_bridge.render.process.run` needs; picklable.
 
     truth_name: shared memory of the TruthBoard; bodies: its bodies in order; room_size_m: (x, y, z), the floor is
-    centred at the origin; address, port: where the MJPEG stream is served; parent_pid: exit when it is gone (0: never).
+    centred at the origin; address, port, kind: where and how the stream is served; parent_pid: exit when it is gone
+    (0: never).
     """
 
     camera: str
@@ -93,3 +102,4 @@ class RenderSpec:
     seed: int = 1
     room_size_m: tuple[float, float, float] = (8.0, 6.0, 4.5)
     parent_pid: int = 0
+    kind: StreamKind = StreamKind.MJPEG

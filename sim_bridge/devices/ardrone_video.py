@@ -1,0 +1,171 @@
+"""The video port of an emulated AR.Drone 2: H.264 in PaVE frames over TCP 5555.
+
+WIRE (AR.Drone sheet 6): the stream begins when a client connects, and what the client says is of no interest; an IDR
+with its parameter sets every 15 pictures; when a reader is late, frames are dropped up to the next IDR.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+import av
+import numpy as np
+from av.video.frame import PictureType
+from numpy.typing import NDArray
+
+from drivers.ardrone.wire.pave import Frame, FrameType, encode_frame
+from sim_bridge.devices.stream_server import Client, StreamServer
+
+PORT = 5555
+_AVC = 4
+_IDR_PERIOD = 15
+_START_CODE = b"\x00\x00\x00\x01"
+# WIRE (AR.Drone sheet 5.4): values of video:video_codec whose live stream is 720p; the others are 360p.
+_CODECS_720P = frozenset({0x83})
+_BOTTOM = 1
+_MANUAL_BITRATE = 2
+# WIRE (AR.Drone sheet 6): pictures as the sensor sees them are of limited range: 16 to 235.
+_LIMITED = np.rint(16 + np.arange(256) * (219 / 255)).astype(np.uint8)
+
+
+class VideoMode(NamedTuple):
+    """What the drone's configuration says of its live video; bit rates [kbit/s] are of codec_fps pictures a second."""
+
+    codec: int = 0x81
+    channel: int = 0
+    codec_fps: int = 30
+    max_bitrate: int = 1000
+    bitrate: int = 1000
+    bitrate_mode: int = 0
+
+    @classmethod
+    def configured(cls, key: Callable[[str], int]) -> "VideoMode":
+        """Return the mode that a drone's configuration asks for; key: whole numbers by name."""
+        names = ("video_codec", "video_channel", "codec_fps", "max_bitrate", "bitrate", "bitrate_ctrl_mode")
+        return cls(*(key(f"video:{name}") for name in names))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Return width and height of the pictures [px]."""
+        return (1280, 720) if self.codec in _CODECS_720P else (640, 360)
+
+    @property
+    def bottom(self) -> bool:
+        """Return whether the camera below is shown."""
+        return self.channel == _BOTTOM
+
+    @property
+    def stream(self) -> int:
+        """Return the stream id of the PaVE frames."""
+        return 2 if self.codec in _CODECS_720P else 1
+
+    @property
+    def bits_per_picture(self) -> float:
+        """Return the mean size of a picture: with fewer pictures a second than configured, each is no better."""
+        kbits = self.bitrate if self.bitrate_mode == _MANUAL_BITRATE else self.max_bitrate
+        return min(max(kbits, 250), 4000) * 1000 / min(max(self.codec_fps, 1), 30)
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedPicture:
+    """A PaVE frame and whether a decoder can begin with it."""
+
+    data: bytes
+    is_idr: bool
+
+
+class VideoEncoder:
+    """Grey pictures of one mode to PaVE frames; `number` and `position` go on from one encoder to the next."""
+
+    def __init__(self, mode: VideoMode, fps: float, number: int = 0, position: int = 0) -> None:
+        self.mode, self.number, self.position = mode, number, position
+        self._index = 0
+        self._codec = _codec(mode, fps)
+        width, height = mode.size
+        self._planes = np.full((height * 3 // 2, width), 128, dtype=np.uint8)
+
+    def encode(self, picture: NDArray[np.uint8], timestamp_ms: int, want_idr: bool) -> EncodedPicture:
+        """Return a picture (h, w) of the mode's size as the next PaVE frame."""
+        height = picture.shape[0]
+        np.take(_LIMITED, picture, out=self._planes[:height])
+        frame = av.VideoFrame.from_ndarray(self._planes, format="yuv420p")
+        frame.pts = self._index
+        frame.pict_type = PictureType.I if want_idr else PictureType.NONE
+        self._index += 1
+        (packet,) = self._codec.encode(frame)  # no look-ahead: each picture comes out at once
+        payload = bytes(packet)
+        kind = FrameType.IDR if packet.is_keyframe else FrameType.PREDICTED
+        sizes = parameter_sizes(payload) if packet.is_keyframe else (0, 0)
+        width, height = self.mode.size
+        self.number += 1
+        pave = Frame(
+            _AVC,
+            width,
+            height,
+            self.number,
+            timestamp_ms,
+            kind,
+            payload,
+            stream=self.mode.stream,
+            parameter_sizes=sizes,
+        )
+        data = encode_frame(pave, self.position)
+        self.position += len(data)
+        return EncodedPicture(data, packet.is_keyframe)
+
+
+def parameter_sizes(payload: bytes) -> tuple[int, int]:
+    """Return the bytes of SPS and PPS, start codes included, at the beginning of a key picture."""
+    second = payload.find(_START_CODE, 4)
+    third = payload.find(b"\x00\x00\x01", second + 4)
+    if second < 0 or third < 0:
+        return 0, 0
+    third -= payload[third - 1] == 0
+    return second, third - second
+
+
+def _codec(mode: VideoMode, fps: float) -> av.VideoCodecContext:
+    codec = av.CodecContext.create("libx264", "w")
+    assert isinstance(codec, av.VideoCodecContext)
+    codec.width, codec.height = mode.size
+    codec.pix_fmt = "yuv420p"
+    codec.framerate = Fraction(fps).limit_denominator(1000)
+    codec.time_base = 1 / codec.framerate
+    codec.thread_count = 1
+    codec.bit_rate = round(mode.bits_per_picture * fps)
+    kbits = round(codec.bit_rate / 1000)
+    parameters = f"keyint={_IDR_PERIOD}:min-keyint=1:scenecut=0:vbv-maxrate={kbits}:vbv-bufsize={max(1, kbits // 2)}"
+    # Real drones encode in hardware: better than x264's fastest preset at the same rate, so it is not the fastest.
+    codec.options = {
+        "preset": "superfast",
+        "tune": "zerolatency",
+        "profile": "baseline",
+        "forced-idr": "1",
+        "x264-params": f"{parameters}:annexb=1:repeat-headers=1",
+    }
+    return codec
+
+
+class ArDroneVideoServer(StreamServer):
+    """Serves PaVE frames; a client that comes or falls behind begins at the next IDR."""
+
+    def __init__(self, address: str, port: int = PORT) -> None:
+        self._newcomers = False
+        super().__init__(address, port)
+
+    def send_at(self, release_ns: int, picture: EncodedPicture) -> None:
+        """Hand a frame to all clients at a monotonic time [ns]."""
+        self._hand_over(release_ns, picture.data, stands_alone=picture.is_idr)
+
+    def take_newcomers(self) -> bool:
+        """Return whether somebody has connected since the last call: the next picture had better be an IDR."""
+        came, self._newcomers = self._newcomers, False
+        return came
+
+    def _greet(self, client: Client) -> None:
+        client.streaming = True
+        self._newcomers = True
+
+    def _hear(self, client: Client, data: bytes) -> bool:
+        return True

@@ -5,6 +5,10 @@ class GroundStationError(Exception):
     """Base of every error with a message meant for the operator."""
 
 
+class OperatorMistake(GroundStationError):
+    """Asked for what cannot be done as asked: a file of the wrong kind, a place that is taken, an extra not installed."""
+
+
 class SettingsError(GroundStationError):
     """One or more settings are wrong; `problems` holds a line for each, with file, line and remedy."""
 

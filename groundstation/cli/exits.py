@@ -4,7 +4,7 @@ from enum import IntEnum
 
 import click
 
-from groundstation.errors import GroundStationError, SettingsError
+from groundstation.errors import GroundStationError, OperatorMistake, SettingsError
 
 
 class ExitCode(IntEnum):
@@ -42,7 +42,7 @@ class UnreachableError(GroundStationError):
 def exit_code_of(error: BaseException) -> ExitCode:
     """Return the code that a failed command ends with."""
     match error:
-        case SettingsError() | click.UsageError():
+        case SettingsError() | OperatorMistake() | click.UsageError():
             return ExitCode.SETTINGS
         case UnreachableError():
             return ExitCode.UNREACHABLE

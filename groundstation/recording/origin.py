@@ -1,6 +1,6 @@
 """Whose recording it is: written by us, and with messages that this program understands."""
 
-from groundstation.errors import GroundStationError
+from groundstation.errors import OperatorMistake
 
 PROFILE = "skein"
 
@@ -10,7 +10,7 @@ MESSAGE_VERSION = 1
 VERSION_FIELD = "message_version"
 
 
-class RecordingError(GroundStationError):
+class RecordingError(OperatorMistake):
     """The file is missing, no recording, or not one that can be read; damage inside one of ours is never an error."""
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.bus import clock
+from groundstation.process.numba_cache import sources_hash
 from groundstation.recording.origin import MESSAGE_VERSION, VERSION_FIELD
 from groundstation.recording.timeline import Timeline
 
@@ -47,6 +48,8 @@ def preamble_of_run(field: bytes, epoch: int, timeline: Timeline, folder: Path) 
         VERSION_FIELD: str(MESSAGE_VERSION),
     }
     versions = {name: version(name) for name in (*_LIBRARIES, "eclipse-zenoh")} | {"python": platform.python_version()}
+    # A re-run repeats every bit only with the same compiled kernels on the same kind of processor.
+    versions |= {"kernels": sources_hash(), "processor": processor()}
     attachments = {FIELD_NAME: ("application/json", field)}
     attachments[CALIBRATIONS_NAME] = ("application/json", json.dumps(_calibrations(resolved)).encode())
     for name, media_type in _FILES.items():
@@ -54,6 +57,16 @@ def preamble_of_run(field: bytes, epoch: int, timeline: Timeline, folder: Path) 
             attachments[name] = (media_type, (folder / name).read_bytes())
     metadata = {"run": run, "versions": versions, "seeds": _seeds(attachments), "conventions": _CONVENTIONS}
     return Preamble(metadata, attachments, created)
+
+
+def processor() -> str:
+    """Return the name of this host's processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
 
 
 def _calibrations(field: dict[str, Any]) -> dict[str, Any]:

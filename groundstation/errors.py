@@ -6,7 +6,7 @@ class GroundStationError(Exception):
 
 
 class OperatorMistake(GroundStationError):
-    """Asked for what cannot be done as asked: a file of the wrong kind, a place that is taken, an extra not installed."""
+    """Asked for what cannot be done as asked: a wrong file, a place that is taken, an extra that is missing."""
 
 
 class SettingsError(GroundStationError):

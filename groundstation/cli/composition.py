@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.ardrone.wire import at
+from drivers.camera.settings import SourceKind, parse_source
 from drivers.registry import entry_point
 from groundstation.errors import GroundStationError
 from groundstation.settings.schema import Field
@@ -65,7 +66,12 @@ def simulated(field: Field, network: Network) -> Field:
 
 
 def _streams(field: Field, network: Network) -> dict[str, tuple[str, int]]:
-    return {name: network.stream(index) for index, name in enumerate((*field.cameras, *field.drones))}
+    streams = {name: network.stream(index) for index, name in enumerate((*field.cameras, *field.drones))}
+    for index, (name, drone) in enumerate(field.drones.items()):
+        source = parse_source(drone.camera.source)
+        if source.kind is SourceKind.ARDRONE:  # a drone sends its own video from its own address
+            streams[name] = (network.drone_address(index), source.port)
+    return streams
 
 
 def process_table(

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 
+from drivers.camera.settings import SourceKind, parse_source
 from groundstation.settings.behaviour import Estimator, Planner, Safety
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
@@ -132,6 +133,31 @@ def _mavlink(parts: Parts) -> Iterator[Finding]:
             yield ("drones", name, "mavlink", "port"), f"is shared with {shared[m.port][0]}, which is reached otherwise"
 
 
+_VIDEO_WIDTHS = {"h264_360p": 640, "h264_720p": 1280}
+
+
+def _own_video(parts: Parts) -> Iterator[Finding]:
+    """An AR.Drone's video is taken from that very drone, in the size that it is told to send."""
+    for name, camera in parts.cameras.items():
+        if parse_source(camera.source).kind is SourceKind.ARDRONE:
+            yield ("cameras", name, "source"), "must not be an AR.Drone's video: drones carry their cameras"
+    for name, drone in parts.drones.items():
+        source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
+        if source.kind is not SourceKind.ARDRONE:
+            continue
+        if drone.kind != "ardrone":
+            yield path, f"must not be an AR.Drone's video for kind: {drone.kind}"
+        elif source.host != drone.address:
+            yield path, f"must be this drone's own address, ardrone://{drone.address} (got {drone.camera.source})"
+        codec = drone.video.codec if drone.video is not None else "h264_360p"
+        wanted, found = _VIDEO_WIDTHS[codec], drone.camera.calibration.width_px
+        if found != wanted:
+            yield (
+                ("drones", name, "camera", "calibration"),
+                f"must be for pictures {wanted} wide, as video codec {codec} sends them (got {found})",
+            )
+
+
 def _names(parts: Parts) -> Iterator[Finding]:
     named: list[tuple[KeyPath, str]] = [(("drones", name), name) for name in parts.drones]
     named += [(("cameras", name), name) for name in parts.cameras]
@@ -201,6 +227,7 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _pads,
     _distinct,
     _mavlink,
+    _own_video,
     _names,
     _heights,
     _rates_and_times,

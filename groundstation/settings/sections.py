@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from drivers.ardrone.settings import ArDroneDriverSettings
-from drivers.camera.settings import CameraDriverSettings
+from drivers.camera.settings import CameraDriverSettings, SourceKind, parse_source
 from drivers.mavlink.settings import MavlinkDriverSettings
 from groundstation.settings.drones import Drone, Mavlink
 from groundstation.settings.room import Calibration, WorldCamera
@@ -43,16 +43,20 @@ def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, t
     """Return the same field with other addresses of drones and other sources of cameras, by name.
 
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
-    port). This is all that simulation changes. Raises KeyError for a name that is not in the field.
+    port), spoken to as the field's own source is where that is an AR.Drone's video, else by HTTP. This is all that
+    simulation changes. Raises KeyError for a name that is not in the field.
     """
     for name in (*addresses, *streams):
         if name not in field.drones and name not in field.cameras:
             raise KeyError(name)
     drones = {}
     for name, drone in field.drones.items():
-        camera = drone.camera.model_copy(update=_source(streams.get(name)))
+        camera = drone.camera.model_copy(update=_source(drone.camera.source, streams.get(name)))
         drones[name] = drone.model_copy(update={"camera": camera, **_place(drone, addresses.get(name))})
-    cameras = {name: camera.model_copy(update=_source(streams.get(name))) for name, camera in field.cameras.items()}
+    cameras = {
+        name: camera.model_copy(update=_source(camera.source, streams.get(name)))
+        for name, camera in field.cameras.items()
+    }
     return field.model_copy(update={"drones": drones, "cameras": cameras})
 
 
@@ -66,8 +70,12 @@ def _place(drone: Drone, address: str | None) -> dict[str, Any]:
     return {"address": address, "mavlink": drone.mavlink.model_copy(update={"local_address": local, "serial": ""})}
 
 
-def _source(stream: tuple[str, int] | None) -> dict[str, str]:
-    return {} if stream is None else {"source": f"http://{stream[0]}:{stream[1]}/video.mjpg"}
+def _source(source: str, stream: tuple[str, int] | None) -> dict[str, str]:
+    if stream is None:
+        return {}
+    if parse_source(source).kind is SourceKind.ARDRONE:
+        return {"source": f"ardrone://{stream[0]}:{stream[1]}"}
+    return {"source": f"http://{stream[0]}:{stream[1]}/video.mjpg"}
 
 
 def core_section(field: Field, run_dir: str, epoch: int) -> str:

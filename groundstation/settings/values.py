@@ -1,11 +1,12 @@
 """Kinds of values that a field file is made of, and the base of its sections."""
 
 import ipaddress
-import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
+
+from drivers.camera.settings import parse_source
 
 NAME_PATTERN = r"^[a-z][a-z0-9_]{0,47}$"
 
@@ -42,8 +43,10 @@ def _is_address(value: str) -> str:
 
 
 def _is_source(value: str) -> str:
-    if not re.fullmatch(r"[a-z][a-z0-9+]*://\S+|/dev/\S+", value):
-        raise PydanticCustomError("source", "must be an address such as http://192.168.1.50:8080/video.mjpg")
+    try:
+        parse_source(value)
+    except ValueError as error:
+        raise PydanticCustomError("source", "{why}", {"why": str(error)}) from None
     return value
 
 

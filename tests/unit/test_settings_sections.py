@@ -99,6 +99,17 @@ def test_simulation_changes_addresses_only(field: Field) -> None:
         rerouted(field, {"drone_9": "127.0.0.1"}, {})
 
 
+def test_simulation_speaks_to_a_drone_s_own_video_as_the_field_does(tmp_path: Path) -> None:
+    text = FIXTURE.read_text(encoding="utf-8").replace("http://192.168.1.51:8080/video.mjpg", "ardrone://192.168.1.11")
+    (tmp_path / "lab.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "cameras").symlink_to(FIXTURE.parent / "cameras")
+    field = load_field(tmp_path / "lab.yaml")
+    streams = {"drone_1": ("127.3.7.11", 5555), "drone_2": ("127.3.7.52", 8080)}
+    emulated = cameras(rerouted(field, {"drone_1": "127.3.7.11"}, streams))
+    assert emulated["drone_1_camera"].source == "ardrone://127.3.7.11:5555"
+    assert emulated["drone_2_camera"].source == "http://127.3.7.52:8080/video.mjpg"
+
+
 def test_the_core_gets_the_whole_field(field: Field) -> None:
     section = json.loads(core_section(field, "runs/x", 3))
     assert (section["run_dir"], section["epoch"]) == ("runs/x", 3)

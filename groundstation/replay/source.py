@@ -20,7 +20,8 @@ class Source:
     """One recorded run.
 
     state, raw: files in order of time; field: the resolved field as JSON; run, versions: what the recorder noted of
-    the run and of the programs; unix_offset_ns: UNIX time minus the run's boot clock.
+    the run and of the programs; began_ns: UNIX time of the first message; unix_offset_ns: UNIX time minus the run's
+    boot clock.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Source:
     field: bytes = b"{}"
     run: dict[str, str] = dataclasses.field(default_factory=dict)
     versions: dict[str, str] = dataclasses.field(default_factory=dict)
+    began_ns: int = 0
     unix_offset_ns: int = 0
 
     @property
@@ -77,7 +79,8 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
         raise RecordingError(f"{first.path}: its field or run cannot be read ({error})") from error
     files = tuple(recording.path for recording in opened)
     versions = first.metadata.get("versions", {})
-    return Source(name, files, tuple(raw), first.attachments[FIELD], run, versions, offset_ns)
+    began_ns = next((record.log_time_ns for path in files for record in open_recording(path).raw_records()), 0)
+    return Source(name, files, tuple(raw), first.attachments[FIELD], run, versions, began_ns, offset_ns)
 
 
 def _created_ns(recording: Recording) -> int:

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -81,35 +81,41 @@ class Comparison:
 
 
 class Repetition:
-    """Lives a recording again, tick by tick, and compares; `comparison` is complete when the ticks are through."""
+    """Lives a recording again, tick by tick, and compares; `comparison` is complete when the ticks are through.
 
-    def __init__(self, source: Source, resolved: Mapping[str, Any]) -> None:
+    hear: is given every message that is said now, encoded.
+    """
+
+    def __init__(
+        self, source: Source, resolved: Mapping[str, Any], hear: Callable[[bytes], object] = lambda _said: None
+    ) -> None:
+        self._hear = hear
         self.comparison = Comparison()
         self.tape = Tape(source.state)
         self._source = source
         self._resolved = resolved
-        self._began_ns: int | None = None
+        self._began_ns = source.began_ns
         self._life: Rerun | None = None
 
     def ticks(self) -> Iterator[Lived]:
         """Yield every tick with what was said in it now."""
         comparison = self.comparison
-        began_s, last_ns = time.process_time(), 0
+        began_s, first_ns, last_ns = time.process_time(), 0, 0
         for tick in self.tape.ticks():
-            if self._began_ns is None:
-                self._began_ns = tick.at_ns
-            last_ns = tick.at_ns
+            first_ns, last_ns = first_ns or tick.at_ns, tick.at_ns
             self._note_inputs(tick)
             if tick.first or self._life is None:
                 self._life = self._new_life(tick)
             said = self._life.tick(tick)
+            for _, message in said:
+                self._hear(codec.encode(message))
             comparison.ticks += 1
             comparison.plans += tick.entry.plan_tick >= 0
             lived = Lived(tick, (tick.at_ns - self._began_ns) / 1e9, said)
             self._compare(lived)
             yield lived
-        self._find_unsaid(last_ns)
-        comparison.recorded_s = (last_ns - (self._began_ns or 0)) / 1e9
+        self._find_unsaid(first_ns, last_ns)
+        comparison.recorded_s = (last_ns - first_ns) / 1e9
         comparison.cpu_s = time.process_time() - began_s
         comparison.damage = self.tape.damage
 
@@ -117,7 +123,7 @@ class Repetition:
         comparison, entry = self.comparison, tick.entry
         comparison.lives += 1
         if entry.tick != 0:
-            at_s = (tick.at_ns - (self._began_ns or 0)) / 1e9
+            at_s = (tick.at_ns - self._began_ns) / 1e9
             comparison.fragments.append(
                 f"the journal begins, or goes on after a gap, at tick {entry.tick} ({at_s:.2f} s)"
             )
@@ -177,14 +183,13 @@ class Repetition:
         if len(self.comparison.findings) < _KEPT_DIFFERENCES:
             self.comparison.findings.append(finding)
 
-    def _find_unsaid(self, last_ns: int) -> None:
+    def _find_unsaid(self, first_ns: int, last_ns: int) -> None:
         """What was recorded in a tick that is over, and was not said now, is a difference too."""
-        began_ns = self._began_ns or 0
         for (topic, entity, stamp_ns), records in sorted(self.tape.said.items(), key=lambda item: item[0][2]):
-            if not began_ns <= stamp_ns <= last_ns - _PLANNING_NS:
+            if not first_ns <= stamp_ns <= last_ns - _PLANNING_NS:
                 continue
             difference = Difference("message", f"{len(records)} recorded", None)
-            self._note_finding(Finding(-1, (stamp_ns - began_ns) / 1e9, topic, entity, difference))
+            self._note_finding(Finding(-1, (stamp_ns - self._began_ns) / 1e9, topic, entity, difference))
 
 
 def _decoded(record: RawRecord) -> Message | None:

@@ -1,0 +1,88 @@
+"""A re-run as a run folder of its own: what was recorded, with what the tracker says now in place of what it said."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from groundstation.bus import codec, keys
+from groundstation.bus.api import Sample
+from groundstation.bus.messages import Message
+from groundstation.bus.topics import JOURNAL, Topic
+from groundstation.recording.capture import Capture
+from groundstation.recording.mcap_file import McapFile
+from groundstation.recording.preamble import Preamble
+from groundstation.recording.reader import RawRecord, RecordingError, open_recording
+from groundstation.recording.timeline import Timeline
+from groundstation.replay.source import FIELD, Source
+from groundstation.replay.ticks import OUTPUTS
+from groundstation.replay.verify import Lived, Repetition
+
+_FACTS = "run.json"
+_REPLACED = frozenset((topic.plane, topic.name) for topic in (*OUTPUTS, JOURNAL))
+
+
+def require_new(folder: Path) -> None:
+    """Raise RecordingError when a folder holds something already."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise RecordingError(f"{folder}: exists already; name a new folder")
+
+
+def live_again(source: Source, repetition: Repetition, folder: Path, field: bytes, changes: str) -> None:
+    """Run a repetition to its end and write it to a new run folder.
+
+    field: the resolved field (JSON) that it runs with; changes: what is not as it was recorded, in words.
+    """
+    require_new(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    opened = open_recording(source.state[0])
+    attachments = {name: (opened.media_types.get(name, ""), data) for name, data in opened.attachments.items()}
+    attachments[FIELD] = ("application/json", field)
+    note = {"replay": {"of": source.name, "changes": changes}}
+    created = int(source.run.get("created_unix_ns", "0"))
+    if _FACTS in opened.attachments:
+        (folder / _FACTS).write_bytes(opened.attachments[_FACTS])
+    file = McapFile(folder / "state.mcap", Preamble({**opened.metadata, **note}, attachments, created))
+    try:
+        _write(source, repetition, file)
+    finally:
+        file.close()
+
+
+def _write(source: Source, repetition: Repetition, file: McapFile) -> None:
+    capture = Capture(Timeline(source.run.get("clock", ""), source.unix_offset_ns))
+    lives = repetition.ticks()
+    lived = next(lives, None)
+    now_ns = 0
+    for record in _copied(source):
+        now_ns = max(now_ns, record.log_time_ns)
+        while lived is not None and lived.tick.at_ns <= now_ns:
+            _write_lived(source, lived, capture, file)
+            lived = next(lives, None)
+        _put(capture, file, Sample(str(record.key), record.data), record.log_time_ns - source.unix_offset_ns)
+    while lived is not None:
+        _write_lived(source, lived, capture, file)
+        lived = next(lives, None)
+
+
+def _copied(source: Source) -> Iterator[RawRecord]:
+    def is_kept(topic: Topic) -> bool:
+        return topic.type is not None and (topic.plane, topic.name) not in _REPLACED
+
+    for path in source.state:
+        yield from open_recording(path).raw_records(is_kept)
+
+
+def _write_lived(source: Source, lived: Lived, capture: Capture, file: McapFile) -> None:
+    site = source.run.get("site", "")
+    for topic, message in lived.said:
+        _put(capture, file, _sample(site, topic, message), lived.tick.entry.now_ns)
+
+
+def _sample(site: str, topic: Topic, message: Message) -> Sample:
+    header = message.header
+    return Sample(keys.expression(site, topic, header.entity, header.source), codec.encode(message))
+
+
+def _put(capture: Capture, file: McapFile, sample: Sample, arrival_ns: int) -> None:
+    entry = capture.entry(sample, arrival_ns)
+    if entry is not None:
+        file.write(entry)

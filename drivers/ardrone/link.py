@@ -67,7 +67,11 @@ class ArDroneLink:
         self._log = log
         self._lock = threading.Lock()
         self._navdata_socket = _open(settings.local_address, settings.local_navdata_port)
-        self._at_socket = _open(settings.local_address, settings.local_at_port)
+        try:
+            self._at_socket = _open(settings.local_address, settings.local_at_port)
+        except DriverError:
+            self._navdata_socket.close()
+            raise
         self._sequence = 1
         self._filter = SequenceFilter()
         self.rejected: Counter[str] = Counter()

@@ -38,12 +38,17 @@ VERBS: dict[str, Verb] = {
         "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."
     ),
     "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
+    "replay": Verb("Look", "groundstation.cli.replay:replay", "A recorded run in the console, or once more computed."),
+    "recording": Verb(
+        "Look", "groundstation.cli.recording:recording", "Look into, repair, cut and convert recordings."
+    ),
     "export": Verb("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
     "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
     "experiment": Verb(
         "Look", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."
     ),
     "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
+    "ardrone": Verb("Settings", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
     "mavlink": Verb("Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."),
     "version": Verb("Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."),
 }

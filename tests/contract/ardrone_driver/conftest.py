@@ -5,7 +5,9 @@ import os
 import re
 import socket
 import struct
+import threading
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -36,6 +38,69 @@ def checked(body: bytes) -> bytes:
     return body + struct.pack("<HHI", 0xFFFF, 8, sum(body))
 
 
+class ScriptedTcp:
+    """FTP with a version.txt on 5551 and the control port 5559, each for one client at a time."""
+
+    def __init__(self, address: str, version: str) -> None:
+        self.address, self.version = address, version
+        self.clients: list[socket.socket] = []
+        self.ftp, self.control = (socket.create_server((address, port)) for port in (5551, 5559))
+        for serve in (self._serve_ftp, self._serve_control):
+            threading.Thread(target=serve, daemon=True).start()
+
+    def close(self) -> None:
+        for listening in (self.ftp, self.control, *self.clients):
+            with suppress(OSError):
+                listening.shutdown(socket.SHUT_RDWR)
+            listening.close()
+
+    def _serve_ftp(self) -> None:
+        with suppress(OSError):
+            while True:
+                client, _ = self.ftp.accept()
+                with client:
+                    self._speak_ftp(client)
+
+    def _speak_ftp(self, client: socket.socket) -> None:
+        data = socket.create_server((self.address, 0))
+        high, low = divmod(data.getsockname()[1], 256)
+        answers = {
+            "USER": "331 go on",
+            "PASS": "230 in",
+            "TYPE": "200 binary",
+            "PASV": f"227 Entering Passive Mode ({self.address.replace('.', ',')},{high},{low})",
+            "RETR": "150 here it comes",
+            "QUIT": "221 bye",
+        }
+        client.sendall(b"220 ready\r\n")
+        with data, client.makefile("r", encoding="ascii", newline="\r\n") as lines:
+            for line in lines:
+                client.sendall((answers.get(line[:4], "502 what?") + "\r\n").encode())
+                if line.startswith("RETR version.txt"):
+                    stream, _ = data.accept()
+                    with stream:
+                        stream.sendall(f"{self.version}\n".encode())
+                    client.sendall(b"226 done\r\n")
+
+    def _serve_control(self) -> None:
+        with suppress(OSError):
+            while True:
+                self.clients.append(self.control.accept()[0])
+
+    def dump(self, config: dict[str, str]) -> None:
+        values = {
+            "general:num_version_soft": self.version,
+            "general:drone_serial": "PS721000AB2L01234",
+            "network:wifi_mode": "0",
+            "network:owner_mac": "00:00:00:00:00:00",
+            "control:accs_gains": "{ 1.0000000e+00 0.0000000e+00\n0.0000000e+00 }",
+        } | config
+        text = "".join(f"{key} = {value}\n" for key, value in values.items()).encode() + b"\0"
+        for client in self.clients:
+            with suppress(OSError):
+                client.sendall(text)
+
+
 class ScriptedDrone:
     """Two sockets and a state: acknowledges CONFIG, takes off and lands at once, remembers every command line."""
 
@@ -52,6 +117,8 @@ class ScriptedDrone:
         self.select = False
         self.lines: list[tuple[str, int, str]] = []
         self.config: dict[str, str] = {}
+        self.deaf_to: set[str] = set()
+        self.tcp: ScriptedTcp | None = None
 
     def _open(self, port: int) -> socket.socket:
         udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -62,6 +129,8 @@ class ScriptedDrone:
     def close(self) -> None:
         self.navdata.close()
         self.at.close()
+        if self.tcp is not None:
+            self.tcp.close()
 
     def packet(self, theta: float = 1000.0) -> bytes:
         self.sequence += 1
@@ -101,10 +170,14 @@ class ScriptedDrone:
         self.lines.append((name, sequence, arguments))
         if name == "CONFIG" and not self.state & COMMAND_BIT:
             key, value = arguments.replace('"', "").split(",")
-            self.config[key] = value
+            if key not in self.deaf_to:
+                self.config[key] = value
             self.state = (self.state | COMMAND_BIT) & ~BOOTSTRAP
         if name == "CTRL" and arguments.startswith("5"):
             self.state &= ~COMMAND_BIT
+        if name == "CTRL" and arguments == "4,0" and self.tcp is not None:
+            self.tcp.dump(self.config)
+            self.state |= COMMAND_BIT
         if name == "REF":
             bits = int(arguments)
             if bits & 0x100 and not self.select:
@@ -153,7 +226,7 @@ class Process:
 class Rig:
     """Scripted drone, driver, and somebody on the other end of the bus."""
 
-    def __init__(self, **settings) -> None:
+    def __init__(self, version: str = "", **settings) -> None:
         exchange = MemoryExchange()
         self.other = MemoryBus(exchange, "lab", "other")
         self.process = Process(MemoryBus(exchange, "lab", "ardrone_drone_1"))
@@ -162,6 +235,8 @@ class Rig:
             for topic in (ODOMETRY, IMU, VEHICLE_STATUS, COMMAND_ACK, RAW_RX, RAW_TX)
         }
         self.fake = ScriptedDrone()
+        if version:
+            self.fake.tcp = ScriptedTcp(self.fake.address, version)
         self.settings = ArDroneDriverSettings(
             name="drone_1", address=self.fake.address, odometry_hz=200, imu_hz=200, **settings
         )
@@ -197,12 +272,12 @@ class Rig:
             self.other.publish(SETPOINT, message)
         self.decision = self.host.turn(time.monotonic_ns())
 
-    def until(self, condition, turns: int = 200) -> None:
-        for _ in range(turns):
-            if condition():
-                return
+    def until(self, condition, limit_s: float = 5.0) -> None:
+        deadline = time.monotonic() + limit_s
+        while not condition():
+            assert time.monotonic() < deadline, "it never came true"
             self.turn()
-        raise AssertionError("it never came true")
+            time.sleep(0.001)
 
     def order(self, verb: Verb, scope=()) -> str:
         name = f"c{next(self.ids)}"
@@ -238,6 +313,46 @@ def rig():
     rig = Rig()
     yield rig
     rig.close()
+
+
+@pytest.fixture
+def new_rig():
+    """Build rigs: version of the firmware ("": no TCP ports), and settings of the driver."""
+    rigs = []
+
+    def build(version="", **settings):
+        rigs.append(Rig(version, **settings))
+        return rigs[-1]
+
+    yield build
+    for rig in rigs:
+        rig.close()
+
+
+@pytest.fixture
+def drone_alone():
+    """Build scripted drones that stream by themselves 200 times a second; version of the firmware as above."""
+    drones, ended = [], threading.Event()
+
+    def live(drone):
+        while not ended.wait(0.005):
+            drone.turn()
+
+    def build(version="", state=BOOTSTRAP):
+        drone = ScriptedDrone()
+        drone.state = state
+        if version:
+            drone.tcp = ScriptedTcp(drone.address, version)
+        thread = threading.Thread(target=live, args=(drone,), daemon=True)
+        drones.append((drone, thread))
+        thread.start()
+        return drone
+
+    yield build
+    ended.set()
+    for drone, thread in drones:
+        thread.join(1)
+        drone.close()
 
 
 @pytest.fixture

@@ -150,7 +150,7 @@ def test_a_restarted_driver_lands_a_flying_drone_and_never_starts_a_standing_one
     second = ArDrone(rig.settings, rig.process.bus)
     rig.drone, rig.host = second, VehicleHost(rig.process, second, AuthorityLimits(brake_s=0.05))
     rig.tracking = True
-    rig.until(lambda: not rig.fake.state & FLY, turns=300)
+    rig.until(lambda: not rig.fake.state & FLY)
     references = rig.fake.said("REF")
     assert references[0] == "290718208", "first it stays up and brakes"
     assert references[-1] == "290717696"

@@ -1,0 +1,85 @@
+"""`groundstation ardrone`: what an AR.Drone at an address is, without flying it."""
+
+import ipaddress
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.errors import DriverError
+
+if TYPE_CHECKING:
+    from drivers.ardrone.probe import Report
+
+
+@click.group(epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1")
+def ardrone() -> None:
+    """Meet AR.Drones."""
+
+
+def _address(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    try:
+        return str(ipaddress.IPv4Address(value))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is no IPv4 address, such as 192.168.1.1.") from None
+
+
+@ardrone.command(
+    epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1\n"
+    "  groundstation ardrone probe 192.168.1.11 --json\n\n"
+    "Exit codes: 0 it answered, 2 no address, 4 nobody answers there."
+)
+@click.argument("address", callback=_address)
+@click.option("--json", "as_json", is_flag=True, help="For programs.")
+def probe(address: str, as_json: bool) -> int:
+    """Tell model, firmware, battery, navdata, link and configuration of the drone at ADDRESS.
+
+    Safe at any time: nothing is sent that starts, moves or ends a flight, and to a drone in the air no command at all.
+    """
+    from drivers.ardrone.probe import probe as look
+
+    try:
+        report = look(address)
+    except DriverError as error:
+        hints = "is it switched on, is this computer in its network (ping it), is it paired with somebody else?"
+        click.echo(f"{error}; {hints}", err=True)
+        return ExitCode.FAULT
+    click.echo(json.dumps(_facts(report), indent=2) if as_json else _text(report))
+    return ExitCode.OK
+
+
+def _facts(report: "Report") -> dict[str, Any]:
+    identity = report.identity
+    return {
+        "address": report.address,
+        "model": identity.model.value,
+        "firmware": identity.firmware or None,
+        "serial": identity.serial or None,
+        "battery": report.battery,
+        "phase": report.phase or None,
+        "state": f"{report.state:08x}",
+        "state_words": list(report.words),
+        "navdata": [
+            {"mode": s.mode, "rate_hz": round(s.rate_hz, 1), "link_quality": s.link_quality} for s in report.streams
+        ],
+        "config": {key: {"value": value, "category": kind or None} for key, (value, kind) in report.config.items()},
+        "hints": report.hints,
+    }
+
+
+def _text(report: "Report") -> str:
+    battery = "unknown" if report.battery is None else f"{report.battery:.0%}"
+    lines = [
+        f"{report.address}: {report.identity.text}",
+        f"battery    {battery}",
+        f"phase      {report.phase or 'unknown'}",
+        f"state      {report.state:08x}: {', '.join(report.words)}",
+    ]
+    for stream in report.streams:
+        link = "" if stream.link_quality is None else f", {stream.link_quality:.0%} of the packets arrive"
+        lines.append(f"navdata    {stream.mode}: {stream.rate_hz:.1f} Hz{link}")
+    if report.config:
+        lines += ["configuration (key, value, set it is kept in)"]
+        lines += [f"  {key:38s} {value or '-':28s} {kind or '?'}" for key, (value, kind) in report.config.items()]
+    return "\n".join(lines + [f"hint: {hint}" for hint in report.hints])

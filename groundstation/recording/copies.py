@@ -1,7 +1,8 @@
 """Valid files from recordings: all that is sound of a cut one, or a stretch of a run."""
 
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -170,3 +171,18 @@ def _latched_copies(indexes: list[FileIndex], latched: Iterable[RawRecord], from
             if raw is not None:
                 schema = index.schemas.get(channel.schema_id)
                 yield Copied(channel, schema, raw.sequence, from_ns, raw.publish_time_ns, raw.data)
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[None]:
+    """Make a folder to be filled; what was written is removed again when that fails.
+
+    Raises RecordingError when there is something already.
+    """
+    require_absent(path)
+    path.mkdir(parents=True)
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise

@@ -1,0 +1,138 @@
+"""`groundstation recording`: what is in a recording, and how to get it out."""
+
+import importlib
+import json
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+if TYPE_CHECKING:
+    from groundstation.recording.info import RecordingInfo
+
+EXISTING = click.Path(exists=True, path_type=Path)
+_MAX_LINES = 20
+
+
+class RecordingGroup(click.Group):
+    """The commands below, and `export`, which is the verb of that name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order in which one needs them."""
+        return ["info", "recover", "cut", "export"]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a command, importing the module of `export` only when it is asked for."""
+        if cmd_name == "export":
+            command = importlib.import_module("groundstation.cli.export").export
+            assert isinstance(command, click.Command)
+            return command
+        return super().get_command(ctx, cmd_name)
+
+
+@click.group(
+    cls=RecordingGroup,
+    epilog="\b\nExamples:\n  groundstation recording info runs/20261120T101500Z-lab\n"
+    "  groundstation recording cut runs/20261120T101500Z-lab --from 30 --to 45\n"
+    "  groundstation recording export --csv runs/20261120T101500Z-lab",
+)
+def recording() -> None:
+    """Look into, repair, cut and convert recordings: a run folder, or one .mcap file of it."""
+
+
+@recording.command()
+@click.argument("recording", type=EXISTING)
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def info(recording: Path, as_json: bool) -> int:
+    """Parts, duration, topics with counts and rates, versions, holes and damage. Reads and checks everything."""
+    from groundstation.recording.info import info_of
+    from groundstation.recording.run import open_run
+
+    found = info_of(open_run(recording))
+    if as_json:
+        click.echo(json.dumps(asdict(found) | {"whole": found.whole}, indent=2))
+    else:
+        _print(found)
+    return ExitCode.OK
+
+
+@recording.command()
+@click.argument("recording", type=EXISTING)
+@click.option("--output", type=click.Path(path_type=Path), help="New file (default: NAME-recovered.mcap beside it).")
+def recover(recording: Path, output: Path | None) -> int:
+    """Make a valid file of one that was cut off, for programs that refuse such files; the original stays.
+
+    Commands of this program need no such step: they read what is sound of a cut file by themselves.
+    """
+    from groundstation.recording.copies import recover as make_valid
+    from groundstation.recording.run import open_run
+
+    damaged = [index for index in open_run(recording).indexes if index.damage]
+    if not damaged:
+        click.echo(f"{recording}: nothing is damaged, nothing was written")
+        return ExitCode.OK
+    if output is not None and len(damaged) > 1:
+        names = ", ".join(index.path.name for index in damaged)
+        raise click.UsageError(f"several files are damaged ({names}): name one of them, or leave out --output.")
+    for index in damaged:
+        target = output or index.path.with_name(f"{index.path.stem}-recovered.mcap")
+        count, damage = make_valid(index.path, target)
+        click.echo(f"{target}: {count} messages of {index.path.name} ({'; '.join(damage)})")
+    return ExitCode.OK
+
+
+@recording.command()
+@click.argument("recording", type=EXISTING)
+@click.option("--from", "from_s", type=click.FloatRange(0), default=0.0, help="Begin [s since the start].")
+@click.option("--to", "to_s", type=click.FloatRange(0), help="End [s since the start] (default: the end).")
+@click.option("--output", type=click.Path(path_type=Path), help="New folder, or file for a file (default: beside it).")
+def cut(recording: Path, from_s: float, to_s: float | None, output: Path | None) -> int:
+    """Write a stretch of a recording to a new one, with all attachments and with what was known when it begins."""
+    from groundstation.recording.stretch import cut_run
+
+    for path, count in cut_run(recording, from_s, to_s, output).items():
+        click.echo(f"{path}: {count} messages")
+    return ExitCode.OK
+
+
+def _print(found: "RecordingInfo") -> None:
+    began = datetime.fromtimestamp(found.start_unix_ns / 1e9, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    run, versions = found.metadata.get("run", {}), found.metadata.get("versions", {})
+    click.echo(f"{began}, {found.duration_s:.1f} s, site {run.get('site', '?')}")
+    seeds = ", ".join(f"{name} {value}" for name, value in found.metadata.get("seeds", {}).items())
+    click.echo(f"by skein-groundstation {versions.get('skein-groundstation', '?')}{f'; {seeds}' if seeds else ''}")
+    click.echo(f"attached: {', '.join(f'{name} ({size} B)' for name, size in found.attachments.items()) or 'nothing'}")
+    click.echo()
+    for part in found.parts:
+        state = "; ".join(part.damage) or "whole"
+        click.echo(f"{part.path}  {part.size_bytes / 1e6:.1f} MB  {part.messages} messages  {state}")
+    click.echo()
+    width = max((len(channel.channel) for channel in found.channels), default=7)
+    click.echo(f"{'channel':{width}}  {'messages':>8}  {'Hz':>7}  {'longest gap':>11}  schema")
+    for channel in found.channels:
+        click.echo(
+            f"{channel.channel:{width}}  {channel.messages:8d}  {channel.rate_hz:7.2f}  "
+            f"{channel.longest_gap_s:9.2f} s  {channel.schema}"
+        )
+    _print_troubles(found)
+
+
+def _print_troubles(found: "RecordingInfo") -> None:
+    holes = [f"{hole.channel}: {hole.from_s:.1f} s to {hole.to_s:.1f} s" for hole in found.holes]
+    for title, lines in (
+        ("Holes (silence of a regular topic)", holes),
+        ("Parts that are missing", found.missing_parts),
+        ("Messages that have changed since", found.changed_messages),
+    ):
+        if lines:
+            click.echo(f"\n{title}:")
+            click.echo("\n".join(f"  {line}" for line in lines[:_MAX_LINES]))
+            if len(lines) > _MAX_LINES:
+                click.echo(f"  and {len(lines) - _MAX_LINES} more (--json shows all)")
+    if any(part.damage for part in found.parts):
+        click.echo("\nWhat is sound of a damaged file is read all the same; `groundstation recording recover` makes a")
+        click.echo("valid file of it for other programs.")

@@ -1,0 +1,43 @@
+"""A stretch of a run as a new run: a folder for a folder, a file for a file."""
+
+import shutil
+from pathlib import Path
+
+from groundstation.bus.clock import NS_PER_S
+from groundstation.recording.copies import cut, new_folder, require_absent
+from groundstation.recording.origin import RecordingError
+from groundstation.recording.run import RecordedRun, open_run
+
+# What reports and replays look for beside the files of a run.
+_COMPANIONS = ("run.json", "resolved.yaml")
+
+
+def cut_run(path: Path, from_s: float, to_s: float | None, output: Path | None) -> dict[Path, int]:
+    """Write what happened between two times [s since the start]; returns the new files with their messages.
+
+    Raises RecordingError when nothing lies between them or the output exists; leaves nothing half done behind.
+    """
+    run = open_run(path)
+    end_s = run.duration_s if to_s is None else to_s
+    if not from_s < end_s:
+        raise RecordingError(f"--from {from_s:g} is not before --to {end_s:g}")
+    if from_s >= run.duration_s:
+        raise RecordingError(f"{path}: lasts {run.duration_s:.1f} s, nothing begins at {from_s:g} s")
+    from_ns = run.start_ns + round(from_s * NS_PER_S)
+    until_ns = run.end_ns + 1 if to_s is None else run.start_ns + round(to_s * NS_PER_S)
+    name = f"{path.name.removesuffix('.mcap')}-{from_s:g}s-{end_s:.6g}s"
+    target = output or path.absolute().with_name(f"{name}.mcap" if path.is_file() else name)
+    require_absent(target)
+    if path.is_file():
+        return {target: cut(run, run.indexes[0].stem, from_ns, until_ns, target)}
+    with new_folder(target):
+        written = _cut_stems(run, from_ns, until_ns, target)
+        for name in _COMPANIONS:
+            if (path / name).is_file():
+                shutil.copy(path / name, target / name)
+    return written
+
+
+def _cut_stems(run: RecordedRun, from_ns: int, until_ns: int, target: Path) -> dict[Path, int]:
+    stems = dict.fromkeys(index.stem for index in run.indexes)
+    return {target / f"{stem}.mcap": cut(run, stem, from_ns, until_ns, target / f"{stem}.mcap") for stem in stems}

@@ -19,8 +19,13 @@ def _is_finite(value: Any) -> bool:
         return math.isfinite(value)
     if isinstance(value, int):
         return -_WHOLE_LIMIT <= value < _WHOLE_LIMIT
+    if isinstance(value, str):
+        return True
     if isinstance(value, tuple):
-        return all(_is_finite(item) for item in value)
+        # Most fields are vectors and matrices: several times a second in every process, so without a call for each entry.
+        if set(map(type, value)) == {float}:
+            return all(map(math.isfinite, value))
+        return all(map(_is_finite, value))
     if isinstance(value, msgspec.Struct):
         return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
     if isinstance(value, dict):

@@ -1,36 +1,91 @@
-"""`groundstation report`: judge a recorded run once more."""
+"""`groundstation report`: judge a recorded run once more, or set two side by side."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from groundstation.cli.exits import ExitCode
 from groundstation.errors import GroundStationError
 
+if TYPE_CHECKING:
+    from groundstation.report.judge import Report
+
 _RUNS = Path("runs")
 
 
-@click.command(epilog="\b\nExamples:\n  groundstation report\n  groundstation report runs/20261120T101500Z-lab --json")
-@click.argument("run_dir", required=False, type=click.Path(file_okay=False, path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print report.json instead of the summary.")
-@click.option("--no-plot", is_flag=True, help="Leave trajectories.png as it is.")
-def report(run_dir: Path | None, as_json: bool, no_plot: bool) -> int:
-    """Rebuild report.json and trajectories.png of a run folder (default: the newest in ./runs).
+@click.command(
+    epilog="\b\nExamples:\n  groundstation report\n  groundstation report runs/20261120T101500Z-lab --json\n"
+    "  groundstation report runs/20261120T101500Z-lab --compare runs/20261120T103000Z-lab"
+)
+@click.argument("recording", required=False, type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print report.json (or the comparison) instead of the summary.")
+@click.option("--no-plot", is_flag=True, help="Leave trajectories.png and report.html as they are.")
+@click.option("--compare", "other", type=click.Path(path_type=Path), help="Another run: write comparison.html.")
+def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None) -> int:
+    """Rebuild report.html, report.json and trajectories.png of a run folder (default: the newest in ./runs).
 
-    Exit code 0 when the run passed, 1 when it did not.
+    Exit code 0 when the run passed, 1 when it did not. A comparison judges nothing: 0 when it could be made.
     """
     from groundstation.report.build import build_report
 
-    built = build_report(run_dir or newest_run(_RUNS), plot=not no_plot)
+    run_dir = _run_dir(recording) if recording else newest_run(_RUNS)
+    if other is not None:
+        _compare(run_dir, _run_dir(other), as_json)
+        return ExitCode.OK
+    built = _writing(lambda: build_report(run_dir, plot=not no_plot))
+    _show(built, as_json)
+    return ExitCode.OK if built.passed else ExitCode.FAILED
+
+
+def _writing(build: Callable[[], "Report"]) -> "Report":
+    try:
+        return build()
+    except OSError as error:
+        where = error.filename or "the run folder"
+        raise GroundStationError(f"{where}: {error.strerror}; nothing of the recording is lost") from error
+
+
+def _show(built: "Report", as_json: bool) -> None:
     if as_json:
         click.echo(built.as_json())
-    else:
-        from rich.console import Console
+        return
+    from rich.console import Console
 
-        from groundstation.report.summary import summary
+    from groundstation.report.summary import summary
 
-        Console().print(summary(built))
-    return ExitCode.OK if built.passed else ExitCode.FAILED
+    Console().print(summary(built))
+
+
+def _compare(first: Path, second: Path, as_json: bool) -> None:
+    from groundstation.report import compare
+    from groundstation.report.gather import gather
+    from groundstation.report.judge import judge
+    from groundstation.report.page.comparison import NAME, write_comparison
+
+    left, right = gather(first), gather(second)
+    reports = judge(left, first), judge(right, second)
+    if as_json:
+        click.echo(compare.as_json(*reports))
+        return
+    try:
+        write_comparison(((left, reports[0]), (right, reports[1])), first / NAME)
+    except OSError as error:
+        raise GroundStationError(f"{first / NAME}: {error.strerror}") from error
+    from rich.console import Console
+
+    from groundstation.report.summary import comparison
+
+    Console().print(comparison(*reports))
+    click.echo(f"  {first / NAME}")
+
+
+def _run_dir(path: Path) -> Path:
+    """Return the run folder that is meant by a folder or by a recording in it."""
+    if not path.exists():
+        raise GroundStationError(f"{path}: there is no such run")
+    return path if path.is_dir() else path.parent
 
 
 def newest_run(folder: Path) -> Path:

@@ -190,8 +190,9 @@ def _log_to(run_dir: Path) -> None:
 
 
 def _build(run_dir: Path) -> Any:
-    from groundstation.report.build import build_report, judge
+    from groundstation.report.build import build_report
     from groundstation.report.gather import gather
+    from groundstation.report.judge import judge
 
     try:
         return build_report(run_dir)
@@ -203,14 +204,14 @@ def _build(run_dir: Path) -> Any:
 def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
     """Write and print the report; None when there is nothing to judge. Never lets a closed terminal hide it."""
     from groundstation.errors import GroundStationError
-    from groundstation.report.build import JSON_NAME, PLOT_NAME
+    from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
 
     try:
         built = _build(run_dir)
     except GroundStationError as error:
         click.echo(f"no report: {error}", err=True)
         return False
-    for name in (JSON_NAME, PLOT_NAME) if copy_to is not None else ():
+    for name in (HTML_NAME, JSON_NAME, PLOT_NAME) if copy_to is not None else ():
         with suppress(OSError):
             shutil.copy(run_dir / name, copy_to or run_dir)
     try:

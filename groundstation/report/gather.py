@@ -18,6 +18,7 @@ from groundstation.bus.topics import (
     PROCESS_STATUS,
     SIM_STATUS,
     TRUTH,
+    VEHICLE_STATUS,
     Topic,
 )
 from groundstation.recording.reader import Record, RecordingError, open_recording, parts
@@ -28,7 +29,18 @@ from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Ti
 
 _WANTED = frozenset(
     (topic.plane, topic.name)
-    for topic in (COMMAND, COMMAND_ACK, ESTIMATE, EVENT, INNOVATION, PLAN, PROCESS_STATUS, SIM_STATUS, TRUTH)
+    for topic in (
+        COMMAND,
+        COMMAND_ACK,
+        ESTIMATE,
+        EVENT,
+        INNOVATION,
+        PLAN,
+        PROCESS_STATUS,
+        SIM_STATUS,
+        TRUTH,
+        VEHICLE_STATUS,
+    )
 )
 
 
@@ -104,6 +116,8 @@ class _Rows:
                 data.plans.append(Timed(time_s, message))
             case m.Innovation():
                 data.innovations.append(Timed(time_s, message))
+            case m.VehicleStatus():
+                data.vehicles.setdefault(message.header.entity, []).append(Timed(time_s, message))
             case m.Event():
                 data.events.append(Timed(time_s, message))
 

@@ -1,5 +1,7 @@
 """What the run cost: CPU, deadlines, planner time, lost messages."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from groundstation.report.tracks import Array, ProcessTrack, RunData
@@ -69,3 +71,32 @@ def planner_ms(data: RunData) -> tuple[float, float] | None:
     seconds = [plan.message.solver.seconds for plan in data.plans]
     median, high = np.percentile(seconds, [50, 99])
     return float(median * 1000), float(high * 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessLoad:
+    """One process over a run: mean cores, ticks, missed deadlines, messages lost in its queues, restarts."""
+
+    name: str
+    cores: float
+    ticks: int
+    missed: int
+    overflowed: int
+    restarts: int
+
+
+def process_loads(data: RunData) -> list[ProcessLoad]:
+    """Return every process, the busiest first."""
+    cores = cpu_cores(data)
+    found = [
+        ProcessLoad(
+            name,
+            cores[name],
+            int(_rise(track.counters, _TICKS)),
+            int(_rise(track.counters, _OVERRUNS)),
+            int(_rise(track.counters, _OVERFLOWED)),
+            len(set(track.counters[:, _PID].tolist())) - 1,
+        )
+        for name, track in data.processes.items()
+    ]
+    return sorted(found, key=lambda load: -load.cores)

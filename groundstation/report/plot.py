@@ -12,7 +12,7 @@ from groundstation.report.criteria import MAX_TARGET_RMSE_M
 from groundstation.report.interval import tracking_interval
 from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_style import INK, KIND_COLORS, MUTED, STYLE, color_of
-from groundstation.report.topology_use import kind_of, segments
+from groundstation.report.topology_use import kind_of, merged, segments
 from groundstation.report.tracks import Array, Flags, RunData
 
 _SIZE_IN = (11.4, 13.0)
@@ -94,9 +94,8 @@ def _draw_heights(axes: Axes, data: RunData) -> None:
 
 def _draw_topology(axes: Axes, data: RunData) -> None:
     start, end = _interval(data)
-    for begin, finish, text in segments(data, start, end):
+    for begin, finish, text in merged(segments(data, start, end)):
         axes.broken_barh([(begin, finish - begin)], (0, 1), facecolors=KIND_COLORS[kind_of(text)], lw=0)
-    for begin, finish, text in _merged(segments(data, start, end)):
         if finish - begin > 0.06 * (end - start):
             axes.text((begin + finish) / 2, 0.5, text.replace("_", " "), ha="center", va="center", fontsize=8,
                       color="white", clip_on=True)  # fmt: skip
@@ -108,13 +107,3 @@ def _draw_topology(axes: Axes, data: RunData) -> None:
     axes.set_ylabel("topology")
     axes.set_xlabel("time since start of recording [s]")
     axes.grid(visible=False)
-
-
-def _merged(parts: list[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
-    merged: list[tuple[float, float, str]] = []
-    for begin, finish, text in parts:
-        if merged and merged[-1][2] == text and begin - merged[-1][1] < 0.05:
-            merged[-1] = (merged[-1][0], finish, text)
-        else:
-            merged.append((begin, finish, text))
-    return merged

@@ -4,8 +4,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from groundstation.report.build import JSON_NAME, PLOT_NAME, Report
+from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
+from groundstation.report.compare import differences
 from groundstation.report.criteria import Criterion, Value
+from groundstation.report.judge import Report
 
 _UNITS = (("_m", "m"), ("_s", "s"), ("_ms", "ms"), ("_percent", "%"), ("_hz", "Hz"), ("_cores", "cores"))
 
@@ -17,8 +19,20 @@ def summary(report: Report) -> RenderableType:
         parts.append(Text(f"  {line}", style="yellow"))
     for line in report.damage[:3]:
         parts.append(Text(f"  recording: {line}", style="dim"))
-    parts.append(Text(f"  {report.run_dir}: {JSON_NAME}, {PLOT_NAME}", style="dim"))
+    parts.append(Text(f"  {report.run_dir}: {HTML_NAME}, {JSON_NAME}, {PLOT_NAME}", style="dim"))
     return Group(*parts)
+
+
+def comparison(first: Report, second: Report) -> RenderableType:
+    """Return the figures of two runs beside each other, for rich to print."""
+    table = Table(box=None, pad_edge=True, header_style="dim")
+    for title in ("figure", first.run_dir.name, second.run_dir.name, "change"):
+        table.add_column(title, justify="left" if title == "figure" else "right")
+    for row in differences(first, second):
+        table.add_row(
+            row.figure, *(_text(value) if value is not None else "–" for value in (row.first, row.second, row.change))
+        )
+    return table
 
 
 def _verdict(report: Report) -> Text:

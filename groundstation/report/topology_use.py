@@ -7,6 +7,7 @@ from groundstation.report.tracks import RunData
 
 # A plan is in force until the next one, but not for longer than this: then the planner was silent.
 _HOLDS_S = 0.5
+_GAP_S = 0.05  # segments nearer than this are one
 FLAT, STRING, OTHER = "flat", "string", "other"
 
 
@@ -30,6 +31,17 @@ def segments(data: RunData, start_s: float, end_s: float) -> list[tuple[float, f
         if finish > begin:
             found.append((begin, finish, plan.message.topology))
     return found
+
+
+def merged(parts: list[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
+    """Return segments with neighbours of the same topology joined."""
+    joined: list[tuple[float, float, str]] = []
+    for begin, finish, text in parts:
+        if joined and joined[-1][2] == text and begin - joined[-1][1] < _GAP_S:
+            joined[-1] = (joined[-1][0], finish, text)
+        else:
+            joined.append((begin, finish, text))
+    return joined
 
 
 def topology_seconds(data: RunData, start_s: float, end_s: float) -> dict[str, float]:

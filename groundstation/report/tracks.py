@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.bus.messages import Command, CommandAck, Event, Innovation, Plan
+from groundstation.bus.messages import Command, CommandAck, Event, Innovation, Plan, VehicleStatus
 from groundstation.report.arena import Arena
 from groundstation.report.run_facts import RunFacts
 
@@ -90,6 +90,7 @@ class RunData:
     plans: list[Timed[Plan]] = field(default_factory=list)
     innovations: list[Timed[Innovation]] = field(default_factory=list)
     events: list[Timed[Event]] = field(default_factory=list)
+    vehicles: dict[str, list[Timed[VehicleStatus]]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
 
     @property

@@ -1,0 +1,60 @@
+"""Two runs side by side: every figure of both with its difference; pure."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from groundstation.report.judge import Report
+
+_FIGURES = (
+    "tracked_s", "target_rmse_m", "target_lost_s", "min_separation_m", "max_fence_violation_m", "topology_switches",
+    "planner_p50_ms", "planner_p99_ms", "tracker_missed_percent", "mean_cpu_cores", "command_to_airborne_s",
+)  # fmt: skip
+
+
+class Difference(msgspec.Struct, frozen=True):
+    """One figure of two runs; None where a run has none. change: second minus first."""
+
+    figure: str
+    first: float | None
+    second: float | None
+
+    @property
+    def change(self) -> float | None:
+        """Return second minus first, where both are known."""
+        return None if self.first is None or self.second is None else self.second - self.first
+
+
+def differences(first: Report, second: Report) -> list[Difference]:
+    """Return every figure that at least one of the runs has."""
+    left, right = dict(_figures(first)), dict(_figures(second))
+    names = list(dict.fromkeys([*left, *right]))
+    return [Difference(name, left.get(name), right.get(name)) for name in names]
+
+
+def as_json(first: Report, second: Report) -> bytes:
+    """Return the comparison as JSON."""
+    rows = [
+        {"figure": row.figure, "first": row.first, "second": row.second, "change": row.change}
+        for row in differences(first, second)
+    ]
+    runs = {name: str(report.run_dir) for name, report in (("first", first), ("second", second))}
+    return msgspec.json.format(msgspec.json.encode({"schema_version": 1, **runs, "figures": rows}), indent=2)
+
+
+def _figures(report: Report) -> Iterator[tuple[str, float | None]]:
+    figures: dict[str, Any] = msgspec.to_builtins(report.figures)
+    for name in _FIGURES:
+        yield name, figures[name]
+    for kind, seconds in sorted(report.figures.topology_seconds.items()):
+        yield f"topology_seconds.{kind}", seconds
+    if report.figures.target is not None:
+        yield "target.anees", report.figures.target.anees
+    for name, robot in sorted(report.figures.robots.items()):
+        yield f"{name}.rmse_m", robot.rmse_m
+        yield f"{name}.anees", robot.anees
+    for edge in report.findings.edges:
+        yield f"nis {edge.observer} → {edge.subject}", edge.nis_per_dof
+    for item in report.findings.interventions:
+        yield f"safety plans {item.robot} {item.cause}", float(item.plans)

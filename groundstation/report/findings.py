@@ -1,0 +1,22 @@
+"""Everything a report finds beyond the figures: consistency per edge, decisions, interventions, links."""
+
+import msgspec
+
+from groundstation.report.consistency import EdgeConsistency, edges
+from groundstation.report.decisions import Intervention, Switch, interventions, switches
+from groundstation.report.links import VehicleLink, links
+from groundstation.report.tracks import RunData
+
+
+class Findings(msgspec.Struct, frozen=True):
+    """Lists for people and programs to read; each type says what it holds."""
+
+    edges: list[EdgeConsistency]
+    switches: list[Switch]
+    interventions: list[Intervention]
+    links: list[VehicleLink]
+
+
+def findings_of(data: RunData) -> Findings:
+    """Return the findings of a run."""
+    return Findings(edges(data), switches(data), interventions(data), links(data))

@@ -1,0 +1,65 @@
+"""Charts over time as values: what the page draws, and nothing about how."""
+
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+from groundstation.report.tracks import Array
+
+_MOST_POINTS = 3000
+
+
+class Curve(msgspec.Struct, frozen=True):
+    """One line of a chart; `values` has a None where there is nothing to draw."""
+
+    label: str
+    color: str
+    values: list[float | None]
+    dashed: bool = False
+
+
+class Span(msgspec.Struct, frozen=True):
+    """A coloured stretch of time behind the curves, or a mark where both ends are the same."""
+
+    begin_s: float
+    end_s: float
+    color: str
+    label: str
+
+
+class Chart(msgspec.Struct, frozen=True):
+    """Curves over one time axis [s]; `log` draws the values on a logarithmic axis."""
+
+    title: str
+    unit: str
+    note: str
+    time_s: list[float]
+    curves: list[Curve]
+    spans: list[Span] = []
+    log: bool = False
+
+
+def thin(count: int) -> slice:
+    """Return the slice that leaves at most a few thousand of `count` points."""
+    return slice(None, None, max(1, -(-count // _MOST_POINTS)))
+
+
+def points(values: Array | Sequence[float], digits: int = 4) -> list[float | None]:
+    """Return values rounded for the page; what is not finite becomes None."""
+    return [round(float(value), digits) if np.isfinite(value) else None for value in values]
+
+
+def times(values: Array) -> list[float]:
+    """Return times rounded to milliseconds."""
+    return [round(float(value), 3) for value in values]
+
+
+def held(time_s: Array, own_s: Sequence[float], values: Sequence[float], stale_s: float) -> Array:
+    """Return the newest of `values` (at times own_s) at each time; NaN where it is older than stale_s."""
+    if not len(own_s):
+        return np.full(len(time_s), np.nan)
+    own, series = np.asarray(own_s, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    index = np.searchsorted(own, time_s, side="right") - 1
+    fresh = (index >= 0) & (time_s - own[np.clip(index, 0, None)] <= stale_s)
+    return np.where(fresh, series[np.clip(index, 0, None)], np.nan)

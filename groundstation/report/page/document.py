@@ -1,0 +1,95 @@
+"""report.html: verdict, room, charts and tables of one run in one file that needs nothing else, not even a network."""
+
+from html import escape
+from importlib.resources import files
+from io import StringIO
+from pathlib import Path
+
+import matplotlib as mpl
+import msgspec
+from matplotlib.figure import Figure
+
+from groundstation.report.interval import tracking_interval
+from groundstation.report.judge import Report
+from groundstation.report.page import tables
+from groundstation.report.page.chart import Chart
+from groundstation.report.page.flight_charts import flight_charts
+from groundstation.report.page.health_charts import health_charts
+from groundstation.report.plot_map import draw_map
+from groundstation.report.plot_style import STYLE
+from groundstation.report.tracks import RunData
+
+
+def write_page(data: RunData, report: Report, path: Path) -> None:
+    """Write the page of a run."""
+    start_s, end_s = tracking_interval(data) or (0.0, max(data.end_s, 1.0))
+    findings = report.findings
+    flight, health = flight_charts(data, start_s, end_s), health_charts(data, start_s, end_s)
+    sections = [
+        ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report, data.arena.target.name)),
+        ("Room", f'<div class="map">{_room(data)}</div>'),
+        ("Flight", holders(flight, 0)),
+        ("Topology", tables.switches_table(findings)),
+        ("Consistency", holders(health, len(flight)) + tables.edges_table(findings)),
+        ("Safety", tables.interventions_table(findings)),
+        ("Links and timing", tables.links_table(findings) + tables.processes_table(data)),
+        ("Events", tables.events_table(data)),
+        *(
+            [("Damage", "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in report.damage) + "</ul>")]
+            * bool(report.damage)
+        ),
+    ]
+    path.write_text(page(report.run_dir.name, _lead(report), sections, [*flight, *health]), encoding="utf-8")
+
+
+def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Chart]) -> str:
+    """Return a whole page; `lead` and the sections are HTML, charts fill the holders that name their number."""
+    here = files("groundstation.report.page")
+    vendor = files("groundstation.console") / "static" / "vendor"
+    style = (vendor / "uPlot.min.css").read_text("utf-8") + (here / "page.css").read_text("utf-8")
+    script = (vendor / "uPlot.min.js").read_text("utf-8") + (here / "page.js").read_text("utf-8")
+    # Inside a script element only this sequence can end it.
+    data = msgspec.json.encode(charts).decode().replace("</", "<\\/")
+    links = "".join(f'<a href="#s{index}">{escape(name)}</a>' for index, (name, _) in enumerate(sections))
+    body = "".join(
+        f'<section id="s{index}"><h2>{escape(name)}</h2>{content}</section>'
+        for index, (name, content) in enumerate(sections)
+    )
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}</style></head>'
+        f"<body><header><h1>{escape(title)}</h1>{lead}<nav>{links}</nav></header><main>{body}</main>"
+        f'<script type="application/json" id="charts">{data}</script><script>{script}</script></body></html>\n'
+    )
+
+
+def holders(charts: list[Chart], first: int) -> str:
+    """Return the places that charts number `first` and on are drawn in."""
+    return "".join(
+        f"<figure><figcaption><b>{escape(chart.title)}</b> {escape(f'[{chart.unit}]' if chart.unit else '')} "
+        f'<span class="dim">{escape(chart.note)}</span></figcaption>'
+        f'<div class="chart" data-chart="{first + index}"></div></figure>'
+        for index, chart in enumerate(charts)
+    )
+
+
+def _lead(report: Report) -> str:
+    verdict = "passed" if report.passed else "failed" if report.valid else "invalid"
+    facts = report.facts
+    known = {
+        "mode": facts.mode, "field": facts.field, "scenario": facts.scenario,
+        "seed": "" if facts.seed is None else str(facts.seed), "tracked": f"{report.figures.tracked_s:.0f} s",
+    }  # fmt: skip
+    words = " · ".join(f"{name} {escape(value)}" for name, value in known.items() if value)
+    why = "" if report.valid else " The simulator did not keep real time: the figures mean nothing."
+    return f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
+
+
+def _room(data: RunData) -> str:
+    with mpl.rc_context({**STYLE, "svg.fonttype": "path", "path.simplify_threshold": 0.5, "svg.hashsalt": "skein"}):
+        figure = Figure(figsize=(11.4, 6.2), layout="constrained")
+        draw_map(figure.add_subplot(), data)
+        text = StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    svg = text.getvalue()
+    return svg[svg.index("<svg") :]

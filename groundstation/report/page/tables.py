@@ -1,0 +1,152 @@
+"""Tables of the page as HTML; every text from a recording is escaped here."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from groundstation.report.criteria import Value
+from groundstation.report.findings import Findings
+from groundstation.report.judge import Report
+from groundstation.report.load import process_loads
+from groundstation.report.tracks import RunData
+
+_EVENTS_SHOWN = 500
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], empty: str) -> str:
+    """Return a table, or the sentence `empty` when there is no row."""
+    body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
+    if not body:
+        return f'<p class="dim">{escape(empty)}</p>'
+    heads = "".join(f"<th>{escape(title)}</th>" for title in head)
+    return f'<div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def number(value: Value, digits: int = 3) -> str:
+    """Return a value as it is read: yes and no, a dash for what was not measured."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
+
+
+def criteria_table(report: Report) -> str:
+    """Return verdict, value and limit of each criterion."""
+    rows = [
+        ("met" if item.ok else "MISSED", item.name, number(item.value), f"{item.relation} {number(item.limit)}")
+        for item in report.criteria
+    ]
+    return table(("", "criterion", "value", "limit"), rows, "No criterion applies.")
+
+
+def accuracy_table(report: Report, target: str) -> str:
+    """Return errors and consistency of every entity over the tracking interval."""
+    entities = {**({target: report.figures.target} if report.figures.target else {}), **report.figures.robots}
+    rows = [
+        (name, number(item.rmse_m), number(item.max_error_m), number(item.lost_s, 1), f"{item.covered:.0%}",
+         number(item.anees, 2), "–" if item.yaw_rmse_rad is None else f"{item.yaw_rmse_rad * 57.29578:.1f}")
+        for name, item in entities.items() if item is not None
+    ]  # fmt: skip
+    head = ("entity", "rms error [m]", "largest [m]", "lost [s]", "covered", "NEES per dof", "yaw rms [deg]")
+    return table(head, rows, "The recording holds no ground truth: errors are unknown.")
+
+
+def edges_table(findings: Findings) -> str:
+    """Return NIS with bounds, verdicts and latency of each observer and subject."""
+    rows = [
+        (f"{edge.observer} → {edge.subject}", edge.count, number(edge.nis_per_dof, 2),
+         f"{number(edge.low, 2)} … {number(edge.high, 2)}", f"{edge.inflated_percent:.1f} %", _counts(edge.refused),
+         f"{edge.latency_p50_ms:.0f} / {edge.latency_p99_ms:.0f}")
+        for edge in findings.edges
+    ]  # fmt: skip
+    head = ("edge", "observations", "NIS per dof", "95 % bounds", "inflated", "refused", "latency p50 / p99 [ms]")
+    return table(head, rows, "No observation reached the filter.")
+
+
+def switches_table(findings: Findings) -> str:
+    """Return each change of topology with the costs of both sides."""
+    rows = [
+        (f"{item.time_s:.1f}", item.before or "nobody", item.after or "nobody", number(item.cost, 5),
+         number(item.stay_cost, 5), item.reason)
+        for item in findings.switches
+    ]  # fmt: skip
+    head = ("time [s]", "from", "to", "cost [m²]", "cost of staying [m²]", "reason")
+    return table(head, rows, "The topology never changed.")
+
+
+def interventions_table(findings: Findings) -> str:
+    """Return what safety cut, by robot and cause."""
+    rows = [
+        (item.robot, item.cause, item.episodes, item.plans, number(item.longest_s, 1), number(item.most_cut_m_s, 2))
+        for item in findings.interventions
+    ]
+    head = ("robot", "cause", "episodes", "plans", "longest [s]", "most cut [m/s]")
+    return table(head, rows, "Safety never changed a velocity.")
+
+
+def links_table(findings: Findings) -> str:
+    """Return how the links to the vehicles held."""
+    rows = [
+        (item.vehicle, number(item.rate_hz_p50, 1), number(item.rate_hz_min, 1), number(item.longest_silence_s, 2),
+         number(item.link_quality_min, 2), _battery(item.battery),
+         _counts(item.rejected))
+        for item in findings.links
+    ]  # fmt: skip
+    head = (
+        "vehicle",
+        "telemetry p50 [Hz]",
+        "least [Hz]",
+        "longest silence [s]",
+        "least link quality",
+        "battery",
+        "refused",
+    )
+    return table(head, rows, "No vehicle reported.")
+
+
+def processes_table(data: RunData) -> str:
+    """Return processor use and deadlines of each process."""
+    rows = [
+        (load.name, f"{load.cores:.1%}", load.ticks, load.missed, load.overflowed, load.restarts)
+        for load in process_loads(data)
+    ]
+    head = ("process", "of one core", "ticks", "missed deadlines", "messages lost in queues", "restarts")
+    return table(head, rows, "No process reported.")
+
+
+def events_table(data: RunData) -> str:
+    """Return commands, and events with their remedies, in order of time."""
+    rows = [
+        (item.time_s, str(item.message.severity), item.message.header.entity, item.message.text, item.message.remedy)
+        for item in data.events
+    ]
+    rows += [
+        (
+            item.time_s,
+            "COMMAND",
+            ", ".join(item.message.scope) or "team",
+            str(item.message.verb),
+            f"by {item.message.issuer}",
+        )
+        for item in data.commands
+    ]
+    rows.sort(key=lambda row: row[0])
+    shown = [(f"{row[0]:.1f}", *row[1:]) for row in rows[:_EVENTS_SHOWN]]
+    left_out = f'<p class="dim">{len(rows) - _EVENTS_SHOWN} more are in the recording.</p>' * (
+        len(rows) > _EVENTS_SHOWN
+    )
+    return table(("time [s]", "", "about", "what", "remedy"), shown, "Nothing happened.") + left_out
+
+
+def _battery(ends: tuple[float, float] | None) -> str:
+    return "–" if ends is None else f"{ends[0]:.0%} → {ends[1]:.0%}"
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{reason} {count}" for reason, count in sorted(counts.items())) or "–"
+
+
+def _cell(value: object) -> str:
+    text = str(value)
+    loud = ' class="bad"' if text in ("MISSED", "ERROR") else ' class="warn"' if text == "WARNING" else ""
+    return f"<td{loud}>{escape(text)}</td>"

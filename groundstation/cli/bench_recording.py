@@ -3,7 +3,6 @@
 import json
 import tempfile
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
 _SLICE_S = 5.0
 _SEEKS = 9
 _LIMITS = {"write_percent_of_core": 8.0, "open_s": 1.0, "seek_s": 0.2}
-_UNIX_NS = 1_700_000_000_000_000_000
 
 
 @click.command(epilog="Example: groundstation bench recording --minutes 2 --json")
@@ -55,11 +53,11 @@ def measure(folder: Path, duration_s: float, seed: int) -> dict[str, Any]:
 
 
 def _written(folder: Path, field: bytes, duration_s: float, seed: int) -> dict[str, Any]:
-    from groundstation.recording.synthetic import CLOCK, SyntheticRun
+    from groundstation.recording.synthetic import CLOCK, UNIX_OFFSET_NS, SyntheticRun, turns, write_turn
     from groundstation.recording.timeline import Timeline
     from groundstation.recording.writing import RunWriter
 
-    writer = RunWriter(folder, field, 1, Timeline(CLOCK, _UNIX_NS))
+    writer = RunWriter(folder, field, 1, Timeline(CLOCK, UNIX_OFFSET_NS))
     run, ours_s, peers_s, count, at_s = SyntheticRun(seed), 0.0, 0.0, 0, 0.0
     with (folder / "peer.bin").open("wb") as stream:
         peer = _PeerWriter(stream)
@@ -68,10 +66,8 @@ def _written(folder: Path, field: bytes, duration_s: float, seed: int) -> dict[s
             at_s += _SLICE_S
             count += len(samples)
             begin = time.process_time()
-            for turn_ns, turn in _turns(samples):
-                writer.write((one for one in turn if not one.attachment), writer.state, turn_ns)
-                writer.write((one for one in turn if one.attachment), writer.raw, turn_ns)
-                writer.tick(turn_ns)
+            for turn_ns, turn in turns(samples):
+                write_turn(writer, turn, turn_ns)
             middle = time.process_time()
             peer.write(samples)
             ours_s += middle - begin
@@ -88,18 +84,6 @@ def _written(folder: Path, field: bytes, duration_s: float, seed: int) -> dict[s
         "write_ratio_to_peer": round(ours_s / peers_s, 2),
         "write_percent_of_core": round(100.0 * ours_s / duration_s, 2),
     }
-
-
-def _turns(samples: "list[tuple[int, Sample]]") -> "Iterator[tuple[int, list[Sample]]]":
-    """Yield what the recorder finds in its queues at each of its turns."""
-    turn: list[Sample] = []
-    due_ns = samples[0][0] if samples else 0
-    for stamp_ns, sample in samples:
-        if stamp_ns >= due_ns:
-            yield stamp_ns, turn
-            turn, due_ns = [], stamp_ns + 66_000_000
-        turn.append(sample)
-    yield due_ns, turn
 
 
 class _PeerWriter:

@@ -5,8 +5,9 @@ No simulator is behind it: bodies go round in circles, estimates are those circl
 
 import heapq
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from random import Random
 
 from groundstation.bus import codec, keys
@@ -15,11 +16,16 @@ from groundstation.bus import topics as t
 from groundstation.bus.api import Sample
 from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.topics import Topic
+from groundstation.recording.series import NO_ROTATION, Rotation
+from groundstation.recording.timeline import Timeline
+from groundstation.recording.writing import RunWriter
 
 SITE = "lab"
 CLOCK = "synthetic"
+UNIX_OFFSET_NS = 1_700_000_000 * NS_PER_S
 DRONES = ("drone_1", "drone_2")
 _TARGET = "turtlebot"
+_TURN_NS = 66_000_000
 # Different ones, or the compression of a chunk would find them again.
 _JPEGS = [b"\xff\xd8" + Random(number).randbytes(28_000) + b"\xff\xd9" for number in range(16)]
 _DATAGRAMS = [Random(number).randbytes(6000) for number in range(16)]
@@ -225,3 +231,30 @@ def _process_status(header: m.Header, time_s: float) -> m.Message:
 
 def _event(header: m.Header, time_s: float) -> m.Message:
     return m.Event(header=header, severity=m.Severity.INFO, text=f"at {time_s:.0f} s", remedy="nothing is wrong")
+
+
+def turns(samples: Iterable[tuple[int, Sample]]) -> Iterator[tuple[int, list[Sample]]]:
+    """Yield (time [ns], samples) as the recorder finds them in its queues at each of its turns."""
+    turn: list[Sample] = []
+    now_ns = due_ns = 0
+    for now_ns, sample in samples:
+        if now_ns >= due_ns:
+            yield now_ns, turn
+            turn, due_ns = [], now_ns + _TURN_NS
+        turn.append(sample)
+    yield now_ns, turn
+
+
+def write_run(folder: Path, field: bytes, duration_s: float, rotation: Rotation = NO_ROTATION, seed: int = 1) -> None:
+    """Write a made-up run to a folder; field: the resolved field as JSON."""
+    writer = RunWriter(folder, field, 1, Timeline(CLOCK, UNIX_OFFSET_NS), rotation=rotation)
+    for now_ns, samples in turns(SyntheticRun(seed).samples(0.0, duration_s)):
+        write_turn(writer, samples, now_ns)
+    writer.close()
+
+
+def write_turn(writer: RunWriter, samples: list[Sample], now_ns: int) -> None:
+    """Write what arrived in a turn, as the recorder does."""
+    writer.write((one for one in samples if not one.attachment), writer.state, now_ns)
+    writer.write((one for one in samples if one.attachment), writer.raw, now_ns)
+    writer.tick(now_ns)

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.pipeline import Sighting
 from drivers.camera.pose import RelativePose
 from drivers.camera.settings import MountSettings
+from drivers.camera.sighting import Sighting
 from groundstation.bus.messages import Header, PoseHypothesis, RelativeObservation
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
 

@@ -24,6 +24,8 @@ _GRID = marker.corner_grid()
 _CENTRES, _BLACK = marker.square_centres()
 # Five points around each centre: one sample alone would hang on a single noisy pixel.
 _SPREAD = np.array([[0.0, 0.0], [0.18, 0.18], [0.18, -0.18], [-0.18, 0.18], [-0.18, -0.18]])
+_X0, _X1, _Y0, _Y1 = marker.EXTENT
+_CARD = np.array([[_X0, _Y0], [_X1, _Y0], [_X1, _Y1], [_X0, _Y1]])
 _SQUARE_SAMPLES = (_CENTRES[:, None] + _SPREAD).reshape(-1, 2)
 
 
@@ -86,11 +88,15 @@ def window_around(points: Array, margin_px: float, shape: tuple[int, ...]) -> Wi
     return Window(left, top, right, bottom) if right - left >= 12 and bottom - top >= 12 else None
 
 
+def enlargement(spacing: float) -> float:
+    """Return by how much a picture is scaled for the board finder when squares are about `spacing` pixels wide."""
+    return float(np.clip(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT))
+
+
 def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
     """Return the board in the window, whose squares are about `spacing` pixels wide, or None."""
     part = picture[window.top : window.bottom, window.left : window.right]
-    scale = float(np.clip(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT))
-    enlarged, ratio = _resized(part, scale)
+    enlarged, ratio = _resized(part, enlargement(spacing))
     found, raw = cv2.findChessboardCorners(enlarged, (marker.CORNERS_X, marker.CORNERS_Y), flags=_FLAGS)
     if not found or raw is None:
         return None
@@ -176,6 +182,11 @@ def sample(picture: Picture, points: Array) -> Array:
     columns, rows = points.T.astype(np.float32).reshape(2, 1, -1)
     grey = cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(grey, dtype=np.float64).ravel()
+
+
+def card_outline(corners: Array) -> Array:
+    """Return the four corners (4, 2) [px] of the printed card, as if the lens were straight."""
+    return _plane_to_pixels(corners, _CARD)
 
 
 def _plane_to_pixels(corners: Array, points: Array) -> Array:

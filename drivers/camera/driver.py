@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from drivers.camera import convert, jpeg
-from drivers.camera.attitudes import AttitudeHistory
 from drivers.camera.pipeline import Pipeline
-from drivers.camera.pose import Gravity
-from drivers.camera.settings import CameraDriverSettings, MarkerKind
+from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import FrameSource, Grey, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
+from drivers.camera.surroundings import Surroundings
 from groundstation.bus import clock
-from groundstation.bus.messages import CameraStatus, Odometry, Severity
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, VIDEO
+from groundstation.bus.messages import CameraStatus, Severity
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, VIDEO
 from groundstation.errors import SettingsError
 from groundstation.process.child import Child
 
@@ -64,13 +63,7 @@ class CameraDriver:
             settings.search_rate_hz,
             settings.search_phase_s,
         )
-        robots = {marker.entity for marker in settings.expected_markers if marker.kind is MarkerKind.ROBOT}
-        self._targets = {marker.entity for marker in settings.expected_markers} - robots
-        if not settings.mount.in_world:
-            robots.add(settings.observer)
-        # Roll and pitch only; the newest sample per poll is a history fine enough.
-        self._odometry = [child.bus.subscribe([ODOMETRY], entity=name, newest=True) for name in sorted(robots)]
-        self._attitudes = AttitudeHistory()
+        self._surroundings = Surroundings(child.bus, settings)
         self._watch = StreamWatch(settings.start_within_s, settings.stall_after_s, clock.now_ns())
         self._processed = self._detections = self._processed_then = 0
         self._exposure_ns = 0
@@ -83,7 +76,7 @@ class CameraDriver:
         """Wait shortly for a picture, handle it, and keep up heartbeat, status and stream watch."""
         packet = self._source.take_newest(_POLL_S)
         self._publish_video()
-        self._read_attitudes()
+        self._surroundings.read()
         if packet is not None:
             self._handle(packet)
         now_ns = clock.now_ns()
@@ -99,14 +92,6 @@ class CameraDriver:
     @property
     def _skipped(self) -> int:
         return max(0, self._source.received - self._processed - sum(self.counts.values()))
-
-    def _read_attitudes(self) -> None:
-        for subscription in self._odometry:
-            for received in subscription.drain():
-                message = received.message
-                if isinstance(message, Odometry) and message.header.clock == clock.clock_id():
-                    header = message.header
-                    self._attitudes.add(header.entity, header.stamp_ns, message.roll_rad, message.pitch_rad)
 
     def _handle(self, packet: Packet) -> None:
         exposure_ns = self._exposed(packet)
@@ -155,20 +140,22 @@ class CameraDriver:
         return False
 
     def _observe(self, picture: NDArray[np.uint8], exposure_ns: int) -> None:
-        settings = self._settings
-        measured = _LEVEL if settings.mount.in_world else self._attitudes.at(settings.observer, exposure_ns)
-        attitude = measured or _LEVEL
-        rotation = convert.stabilized_from_optical(settings.mount, *attitude)
-
-        def gravity_of(entity: str) -> Gravity:
-            subject = _LEVEL if entity in self._targets else self._attitudes.at(entity, exposure_ns)
-            return Gravity(rotation, *(subject or _LEVEL), known=measured is not None and subject is not None)
-
-        for sighting in self._pipeline.process(picture, exposure_ns, gravity_of):
+        settings, around = self._settings, self._surroundings
+        attitude = around.attitude(exposure_ns) or _LEVEL
+        sightings = self._pipeline.process(
+            picture,
+            exposure_ns,
+            lambda entity: around.gravity(entity, exposure_ns),
+            around.predictions(exposure_ns),
+            lambda entity: around.drop_m(entity, exposure_ns),
+        )
+        for sighting in sightings:
             header = self._child.bus.header(settings.observer, exposure_ns)
             observation = convert.observation_from_sighting(sighting, header, settings.name, attitude)
             self._child.bus.publish(OBSERVATION, observation)
             self._detections += 1
+        for notice in self._pipeline.take_notices():
+            self._child.event(Severity.WARNING, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
         """Pass a JPEG on, at most `image_fps` times a second: as it came, or made of what was decoded."""

@@ -33,9 +33,14 @@ class Reading:
         return self.margin > least_margin
 
 
-def read_bar(picture: NDArray[np.uint8], find: Find, intrinsics: CameraIntrinsics) -> Reading | None:
-    """Return the reading of a board's bar, or None when the bar is not fully in the picture."""
-    pixels = _bar_pixels(find.corners, intrinsics)
+def read_bar(
+    picture: NDArray[np.uint8], find: Find, intrinsics: CameraIntrinsics, mirrored: bool = False
+) -> Reading | None:
+    """Return the reading of a board's bar, or None when the bar is not fully in the picture.
+
+    mirrored: where the bar of a print that was mirrored lies; the squares alone look the same both ways.
+    """
+    pixels = _bar_pixels(find.corners, intrinsics, _SAMPLES * (-1.0, 1.0) if mirrored else _SAMPLES)
     if pixels is None or not intrinsics.contains(pixels, 1.0).all():
         return None
     grey = sample(picture, pixels).reshape(marker.CELLS, -1).mean(axis=1)
@@ -71,12 +76,12 @@ def _step(ratio: Array) -> Array:
     return np.array([0.5 + 0.5 * math.erf(value / math.sqrt(2.0)) for value in ratio.ravel()]).reshape(ratio.shape)
 
 
-def _bar_pixels(corners: Array, intrinsics: CameraIntrinsics) -> Array | None:
+def _bar_pixels(corners: Array, intrinsics: CameraIntrinsics, samples: Array) -> Array | None:
     """Return where the cells' samples are in the picture: a homography of undistorted corners, then the lens."""
     rays = intrinsics.normalised_from_pixels(corners)
     if not np.isfinite(rays).all():
         return None
     h = homography(_GRID, rays)
-    lifted = _SAMPLES @ h[:, :2].T + h[:, 2]
+    lifted = samples @ h[:, :2].T + h[:, 2]
     pixels = intrinsics.pixels_from_normalised(lifted[:, :2] / lifted[:, 2:])
     return pixels if np.isfinite(pixels).all() else None

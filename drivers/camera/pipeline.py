@@ -1,37 +1,38 @@
-"""One camera's eyes without its wires: picture and attitudes in, sightings out; keeps the tracks between pictures."""
+"""One camera's eyes without its wires: picture, attitudes and belief in, sightings out; keeps tracks in between."""
 
-from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import detect, markers, pose
-from drivers.camera.search import search
+from drivers.camera.faults import MarkerFaults
+from drivers.camera.foresight import Prediction
+from drivers.camera.search import find_in, search
 from drivers.camera.settings import DetectorSettings, MarkerSettings
+from drivers.camera.sighting import Notice, Sighting
 from drivers.camera.tracks import Track
 from groundstation.geometry.board import Board
 from groundstation.geometry.lens import CameraIntrinsics
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
+Followed = list[tuple[Track, detect.Find]]
+GravityOf = Callable[[str], pose.Gravity]
+DropOf = Callable[[str], float | None]
+
 _NS = 1_000_000_000
 # Corners beside a tracked board, its bar's among them, are no new board.
 _TAKEN_SQUARES = 2.2
+# Where the belief expects a marker that does not show, it is looked for in so many pictures, then in every third.
+_EAGER_LOOKS, _PATIENT_STRIDE = 4, 3
+_NOTHING_EXPECTED: Mapping[str, Prediction | None] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """An identified marker in one picture; corners (12, 2) [px]."""
-
-    entity: str
-    margin: float
-    choice: pose.PoseChoice
-    corners: Array
-
-
-GravityOf = Callable[[str], pose.Gravity]
+def _unknown_drop(_entity: str) -> float | None:
+    return None
 
 
 class Pipeline:
@@ -55,44 +56,100 @@ class Pipeline:
         self._search_rate_hz = search_rate_hz
         self._search_phase_ns = round(search_phase_s * _NS)
         self._next_search_ns: int | None = None
+        self._searched_ns = 0
         self._tracks: list[Track] = []
+        self._blind: Counter[str] = Counter()
+        self._faults = MarkerFaults()
         self.counts: Counter[str] = Counter()
 
     @property
     def tracked(self) -> tuple[str, ...]:
         """Return the entities in view."""
-        return tuple(self._expected[track.code].entity for track in self._tracks if track.code in self._expected)
+        return tuple(entity for track in self._tracks if (entity := self._entity_of(track)) is not None)
 
-    def process(self, picture: Picture, stamp_ns: int, gravity_of: GravityOf) -> list[Sighting]:
-        """Return the sightings in a picture exposed at `stamp_ns`; gravity_of gives what is known for a subject."""
-        finds = self._follow(picture, stamp_ns)
+    def take_notices(self) -> list[Notice]:
+        """Return and forget what an operator should hear; the same thing is never said twice."""
+        return self._faults.take()
+
+    def process(
+        self,
+        picture: Picture,
+        stamp_ns: int,
+        gravity_of: GravityOf,
+        predictions: Mapping[str, Prediction | None] = _NOTHING_EXPECTED,
+        drop_of: DropOf = _unknown_drop,
+    ) -> list[Sighting]:
+        """Return the sightings in a picture exposed at `stamp_ns`.
+
+        gravity_of, drop_of: what is known for a subject; predictions: where the belief expects which marker.
+        """
+        finds = self._follow(picture, stamp_ns, predictions)
+        self._look_where_expected(picture, stamp_ns, predictions, finds)
         if self._is_search_due(stamp_ns):
             finds += self._search(picture, stamp_ns)
-            self._schedule_search(stamp_ns)
+            self._schedule_search(stamp_ns, predictions)
         sightings = []
         for track, find in finds:
-            track.identify(markers.read_bar(picture, find, self._intrinsics), stamp_ns, self._settings.identity_margin)
-            sighting = self._measure(track, gravity_of)
+            self._identify(picture, track, find, stamp_ns)
+            sighting = self._measure(track, stamp_ns, gravity_of, drop_of)
             if sighting is not None:
                 sightings.append(sighting)
-        self._tracks = [track for track in self._tracks if not self._is_over(track, stamp_ns)]
-        return self._unique(sightings)
+        self._forget(stamp_ns, predictions)
+        return self._resolved(sightings, predictions)
 
-    def _follow(self, picture: Picture, stamp_ns: int) -> list[tuple[Track, detect.Find]]:
-        finds: list[tuple[Track, detect.Find]] = []
+    def _entity_of(self, track: Track) -> str | None:
+        marker = self._expected.get(track.code) if track.code is not None else None
+        return marker.entity if marker is not None else None
+
+    def _prediction_of(self, track: Track, predictions: Mapping[str, Prediction | None]) -> Prediction | None:
+        return predictions.get(self._entity_of(track) or "")
+
+    def _follow(self, picture: Picture, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> Followed:
+        finds: Followed = []
         for track in self._tracks:
-            window = track.window(stamp_ns, picture.shape)
+            prediction = self._prediction_of(track, predictions)
+            window = track.window(stamp_ns, picture.shape, prediction)
             find = detect.find_board(picture, window, detect.spacing_px(track.corners)) if window else None
-            if find is None or not track.accepts(find, stamp_ns) or self._is_taken(find, finds):
+            if find is None or not track.accepts(find, stamp_ns, prediction) or _is_taken(find, finds):
                 track.miss()
                 self.counts["missed"] += 1
                 continue
-            track.follow(find, stamp_ns)
+            track.follow(find, stamp_ns, prediction)
             self.counts["followed"] += 1
             finds.append((track, find))
         return finds
 
-    def _search(self, picture: Picture, stamp_ns: int) -> list[tuple[Track, detect.Find]]:
+    def _look_where_expected(
+        self, picture: Picture, stamp_ns: int, predictions: Mapping[str, Prediction | None], finds: Followed
+    ) -> None:
+        """Look for markers that are not in view but should be, where the belief has them; adds to `finds`."""
+        followed = {self._entity_of(track) for track, _ in finds}
+        for entity, prediction in predictions.items():
+            if prediction is None or entity in followed or _is_there(prediction, finds):
+                self._blind[entity] = 0
+                continue
+            self._blind[entity] += 1
+            patient = self._blind[entity] > _EAGER_LOOKS and self._blind[entity] % _PATIENT_STRIDE != 0
+            window = None if patient else prediction.window(picture.shape)
+            if window is None:
+                continue
+            find = find_in(picture, window, prediction.spacing_px, [other.corners for _, other in finds])
+            if find is None or _is_taken(find, finds):
+                self.counts["absent"] += 1
+                continue
+            self.counts["foreseen"] += 1
+            finds.append((self._adopted(find, stamp_ns, prediction), find))
+
+    def _adopted(self, find: detect.Find, stamp_ns: int, prediction: Prediction) -> Track:
+        """Return the track that had lost this board, else a new one; whose it is, its bar has to say."""
+        for track in self._tracks:
+            if track.misses and track.accepts(find, stamp_ns):
+                track.follow(find, stamp_ns, prediction)
+                return track
+        self._tracks.append(Track(find.corners, stamp_ns))
+        return self._tracks[-1]
+
+    def _search(self, picture: Picture, stamp_ns: int) -> Followed:
         taken = []
         for track in self._tracks:
             if track.misses == 0:
@@ -100,65 +157,115 @@ class Pipeline:
                 window = detect.window_around(track.corners, margin_px, picture.shape)
                 taken += [window] if window else []
         known = [(track, detect.Find(track.corners, 0.0, 0.0)) for track in self._tracks if track.misses == 0]
-        finds = [find for find in search(picture, taken) if not self._is_taken(find, known)]
+        finds = [find for find in search(picture, taken) if not _is_taken(find, known)]
         fresh = [(Track(find.corners, stamp_ns), find) for find in finds]
         # A board that is found again replaces the track that had missed it.
-        self._tracks = [t for t in self._tracks if t.misses == 0 or not self._is_taken_by(t, fresh)]
+        self._tracks = [t for t in self._tracks if t.misses == 0 or not _is_taken_by(t, fresh)]
         self._tracks += [track for track, _ in fresh]
         self.counts["searches"] += 1
         self.counts["found"] += len(fresh)
         return fresh
-
-    def _is_taken_by(self, track: Track, fresh: list[tuple[Track, detect.Find]]) -> bool:
-        return any(track.accepts(find, new.stamp_ns) for new, find in fresh)
-
-    @staticmethod
-    def _is_taken(find: detect.Find, finds: list[tuple[Track, detect.Find]]) -> bool:
-        return any(np.hypot(*(find.centre - other.centre)) < detect.spacing_px(other.corners) for _, other in finds)
 
     def _is_search_due(self, stamp_ns: int) -> bool:
         if self._next_search_ns is None:
             self._next_search_ns = stamp_ns + self._search_phase_ns
         return bool(self._expected) and stamp_ns >= self._next_search_ns
 
-    def _schedule_search(self, stamp_ns: int) -> None:
-        """Search at the full rate while nothing is in view, at half of it while something is missing, else seldom."""
-        seen = len(set(self.tracked))
+    def _schedule_search(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
+        """Search at the full rate while nothing is in view, at half of it while something is missing, else seldom.
+
+        What the belief has outside of the picture is not missing.
+        """
+        seen = set(self.tracked)
+        missing = {m.entity for m in self._expected.values() if predictions.get(m.entity, m) is not None} - seen
         rate_hz = self._search_rate_hz if not seen else self._search_rate_hz / 2
-        if seen == len(self._expected):
+        if not missing:
             rate_hz = self._settings.tracked_search_rate_hz
+        self._searched_ns = stamp_ns
         self._next_search_ns = stamp_ns + round(_NS / rate_hz)
 
-    def _measure(self, track: Track, gravity_of: GravityOf) -> Sighting | None:
-        """Return the sighting of an identified, expected board, unless its corners fit no pose."""
-        expected = self._expected.get(track.code) if track.code is not None else None
-        if expected is None:
-            self.counts["unknown"] += 1
-            return None
-        points = self._points[expected.code]
-        poses = pose.planar_poses(track.corners, points, self._intrinsics)
-        if not poses:
-            self.counts["no_pose"] += 1
-            return None
-        choice = pose.choose(
-            poses,
-            points,
-            self._intrinsics,
-            gravity_of(expected.entity),
-            self._settings.corner_floor_px,
-            self._settings.ambiguity_cost,
-        )
-        if choice.residual_px > self._settings.max_residual_px:
-            self.counts["residual"] += 1
-            return None
-        return Sighting(expected.entity, track.margin, choice, track.corners)
+    def _forget(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
+        """Drop tracks that are over; when a marker was lost that should still be in view, search soon."""
+        over = [track for track in self._tracks if self._is_over(track, stamp_ns)]
+        self._tracks = [track for track in self._tracks if not self._is_over(track, stamp_ns)]
+        lost = [entity for track in over if (entity := self._entity_of(track)) is not None]
+        if any(predictions.get(entity, ...) is not None for entity in lost) and self._next_search_ns is not None:
+            soonest = self._searched_ns + round(_NS / (2.0 * self._search_rate_hz))
+            self._next_search_ns = min(self._next_search_ns, max(stamp_ns, soonest))
 
     def _is_over(self, track: Track, stamp_ns: int) -> bool:
         foreign = track.code is not None and track.code not in self._expected
         return foreign or track.is_lost(stamp_ns)
 
-    def _unique(self, sightings: list[Sighting]) -> list[Sighting]:
-        """Return sightings of entities that were seen once; two boards with one code cannot both be right."""
-        times = Counter(sighting.entity for sighting in sightings)
-        self.counts["double"] += sum(times[s.entity] > 1 for s in sightings)
-        return [sighting for sighting in sightings if times[sighting.entity] == 1]
+    def _identify(self, picture: Picture, track: Track, find: detect.Find, stamp_ns: int) -> None:
+        least = self._settings.identity_margin
+        reading = markers.read_bar(picture, find, self._intrinsics)
+        track.identify(reading, stamp_ns, least)
+        if track.code is not None or (reading is not None and reading.is_sure(least)):
+            return
+        mirrored = markers.read_bar(picture, find, self._intrinsics, mirrored=True)
+        marker = self._expected.get(mirrored.code) if mirrored is not None and mirrored.is_sure(least) else None
+        if marker is not None and mirrored is not None:
+            self.counts["mirrored"] += 1
+            self._faults.mirrored(marker, mirrored)
+
+    def _measure(self, track: Track, stamp_ns: int, gravity_of: GravityOf, drop_of: DropOf) -> Sighting | None:
+        """Return the sighting of an identified, expected board, unless its corners fit no pose."""
+        expected = self._expected.get(track.code) if track.code is not None else None
+        if expected is None:
+            self.counts["unknown"] += 1
+            return None
+        points, settings = self._points[expected.code], self._settings
+        poses = pose.planar_poses(track.corners, points, self._intrinsics)
+        if not poses:
+            self.counts["no_pose"] += 1
+            return None
+        gravity = gravity_of(expected.entity)
+        choice = pose.choose(
+            poses, points, self._intrinsics, gravity, settings.corner_floor_px, settings.ambiguity_cost
+        )
+        if choice.residual_px > settings.max_residual_px:
+            self.counts["residual"] += 1
+            return None
+        relative_m = gravity.stabilized_from_optical @ choice.best.position_m
+        self._faults.measured(expected, stamp_ns, relative_m, drop_of(expected.entity))
+        return Sighting(expected.entity, track.margin, choice, track.corners)
+
+    def _resolved(self, sightings: list[Sighting], predictions: Mapping[str, Prediction | None]) -> list[Sighting]:
+        """Return one sighting per entity; of two boards with one code, one is the other's alternative.
+
+        The one nearer to where the belief has it comes first, and the estimator decides. Without a belief nothing tells
+        them apart, and both are withheld; so are three.
+        """
+        by_entity: defaultdict[str, list[Sighting]] = defaultdict(list)
+        for sighting in sightings:
+            by_entity[sighting.entity].append(sighting)
+        resolved = []
+        for entity, group in by_entity.items():
+            if len(group) == 1:
+                resolved += group
+                continue
+            self.counts["double"] += len(group)
+            self._faults.doubled(next(m for m in self._expected.values() if m.entity == entity))
+            prediction = predictions.get(entity)
+            if prediction is None or len(group) > 2:
+                continue
+            centre = prediction.centre
+            first, other = sorted(group, key=lambda s: float(np.hypot(*(s.corners.mean(axis=0) - centre))))
+            choice = pose.PoseChoice(first.choice.best, other.choice.best, first.choice.residual_px)
+            resolved.append(Sighting(entity, min(first.margin, other.margin), choice, first.corners))
+        return resolved
+
+
+def _is_there(prediction: Prediction, finds: Followed) -> bool:
+    """Return whether a board without a readable bar already stands where this marker is expected."""
+    reach = prediction.radius_px + prediction.std_px
+    return any(t.code is None and float(np.hypot(*(f.centre - prediction.centre))) < reach for t, f in finds)
+
+
+def _is_taken_by(track: Track, fresh: Followed) -> bool:
+    return any(track.accepts(find, new.stamp_ns) for new, find in fresh)
+
+
+def _is_taken(find: detect.Find, finds: Followed) -> bool:
+    return any(np.hypot(*(find.centre - other.centre)) < detect.spacing_px(other.corners) for _, other in finds)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.detect import Find, Window, find_board, window_around
+from drivers.camera.detect import Find, Window, card_outline, enlargement, find_board, window_around
 from groundstation.geometry import board as marker
 
 Array = NDArray[np.float64]
@@ -26,6 +26,8 @@ _REACH = 2.1
 _LEAST_CLUSTER, _MOST_CLUSTER = 6, 40
 _MOST_WINDOWS = 4
 _MARGIN_SQUARES = 2.6
+# Up to here the board finder is cheaper than a search for saddle points in the same window [px, enlarged].
+_MOST_ENLARGED_PX = 150_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +47,43 @@ class Cluster:
     spacing: float
 
 
-def search(picture: Picture, taken: list[Window]) -> list[Find]:
-    """Return the boards found in the whole picture but for the windows already taken; at most four are looked at."""
+def find_in(picture: Picture, window: Window, spacing: float, others: list[Array]) -> Find | None:
+    """Return a board in the window that is none of the `others` (corners of each), or None.
+
+    A window too wide to be enlarged as a whole is searched for saddle points first.
+    """
+    picture = _without(picture, window, others)
+    width, height = window.right - window.left, window.bottom - window.top
+    if width * height * enlargement(spacing) ** 2 <= _MOST_ENLARGED_PX:
+        return find_board(picture, window, spacing)
+    part = np.ascontiguousarray(picture[window.top : window.bottom, window.left : window.right])
+    finds = search(part, [], 2)
+    if not finds:
+        return None
+    return Find(finds[0].corners + np.array([window.left, window.top]), finds[0].white, finds[0].black)
+
+
+def _without(picture: Picture, window: Window, others: list[Array]) -> Picture:
+    """Return a picture in which other boards that reach into the window are painted over."""
+    outlines = [card_outline(corners) for corners in others]
+    near = [
+        outline
+        for outline in outlines
+        if (outline.max(axis=0) >= (window.left, window.top)).all()
+        and (outline.min(axis=0) <= (window.right, window.bottom)).all()
+    ]
+    if not near:
+        return picture
+    painted = picture.copy()
+    for outline in near:
+        cv2.fillConvexPoly(painted, np.rint(outline).astype(np.int32), 128)
+    return painted
+
+
+def search(picture: Picture, taken: list[Window], most: int = _MOST_WINDOWS) -> list[Find]:
+    """Return the boards found in the whole picture but for the windows already taken; looks at `most` of them."""
     finds: list[Find] = []
-    for cluster in clusters(saddle_points(picture), taken)[:_MOST_WINDOWS]:
+    for cluster in clusters(saddle_points(picture), taken)[:most]:
         window = window_around(cluster.points, _MARGIN_SQUARES * cluster.spacing, picture.shape)
         find = find_board(picture, window, cluster.spacing) if window else None
         if find is not None and all(np.hypot(*(find.centre - other.centre)) > cluster.spacing for other in finds):

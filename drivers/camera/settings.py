@@ -107,6 +107,16 @@ class MarkerSettings(_Section):
     position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     kind: MarkerKind = MarkerKind.ROBOT
 
+    @property
+    def label(self) -> str:
+        """Return what an operator calls it."""
+        return f"marker {self.code}"
+
+    @property
+    def size_mm(self) -> float:
+        """Return the length that a ruler is put to: the side of a square."""
+        return self.square_mm
+
 
 class MountSettings(_Section):
     """Where the camera is: `parent` "world", or the robot that carries it.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.detect import Find, Window, spacing_px, window_around
+from drivers.camera.foresight import Prediction
 from drivers.camera.markers import Reading
 
 Array = NDArray[np.float64]
@@ -27,7 +28,10 @@ _AT_ONCE_MARGIN = 2.0
 
 @dataclass(slots=True)
 class Track:
-    """One board: last corners (12, 2) [px] and their time, image velocity [px/s], identity if known."""
+    """One board: last corners (12, 2) [px] and their time, image velocity [px/s], identity if known.
+
+    foreseen: where the belief had its centre in the picture of the last corners [px].
+    """
 
     corners: Array
     stamp_ns: int
@@ -37,29 +41,36 @@ class Track:
     margin: float = 0.0
     read_ns: int = 0
     misses: int = 0
+    foreseen: Array | None = None
 
-    def expected_corners(self, stamp_ns: int) -> Array:
-        """Return where the corners should be at a later time, at constant image velocity."""
+    def expected_corners(self, stamp_ns: int, prediction: Prediction | None = None) -> Array:
+        """Return where the corners should be at a later time.
+
+        They move as the belief does, which knows how both vehicles turn; without one, at constant image velocity.
+        """
+        if prediction is not None and self.foreseen is not None:
+            return np.asarray(self.corners + (prediction.centre - self.foreseen))
         return np.asarray(self.corners + self.velocity * ((stamp_ns - self.stamp_ns) / _NS))
 
-    def window(self, stamp_ns: int, shape: tuple[int, ...]) -> Window | None:
+    def window(self, stamp_ns: int, shape: tuple[int, ...], prediction: Prediction | None = None) -> Window | None:
         """Return where to look, or None when that has left the picture."""
         unrest = min(_MOST_UNREST_PX, _UNREST_PX_S * (stamp_ns - self.stamp_ns) / _NS)
         margin = _MARGIN_SQUARES * spacing_px(self.corners) + unrest
-        return window_around(self.expected_corners(stamp_ns), margin, shape)
+        return window_around(self.expected_corners(stamp_ns, prediction), margin, shape)
 
-    def accepts(self, find: Find, stamp_ns: int) -> bool:
+    def accepts(self, find: Find, stamp_ns: int, prediction: Prediction | None = None) -> bool:
         """Return whether a find may be this board: near where it should be and of about its size."""
-        shift = find.centre - self.expected_corners(stamp_ns).mean(axis=0)
+        shift = find.centre - self.expected_corners(stamp_ns, prediction).mean(axis=0)
         own, other = spacing_px(self.corners), spacing_px(find.corners)
         return float(np.hypot(*shift)) < 2.5 * own + _MOST_UNREST_PX and 0.6 < other / own < 1.7
 
-    def follow(self, find: Find, stamp_ns: int) -> None:
+    def follow(self, find: Find, stamp_ns: int, prediction: Prediction | None = None) -> None:
         """Take over a new detection."""
         seconds = (stamp_ns - self.stamp_ns) / _NS
         if seconds > 0.0:
             self.velocity = (find.corners - self.corners).mean(axis=0) / seconds
         self.corners, self.stamp_ns, self.misses = find.corners, stamp_ns, 0
+        self.foreseen = prediction.centre if prediction is not None else None
 
     def miss(self) -> None:
         """Remember that the board was not where it should be."""

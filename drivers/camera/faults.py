@@ -1,0 +1,57 @@
+"""Faults of printed markers that a person has to put right: mirrored, of the wrong size, used twice."""
+
+from collections import Counter, defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.markers import Reading
+from drivers.camera.settings import MarkerSettings
+from drivers.camera.sighting import Notice
+from drivers.camera.size_check import SizeCheck
+
+_MIRRORED_MARGIN, _MIRRORED_TIMES = 2.0, 5
+
+
+class MarkerFaults:
+    """Collects signs of faults and words each fault once."""
+
+    def __init__(self) -> None:
+        self._sizes: defaultdict[str, SizeCheck] = defaultdict(SizeCheck)
+        self._mirrored: Counter[str] = Counter()
+        self._notices: list[Notice] = []
+        self._told: set[tuple[str, str]] = set()
+
+    def take(self) -> list[Notice]:
+        """Return and forget what has not been told yet."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def mirrored(self, marker: MarkerSettings, reading: Reading) -> None:
+        """Take in that a bar reads on the wrong side of its board; a few times, since clutter may look like one."""
+        self._mirrored[marker.entity] += reading.is_sure(_MIRRORED_MARGIN)
+        if self._mirrored[marker.entity] >= _MIRRORED_TIMES:
+            text = f"the {marker.label} of {marker.entity} is mirrored and cannot be used"
+            self._tell("mirrored", Notice(marker.entity, text, "print it again, not mirrored"))
+
+    def measured(
+        self, marker: MarkerSettings, stamp_ns: int, relative_m: NDArray[np.float64], drop_m: float | None
+    ) -> None:
+        """Take in where a marker was seen from the camera [m; z up], and how far below height sensors have it."""
+        check = self._sizes[marker.entity]
+        check.add(stamp_ns, relative_m, drop_m)
+        ratio = check.ratio
+        if ratio is not None:
+            text = f"the {marker.label} of {marker.entity} seems {ratio:.2f} times as far as height sensors say"
+            remedy = f"measure it: {marker.size_mm:g} mm are set, {marker.size_mm / ratio:.0f} mm would fit"
+            self._tell("size", Notice(marker.entity, text, remedy))
+
+    def doubled(self, marker: MarkerSettings) -> None:
+        """Take in that several markers in view carry one identity."""
+        text = f"several markers in view carry the identity of {marker.entity} ({marker.label})"
+        self._tell("double", Notice(marker.entity, text, "remove all but one, or give them identities of their own"))
+
+    def _tell(self, kind: str, notice: Notice) -> None:
+        if (kind, notice.entity) not in self._told:
+            self._told.add((kind, notice.entity))
+            self._notices.append(notice)

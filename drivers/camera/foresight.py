@@ -1,0 +1,167 @@
+"""Where markers should be in a picture: the belief about every entity, the camera's pose and both attitudes."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera import convert
+from drivers.camera.detect import Window, window_around
+from drivers.camera.settings import MarkerKind, MarkerSettings, MountSettings
+from groundstation.bus.messages import EntityEstimate, Estimate
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+from groundstation.geometry.rotations import rotation_from_euler, rotation_z
+
+Array = NDArray[np.float64]
+Attitude = tuple[float, float]
+
+# Estimates at 50 Hz; a picture is exposed up to 0.5 s before it is looked at.
+_KEPT = 48
+_FARTHEST_NS = 300_000_000
+# Roll, pitch and mounting of an observer that measures its attitude, of one whose levelness is assumed, and of a mount.
+_ATTITUDE_STD_RAD, _LEVEL_STD_RAD, _MOUNT_STD_RAD = math.radians(2.0), math.radians(8.0), math.radians(0.5)
+_FLOOR_STD_M = 0.02
+_SIGMAS = 2.5
+_SLACK_PX = 4.0
+_LEAST_DEPTH_M = 0.15
+# Seen flatter than this (85 degrees from face on), a board is turned away for certain.
+_LEAST_FACING = 0.087
+_WIDEST_SHARE = 0.2
+_RADIUS_SQUARES = 1.81
+_MARGIN_SQUARES = 1.6
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Where the corners of a marker should be: a circle [px], its uncertainty (one sigma, px), the side of a square."""
+
+    centre: Array
+    radius_px: float
+    spacing_px: float
+    std_px: float
+
+    def window(self, shape: tuple[int, ...]) -> Window | None:
+        """Return where to look, wide enough for the uncertainty; None when that is outside of the picture."""
+        reach = self.radius_px + _MARGIN_SQUARES * self.spacing_px + _SIGMAS * self.std_px + _SLACK_PX
+        return window_around(self.centre[None], reach, shape)
+
+
+# None: certainly not in the picture. Entities of which nothing useful is known are missing.
+Predictions = dict[str, Prediction | None]
+
+
+class Foresight:
+    """The newest estimates, and what they mean for one camera; pure values."""
+
+    def __init__(
+        self, mount: MountSettings, observer: str, markers: tuple[MarkerSettings, ...], intrinsics: CameraIntrinsics
+    ) -> None:
+        self._mount, self._observer, self._markers, self._intrinsics = mount, observer, markers, intrinsics
+        self._estimates: deque[Estimate] = deque(maxlen=_KEPT)
+
+    def add(self, estimate: Estimate) -> None:
+        """Remember an estimate; one that is older than the newest is ignored."""
+        if not self._estimates or estimate.header.stamp_ns > self._estimates[-1].header.stamp_ns:
+            self._estimates.append(estimate)
+
+    def at(self, stamp_ns: int, attitude: Attitude | None) -> Predictions:
+        """Return where each marker should be in a picture exposed then; `attitude` is the observer's, if measured."""
+        estimate = min(self._estimates, key=lambda e: abs(e.header.stamp_ns - stamp_ns), default=None)
+        if estimate is None or abs(estimate.header.stamp_ns - stamp_ns) > _FARTHEST_NS:
+            return {}
+        seconds = (stamp_ns - estimate.header.stamp_ns) / 1e9
+        entities = {entity.name: entity for entity in estimate.entities}
+        camera = self._camera(entities.get(self._observer), seconds, attitude)
+        if camera is None:
+            return {}
+        found: Predictions = {}
+        for marker in self._markers:
+            entity = entities.get(marker.entity)
+            place = _marker_place(entity, marker, seconds) if entity is not None else None
+            if place is not None:
+                known, prediction = _seen(camera, *place, marker.square_mm / 1000.0, self._intrinsics)
+                if known:
+                    found[marker.entity] = prediction
+        return found
+
+    def _camera(self, carrier: EntityEstimate | None, seconds: float, attitude: Attitude | None) -> "_Camera | None":
+        position = np.array(self._mount.position_m)
+        optical = convert.parent_from_optical(self._mount)
+        if self._mount.in_world:
+            return _Camera(Pose(optical, position), np.zeros((3, 3)), _MOUNT_STD_RAD, _MOUNT_STD_RAD**2)
+        if carrier is None or len(carrier.mean) != 4:
+            return None
+        covariance = np.array(carrier.covariance).reshape(4, 4)
+        base = rotation_from_euler(*(attitude or (0.0, 0.0)), carrier.mean[3])
+        centre = np.array(carrier.mean[:3]) + seconds * np.array(carrier.velocity_m_s)
+        tilt = _ATTITUDE_STD_RAD if attitude is not None else _LEVEL_STD_RAD
+        return _Camera(Pose(base @ optical, centre + base @ position), covariance[:3, :3], tilt, covariance[3, 3])
+
+
+@dataclass(frozen=True, slots=True)
+class _Camera:
+    """world_from_optical; covariance of its position [m^2], std of its tilt [rad], variance of its heading [rad^2]."""
+
+    pose: Pose
+    covariance: Array
+    tilt_std_rad: float
+    yaw_variance: float
+
+    def covariance_of(self, point: Array) -> Array:
+        """Return the covariance (3, 3) [m^2; world] of a world point relative to the camera, from the camera alone."""
+        x, y, z = point - self.pose.translation
+        by_tilt = np.array([[0.0, z], [-z, 0.0], [y, -x]])
+        by_yaw = np.array([-y, x, 0.0])
+        return np.asarray(
+            self.covariance + self.tilt_std_rad**2 * by_tilt @ by_tilt.T + self.yaw_variance * np.outer(by_yaw, by_yaw)
+        )
+
+
+def _marker_place(entity: EntityEstimate, marker: MarkerSettings, seconds: float) -> tuple[Array, Array] | None:
+    """Return a marker's centre [m; world] and its covariance (3, 3)."""
+    mean, size = np.array(entity.mean), len(entity.mean)
+    covariance = np.array(entity.covariance).reshape(size, size)
+    offset = np.array(marker.position_m)
+    if marker.kind is MarkerKind.TARGET:
+        full = np.diag([0.0, 0.0, _FLOOR_STD_M**2])
+        full[:2, :2] = covariance[:2, :2]
+        along = np.append(np.array(entity.velocity_m_s)[:2], 0.0)
+        # Its heading is unknown: what its marker lies beside its centre is uncertainty.
+        full[:2, :2] += np.eye(2) * float(offset[:2] @ offset[:2])
+        return np.append(mean[:2], 0.0) + seconds * along + (0.0, 0.0, offset[2]), full
+    if size != 4:
+        return None
+    centre = mean[:3] + seconds * np.array(entity.velocity_m_s) + rotation_z(float(mean[3])) @ offset
+    return centre, covariance[:3, :3]
+
+
+def _seen(
+    camera: _Camera, centre: Array, covariance: Array, square_m: float, intrinsics: CameraIntrinsics
+) -> tuple[bool, Prediction | None]:
+    """Return whether anything can be said, and where the marker is seen (None: certainly nowhere)."""
+    rotation = camera.pose.rotation
+    point = camera.pose.inverse().apply(centre)
+    relative = rotation.T @ (covariance + camera.covariance_of(centre)) @ rotation
+    depth_std = math.sqrt(relative[2, 2])
+    height = -float(rotation[2] @ point)
+    height_std = _SIGMAS * math.sqrt(float(rotation[2] @ relative @ rotation[2]))
+    if height + height_std < _LEAST_FACING * float(np.linalg.norm(point)):
+        return True, None
+    if point[2] < _LEAST_DEPTH_M + _SIGMAS * depth_std:
+        return point[2] < -_SIGMAS * depth_std, None
+    jacobian = intrinsics.project_jacobian(point)
+    std_px = math.sqrt(float(np.linalg.eigvalsh(jacobian @ relative @ jacobian.T)[-1]))
+    centre_px = intrinsics.project(point)
+    if std_px > _WIDEST_SHARE * intrinsics.width_px:
+        return False, None
+    if not np.isfinite(centre_px).all():
+        return True, None
+    # The marker lies level; how it is turned does not change the largest and least length of a square.
+    level = np.linalg.svd(jacobian @ rotation.T[:, :2], compute_uv=False) * square_m
+    radius = _RADIUS_SQUARES * float(level[0])
+    if not intrinsics.contains(centre_px, -_SIGMAS * std_px):
+        return True, None
+    return True, Prediction(centre_px, radius, float(level[1]), std_px)

@@ -1,0 +1,27 @@
+"""What the detector hands on: an identified marker with its pose, and what an operator should hear."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.pose import PoseChoice
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """An identified marker in one picture; corners (n, 2) [px]."""
+
+    entity: str
+    margin: float
+    choice: PoseChoice
+    corners: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something about a marker that is wrong and that a person can put right."""
+
+    entity: str
+    text: str
+    remedy: str

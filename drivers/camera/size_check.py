@@ -1,0 +1,39 @@
+"""Is a marker as large as the field says? Its distance by size against its distance by height sensors."""
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+_NS = 1_000_000_000
+_LEAST_DROP_M = 0.5
+_KEPT, _LEAST_SAMPLES, _LEAST_SPAN_NS = 120, 40, 3 * _NS
+# Errors that do not average out: a height sensor's offset [m], and roll and pitch [rad] times the distance aside.
+_HEIGHT_STD_M, _ATTITUDE_STD_RAD = 0.05, math.radians(2.0)
+_SIGMAS, _LEAST_DEVIATION = 3.0, math.log(1.08)
+
+
+class SizeCheck:
+    """Collects ratios for one marker; `ratio` is told once they contradict the size for three seconds."""
+
+    def __init__(self) -> None:
+        self._ratios: deque[tuple[int, float, float]] = deque(maxlen=_KEPT)
+
+    def add(self, stamp_ns: int, relative_m: NDArray[np.float64], drop_m: float | None) -> None:
+        """Take in a sighting: marker relative to the camera [m; z up], and how far below height sensors have it."""
+        seen_drop = -float(relative_m[2])
+        if drop_m is None or drop_m < _LEAST_DROP_M or seen_drop <= 0.0:
+            return
+        aside = math.hypot(relative_m[0], relative_m[1]) / seen_drop
+        std = math.hypot(_HEIGHT_STD_M / drop_m, _ATTITUDE_STD_RAD * aside)
+        self._ratios.append((stamp_ns, math.log(seen_drop / drop_m), std))
+
+    @property
+    def ratio(self) -> float | None:
+        """Return by how much the marker seems farther than it is, or None while that agrees with its size."""
+        if len(self._ratios) < _LEAST_SAMPLES or self._ratios[-1][0] - self._ratios[0][0] < _LEAST_SPAN_NS:
+            return None
+        deviation = float(np.median([ratio for _, ratio, _ in self._ratios]))
+        std = float(np.mean([std for _, _, std in self._ratios]))
+        return math.exp(deviation) if abs(deviation) > max(_LEAST_DEVIATION, _SIGMAS * std) else None

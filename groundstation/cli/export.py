@@ -1,62 +1,113 @@
-"""`groundstation export`: recordings in the formats of other programs."""
+"""`groundstation recording export`, also `groundstation export`: recordings in the formats of other programs."""
 
-import base64
-import json
-import struct
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.errors import GroundStationError
 
-_MAGIC = 0xFD
-_STAMP = struct.Struct(">Q")
+if TYPE_CHECKING:
+    from groundstation.recording.run import RecordedRun
+
+_MAX_LINES = 5
 
 
 @click.command(
-    epilog="\b\nExample:\n  groundstation export --tlog runs/20261120T120000Z-mixed-team\n"
-    "writes drone_2.tlog, ... beside the recording, for MAVProxy, Mission Planner or QGroundControl."
+    epilog="\b\nExamples:\n  groundstation recording export --csv runs/20261120T120000Z-lab\n"
+    "  groundstation recording export --rrd --output flight.rrd runs/20261120T120000Z-lab\n"
+    "  groundstation export --tlog runs/20261120T120000Z-mixed-team"
 )
-@click.argument("run_dir", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--tlog", is_flag=True, help="MAVLink telemetry logs, one for each MAVLink vehicle, both directions.")
-def export(run_dir: Path, tlog: bool) -> int:
-    """Write what was recorded in RUN_DIR in another format."""
-    if not tlog:
-        raise click.UsageError("say which format: --tlog")
-    written = write_tlogs(run_dir)
-    for path, count in written.items():
-        click.echo(f"{path}: {count} datagrams")
-    if not written:
-        raise GroundStationError(f"{run_dir}: no MAVLink datagrams are recorded there (recording.raw_datagrams)")
+@click.argument("recording", type=click.Path(exists=True, path_type=Path))
+@click.option("--csv", "formats", flag_value="csv", multiple=True, help="One table for each topic, units in the names.")
+@click.option("--parquet", "formats", flag_value="parquet", multiple=True, help="The same, typed; extra [parquet].")
+@click.option("--rrd", "formats", flag_value="rrd", multiple=True, help="A scene for the Rerun viewer; extra [rerun].")
+@click.option(
+    "--foxglove-scene",
+    "formats",
+    flag_value="scene",
+    multiple=True,
+    help="A copy with ellipses, links and arrows for Foxglove's 3D panel; extra [foxglove].",
+)
+@click.option("--tlog", "formats", flag_value="tlog", multiple=True, help="MAVLink logs, one for each vehicle.")
+@click.option("--output", type=click.Path(path_type=Path), help="Where to (default: beside the recording).")
+def export(recording: Path, formats: tuple[str, ...], output: Path | None) -> int:
+    """Write RECORDING, a run folder or one file of it, in other formats. Cut recordings are read as far as they go."""
+    from groundstation.recording.run import open_run
+
+    if not formats:
+        raise click.UsageError("say which format: --csv, --parquet, --rrd, --foxglove-scene or --tlog")
+    if output is not None and len(formats) > 1:
+        raise click.UsageError("--output names one place: export one format at a time, or leave it out")
+    run = open_run(recording)
+    for name in formats:
+        _WRITERS[name](run, recording, output)
+    _tell("damaged, read as far as it is sound", run.damage)
     return ExitCode.OK
 
 
-def write_tlogs(run_dir: Path) -> dict[Path, int]:
-    """Write one .tlog for each MAVLink vehicle of a run; returns the files and how many datagrams each holds.
+def _tables(kind: str) -> "Callable[[RecordedRun, Path, Path | None], None]":
+    def write(run: "RecordedRun", recording: Path, output: Path | None) -> None:
+        from groundstation.engineering_views.extras import require_parquet
+        from groundstation.recording.table_files import CsvFile, ParquetFile, write_tables
 
-    WIRE (.tlog, as pymavlink reads it): UNIX time [us], 8 bytes, big-endian, before each frame.
-    """
-    from drivers.datagrams import unpack
-    from groundstation.bus.topics import RAW_RX, RAW_TX
-    from groundstation.recording.reader import open_recording, parts
+        if kind == "parquet":
+            require_parquet()
+        folder = output or _beside(recording, kind, is_folder=True)
+        counts, unread = write_tables(run, folder, CsvFile if kind == "csv" else ParquetFile)
+        for name, count in sorted(counts.items()):
+            click.echo(f"{folder / name}.{kind}: {count} rows")
+        _tell("not readable", unread)
 
-    frames: dict[str, list[tuple[int, bytes]]] = {}
-    for part in parts(run_dir, "raw"):
-        recording = open_recording(part)
-        for record in recording.raw_records(lambda topic: topic in (RAW_RX, RAW_TX)):
-            batch = unpack(base64.b64decode(json.loads(record.data)["data"]))
-            if not batch or not batch[0][1] or batch[0][1][0] != _MAGIC:
-                continue
-            # The message is stamped as its first datagram; the others follow on the same boot clock.
-            offset_ns = record.log_time_ns - batch[0][0]
-            held = frames.setdefault(record.key.entity, [])
-            held += [(stamp_ns + offset_ns, data) for stamp_ns, data in batch]
-    written = {}
-    for entity, held in sorted(frames.items()):
-        path = run_dir / f"{entity}.tlog"
-        with path.open("wb") as file:
-            for stamp_ns, data in sorted(held, key=lambda pair: pair[0]):
-                file.write(_STAMP.pack(max(0, stamp_ns) // 1000) + data)
-        written[path] = len(held)
-    return written
+    return write
+
+
+def _rrd(run: "RecordedRun", recording: Path, output: Path | None) -> None:
+    from groundstation.engineering_views.rerun_file import write_rrd
+
+    path = output or _beside(recording, "rrd")
+    count, unread = write_rrd(run, path)
+    click.echo(f"{path}: {count} messages; open it with: rerun {path}")
+    _tell("not readable", unread)
+
+
+def _scene(run: "RecordedRun", recording: Path, output: Path | None) -> None:
+    from groundstation.engineering_views.foxglove_file import write_with_scene
+
+    path = output or _beside(recording, "scene.mcap")
+    count, unread = write_with_scene(run, path)
+    click.echo(f"{path}: {count} scenes beside everything else; open it in Foxglove or Lichtblick")
+    _tell("not readable", unread)
+
+
+def _tlog(run: "RecordedRun", recording: Path, output: Path | None) -> None:
+    from groundstation.cli.tlog import write_tlogs
+
+    folder = output or (recording if recording.is_dir() else recording.parent)
+    for path, count in write_tlogs(run, folder).items():
+        click.echo(f"{path}: {count} datagrams")
+
+
+_WRITERS: "dict[str, Callable[[RecordedRun, Path, Path | None], None]]" = {
+    "csv": _tables("csv"),
+    "parquet": _tables("parquet"),
+    "rrd": _rrd,
+    "scene": _scene,
+    "tlog": _tlog,
+}
+
+
+def _beside(recording: Path, suffix: str, *, is_folder: bool = False) -> Path:
+    """Return the usual place: inside a run folder, beside a file."""
+    if recording.is_dir():
+        return recording / (suffix if is_folder else f"{recording.resolve().name}.{suffix}")
+    return recording.with_name(f"{recording.stem}-{suffix}" if is_folder else f"{recording.stem}.{suffix}")
+
+
+def _tell(title: str, lines: Iterable[str]) -> None:
+    listed = list(lines)
+    for line in listed[:_MAX_LINES]:
+        click.echo(f"{title}: {line}", err=True)
+    if len(listed) > _MAX_LINES:
+        click.echo(f"{title}: and {len(listed) - _MAX_LINES} more", err=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from groundstation.bus.clock import NS_PER_S
-from groundstation.errors import GroundStationError, MessageError, OperatorMistake
+from groundstation.errors import GroundStationError, MessageError
 from groundstation.recording.chunks import RawRecord
 from groundstation.recording.copies import new_folder
 from groundstation.recording.reader import decode, payload
@@ -102,14 +102,6 @@ class ParquetFile:
         """Write what is left and the footer."""
         self._flush()
         self._writer.close()
-
-
-def require_parquet() -> None:
-    """Raise OperatorMistake, with the remedy, when the extra is not installed."""
-    try:
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as error:
-        raise OperatorMistake('--parquet needs pyarrow: pip install "skein-groundstation[parquet]"') from error
 
 
 # What raw topics leave in a table: when, and how much.

@@ -11,10 +11,12 @@ from drivers.mavlink.wire.frames import Encoder
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.topics import RAW_RX, RAW_TX
-from groundstation.cli.export import export, write_tlogs
+from groundstation.cli.export import export
+from groundstation.cli.tlog import write_tlogs
 from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import Preamble
+from groundstation.recording.run import open_run
 from groundstation.recording.timeline import Timeline
 
 S = 1_000_000_000
@@ -48,7 +50,7 @@ def test_tlog_is_read_by_pymavlink(run_dir):
     os.environ["MAVLINK20"] = "1"
     from pymavlink import mavutil
 
-    written = write_tlogs(run_dir)
+    written = write_tlogs(open_run(run_dir), run_dir)
     assert {path.name: count for path, count in written.items()} == {"drone_2.tlog": 10}
     log = mavutil.mavlink_connection(str(run_dir / "drone_2.tlog"))
     found = []
@@ -59,6 +61,12 @@ def test_tlog_is_read_by_pymavlink(run_dir):
     assert [stamp - 1_700_000_000 for _, stamp in found] == pytest.approx([n / 2 for n in range(10)], abs=1e-3)
 
 
-def test_nothing_to_export_is_an_error(tmp_path):
-    result = CliRunner().invoke(export, ["--tlog", str(tmp_path)], standalone_mode=False)
+def test_a_run_without_mavlink_and_a_log_that_exists_are_errors(run_dir, tmp_path):
+    assert CliRunner().invoke(export, ["--tlog", str(run_dir)], standalone_mode=False).exit_code == 0
+    again = CliRunner().invoke(export, ["--tlog", str(run_dir)], standalone_mode=False)
+    assert "exists already" in str(again.exception)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    McapFile(empty / "raw.mcap", Preamble({"run": {}}, {}, OFFSET)).close()
+    result = CliRunner().invoke(export, ["--tlog", str(empty)], standalone_mode=False)
     assert "no MAVLink datagrams" in str(result.exception)

@@ -1,0 +1,1 @@
+"""Optional views for engineers: Rerun and Foxglove, live or from a recording."""

@@ -1,0 +1,25 @@
+"""Optional libraries: missing ones are an operator's matter, with the command that installs them."""
+
+from importlib.util import find_spec
+
+from groundstation.errors import OperatorMistake
+
+
+def _require(module: str, library: str, extra: str) -> None:
+    if find_spec(module) is None:
+        raise OperatorMistake(f'{library} is not installed: pip install "skein-groundstation[{extra}]"')
+
+
+def require_rerun() -> None:
+    """Raise OperatorMistake, with the remedy, when the extra [rerun] is not installed."""
+    _require("rerun", "Rerun", "rerun")
+
+
+def require_foxglove() -> None:
+    """Raise OperatorMistake, with the remedy, when the extra [foxglove] is not installed."""
+    _require("foxglove", "The Foxglove SDK", "foxglove")
+
+
+def require_parquet() -> None:
+    """Raise OperatorMistake, with the remedy, when the extra [parquet] is not installed."""
+    _require("pyarrow", "pyarrow", "parquet")

@@ -1,0 +1,70 @@
+"""A recorded run as an .rrd file for the Rerun viewer."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from groundstation.engineering_views.extras import require_rerun
+from groundstation.errors import MessageError
+from groundstation.recording.copies import require_absent
+from groundstation.recording.preamble import FIELD_NAME
+from groundstation.recording.reader import decode, payload
+from groundstation.recording.run import RecordedRun
+from groundstation.recording.schemas import is_picture
+from groundstation.recording.table_files import no_room_named
+
+APPLICATION = "skein"
+
+
+def write_rrd(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
+    """Write a new .rrd file; returns how many messages it was made of, and what could not be decoded.
+
+    Raises OperatorMistake when the extra is not installed or the file exists, ExportError when it cannot be written.
+    """
+    require_rerun()
+    require_absent(path)
+    partial = path.with_name(f".{path.name}.partial")
+    with no_room_named(path):
+        try:
+            partial.touch()  # the library itself would only log that it cannot write
+            found = _write(run, partial)
+            partial.rename(path)
+        finally:
+            partial.unlink(missing_ok=True)
+    return found
+
+
+def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
+    import rerun as rr
+
+    from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
+
+    field = field_of(run)
+    unread: dict[str, None] = {}
+    count = 0
+    stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.paths[0].parent.name}-{run.start_ns}")
+    stream.save(path, default_blueprint=blueprint(field))
+    scene = RerunScene(stream, field, run.start_ns)
+    for raw in run.records_from(run.start_ns, lambda topic: topic.type is not None or is_picture(topic)):
+        try:
+            if raw.key.topic.type is None:
+                scene.take_picture(raw.log_time_ns, raw.key.entity, raw.key.topic, payload(raw)[1])
+            else:
+                scene.take(raw.log_time_ns, decode(raw).message)
+        except MessageError as error:
+            unread[str(error)] = None
+            continue
+        count += 1
+    stream.flush()
+    stream.disconnect()
+    return count, list(unread)
+
+
+def field_of(run: RecordedRun) -> dict[str, Any]:
+    """Return the resolved field of a run; a bare one where none is attached, so that the rest can still be shown."""
+    try:
+        found: dict[str, Any] = msgspec.json.decode(run.attachments.get(FIELD_NAME, b"{}"), type=dict)
+    except msgspec.DecodeError:
+        return {}
+    return found

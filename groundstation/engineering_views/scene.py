@@ -1,0 +1,116 @@
+"""What there is to draw, without saying with what: bodies, 95 % ellipses, links, arrows, in the world frame."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus import messages as m
+from groundstation.geometry.ellipse import semi_axes_95
+from groundstation.recording.derived import camera_frames
+from groundstation.recording.viewers import Transform
+
+Array = NDArray[np.float64]
+Rgb = tuple[int, int, int]
+
+_RING_POINTS = 40
+_CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
+# Safe for colour-blind people (Okabe and Ito, 2008): robots in turn, then the target.
+ROBOT_COLOURS: tuple[Rgb, ...] = ((0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233))
+TARGET_COLOUR: Rgb = (213, 94, 0)
+LINK_COLOUR: Rgb = (130, 130, 130)
+# An arrow is as long as the way in this time.
+ARROW_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A robot or the target: position [m; world], yaw [rad] (0 where there is none), ellipse ring (n, 3) [m; world]."""
+
+    name: str
+    is_target: bool
+    position_m: tuple[float, float, float]
+    yaw_rad: float
+    ring_m: Array
+    std_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """An edge of the topology as a line whose half-width [m] grows with its information."""
+
+    name: str
+    begin_m: tuple[float, float, float]
+    end_m: tuple[float, float, float]
+    half_width_m: float
+
+
+class Scene:
+    """Where everything is, as far as the messages so far say."""
+
+    def __init__(self, field: Mapping[str, Any]) -> None:
+        self.field = field
+        self.cameras: tuple[Transform, ...] = camera_frames(dict(field))
+        self.target = str(field.get("target", {}).get("name", ""))
+        self._target_height_m = float(field.get("target", {}).get("marker", {}).get("height_m", 0.0))
+        self._names = sorted(field.get("drones", {}))
+        self._places = {one.child: one.position_m for one in self.cameras if one.parent == "world"}
+        self.bodies: dict[str, Body] = {}
+
+    def colour(self, name: str) -> Rgb:
+        """Return the colour of a robot or the target."""
+        if name not in self._names:
+            return TARGET_COLOUR
+        return ROBOT_COLOURS[self._names.index(name) % len(ROBOT_COLOURS)]
+
+    def take_estimate(self, message: m.Estimate) -> list[Body]:
+        """Return the bodies of an estimate, and remember them."""
+        found = [self._body(entity) for entity in message.entities]
+        self.bodies.update((body.name, body) for body in found)
+        return found
+
+    def _body(self, entity: m.EntityEstimate) -> Body:
+        size, mean = len(entity.mean), entity.mean
+        has_pose = size >= 4
+        height = mean[2] if has_pose else self._target_height_m
+        position = (mean[0], mean[1], height)
+        covariance = np.asarray(entity.covariance).reshape(size, size)
+        ring = _ring(position, covariance)
+        std = math.sqrt(max(0.0, float(covariance[0, 0] + covariance[1, 1])))
+        return Body(entity.name, not has_pose, position, mean[3] if has_pose else 0.0, ring, std)
+
+    def links(self, plan: m.Plan) -> list[Link]:
+        """Return the edges of a plan between what has a known place."""
+        found = []
+        for edge in plan.edges:
+            begin, end = self._place(edge.observer), self._place(edge.subject)
+            if begin is not None and end is not None:
+                width = 0.004 * (1.0 + math.log10(1.0 + max(0.0, edge.information)))
+                found.append(Link(f"{edge.observer} sees {edge.subject}", begin, end, width))
+        return found
+
+    def _place(self, name: str) -> tuple[float, float, float] | None:
+        body = self.bodies.get(name)
+        return body.position_m if body is not None else self._places.get(name)
+
+    def arrow(self, setpoint: m.VelocitySetpoint) -> tuple[Array, Array] | None:
+        """Return (origin, vector) [m; world] of a commanded velocity, or None where the robot is not known."""
+        body = self.bodies.get(setpoint.header.entity)
+        if body is None:
+            return None
+        forward, left, up = setpoint.velocity_m_s
+        c, s = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
+        vector = np.array([c * forward - s * left, s * forward + c * left, up])
+        return np.array(body.position_m), ARROW_S * vector
+
+
+def _ring(position_m: tuple[float, float, float], covariance: Array) -> Array:
+    """Return the 95 % ellipse of x and y around a position, at its height (n, 3) [m; world]."""
+    major, minor, turn = semi_axes_95(float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
+    along, across = major * np.cos(_CIRCLE), minor * np.sin(_CIRCLE)
+    x = position_m[0] + along * math.cos(turn) - across * math.sin(turn)
+    y = position_m[1] + along * math.sin(turn) + across * math.cos(turn)
+    return np.column_stack((x, y, np.full(len(x), position_m[2])))

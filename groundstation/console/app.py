@@ -28,9 +28,16 @@ class ConsoleApp:
     """Builds the ASGI application. `seed` gets a frame's number and returns everything a new viewer must know."""
 
     def __init__(
-        self, pages: dict[str, StaticFile], token: str, board: Board, sessions: Sessions, seed: Callable[[int], str]
+        self,
+        pages: dict[str, StaticFile],
+        token: str,
+        board: Board,
+        sessions: Sessions,
+        seed: Callable[[int], str],
+        clock: Callable[[], int],
     ) -> None:
         self._pages, self._token, self._board, self._sessions, self._seed = pages, token, board, sessions, seed
+        self._clock = clock
         self._numbers = itertools.count(1)
         self.refused: Counter[str] = Counter()
         routes = [
@@ -56,7 +63,7 @@ class ConsoleApp:
             self.refused["full"] += 1
             await socket.close(_CLOSE_FULL, f"{MAX_VIEWERS} viewers are connected already")
             return
-        viewer = Viewer(next(self._numbers), self._board, socket.send_text, socket.send_bytes)
+        viewer = Viewer(next(self._numbers), self._board, socket.send_text, socket.send_bytes, self._clock)
         self._sessions.add(viewer)
         listening = asyncio.create_task(self._listen(socket, viewer))
         sending = asyncio.create_task(viewer.run(self._seed))

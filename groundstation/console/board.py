@@ -24,6 +24,12 @@ class Board:
         self.turn += 1
         self._composed.clear()
 
+    def forget(self) -> None:
+        """Forget all sections: what comes next belongs to another time."""
+        self._sections.clear()
+        self._changed.clear()
+        self._composed.clear()
+
     def put(self, name: str, content: Any) -> None:
         """Set a section; it counts as changed only if its JSON differs."""
         encoded = _encoder.encode(content)

@@ -11,6 +11,7 @@ from groundstation.geometry.ellipse import semi_axes_95
 _TRAIL_POINTS = 300
 _TRAIL_NS = 200_000_000
 _SAMPLES = 240
+_PASSED = 1000
 _SAMPLE_NS = 500_000_000
 
 
@@ -21,7 +22,13 @@ class History:
         self._target = target
         self._trails: dict[str, deque[tuple[float, float]]] = {}
         self._samples: deque[dict[str, Any]] = deque(maxlen=_SAMPLES)
+        self._passed: deque[tuple[str, float, float]] = deque(maxlen=_PASSED)
+        self._passed_samples: deque[dict[str, Any]] = deque(maxlen=_SAMPLES)
         self._next_trail_ns = self._next_sample_ns = 0
+
+    def due(self, now_ns: int) -> bool:
+        """Return whether there is something to take."""
+        return now_ns >= min(self._next_trail_ns, self._next_sample_ns)
 
     def step(
         self,
@@ -35,14 +42,23 @@ class History:
         if estimate is not None and now_ns >= self._next_trail_ns:
             self._next_trail_ns = now_ns + _TRAIL_NS
             for entity in estimate.entities:
-                trail = self._trails.setdefault(entity.name, deque(maxlen=_TRAIL_POINTS))
-                trail.append((round(entity.mean[0], 3), round(entity.mean[1], 3)))
+                point = (round(entity.mean[0], 3), round(entity.mean[1], 3))
+                self._trails.setdefault(entity.name, deque(maxlen=_TRAIL_POINTS)).append(point)
+                self._passed.append((entity.name, *point))
         if now_ns < self._next_sample_ns:
             return None
         self._next_sample_ns = now_ns + _SAMPLE_NS
         sample = self._sample(now_ns, estimate, plan, nis, truth)
         self._samples.append(sample)
+        self._passed_samples.append(sample)
         return sample
+
+    def take_passed(self) -> dict[str, Any]:
+        """Return and forget what was taken since the last call: a fast replay takes more than one of each at a time."""
+        passed = {"points": list(self._passed), "samples": list(self._passed_samples)}
+        self._passed.clear()
+        self._passed_samples.clear()
+        return passed
 
     def as_json(self) -> dict[str, Any]:
         """Return everything kept."""

@@ -71,7 +71,32 @@ class FollowPath(FromPage, frozen=True):
     """Sends the simulated target back to its path."""
 
 
-PageMessage = Hello | Order | TakeOver | Release | Seen | Watch | Drive | Place | FollowPath
+class Play(FromPage, frozen=True):
+    """Lets a replay go on, or stops it."""
+
+    playing: bool
+
+
+class Speed(FromPage, frozen=True):
+    """How many times as fast as it was a replay goes."""
+
+    factor: Annotated[float, msgspec.Meta(ge=0.1, le=20)]
+
+
+class Seek(FromPage, frozen=True):
+    """Takes a replay to a time of the run's boot clock."""
+
+    at_ms: Annotated[float, msgspec.Meta(ge=0, le=1e13)]
+
+
+class Step(FromPage, frozen=True):
+    """Takes a replay so many ticks of the tracker forwards, or backwards if negative, and stops it there."""
+
+    ticks: Annotated[int, msgspec.Meta(ge=-50, le=50)]
+
+
+Playing = Play | Speed | Seek | Step
+PageMessage = Hello | Order | TakeOver | Release | Seen | Watch | Drive | Place | FollowPath | Playing
 _decoder: msgspec.json.Decoder[PageMessage] = msgspec.json.Decoder(PageMessage)
 
 

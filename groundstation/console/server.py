@@ -4,14 +4,14 @@ import asyncio
 import contextlib
 import secrets
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import msgspec
 import uvicorn
 
 from groundstation.bus import clock
-from groundstation.bus.api import Bus
+from groundstation.bus.api import Bus, Received
 from groundstation.bus.messages import Command, CommandAck, Lease, RelativeObservation
 from groundstation.bus.topics import (
     CAMERA_STATUS,
@@ -35,6 +35,7 @@ from groundstation.console.board import Board
 from groundstation.console.orders import OrderDesk
 from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
+from groundstation.console.player import Player
 from groundstation.console.scene import lenses_of
 from groundstation.console.session import Sessions
 from groundstation.console.state import ConsoleState
@@ -48,6 +49,7 @@ _PORTS_TRIED = 10
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS)
 _EACH = (EVENT, COMMAND, COMMAND_ACK, LEASE, OBSERVATION, INNOVATION)
+TOPICS = (*_NEWEST, *_EACH, TRUTH, IMAGE)
 
 
 def claim_port(port: int) -> socket.socket:
@@ -67,19 +69,34 @@ def claim_port(port: int) -> socket.socket:
 
 
 class ConsoleServer:
-    """Serves one run. `scene`: what does not move; `field`: the resolved field, or {} if it is not known."""
+    """Serves one run. `scene`: what does not move; `field`: the resolved field, or {} if it is not known.
 
-    def __init__(self, bus: Bus, cast: Cast, scene: dict[str, Any], field: Mapping[str, Any], listener: socket.socket):
+    player: what replays a recording on the bus, where this is no live run.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        cast: Cast,
+        scene: dict[str, Any],
+        field: Mapping[str, Any],
+        listener: socket.socket,
+        player: Player | None = None,
+    ) -> None:
         self._scene = scene
         self._listener = listener
+        self._cast, self._bus, self._player = cast, bus, player
+        self._lenses = lenses_of(field) if field else {}
+        self._now_ns = player.now_ns if player else clock.now_ns
         self.url = f"http://{HOST}:{listener.getsockname()[1]}/"
         self.board = Board()
-        self.state = ConsoleState(cast, clock.now_ns())
-        self._pictures = PictureDesk(lenses_of(field) if field else {})
-        self._desk = OrderDesk(bus, tuple(cast.drones))
+        self.state = ConsoleState(cast, self._now_ns())
+        self._pictures = PictureDesk(self._lenses)
         token = secrets.token_urlsafe(24)
-        self.sessions = Sessions(bus, self._desk, token, cast.target if scene["truth"] else "")
-        self.app = ConsoleApp(load_pages(token), token, self.board, self.sessions, self._seed)
+        steered = cast.target if scene["truth"] and player is None else ""
+        desk = OrderDesk(bus, tuple(cast.drones))
+        self.sessions = Sessions(bus, desk, token, steered, lambda: self._pictures.frames, player)
+        self.app = ConsoleApp(load_pages(token), token, self.board, self.sessions, self._seed, self._now_ns)
         self._run = secrets.token_hex(6)
         newest = (*_NEWEST, TRUTH) if scene["truth"] else _NEWEST
         self._newest = bus.subscribe(newest, newest=True)
@@ -121,7 +138,7 @@ class ConsoleServer:
         loop = asyncio.get_running_loop()
         period_s, due_s, turns, late = 1.0 / RATE_HZ, loop.time(), 0, 0
         while go_on(turns, late) and not serving.done():
-            self.turn(clock.now_ns())
+            self.turn(self._now_ns())
             turns += 1
             due_s += period_s
             if due_s < loop.time():
@@ -131,28 +148,66 @@ class ConsoleServer:
 
     def turn(self, now_ns: int) -> None:
         """Take in what has arrived and tell the viewers."""
+        self.take_in(now_ns)
         self.board.begin()
-        self.state.ingest(self._newest.drain())
-        each = self._each.drain()
-        self.state.ingest(each)
-        for received in each:
-            self._hear(received.message, now_ns)
-        self._desk.step(now_ns)
-        self.sessions.helm.step(now_ns)
-        self._take_pictures(now_ns)
         self.state.put(self.board, now_ns)
-        self.board.put("detections", self._pictures.detections())
-        self.board.put("orders", self._desk.summary())
-        self.board.put("session", self.sessions.summary(now_ns))
+        self._put_own(now_ns)
         for viewer in self.sessions.viewers.values():
             viewer.notice()
+
+    def take_in(self, now_ns: int) -> None:
+        """Take in what has arrived until a time."""
+        self.ingest(self._newest.drain(), now_ns)
+        self.ingest(self._each.drain(), now_ns)
+        self.sessions.desk.step(now_ns)
+        self.sessions.helm.step(now_ns)
+        self._take_pictures(now_ns)
+        self.state.note(now_ns)
+
+    def ingest(self, received: Iterable[Received], now_ns: int) -> None:
+        """Remember messages that came at a time."""
+        received = list(received)
+        self.state.ingest(received)
+        for item in received:
+            self._hear(item.message, now_ns)
+
+    def begin_anew(self) -> None:
+        """Forget what was seen: a replay has gone to another time. `show_anew` tells the viewers."""
+        for subscription in (self._newest, self._each, self._images):
+            subscription.drain_samples()
+        self.state = ConsoleState(self._cast, self._now_ns())
+        self._pictures = PictureDesk(self._lenses)
+        self.sessions.desk = OrderDesk(self._bus, tuple(self._cast.drones))
+
+    def show_anew(self, now_ns: int) -> None:
+        """Tell all viewers everything, as to one that has just come."""
+        self._take_pictures(now_ns)
+        self.board.begin()
+        self.board.forget()
+        self.state.put(self.board, now_ns)
+        self.state.put_often(self.board)
+        self.state.put_seldom(self.board, now_ns)
+        self.state.history.take_passed()  # the seed holds it
+        self._put_own(now_ns)
+        for viewer in self.sessions.viewers.values():
+            viewer.reseed()
+            for camera, frame in self._pictures.frames.items():
+                viewer.show(camera, frame)
+
+    def _put_own(self, now_ns: int) -> None:
+        self.board.put("detections", self._pictures.detections())
+        self.board.put("orders", self.sessions.desk.summary())
+        self.board.put("session", self.sessions.summary(now_ns))
+        if self._player is not None:
+            self.board.put("playback", self._player.section())
+            self.board.put("passed", self.state.history.take_passed())
 
     def _hear(self, message: object, now_ns: int) -> None:
         match message:
             case Command() | CommandAck():
-                self._desk.hear(message, now_ns)
+                self.sessions.desk.hear(message, now_ns)
             case Lease():
-                self._desk.hear_lease(message)
+                self.sessions.desk.hear_lease(message)
             case RelativeObservation():
                 self._pictures.take_detection(message)
             case _:
@@ -170,7 +225,7 @@ class ConsoleServer:
             "type": "seed",
             "run": self._run,
             "seq": seq,
-            "now": clock.now_ns() / 1e6,
+            "now": self._now_ns() / 1e6,
             "scene": self._scene,
             "history": self.state.history.as_json(),
             "s": msgspec.Raw(self.board.since(-1)),

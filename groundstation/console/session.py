@@ -2,6 +2,7 @@
 
 import hmac
 from collections import Counter
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgspec
@@ -12,6 +13,7 @@ from groundstation.bus.messages import SimCommand
 from groundstation.bus.topics import SIM_COMMAND
 from groundstation.console.helm import Helm
 from groundstation.console.orders import STOPS, OrderDesk
+from groundstation.console.player import Player
 from groundstation.console.protocol import (
     Drive,
     FollowPath,
@@ -19,8 +21,13 @@ from groundstation.console.protocol import (
     Order,
     PageMessage,
     Place,
+    Play,
+    Playing,
     Release,
+    Seek,
     Seen,
+    Speed,
+    Step,
     TakeOver,
     Watch,
 )
@@ -32,17 +39,32 @@ def encoded(kind: str, **content: Any) -> str:
     return msgspec.json.encode({"type": kind, **content}).decode()
 
 
+def _ref_of(message: PageMessage) -> str:
+    return message.ref if isinstance(message, Order) else ""
+
+
 class Sessions:
     """All viewers, the operator among them, and what their pages may do.
 
-    simulated_target: the body that pages may steer, "" outside of simulation.
+    simulated_target: the body that pages may steer, "" outside of simulation; pictures: the newest frame of each
+    camera; player: what replays, where this is a replay: then nothing can be commanded.
     """
 
-    def __init__(self, bus: Bus, desk: OrderDesk, token: str, simulated_target: str) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        desk: OrderDesk,
+        token: str,
+        simulated_target: str,
+        pictures: Callable[[], Mapping[str, bytes]] = dict,
+        player: Player | None = None,
+    ) -> None:
         self._bus = bus
-        self._desk = desk
+        self.desk = desk
         self._token = token
         self._target = simulated_target
+        self._newest_pictures = pictures
+        self._player = player
         self.helm = Helm()
         self.viewers: dict[int, Viewer] = {}
         self.refused: Counter[str] = Counter()
@@ -63,7 +85,7 @@ class Sessions:
             "operator": self.helm.client,
             "operator_name": self.helm.name,
             "viewers": len(self.viewers),
-            "lease": self._desk.lease_holder(now_ns),
+            "lease": self.desk.lease_holder(now_ns),
         }
 
     def handle(self, viewer: Viewer, message: PageMessage) -> None:
@@ -72,11 +94,15 @@ class Sessions:
             case Seen(seq=seq):
                 viewer.saw(seq)
             case Watch(cameras=cameras):
-                viewer.watched = frozenset(cameras)
+                self._watch(viewer, frozenset(cameras))
             case Hello():
                 self._greet(viewer, message)
             case _ if not viewer.trusted:
                 self._refuse(viewer, "untrusted", "this page may only look: reload it")
+            case Play() | Speed() | Seek() | Step():
+                self._replay(viewer, message)
+            case _ if self._player is not None:
+                self._refuse(viewer, "replay", "this is a replay: nothing here can be commanded", _ref_of(message))
             case Order():
                 self._order(viewer, message)
             case TakeOver():
@@ -85,6 +111,26 @@ class Sessions:
                 self.helm.release(viewer.client)
             case _:
                 self._steer(viewer, message)
+
+    def _watch(self, viewer: Viewer, cameras: frozenset[str]) -> None:
+        fresh, viewer.watched = cameras - viewer.watched, cameras
+        for camera, frame in self._newest_pictures().items():
+            if camera in fresh:
+                viewer.show(camera, frame)
+
+    def _replay(self, viewer: Viewer, message: Playing) -> None:
+        if self._player is None:
+            self._refuse(viewer, "no_replay", "this is no replay: time goes as it goes")
+            return
+        match message:
+            case Play(playing=playing):
+                self._player.play(playing)
+            case Speed(factor=factor):
+                self._player.set_speed(factor)
+            case Seek(at_ms=at_ms):
+                self._player.seek(round(at_ms * 1e6))
+            case Step(ticks=ticks):
+                self._player.step(ticks)
 
     def _greet(self, viewer: Viewer, hello: Hello) -> None:
         viewer.client = hello.client
@@ -102,7 +148,7 @@ class Sessions:
                 return
             self.helm.take(viewer.client, viewer.name)
         now_ns = clock.now_ns()
-        problem = self._desk.give(order.verb, order.drones, viewer.name, order.at_ms, order.ref, now_ns)
+        problem = self.desk.give(order.verb, order.drones, viewer.name, order.at_ms, order.ref, now_ns)
         if problem:
             self._refuse(viewer, "order", problem, order.ref)
 

@@ -26,6 +26,7 @@ class ConsoleState:
         self.history = History(cast.target)
         self.setpoints: dict[str, Seen[m.VelocitySetpoint]] = {}
         self.truth: dict[str, Seen[m.TruthState]] = {}
+        self._sample: dict[str, Any] | None = None
 
     def ingest(self, received: Iterable[Received]) -> None:
         """Remember messages."""
@@ -40,38 +41,45 @@ class ConsoleState:
                 case _:
                     self.monitor.ingest((item,))
 
+    def note(self, now_ns: int) -> None:
+        """Let trails and curves go on, where it is time for it."""
+        if not self.history.due(now_ns):
+            return
+        truth = {name: seen.message for name, seen in self.truth.items()}
+        plan = self.monitor.plan.message if self.monitor.plan else None
+        estimate = self.monitor.estimate.message if self.monitor.estimate else None
+        nis = self.health.summary()["nis"]
+        self._sample = self.history.step(now_ns, estimate, plan, nis, truth) or self._sample
+
     def put(self, board: Board, now_ns: int) -> None:
         """Put what changed on the board."""
         board.put("estimate", _estimate(self.monitor.estimate))
         board.put("setpoints", {name: _setpoint(seen) for name, seen in self.setpoints.items()})
         if self.truth:
             board.put("truth", {name: _truth(seen) for name, seen in self.truth.items()})
+        if self._sample is not None:
+            board.put("sample", self._sample)
         if board.turn % _OFTEN == 0:
-            self._put_often(board)
+            self.put_often(board)
         if board.turn % _SELDOM == 0:
-            self._put_seldom(board, now_ns)
+            self.put_seldom(board, now_ns)
 
-    def _put_often(self, board: Board) -> None:
+    def put_often(self, board: Board) -> None:
+        """Put what changes ten times a second."""
         known = self.monitor
         board.put("vehicles", {name: _vehicle(seen) for name, seen in known.vehicles.items()})
         board.put("plan", _plan(known.plan))
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [_event(seen) for seen in list(known.events)[-_EVENTS:]])
 
-    def _put_seldom(self, board: Board, now_ns: int) -> None:
+    def put_seldom(self, board: Board, now_ns: int) -> None:
+        """Put what may be a quarter of a second old."""
         known = self.monitor
         board.put("cameras", {name: _camera(seen) for name, seen in known.cameras.items()})
         board.put("processes", {name: _process(seen) for name, seen in known.processes.items()})
         alarms = [{"text": alarm.text, "grave": alarm.grave} for alarm in alarms_of(known, now_ns)]
         board.put("alarms", alarms)
-        health = self.health.summary()
-        board.put("health", health)
-        truth = {name: seen.message for name, seen in self.truth.items()}
-        plan = known.plan.message if known.plan else None
-        estimate = known.estimate.message if known.estimate else None
-        sample = self.history.step(now_ns, estimate, plan, health["nis"], truth)
-        if sample is not None:
-            board.put("sample", sample)
+        board.put("health", self.health.summary())
 
 
 def _ms(seen: Seen[Any]) -> float:

@@ -21,7 +21,14 @@ class Viewer:
     with too many of these is too slow to be helped.
     """
 
-    def __init__(self, number: int, board: Board, send_text: "SendText", send_bytes: "SendBytes") -> None:
+    def __init__(
+        self,
+        number: int,
+        board: Board,
+        send_text: "SendText",
+        send_bytes: "SendBytes",
+        clock: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
         self.number = number
         self.name = f"viewer {number}"
         self.client = ""
@@ -30,16 +37,24 @@ class Viewer:
         self.watched: frozenset[str] = frozenset()
         self.skipped = 0
         self._board = board
+        self._clock = clock
         self._send_text, self._send_bytes = send_text, send_bytes
         self._urgent: deque[str] = deque()
         self._pictures: dict[str, bytes] = {}
         self._wake = asyncio.Event()
         self._seq = self._seen = 0
         self._turn = -1
+        self._unseeded = True
         self._allowance, self._allowance_at = _BURST, time.monotonic()
 
     def notice(self) -> None:
         """Say that the board has changed."""
+        self._wake.set()
+
+    def reseed(self) -> None:
+        """Tell everything once more: what was said so far belongs to another time."""
+        self._unseeded = True
+        self._pictures.clear()
         self._wake.set()
 
     def say(self, text: str) -> None:
@@ -69,33 +84,36 @@ class Viewer:
 
     async def run(self, seed: Callable[[int], str]) -> None:
         """Send a seed, then what changes, until cancelled; `seed` gets the frame's number."""
-        self._seq += 1
-        self._turn = self._board.turn
-        await self._send_text(seed(self._seq))
+        await self._send_newest(seed)
         while not self.too_slow:
             await self._wake.wait()
             self._wake.clear()
             while self._urgent:
                 await self._send_text(self._urgent.popleft())
             if self._seq - self._seen < WINDOW:
-                await self._send_newest()
+                await self._send_newest(seed)
             else:
                 self.skipped += 1
 
-    async def _send_newest(self) -> None:
-        if self._turn < self._board.turn:
+    async def _send_newest(self, seed: Callable[[int], str]) -> None:
+        if self._unseeded:
+            self._unseeded = False
+            self._turn = self._board.turn
+            self._seq += 1
+            await self._send_text(seed(self._seq))
+        elif self._turn < self._board.turn:
             sections = self._board.since(self._turn)
             self._turn = self._board.turn
             self._seq += 1
-            await self._send_text(delta(self._seq, sections))
+            await self._send_text(delta(self._seq, self._clock(), sections))
         while self._pictures:
             camera = next(iter(self._pictures))
             await self._send_bytes(self._pictures.pop(camera))
 
 
-def delta(seq: int, sections: bytes) -> str:
+def delta(seq: int, now_ns: int, sections: bytes) -> str:
     """Return a frame of what changed, with the server's time."""
-    return f'{{"type":"delta","seq":{seq},"now":{time.monotonic_ns() / 1e6:.3f},"s":{sections.decode()}}}'
+    return f'{{"type":"delta","seq":{seq},"now":{now_ns / 1e6:.3f},"s":{sections.decode()}}}'
 
 
 SendText = Callable[[str], Awaitable[None]]

@@ -109,6 +109,7 @@ def test_sections_say_what_came() -> None:
     )
     for turn in range(10):
         board.begin()
+        state.note(NS + turn * 50_000_000)
         state.put(board, NS + turn * 50_000_000)
     said = json.loads(board.since(-1))
     assert [entity["name"] for entity in said["estimate"]["entities"]] == ["drone_1", "turtlebot"]

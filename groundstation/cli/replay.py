@@ -1,0 +1,132 @@
+"""`groundstation replay`: a recorded run in the console as it was, or once more through today's tracker."""
+
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+if TYPE_CHECKING:
+    from groundstation.replay.source import Source
+    from groundstation.replay.verify import Comparison
+
+_RUNS = Path("runs")
+_RERUN_ONLY = ("options", "estimator", "json_file", "output")
+_NAMES = {"options": "--set", "estimator": "--estimator", "json_file": "--json", "output": "--output"}
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation replay                                    the newest run, in the console\n"
+    "  groundstation replay runs/20261120T101500Z-lab --from 30 --speed 2\n"
+    "  groundstation replay RUN --rerun tracker                is today's tracker the recorded one, to the bit?\n"
+    "  groundstation replay RUN --set estimator.gate=4 --set planner.horizon_steps=5\n"
+    "  groundstation replay RUN --estimator other.yaml --output what-if\n\n"
+    "Exit codes: 0 done, or identical; 1 the re-run differs; 2 wrong usage, settings, or nothing that can be replayed."
+)
+@click.argument("recording", nargs=-1, type=click.Path(exists=True, path_type=Path))
+@click.option("--rerun", type=click.Choice(["tracker"]), help="Feed what was recorded to today's tracker and compare.")
+@click.option("--set", "options", multiple=True, metavar="A.B=C", help="Re-run with another setting; repeatable.")
+@click.option(
+    "--estimator",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Re-run with the estimator section of a field file.",
+)
+@click.option("--json", "json_file", type=click.Path(path_type=Path), help="Write the comparison of a re-run.")
+@click.option(
+    "--output", type=click.Path(path_type=Path), help="Write a re-run as a run folder, for report and replay."
+)
+@click.option("--port", type=click.IntRange(1024, 65535), help="Where to serve (default: the field's console.port).")
+@click.option("--from", "from_s", type=click.FloatRange(0), help="Begin so many seconds after the recording's start.")
+@click.option("--speed", type=click.FloatRange(0.1, 20), help="Times as fast as it was (default: 1).")
+@click.option("--paused", is_flag=True, help="Wait for the page to press play.")
+@click.option("--headless", is_flag=True, help="End when the recording does, instead of waiting for the page.")
+def replay(recording: tuple[Path, ...], rerun: str | None, **options: Any) -> int:
+    """Play a recorded run in the console as if it were live; or re-run it, and compare.
+
+    RECORDING is a run folder, or the .mcap files of one (default: the newest run in ./runs).
+    """
+    from groundstation.recording.reader import RecordingError
+    from groundstation.replay.source import open_source
+
+    again = rerun or options["options"] or options["estimator"]
+    if not again:
+        idle = [_NAMES[name] for name in _RERUN_ONLY if options[name]]
+        if idle:
+            raise click.UsageError(f"{', '.join(idle)} belongs to a re-run: add --rerun tracker")
+    try:
+        source = open_source(recording or (_newest(),))
+        return _run_again(source, **options) if again else _play(source, **options)
+    except RecordingError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _newest() -> Path:
+    from groundstation.cli.report import newest_run
+
+    return newest_run(_RUNS)
+
+
+def _play(
+    source: "Source",
+    *,
+    port: int | None,
+    from_s: float | None,
+    speed: float | None,
+    paused: bool,
+    headless: bool,
+    **_rerun: Any,
+) -> int:
+    import asyncio
+
+    from groundstation.replay.playback import Playback
+    from groundstation.replay.show import serve
+
+    playback = Playback(source, speed or 1.0, from_s or 0.0, playing=not paused or headless)
+    click.echo(f"replay of {source.name}: {playback.reel.duration_s:.1f} s")
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serve(playback, port, headless, lambda url: click.echo(f"{url} (Ctrl-C leaves it)")))
+    return ExitCode.OK
+
+
+def _run_again(
+    source: "Source",
+    *,
+    options: tuple[str, ...],
+    estimator: Path | None,
+    json_file: Path | None,
+    output: Path | None,
+    **playing: Any,
+) -> int:
+    from groundstation.process import numba_cache
+    from groundstation.settings.recorded import recorded_field
+
+    given = [f"--{name.removesuffix('_s')}" for name, value in playing.items() if value]
+    if given:
+        raise click.UsageError(f"{', '.join(given)} belongs to playing in the console, not to a re-run")
+    field = recorded_field(source.field, options, estimator).model_dump(mode="json")
+    numba_cache.activate()
+    from groundstation.replay.again import Again
+
+    changes = [*([f"estimator of {estimator}"] if estimator else []), *options]
+    again = Again(source, field, changes, output)
+    if json_file is not None:
+        _require_writable(json_file)
+    result = again.run()
+    for line in again.lines(result):
+        click.echo(line)
+    if json_file is not None:
+        json_file.write_bytes(again.as_json(result))
+    if changes:
+        return ExitCode.OK
+    return _exit_code(result)
+
+
+def _exit_code(result: "Comparison") -> int:
+    return ExitCode.OK if result.identical else ExitCode.FAILED
+
+
+def _require_writable(path: Path) -> None:
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        raise click.UsageError(f"{path}: cannot be written there")

@@ -1,0 +1,89 @@
+"""The clock of a replay: where it is, how fast it goes, and where a page wants it to be."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from groundstation.replay.reel import Reel
+from groundstation.replay.source import Source
+
+# Trails are kept at 5 Hz: a fast replay takes so much at a time, and loses no point of them.
+_STRETCH_NS = 200_000_000
+_LONGEST_TURN_S = 0.25
+
+
+class Playback:
+    """Keeps the time of a replay [UNIX ns inside; the run's boot clock towards pages, see console.player.Player].
+
+    from_s: where it begins, after the start of the recording.
+    """
+
+    def __init__(self, source: Source, speed: float = 1.0, from_s: float = 0.0, playing: bool = True) -> None:
+        self.source = source
+        self.reel = Reel(source)
+        self.speed = speed
+        self.playing = playing
+        self.at_ns = min(self.reel.end_ns, self.reel.start_ns + round(from_s * 1e9))
+        self._sought = True
+
+    @property
+    def ended(self) -> bool:
+        """Return whether there is nothing more to come."""
+        return self.at_ns >= self.reel.end_ns
+
+    def boot_ns(self, unix_ns: int) -> int:
+        """Return a time of the recording on the run's boot clock."""
+        return unix_ns - self.source.unix_offset_ns
+
+    def now_ns(self) -> int:
+        """Return how far it has come [boot clock]."""
+        return self.boot_ns(self.at_ns)
+
+    def section(self) -> dict[str, Any]:
+        """Return what pages show of it."""
+        return {
+            "at_ms": round(self.now_ns() / 1e6, 3),
+            "playing": self.playing and not self.ended,
+            "speed": self.speed,
+            "ended": self.ended,
+        }
+
+    def play(self, playing: bool) -> None:
+        """Go on, or stop; at the end, from the start again."""
+        self.playing = playing
+        if playing and self.ended:
+            self._go(self.reel.start_ns)
+
+    def set_speed(self, factor: float) -> None:
+        """Go so many times as fast as it was."""
+        self.speed = factor
+
+    def seek(self, at_ns: int) -> None:
+        """Go to a time of the boot clock, as far as it is recorded."""
+        self._go(at_ns + self.source.unix_offset_ns)
+
+    def step(self, ticks: int) -> None:
+        """Go so many ticks of the tracker on or back, and stop there."""
+        self.playing = False
+        at_ns = self.at_ns
+        for _ in range(abs(ticks)):
+            at_ns = self.reel.tick_after(at_ns) if ticks > 0 else self.reel.tick_before(at_ns)
+        self._go(at_ns)
+
+    def _go(self, at_ns: int) -> None:
+        self.at_ns = max(self.reel.start_ns, min(self.reel.end_ns, at_ns))
+        self._sought = True
+
+    def take_sought(self) -> bool:
+        """Return and forget whether it has jumped since the last call."""
+        sought, self._sought = self._sought, False
+        return sought
+
+    def advance(self, elapsed_s: float) -> Iterator[tuple[int, int]]:
+        """Let time go on; yields (after, until) in stretches, each when the one before has been shown."""
+        if not self.playing:
+            return
+        # A turn that was slept through is not made up for: nobody would see what passed.
+        goal_ns = min(self.reel.end_ns, self.at_ns + round(min(elapsed_s, _LONGEST_TURN_S) * self.speed * 1e9))
+        while self.at_ns < goal_ns:
+            after_ns, self.at_ns = self.at_ns, min(goal_ns, self.at_ns + _STRETCH_NS)
+            yield after_ns, self.at_ns

@@ -1,0 +1,116 @@
+"""A recording in the order in which the console got it, from any moment on, forwards or from before.
+
+A message is recorded at its time of measurement, and came later. The recorder wrote in order of arrival: what stands
+before it in the file had come before it, so it came at the latest time that any message had until then.
+"""
+
+import heapq
+from bisect import bisect_left
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator
+from itertools import accumulate
+
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, EVENT, Topic
+from groundstation.console.server import TOPICS
+from groundstation.recording.chunks import RawRecord
+from groundstation.recording.index import FileIndex
+from groundstation.recording.run import RecordedRun
+from groundstation.replay.source import Source
+
+Wanted = Callable[[Topic], bool]
+Arrival = tuple[int, RawRecord]
+_MILESTONES = (EVENT, COMMAND, COMMAND_ACK)
+# Chunks last 0.4 s: so many of small ones hold what a seek looks back over, and few of those with pictures are large.
+_KEPT_SMALL, _KEPT_LARGE = 400, 6
+_LARGE_BYTES = 200_000
+_STEP_REACH_NS = 30_000_000_000
+
+
+def among(topics: Iterable[Topic]) -> Wanted:
+    """Return a question for topics; by identity, since there is one of each and it is asked of every message."""
+    known = frozenset(map(id, topics))
+    return lambda topic: id(topic) in known
+
+
+is_shown = among(TOPICS)  # the console shows something of it
+
+
+class _File:
+    """One file's chunks by time of arrival [UNIX ns]."""
+
+    def __init__(self, index: FileIndex) -> None:
+        self._index = index
+        self.ends = list(accumulate((chunk.end_ns for chunk in index.chunks), max))
+        self.begins = [chunk.start_ns for chunk in index.chunks[:1]] + self.ends[:-1]
+        self._read: OrderedDict[int, list[Arrival]] = OrderedDict()
+
+    def between(self, after_ns: int, until_ns: int, wanted: Wanted) -> Iterator[Arrival]:
+        for number in range(bisect_left(self.ends, after_ns + 1), len(self.ends)):
+            if self.begins[number] > until_ns:
+                return
+            if not self._index.holds(self._index.chunks[number], wanted):
+                continue
+            for at_ns, record in self._arrivals(number):
+                if after_ns < at_ns <= until_ns and wanted(record.key.topic):
+                    yield at_ns, record
+
+    def _arrivals(self, number: int) -> list[Arrival]:
+        if number in self._read:
+            self._read.move_to_end(number)
+            return self._read[number]
+        chunk = self._index.chunks[number]
+        now_ns = self.begins[number]
+        arrivals = []
+        for record in self._index.read(chunk):
+            now_ns = max(now_ns, record.log_time_ns)
+            if is_shown(record.key.topic):
+                arrivals.append((now_ns, record))
+        self._read[number] = arrivals
+        while len(self._read) > (_KEPT_SMALL if chunk.length < _LARGE_BYTES else _KEPT_LARGE):
+            self._read.popitem(last=False)
+        return arrivals
+
+
+class Reel:
+    """All files of a run as one stream of arrivals; times in UNIX ns."""
+
+    def __init__(self, source: Source) -> None:
+        self._run = RecordedRun([*source.state, *source.raw])
+        self._files = [_File(index) for index in self._run.indexes if index.chunks]
+        self.start_ns = min((file.begins[0] for file in self._files), default=0)
+        self.end_ns = max((file.ends[-1] for file in self._files), default=0)
+        self.topics = frozenset(key.topic.name for key in self._run.counts())
+        self.milestones = list(self.between(self.start_ns - 1, self.end_ns, among(_MILESTONES)))
+
+    @property
+    def duration_s(self) -> float:
+        """Return how long it is."""
+        return (self.end_ns - self.start_ns) / 1e9
+
+    @property
+    def damage(self) -> list[str]:
+        """Return what was wrong with the files."""
+        return self._run.damage
+
+    def between(self, after_ns: int, until_ns: int, wanted: Wanted = is_shown) -> Iterator[Arrival]:
+        """Yield what came after one time and not after another, in the order in which it came."""
+        streams = [file.between(after_ns, until_ns, wanted) for file in self._files]
+        yield from heapq.merge(*streams, key=lambda arrival: arrival[0])
+
+    def newest(self, at_ns: int, wanted: Wanted) -> list[RawRecord]:
+        """Return the last message of each wanted key until a time."""
+        return list(self._run.latest_before(at_ns + 1, wanted).values())
+
+    def tick_after(self, at_ns: int) -> int:
+        """Return when the next tick of the tracker is, or the end."""
+        ticks = self.between(at_ns, min(at_ns + _STEP_REACH_NS, self.end_ns), among((ESTIMATE,)))
+        return next((tick_ns for tick_ns, _ in ticks), self.end_ns)
+
+    def tick_before(self, at_ns: int) -> int:
+        """Return when the tick of the tracker before a time is, or the start."""
+        for reach_ns in (_STEP_REACH_NS // 30, _STEP_REACH_NS):
+            since_ns = max(self.start_ns - 1, at_ns - reach_ns)
+            ticks = [tick_ns for tick_ns, _ in self.between(since_ns, at_ns - 1, among((ESTIMATE,)))]
+            if ticks:
+                return ticks[-1]
+        return self.start_ns

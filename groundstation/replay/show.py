@@ -1,0 +1,178 @@
+"""A recording in the console's own server and page, through a bus that ends in this process."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from groundstation.bus import codec
+from groundstation.bus.api import Received, Sample, decode_sample
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import Command, Event, Severity
+from groundstation.bus.topics import (
+    CAMERA_STATUS,
+    ESTIMATE,
+    IMAGE,
+    INNOVATION,
+    LEASE,
+    OBSERVATION,
+    PLAN,
+    PROCESS_STATUS,
+    SETPOINT,
+    SIM_STATUS,
+    TRUTH,
+    VEHICLE_STATUS,
+)
+from groundstation.console.scene import scene_from_field
+from groundstation.console.section import port_of
+from groundstation.console.server import ConsoleServer, claim_port
+from groundstation.errors import MessageError
+from groundstation.monitor.state import cast_from_field
+from groundstation.recording.chunks import RawRecord
+from groundstation.recording.reader import RecordingError, payload
+from groundstation.replay.playback import Playback
+from groundstation.replay.reel import among
+
+_LATCHED = (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS, TRUTH, LEASE)
+_TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
+# What the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
+_LOOK_BACK_NS, _SEEN_NS = 122_000_000_000, 5_000_000_000
+# Trails go on at 5 Hz, curves at 2 Hz (console.history).
+_TRACE_NS, _CURVE_NS = 200_000_000, 500_000_000
+_MARKS = 400
+_MS = 1e6
+
+
+class Show:
+    """One replay in front of any number of viewers, who all see the same and may all turn the knobs."""
+
+    def __init__(self, playback: Playback, port: int | None) -> None:
+        source = playback.source
+        self.playback = playback
+        self._reel = playback.reel
+        self._exchange = MemoryExchange()
+        bus = MemoryBus(self._exchange, source.run.get("site", "lab"), "replay")
+        try:
+            field = source.resolved
+            cast = cast_from_field(source.field)
+            scene = scene_from_field(field, TRUTH.name in self._reel.topics)
+        except (KeyError, ValueError, TypeError) as error:
+            raise RecordingError(f"{source.name}: its field is none that the console can draw ({error!r})") from error
+        scene["replay"] = self._about()
+        self.server = ConsoleServer(bus, cast, scene, field, claim_port(port or port_of(source.field)), playback)
+        self.undecodable = 0
+        self._at_s = time.monotonic()
+
+    def _about(self) -> dict[str, Any]:
+        start, end = (self.playback.boot_ns(at) / _MS for at in (self._reel.start_ns, self._reel.end_ns))
+        return {"name": self.playback.source.name, "start_ms": start, "end_ms": end, "marks": self._marks()}
+
+    def _marks(self) -> list[dict[str, Any]]:
+        """Return what happened when: events, and the first saying of each command."""
+        marks: list[dict[str, Any]] = []
+        said: set[tuple[str, ...]] = set()
+        for at_ns, record in self._reel.milestones:
+            message = _received(record)
+            at_ms = round(self.playback.boot_ns(at_ns) / _MS, 1)
+            match message and message.message:
+                case Event() as event:
+                    text = (
+                        event.text
+                        if event.text.startswith(event.header.entity)
+                        else f"{event.header.entity}: {event.text}"
+                    )
+                    marks.append({"at_ms": at_ms, "kind": str(event.severity), "text": text})
+                case Command() as command:
+                    name = (command.verb, command.issuer, *command.scope)
+                    if name not in said:
+                        said.add(name)
+                        whom = ", ".join(name for name in command.scope if name != "operator") or "all"
+                        marks.append({"at_ms": at_ms, "kind": "COMMAND", "text": f"{command.verb} {whom}"})
+        if len(marks) > _MARKS:  # the quiet ones go first
+            loud = [mark for mark in marks if mark["kind"] != Severity.INFO]
+            marks = loud[:_MARKS]
+        return marks
+
+    def turn(self) -> None:
+        """Bring the server's board to where the replay is now; the server's own turn tells the viewers."""
+        now_s = time.monotonic()
+        elapsed_s, self._at_s = now_s - self._at_s, now_s
+        if self.playback.take_sought():
+            self._refill()
+            self._at_s = time.monotonic()
+            return
+        for after_ns, until_ns in self.playback.advance(elapsed_s):
+            for _, record in self._reel.between(after_ns, until_ns):
+                self._deliver(record)
+            self.server.take_in(self.playback.boot_ns(until_ns))
+
+    def _deliver(self, record: RawRecord) -> None:
+        if record.key.topic.type is not None:
+            self._exchange.deliver(Sample(str(record.key), record.data))
+            return
+        try:
+            header, content = payload(record)
+        except MessageError:
+            self.undecodable += 1
+            return
+        self._exchange.deliver(Sample(str(record.key), content, codec.encode(header)))
+
+    def _refill(self) -> None:
+        """Remember what had been seen until now: the newest of everything, what happened, trails and curves."""
+        server, reel, at_ns = self.server, self._reel, self.playback.at_ns
+        now_ns = self.playback.now_ns()
+        server.begin_anew()
+        self._trace(max(reel.start_ns - 1, at_ns - _LOOK_BACK_NS), at_ns)
+        self._ingest(reel.newest(at_ns, among(_LATCHED)), now_ns)
+        for came_ns, record in reel.milestones:
+            if came_ns > at_ns:
+                break
+            self._ingest([record], self.playback.boot_ns(came_ns))
+        recently = reel.between(at_ns - _SEEN_NS, at_ns, among((OBSERVATION,)))
+        self._ingest([record for _, record in recently], now_ns)
+        for record in reel.newest(at_ns, among((IMAGE,))):
+            self._deliver(record)
+        server.sessions.desk.step(now_ns)
+        server.show_anew(now_ns)
+
+    def _trace(self, after_ns: int, at_ns: int) -> None:
+        """Let trails, curves and NIS go through the past as they did, with the newest of each key at each step."""
+        step: dict[str, RawRecord] = {}
+        innovations: list[RawRecord] = []
+        due_ns = after_ns + _TRACE_NS
+        for came_ns, record in self._reel.between(after_ns, at_ns, among(_TRACED)):
+            while came_ns >= due_ns:
+                self._ingest([*step.values(), *innovations], self.playback.boot_ns(due_ns))
+                self.server.state.note(self.playback.boot_ns(due_ns))
+                step.clear()
+                innovations.clear()
+                gone_ns = due_ns - after_ns
+                due_ns += min(_TRACE_NS - gone_ns % _TRACE_NS, _CURVE_NS - gone_ns % _CURVE_NS)
+            if record.key.topic is INNOVATION:
+                innovations.append(record)
+            else:
+                step[str(record.key)] = record
+        self._ingest([*step.values(), *innovations], self.playback.boot_ns(at_ns))
+
+    def _ingest(self, records: list[RawRecord], now_ns: int) -> None:
+        received = [message for record in records if (message := _received(record)) is not None]
+        self.undecodable += len(records) - len(received)
+        self.server.ingest(received, now_ns)
+
+
+def _received(record: RawRecord) -> Received | None:
+    try:
+        return decode_sample(Sample(str(record.key), record.data))
+    except MessageError:
+        return None
+
+
+async def serve(playback: Playback, port: int | None, headless: bool, announce: Callable[[str], None]) -> None:
+    """Serve until interrupted; headless: until the recording ends."""
+    show = Show(playback, port)
+    announce(show.server.url)
+
+    def go_on(_turns: int, _late: int) -> bool:
+        show.turn()
+        return not (headless and playback.ended)
+
+    await show.server.serve(go_on)

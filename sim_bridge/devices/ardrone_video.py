@@ -21,6 +21,8 @@ PORT = 5555
 _AVC = 4
 _IDR_PERIOD = 15
 _START_CODE = b"\x00\x00\x00\x01"
+_SHORT_CODE = b"\x00\x00\x01"
+_SEI = 6
 # WIRE (AR.Drone sheet 5.4): values of video:video_codec whose live stream is 720p; the others are 360p.
 _CODECS_720P = frozenset({0x83})
 _BOTTOM = 1
@@ -97,6 +99,7 @@ class VideoEncoder:
         payload = bytes(packet)
         kind = FrameType.IDR if packet.is_keyframe else FrameType.PREDICTED
         sizes = parameter_sizes(payload) if packet.is_keyframe else (0, 0)
+        payload = _without_remarks(payload, sum(sizes))
         width, height = self.mode.size
         self.number += 1
         pave = Frame(
@@ -118,11 +121,21 @@ class VideoEncoder:
 def parameter_sizes(payload: bytes) -> tuple[int, int]:
     """Return the bytes of SPS and PPS, start codes included, at the beginning of a key picture."""
     second = payload.find(_START_CODE, 4)
-    third = payload.find(b"\x00\x00\x01", second + 4)
+    third = payload.find(_SHORT_CODE, second + 4)
     if second < 0 or third < 0:
         return 0, 0
     third -= payload[third - 1] == 0
     return second, third - second
+
+
+def _without_remarks(payload: bytes, start: int) -> bytes:
+    """Return the payload without a SEI unit at a place: the encoder signs its first picture, which no drone does."""
+    unit = payload.find(_SHORT_CODE, start) + len(_SHORT_CODE)
+    if payload[unit] & 0x1F != _SEI:
+        return payload
+    end = payload.find(_SHORT_CODE, unit)
+    end -= payload[end - 1] == 0
+    return payload[:start] + payload[end:]
 
 
 def _codec(mode: VideoMode, fps: float) -> av.VideoCodecContext:

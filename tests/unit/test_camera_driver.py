@@ -11,12 +11,11 @@ import pytest
 from drivers.camera import driver
 from drivers.camera.attitudes import AttitudeHistory
 from drivers.camera.settings import CameraDriverSettings
-from drivers.camera.sources.frames import Packet
-from drivers.camera.stream_watch import StreamState, StreamWatch
+from drivers.camera.sources.frames import Matrix, Packet, Unit
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Odometry
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, VIDEO
 from groundstation.errors import SettingsError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
@@ -54,6 +53,7 @@ def settings(**changes):
 class FakeSource:
     def __init__(self):
         self.packets, self.received, self.connected, self.detail = deque(), 0, True, ""
+        self.units = []
 
     def push(self, data, arrival_ns=None):
         self.received += 1
@@ -63,8 +63,14 @@ class FakeSource:
     def take_newest(self, timeout_s):
         return self.packets.popleft() if self.packets else None
 
+    def push_decoded(self, pixels, unit):
+        self.received += 1
+        self.packets.append(Packet(b"", unit.arrival_ns, unit.settled_ns, self.received, Matrix(pixels)))
+        self.units.append(unit)
+
     def take_video(self):
-        return []
+        units, self.units = self.units, []
+        return units
 
     def close(self):
         pass
@@ -98,7 +104,7 @@ def rig():
     exchange = MemoryExchange()
     child, source = FakeChild(MemoryBus(exchange, "lab", "drone_1_camera")), FakeSource()
     listener = MemoryBus(exchange, "lab", "test")
-    subscription = listener.subscribe([OBSERVATION, CAMERA_STATUS, IMAGE])
+    subscription = listener.subscribe([OBSERVATION, CAMERA_STATUS, IMAGE, VIDEO])
 
     class Rig:
         pass
@@ -177,6 +183,50 @@ def test_garbage_is_counted_and_never_published(rig, jpeg):
     assert any(r.key.topic is OBSERVATION for r in rig.heard.drain())
 
 
+def test_video_is_passed_on_whole_as_received_and_shown_as_jpegs(rig, jpeg):
+    pixels = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    start_ns = clock.now_ns()
+    for k in range(16):
+        came_ns = start_ns + k * 66_000_000
+        rig.source.push_decoded(pixels, Unit(b"unit %d" % k, came_ns, came_ns - 5_000_000, starts=k == 0))
+        rig.camera.turn()
+    heard = rig.heard.drain()
+    video = [r for r in heard if r.key.topic is VIDEO]
+    assert [r.payload for r in video] == [b"unit %d" % k for k in range(16)]
+    assert video[3].header.stamp_ns == start_ns + 3 * 66_000_000 - 125_000_000
+    images = [r for r in heard if r.key.topic is IMAGE]
+    assert len(images) in (5, 6) and images[0].payload.startswith(b"\xff\xd8")
+    assert images[0].header.stamp_ns == video[0].header.stamp_ns
+    observations = [r.message for r in heard if r.key.topic is OBSERVATION]
+    assert observations and observations[0].header.stamp_ns == video[0].header.stamp_ns
+
+
+def test_a_picture_that_comes_before_its_usual_time_was_not_exposed_in_the_future(rig, jpeg):
+    rig.camera._delay_ns = 0
+    now_ns = clock.now_ns()
+    rig.source.push_decoded(np.zeros((360, 640), np.uint8), Unit(b"x", now_ns, now_ns + 30_000_000))
+    rig.camera.turn()
+    (video,) = [r for r in rig.heard.drain() if r.key.topic is VIDEO]
+    assert video.header.stamp_ns == now_ns
+
+
+def test_nothing_is_passed_on_where_no_pictures_are_wanted(rig, jpeg):
+    rig.camera._settings = settings(image_fps=0)
+    rig.source.push_decoded(np.zeros((360, 640), np.uint8), Unit(b"x", clock.now_ns(), clock.now_ns()))
+    rig.camera.turn()
+    assert not [r for r in rig.heard.drain() if r.key.topic in (IMAGE, VIDEO)]
+
+
+def test_a_picture_that_claims_to_be_huge_is_refused_unread(rig, jpeg, monkeypatch):
+    place = jpeg.index(b"\xff\xc0")
+    huge = jpeg[: place + 5] + b"\xff\xff\xff\xff" + jpeg[place + 9 :]
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
+    rig.source.push(huge)
+    rig.camera.turn()
+    assert rig.camera.counts["size"] == 1
+    assert "65535x65535" in rig.child.events[0][1]
+
+
 def test_another_picture_size_is_refused_by_name(rig):
     for _ in range(3):
         rig.source.push(encoded(np.full((240, 320), 128, np.uint8)))
@@ -236,19 +286,6 @@ def test_attitudes_are_read_at_the_exposure():
     assert history.at("drone_1", 190_000_000 + 150_000_000) == pytest.approx((0.19, -0.38))
     assert history.at("drone_1", 190_000_000 + 250_000_000) is None
     assert history.at("drone_2", 0) is None
-
-
-def test_stream_watch():
-    watch = StreamWatch(5.0, 1.0, 0)
-    assert not watch.look(4_000_000_000)
-    assert watch.look(5_000_000_000)
-    assert not watch.look(6_000_000_000)
-    assert watch.usable(7_000_000_000)
-    assert not watch.usable(7_100_000_000)
-    assert watch.look(8_200_000_000)
-    assert watch.state is StreamState.SILENT
-    assert watch.refused("too small", 9_000_000_000)
-    assert not watch.refused("too small", 9_100_000_000)
 
 
 @pytest.mark.parametrize(

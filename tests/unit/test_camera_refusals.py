@@ -1,0 +1,55 @@
+"""What a camera driver makes of a stream before it looks at a picture: silence, refusals, sizes in the head."""
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.camera import jpeg
+from drivers.camera.stream_watch import StreamState, StreamWatch
+
+
+def test_stream_watch():
+    watch = StreamWatch(5.0, 1.0, 0)
+    assert not watch.look(4_000_000_000)
+    assert watch.look(5_000_000_000)
+    assert not watch.look(6_000_000_000)
+    assert watch.usable(7_000_000_000)
+    assert not watch.usable(7_100_000_000)
+    assert watch.look(8_200_000_000)
+    assert watch.state is StreamState.SILENT
+    assert watch.refused("too small", 9_000_000_000)
+    assert not watch.refused("too small", 9_100_000_000)
+
+
+@pytest.mark.parametrize("progressive", [0, 1])
+@pytest.mark.parametrize("shape", [(1, 1), (48, 64), (720, 1280, 3)])
+def test_the_size_of_a_jpeg_is_in_its_head(shape, progressive):
+    data = cv2.imencode(".jpg", np.zeros(shape, np.uint8), (cv2.IMWRITE_JPEG_PROGRESSIVE, progressive))[1].tobytes()
+    assert jpeg.size_of(data) == (shape[1], shape[0])
+    assert jpeg.size_of(data + b"\r\n") == (shape[1], shape[0])
+    assert jpeg.size_of(data[:-2]) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\xff\xd8\xff\xd9",
+        b"\xff\xd8" + b"\xff" * 5000 + b"\xff\xd9",
+        b"\xff\xd8\xff\xe0\x00\x00\xff\xd9",
+        b"\xff\xd8\xff\xc0\x00\x11\x08\x00\x00\x00\x10\xff\xd9",
+        b"\x89PNG\r\n\x1a\n",
+    ],
+)
+def test_what_is_no_whole_jpeg_has_no_size(data):
+    assert jpeg.size_of(data) is None
+
+
+def test_any_bytes_have_a_size_or_none():
+    random = np.random.default_rng(4)
+    whole = cv2.imencode(".jpg", np.zeros((48, 64), np.uint8))[1]
+    for _ in range(2000):
+        data = whole.copy()
+        data[random.integers(2, len(data) - 2, 6)] = random.integers(0, 256, 6)
+        size = jpeg.size_of(data.tobytes())
+        assert size is None or (0 < size[0] < 65536 and 0 < size[1] < 65536)

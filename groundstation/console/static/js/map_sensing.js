@@ -1,0 +1,82 @@
+// What cameras see: footprints, and the sensing graph with the information that each link brings.
+
+import { bodyToWorld, footprint, thickness } from "./geometry.js";
+import { colourOf, ink } from "./palette.js";
+import { drawArrow, label, path } from "./pen.js";
+import { ageS, droneNames, entities, entity, isSeen, store } from "./store.js";
+
+export function drawFootprints(g, view) {
+  const alpha = g.globalAlpha, [w, h] = store.scene.room.size_m;
+  g.save();
+  g.beginPath();
+  g.rect(...view.point(-w / 2, h / 2), w * view.scale, h * view.scale);
+  g.clip();
+  for (const camera of store.scene.cameras) {
+    const up = entities().filter((e) => e.kind === "robot").map((e) => e.mean[2]);
+    const height = up.length ? Math.max(...up) : 0;
+    const points = footprint(camera.rays, camera.position_m, 0, height);
+    if (!points.length) continue;
+    path(g, view, points, true);
+    g.setLineDash([2, 4]);
+    g.strokeStyle = ink().axis;
+    g.lineWidth = 1.5;
+    g.stroke();
+    g.setLineDash([]);
+    const top = points.reduce((best, p) => (p[1] > best[1] ? p : best));
+    const [, y] = view.point(...top);
+    label(g, `${camera.name} at ${height.toFixed(1)} m`, view.point(camera.position_m[0], 0)[0], y - 5, ink().dim, 11, 400);
+  }
+  for (const drone of store.scene.drones) {
+    const body = entity(drone.name);
+    if (!body || !drone.camera) continue;
+    const [ox, oy] = bodyToWorld(drone.camera.position_m, body.mean[3]);
+    const eye = [body.mean[0] + ox, body.mean[1] + oy, body.mean[2] + drone.camera.position_m[2]];
+    const points = footprint(drone.camera.rays, eye, body.mean[3], store.scene.target.height_m);
+    if (!points.length) continue;
+    path(g, view, points, true);
+    g.fillStyle = g.strokeStyle = colourOf(drone.name);
+    g.globalAlpha = alpha * 0.09;
+    g.fill();
+    g.globalAlpha = alpha * 0.55;
+    g.lineWidth = 1;
+    g.stroke();
+    g.globalAlpha = alpha;
+  }
+  g.restore();
+}
+
+function place(name) {
+  const body = entity(name);
+  if (body) return body.mean;
+  return store.scene.cameras.find((camera) => camera.name === name)?.position_m;
+}
+
+export function drawGraph(g, view) {
+  for (const camera of store.scene.cameras) drawCamera(g, view, camera);
+  const plan = store.s.plan;
+  if (!plan || ageS(plan.at) > 2) return;
+  const alpha = g.globalAlpha;
+  for (const [observer, subject, information] of plan.edges) {
+    const a = place(observer), b = place(subject);
+    if (!a || !b) continue;
+    const seen = isSeen(observer, subject), colour = droneNames().includes(observer) ? colourOf(observer) : ink().link;
+    g.globalAlpha = alpha * (seen ? 0.75 : 0.6);
+    g.setLineDash(seen ? [] : [6, 6]);
+    drawArrow(g, view.point(a[0], a[1]), view.point(b[0], b[1]), thickness(information), colour, 0.3 * view.scale);
+    g.setLineDash([]);
+    g.globalAlpha = alpha;
+    const [x, y] = view.point((a[0] + b[0]) / 2, (a[1] + b[1]) / 2);
+    label(g, `${information >= 10 ? Math.round(information) : information.toFixed(1)} m⁻²${seen ? "" : " unseen"}`, x, y - 5, colour, 11, 500);
+  }
+}
+
+function drawCamera(g, view, camera) {
+  const [x, y] = view.point(camera.position_m[0], camera.position_m[1]);
+  g.fillStyle = ink().link;
+  g.fillRect(x - 7, y - 5, 14, 10);
+  g.beginPath();
+  g.arc(x, y, 3, 0, 7);
+  g.fillStyle = ink().floor;
+  g.fill();
+  label(g, camera.name, x, y + 18, ink().dim, 11, 500);
+}

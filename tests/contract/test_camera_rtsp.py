@@ -1,0 +1,171 @@
+"""The RTSP source against a small server of our own: RTP over the RTSP connection, as RFC 2326 and RFC 6184 have it."""
+
+import base64
+import socket
+import struct
+import threading
+import time
+from contextlib import contextmanager, suppress
+from fractions import Fraction
+
+import av
+import numpy as np
+
+from drivers.camera.sources.container import has_parameters
+from drivers.camera.sources.opening import open_source
+
+
+def wait_for(condition, seconds=15.0):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen in time"
+        time.sleep(0.005)
+
+
+def units_of(data):
+    """Return the NAL units of an Annex B access unit."""
+    return [part.rstrip(b"\x00") for part in data.split(b"\x00\x00\x01") if part.strip(b"\x00")]
+
+
+def encoder():
+    codec = av.CodecContext.create("libx264", "w")
+    codec.width, codec.height, codec.pix_fmt = 160, 96, "yuv420p"
+    codec.time_base, codec.framerate = Fraction(1, 25), Fraction(25)
+    codec.options = {
+        "preset": "ultrafast",
+        "tune": "zerolatency",
+        "profile": "baseline",
+        "x264-params": "keyint=10:scenecut=0:annexb=1:repeat-headers=1",
+    }
+    return codec
+
+
+class Camera:
+    """Answers one client at a time and sends it 25 pictures a second, brighter and brighter."""
+
+    def __init__(self, in_band):
+        self.in_band = in_band
+        self.clients = 0
+        self.codec, self.number = encoder(), 0
+        self.sets = [u for u in units_of(self.picture()) if u[0] & 0x1F in (7, 8)]
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        self.closing = threading.Event()
+        self.connection = None
+        self.thread = threading.Thread(target=self.serve, daemon=True)
+        self.thread.start()
+
+    def picture(self):
+        planes = np.full((144, 160), 128, np.uint8)
+        planes[:96] = 40 + self.number % 160
+        self.number += 1
+        (packet,) = self.codec.encode(av.VideoFrame.from_ndarray(planes, "yuv420p"))
+        return bytes(packet)
+
+    def serve(self):
+        while not self.closing.is_set():
+            with suppress(OSError):
+                self.connection, _ = self.listener.accept()
+                with self.connection:
+                    self.talk(self.connection)
+
+    def talk(self, connection):
+        self.clients += 1
+        while True:
+            request = b""
+            while b"\r\n\r\n" not in request:
+                data = connection.recv(4096)
+                if not data:
+                    return
+                request += data
+            method, url = request.decode().split()[:2]
+            sequence = next(line for line in request.decode().split("\r\n") if line.lower().startswith("cseq"))
+            head, body = f"RTSP/1.0 200 OK\r\n{sequence}\r\nSession: 7\r\n", ""
+            if method == "DESCRIBE":
+                sets = ",".join(base64.b64encode(u).decode() for u in self.sets)
+                body = (
+                    "v=0\r\no=- 1 1 IN IP4 127.0.0.1\r\ns=x\r\nc=IN IP4 0.0.0.0\r\nt=0 0\r\na=control:*\r\n"
+                    "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\n"
+                    f"a=fmtp:96 packetization-mode=1;sprop-parameter-sets={sets}\r\na=control:track1\r\n"
+                )
+                head += f"Content-Base: {url}/\r\nContent-Type: application/sdp\r\nContent-Length: {len(body)}\r\n"
+            elif method == "SETUP":
+                head += "Transport: RTP/AVP/TCP;unicast;interleaved=0-1\r\n"
+            connection.sendall(f"{head}\r\n{body}".encode())
+            if method == "PLAY":
+                self.stream(connection)
+                return
+
+    def stream(self, connection):
+        sequence = 0
+        while not self.closing.wait(0.04):
+            parts = [u for u in units_of(self.picture()) if self.in_band or u[0] & 0x1F not in (7, 8)]
+            for index, part in enumerate(parts):
+                last = 0x80 if index == len(parts) - 1 else 0
+                rtp = struct.pack(">BBHII", 0x80, 96 | last, sequence & 0xFFFF, self.number * 3600, 1) + part
+                connection.sendall(b"$\x00" + struct.pack(">H", len(rtp)) + rtp)
+                sequence += 1
+
+    def hang_up(self):
+        with suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
+
+    def close(self):
+        self.closing.set()
+        self.hang_up()
+        with suppress(OSError):
+            self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        self.thread.join(5.0)
+
+
+@contextmanager
+def watching(in_band=True):
+    camera = Camera(in_band)
+    source = open_source(f"rtsp://127.0.0.1:{camera.port}/stream")
+    try:
+        yield camera, source
+    finally:
+        camera.close()
+        source.close()
+
+
+def taken(source, count, seconds=15.0):
+    packets, deadline = [], time.monotonic() + seconds
+    while len(packets) < count:
+        assert time.monotonic() < deadline, (source.detail, source.received, source.rejected)
+        packet = source.take_newest(0.1)
+        packets += [packet] if packet is not None else []
+    return packets
+
+
+def test_pictures_and_access_units_come_as_they_were_sent():
+    with watching(in_band=False) as (_, source):
+        packets = taken(source, 25)
+        assert source.connected
+        assert packets[-1].picture.grey().shape == (96, 160)
+        levels = [float(packet.picture.grey().mean()) for packet in packets[-5:]]
+        assert levels == sorted(levels) and levels[-1] > levels[0]
+        units = source.take_video()
+        keys = [unit for unit in units if unit.starts]
+        assert keys and all(has_parameters(unit.data) for unit in keys), "a recording can begin at each key picture"
+        assert not any(has_parameters(unit.data) for unit in units if not unit.starts)
+
+
+def test_it_comes_back_when_the_camera_hangs_up():
+    with watching() as (camera, source):
+        taken(source, 3)
+        camera.hang_up()
+        wait_for(lambda: camera.clients == 2)
+        taken(source, 3)
+
+
+def test_an_absent_camera_is_named_without_its_password():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    source = open_source(f"rtsp://user:secret@127.0.0.1:{port}/stream")
+    try:
+        wait_for(lambda: "refused" in source.detail)
+        assert f"127.0.0.1:{port}" in source.detail and "secret" not in source.detail
+    finally:
+        source.close()

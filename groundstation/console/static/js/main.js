@@ -9,35 +9,47 @@ import { give, showControls, showOrders, startOrders } from "./orders.js";
 import { ink, nameRobots, startTheme } from "./palette.js";
 import { showPlan, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
+import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { ghostPoint, startSteering } from "./steer.js";
-import { droneNames, entities, estimateAge, now, store } from "./store.js";
+import { droneNames, entities, estimateAge, now, replaying, steerable, store } from "./store.js";
 import { buildTeam, paint, showTeam } from "./team.js";
 import { View } from "./view.js";
 
 const SLOW_MS = 200;
 const NAMES = { footprints: "Footprints", graph: "Sensing graph", trails: "Trails", velocities: "Velocities", truth: "Truth" };
-let dirty = true, undrawnStamp = null, lastSlow = 0;
+let dirty = true, undrawnStamp = null, lastSlow = 0, builtFor = "";
 
 const view = new View(byId("map"), () => { dirty = true; });
 
 on("seed", () => {
-  const { scene } = store;
-  nameRobots(droneNames());
-  document.title = `${scene.site} · Skein`;
-  byId("site").textContent = scene.site;
-  byId("sim").hidden = !scene.truth;
-  for (const node of document.querySelectorAll(".only-sim")) node.hidden = !scene.truth;
-  view.room = scene.room.size_m;
-  if (view.fitted) view.fit();
-  document.querySelector(".legend").open = (view.width - view.scale * view.room[0]) / 2 > 335;
-  buildLayers(); buildLegend(); buildTeam(); buildCameras(); buildCharts();
+  const { scene } = store, built = JSON.stringify(scene);
+  // A replay that has jumped seeds the same scene again: what is in focus or being dragged must stay.
+  if (built !== builtFor) build(scene);
+  else showSamples();
+  builtFor = built;
+  undrawnStamp = null;
   showAll();
   dirty = true;
 });
 
+function build(scene) {
+  nameRobots(droneNames());
+  document.title = `${scene.replay ? `REPLAY ${scene.replay.name}` : scene.site} · Skein`;
+  document.body.classList.toggle("replay", replaying());
+  byId("site").textContent = scene.site;
+  byId("sim").hidden = !scene.truth;
+  for (const node of document.querySelectorAll(".only-sim")) node.hidden = !steerable();
+  view.room = scene.room.size_m;
+  if (view.fitted) view.fit();
+  document.querySelector(".legend").open = (view.width - view.scale * view.room[0]) / 2 > 335;
+  buildLayers(); buildLegend(); buildTeam(); buildCameras(); buildCharts();
+  startPlayback();
+}
+
 on("delta", (sections, sampled) => {
   if (sections.estimate) undrawnStamp = sections.estimate.at;
   if (sections.orders || sections.session) { showOrders(); showControls(); }
+  if (sections.playback) showPlayback();
   if (sections.plan) showPlan();
   if (sections.detections) showDetections();
   if (sampled) { showSamples(); showTimeline(); }
@@ -48,7 +60,7 @@ on("notice", (notice) => { addNotice(notice); showBanners(); });
 on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
 
 function showAll() {
-  showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showControls(); showOrders();
+  showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showControls(); showOrders(); showPlayback();
   describe();
 }
 
@@ -108,12 +120,13 @@ byId("theme").onclick = toggleTheme;
 byId("help").onclick = () => byId("about").showModal();
 
 addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || (event.repeat && !replaying())) return;
   const key = event.key.toLowerCase();
-  if (key === "l") give("LAND");
+  if (replaying() && playbackKey(event)) event.preventDefault();
+  else if (key === "l") give("LAND");
   else if (key === "h") give("HOLD");
   else if (key === "t") toggleTheme();
-  else if (key === "p" && store.scene?.truth) send("followpath");
+  else if (key === "p" && steerable()) send("followpath");
   else if (key === "?") byId("about").open ? byId("about").close() : byId("about").showModal();
 });
 
@@ -123,6 +136,7 @@ window.__console = {
     return {
       frames: store.frames, seeds: store.seeds, seq: store.seq, run: store.run, connected: store.connected, client: me.client, trusted: me.trusted,
       draws: drawn.draws, drawMs: drawn.ms, ellipses: structuredClone(drawn.ellipses), latencies: [...drawn.latencies], pictures: { ...pictures },
+      playback: structuredClone(store.s.playback ?? null), nowMs: now(), sections: structuredClone(store.s), samples: store.samples.length,
       orders: structuredClone(store.s.orders ?? []), estimateAge: estimateAge(), trail: Object.fromEntries(Object.entries(store.trails).map(([name, trail]) => [name, trail.length])),
       scale: view.scale, points: Object.fromEntries(entities().map(({ name, mean }) => [name, view.point(mean[0], mean[1])])), at: Object.fromEntries(entities().map(({ name, mean }) => [name, mean])),
     };

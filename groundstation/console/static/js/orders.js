@@ -2,7 +2,7 @@
 
 import { byId, el, seconds, text } from "./dom.js";
 import { me, on, send } from "./link.js";
-import { ageS, droneNames, now, store } from "./store.js";
+import { ageS, droneNames, now, replaying, store } from "./store.js";
 
 const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
 const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000;
@@ -15,6 +15,7 @@ const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ eff
 let own = [], count = 0;
 
 export function give(verb, drones = []) {
+  if (replaying()) return; // the server would refuse it as well
   const order = { ref: `${me.client}-${++count}`, verb, drones, at: performance.now(), given_ms: now(), state: "sent", note: "" };
   order.out = send("order", { verb, drones, at_ms: order.given_ms, ref: order.ref });
   if (!order.out) {
@@ -69,13 +70,14 @@ function holdToPress(button, fire) {
 }
 
 export function showControls() {
-  const names = droneNames(), session = store.s.session ?? {};
+  const names = droneNames(), session = store.s.session ?? {}, replay = replaying();
+  for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land]")) node.disabled = replay;
   for (const node of document.querySelectorAll(".count")) text(node, names.length ? `${names.length}` : "");
   const free = !session.operator, mine = session.operator === me.client;
-  text(byId("operator"), !me.trusted ? "looking only" : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
-  byId("takeover").hidden = !me.trusted || free || mine;
-  const able = me.trusted && store.connected && (free || mine) && Boolean(session.lease);
-  const why = !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
+  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
+  byId("takeover").hidden = replay || !me.trusted || free || mine;
+  const able = !replay && me.trusted && store.connected && (free || mine) && Boolean(session.lease);
+  const why = replay ? "a replay: nothing here can be commanded" : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
   for (const id of ["takeoff", "track", "resume"]) { byId(id).disabled = !able; byId(id).title = why; }
 }
 

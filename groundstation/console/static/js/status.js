@@ -2,7 +2,7 @@
 
 import { byId, el, seconds, text } from "./dom.js";
 import { drawn } from "./map.js";
-import { ageS, estimateAge, silentS, store } from "./store.js";
+import { ageS, estimateAge, replaying, silentS, store } from "./store.js";
 
 const SILENT_S = 0.8, TRACKER_S = 0.5;
 const notices = [];
@@ -26,7 +26,7 @@ export function showBanners() {
   const host = byId("banners"), kinds = banners.map(([kind]) => kind).join();
   if (host.dataset.kinds !== kinds) {
     host.dataset.kinds = kinds;
-    host.replaceChildren(...banners.map(([kind, , , , shell]) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
+    host.replaceChildren(...banners.map(([kind, , , , shell]) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
   }
   banners.forEach(([, grave, title, more], index) => {
     const node = host.children[index];
@@ -38,11 +38,11 @@ export function showBanners() {
 
 export function showTop() {
   const link = byId("link"), silent = silentS() > SILENT_S, age = estimateAge();
-  const [level, words] = !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : age > TRACKER_S ? ["bad", "tracker silent"] : ["good", "live"];
+  const [level, words] = !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : age > TRACKER_S ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
   link.dataset.level = level;
   text(link, words);
   const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];
-  text(byId("clock"), level === "good" && middle !== undefined ? `${middle.toFixed(0)} ms` : Number.isFinite(age) ? `${seconds(age)} old` : "");
+  text(byId("clock"), level === "good" && replaying() ? "" : level === "good" && middle !== undefined ? `${middle.toFixed(0)} ms` : Number.isFinite(age) ? `${seconds(age)} old` : "");
 }
 
 export function showHealth() {

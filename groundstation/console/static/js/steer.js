@@ -2,7 +2,7 @@
 
 import { byId } from "./dom.js";
 import { send } from "./link.js";
-import { entity, store } from "./store.js";
+import { entity, steerable, store } from "./store.js";
 
 const SPEED_M_S = 0.4, TURN_RAD_S = 1.2, PERIOD_MS = 100, GRAB_PX = 24, PLACE_MS = 100;
 const KEYS = { ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
@@ -20,7 +20,7 @@ export function startSteering(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    const at = store.scene?.truth && pointers.size === 1 ? targetPoint(view) : null;
+    const at = steerable() && pointers.size === 1 ? targetPoint(view) : null;
     if (at && Math.hypot(at[0] - event.offsetX, at[1] - event.offsetY) < GRAB_PX) ghost = view.world(event.offsetX, event.offsetY);
   });
   canvas.addEventListener("pointermove", (event) => move(event, view));
@@ -70,7 +70,7 @@ function place() {
 
 function key(event, view) {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (event.key in KEYS && store.scene?.truth) { event.preventDefault(); down.add(event.key); drive(); }
+  if (event.key in KEYS && steerable()) { event.preventDefault(); down.add(event.key); drive(); }
   else if (event.key === "+" || event.key === "=") view.zoom(1.2);
   else if (event.key === "-") view.zoom(1 / 1.2);
   else if (event.key === "0") view.fit();

@@ -5,7 +5,7 @@ const OFFSET_WINDOW_MS = 30000;
 
 export const store = {
   scene: null, s: {}, run: "", seq: 0, frames: 0, seeds: 0,
-  trails: {}, samples: [], receivedAt: -Infinity, connected: false,
+  trails: {}, samples: [], receivedAt: -Infinity, serverMs: 0, connected: false,
 };
 
 let offsets = [], lastTrail = 0, lastSample = 0;
@@ -13,18 +13,23 @@ let offsets = [], lastTrail = 0, lastSample = 0;
 // The greatest difference seen is the one with the least delay: sent and received at nearly the same time.
 function noteClock(serverMs) {
   const at = performance.now();
+  store.serverMs = serverMs;
   offsets.push([at, serverMs - at]);
   offsets = offsets.filter(([when]) => at - when < OFFSET_WINDOW_MS);
   store.offset = Math.max(...offsets.map(([, offset]) => offset));
   store.receivedAt = at;
 }
 
-export const now = () => performance.now() + (store.offset ?? 0);
+export const replaying = () => Boolean(store.scene?.replay);
+export const steerable = () => Boolean(store.scene?.truth) && !replaying();
+// A replay's time stands still, runs and jumps: it is what the newest frame says.
+export const now = () => (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));
 export const ageS = (atMs) => (atMs === undefined || atMs === null ? Infinity : Math.max(0, (now() - atMs) / 1000));
 export const silentS = () => (performance.now() - store.receivedAt) / 1000;
 
 export function takeSeed(seed) {
   offsets = [];
+  lastTrail = lastSample = 0;
   noteClock(seed.now);
   Object.assign(store, { scene: seed.scene, s: seed.s, run: seed.run, seq: seed.seq });
   store.trails = seed.history.trails;
@@ -37,6 +42,7 @@ export function takeDelta(delta) {
   store.seq = delta.seq;
   store.frames += 1;
   Object.assign(store.s, delta.s);
+  if (replaying()) return takePassed(delta.s.passed);
   if (delta.s.estimate) extendTrails(delta.s.estimate);
   if (delta.s.sample && delta.s.sample.t_ms > lastSample) {
     lastSample = delta.s.sample.t_ms;
@@ -45,6 +51,18 @@ export function takeDelta(delta) {
     return true;
   }
   return false;
+}
+
+// A fast replay passes more than one point and sample between two frames.
+function takePassed(passed) {
+  for (const [name, x, y] of passed?.points ?? []) {
+    const trail = (store.trails[name] ??= []);
+    trail.push([x, y]);
+    if (trail.length > TRAIL_POINTS) trail.shift();
+  }
+  store.samples.push(...(passed?.samples ?? []));
+  store.samples.splice(0, Math.max(0, store.samples.length - SAMPLES));
+  return Boolean(passed?.samples.length);
 }
 
 function extendTrails(estimate) {

@@ -25,7 +25,7 @@ function card(name, fields, drone) {
   const values = Object.fromEntries(fields.map((field) => [field, el("dd", { data: { testid: `${name}-${field}` } })]));
   const mode = el("span", { class: "pill", data: { testid: `${name}-mode` } });
   const chip = svg("svg", { viewBox: "0 0 18 18", class: "chip", "aria-hidden": "true" });
-  const land = drone ? el("button", { class: "small", "aria-label": `Land ${name}`, data: { testid: `${name}-land` } }, "Land") : null;
+  const land = drone ? el("button", { class: "small", "aria-label": `Land ${name}`, data: { testid: `${name}-land`, land: name } }, "Land") : null;
   if (land) land.onclick = () => give("LAND", [name]);
   const detail = el("p", { class: "detail", hidden: true });
   const root = el("article", { class: "unit", "aria-label": name, data: { testid: `card-${name}` } },

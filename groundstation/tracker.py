@@ -88,7 +88,7 @@ class Tracker:
         self.holding = False
         self.current: PlanResult | None = None
         self.rejected: Counter[str] = Counter()
-        self._intake = Intake(self.filter, parameters.estimator.cameras, clock)
+        self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
         self._topology = Topology(())
         self._plan_stale = False
         self._belief = self.filter.belief()

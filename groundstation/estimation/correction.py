@@ -144,36 +144,6 @@ def apply(
             P[a, j] = P[j, a]
 
 
-@kernel("void(float64[::1], float64[:,::1], int64, int64, float64, float64, float64)")
-def correct_sum(mean: Array, P: Array, a: int, b: int, z: float, R: float, gate: float) -> None:
-    """Correct by a softly gated measurement of the sum of two states: height and the error of its sensor.
-
-    Over an object the height is short by the object's height: the soft gate lets the error state take it up.
-    """
-    n = P.shape[0]
-    W, K = np.empty(n), np.empty(n)
-    for j in range(n):
-        W[j] = P[a, j] + P[b, j]
-    S = W[a] + W[b] + R
-    y = z - mean[a] - mean[b]
-    if y * y > gate * S:
-        R += y * y / gate - S
-        S = y * y / gate
-    for j in range(n):
-        K[j] = W[j] / S
-        mean[j] += K[j] * y
-    for i in range(n):
-        for j in range(n):
-            P[i, j] -= K[i] * W[j]
-    for i in range(n):
-        W[i] = P[i, a] + P[i, b] - R * K[i]
-    for i in range(n):
-        for j in range(i, n):
-            P[i, j] -= W[i] * K[j]
-        for j in range(i):
-            P[i, j] = P[j, i]
-
-
 @kernel("boolean(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1])")
 def is_distribution(mean: Array, P: Array, entities: IntArray, aux: Array) -> bool:
     """Return whether mean and P are finite and P is positive definite over the active entities."""

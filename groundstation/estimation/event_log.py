@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.bus.messages import PoseHypothesis, Verdict
 from groundstation.estimation import slots as s
-from groundstation.estimation.measurement import Correction, Measurement
+from groundstation.estimation.measurement import Correction, Measurement, Reading
 
 _VERDICTS = {
     s.ACCEPTED: (Verdict.ACCEPTED, ""),
@@ -18,6 +18,7 @@ _VERDICTS = {
     s.OBSERVER_UNKNOWN: (Verdict.UNKNOWN_ENTITY, "the observer has no belief yet"),
     s.SUBJECT_GROUNDED: (Verdict.UNKNOWN_ENTITY, "the subject does not fly"),
     s.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
+    s.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot tell where its subject is"),
 }
 
 
@@ -83,20 +84,24 @@ class EventLog:
         self._free.extend(range(size, 2 * size))
 
 
-def observation_columns(m: Measurement, at: float, step: int, observer: int, subject: int, camera: int) -> list[float]:
-    """Return the columns of an observation event (slots.py)."""
-    other = m.alternative
+def observation_columns(
+    m: Measurement | Reading, at: float, step: int, observer: int, subject: int, sensor: int
+) -> list[float]:
+    """Return the columns of an observation event (slots.py); raises ValueError for a reading of the wrong shape."""
+    other = m.alternative if isinstance(m, Measurement) else None
     columns = [
         at,
-        s.KIND_OBSERVATION,
+        s.EVENT_OBSERVATION,
         observer,
         subject,
-        camera,
+        sensor,
         m.roll_rad,
         m.pitch_rad,
         float(other is not None),
         step,
     ]
+    if isinstance(m, Reading):
+        return columns + _padded(m.z, m.covariance) + [float(len(m.z))]
     columns += _hypothesis(PoseHypothesis(m.position_m, m.yaw_rad, m.covariance))
     columns.append(3.0 if m.yaw_rad is None else 4.0)
     if other is not None:
@@ -105,7 +110,15 @@ def observation_columns(m: Measurement, at: float, step: int, observer: int, sub
 
 
 def _hypothesis(pose: PoseHypothesis) -> list[float]:
-    if pose.yaw_rad is not None:
-        return [*pose.position_m, pose.yaw_rad, *pose.covariance]
-    c = pose.covariance
-    return [*pose.position_m, 0.0, *c[0:3], 0.0, *c[3:6], 0.0, *c[6:9], 0.0, 0.0, 0.0, 0.0, 1.0]
+    yaw = () if pose.yaw_rad is None else (pose.yaw_rad,)
+    return _padded((*pose.position_m, *yaw), pose.covariance)
+
+
+def _padded(z: tuple[float, ...], covariance: tuple[float, ...]) -> list[float]:
+    """Return z (4) and its covariance (16), the rows that it lacks filled up with those of an identity."""
+    rows = len(z)
+    if not 1 <= rows <= 4 or len(covariance) != rows * rows:
+        raise ValueError(f"a reading has 1 to 4 rows and a square covariance (got {rows}, {len(covariance)})")
+    full = np.eye(4)
+    full[:rows, :rows] = np.reshape(covariance, (rows, rows))
+    return [*z, *[0.0] * (4 - rows), *full.ravel().tolist()]

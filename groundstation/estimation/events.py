@@ -1,138 +1,32 @@
-"""What happens at one measurement time: an observation, a take-off, a landing; compiled."""
+"""What happens at one measurement time: an observation, or a change of who is in the state; compiled.
+
+Arrays with a leading axis hold one belief per mode (modes.py): means (m, n), covariances (m, n, n), weights (m),
+entities and parameters (m, entities, columns). What is decided (gate, hypothesis, joining) is decided for all modes.
+"""
+
+import math
 
 import numpy as np
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.correction import (
-    apply,
-    bound_precision,
-    inflate,
-    log_determinant,
-    project,
-    project_columns,
-    surprise,
-)
+from groundstation.estimation.correction import log_determinant
+from groundstation.estimation.dispatch import call_locate
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import cholesky, copy_matrix, wrap
-from groundstation.estimation.motion import clear, join
-from groundstation.estimation.relative_pose import add_mounting_noise, pose_from_observation, relative_pose
+from groundstation.estimation.linear import copy_matrix
+from groundstation.estimation.motion import clear, enter, join
+from groundstation.estimation.update import correct, linearise, read, write_outcome
 
 
-@kernel("int64(float64[::1], int64, int64, float64[::1], float64[:,::1])")
-def unpack(event: Array, offset: int, rows: int, z: Array, R: Array) -> int:
-    """Write z and R of the hypothesis at an offset of the event; returns PENDING, or what is wrong with it."""
-    factor = np.empty((4, 4))
-    for i in range(4):
-        z[i] = event[offset + i]
-        for j in range(4):
-            R[i, j] = 0.5 * (event[offset + 4 + 4 * i + j] + event[offset + 4 + 4 * j + i])
-            factor[i, j] = R[i, j]
-    if not cholesky(factor, rows):
-        return s.SINGULAR
-    if z[2] <= 0.0:
-        return s.OUT_OF_VIEW
-    return s.PENDING
-
-
-@kernel(
-    "float64(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[::1], float64[::1], int64,"
-    " float64[::1], float64[:,::1], float64[:,:,::1], float64[::1])"
-)
-def linearise(
-    mean: Array,
-    P: Array,
-    entities: IntArray,
-    parameters: Array,
-    camera: Array,
-    event: Array,
-    rows: int,
-    z: Array,
-    R: Array,
-    work: Array,
-    y: Array,
-) -> float:
-    """Write y = z - h(x) and, into work, H of both blocks, H P H^T and the factor of S; returns the NIS or -1."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    start = entities[subject, s.ENTITY_START]
-    size = entities[subject, s.ENTITY_SIZE]
-    start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
-    h = np.zeros(4)
-    relative_pose(
-        mean[start_o : start_o + size_o],
-        mean[start : start + size],
-        parameters[subject],
-        entities[subject, s.ENTITY_MODEL],
-        camera,
-        event[s.EVENT_ROLL],
-        event[s.EVENT_PITCH],
-        rows,
-        h,
-        work[0],
-        work[1],
-    )
-    for i in range(rows):
-        y[i] = z[i] - h[i]
-    if rows == 4:
-        y[3] = wrap(y[3])
-    W = np.empty((rows, P.shape[0]))
-    HPH = np.empty((rows, rows))
-    project(P, start_o, size_o, work[0], start, size, work[1], rows, W)
-    project_columns(W, start_o, size_o, work[0], start, size, work[1], rows, HPH)
-    for i in range(rows):
-        for j in range(rows):
-            work[2, i, j] = HPH[i, j]
-    bound_precision(work[2], R, rows)
-    return surprise(work[2], R, y, rows, work[3])
-
-
-@kernel(
-    "void(float64[::1], float64[:,::1], int64[:,::1], float64[::1], int64, float64[:,::1], float64[:,:,::1],"
-    " float64[::1], float64)"
-)
-def correct(
-    mean: Array, P: Array, entities: IntArray, event: Array, rows: int, R: Array, work: Array, y: Array, factor: float
-) -> None:
-    """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    start, size = entities[subject, s.ENTITY_START], entities[subject, s.ENTITY_SIZE]
-    start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
-    if factor > 1.0:
-        inflate(work[2], R, rows, factor)
-        surprise(work[2], R, y, rows, work[3])
-    W = np.empty((rows, P.shape[0]))
-    project(P, start_o, size_o, work[0], start, size, work[1], rows, W)
-    apply(mean, P, start_o, size_o, work[0], start, size, work[1], rows, W, work[3], R, y)
-    for e in range(entities.shape[0]):
-        if entities[e, s.ENTITY_MODEL] == s.ODOMETRY_ROBOT:
-            yaw = entities[e, s.ENTITY_START] + s.YAW
-            mean[yaw] = wrap(mean[yaw])
-
-
-@kernel("void(float64[::1], float64, int64, float64[::1], float64[:,:,::1])")
-def write_outcome(out: Array, nis: float, rows: int, y: Array, work: Array) -> None:
-    """Record residual, S and NIS, so that each correction can explain itself."""
-    out[s.OUT_NIS] = nis
-    out[s.OUT_SIZE] = rows
-    for i in range(rows):
-        out[s.OUT_RESIDUAL + i] = y[i]
-        for j in range(rows):
-            total = 0.0
-            for k in range(min(i, j) + 1):
-                total += work[3, i, k] * work[3, j, k]
-            out[s.OUT_COVARIANCE + rows * i + j] = total
-
-
-@kernel("int64(int64[:,::1], float64[:,::1], float64[::1])")
-def refusal(entities: IntArray, aux: Array, event: Array) -> int:
+@kernel("int64(int64[:,::1], float64[:,::1], float64[::1], int64)")
+def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
     """Return why an observation cannot be used whatever it says, or PENDING."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
     if aux[observer, s.ACTIVE] == 0.0:
         return s.OBSERVER_UNKNOWN
-    is_robot = entities[subject, s.ENTITY_MODEL] == s.ODOMETRY_ROBOT
-    if is_robot and aux[subject, s.AIRBORNE] == 0.0:
+    if aux[subject, s.ADMITTED] == 0.0:
         return s.SUBJECT_GROUNDED
-    if is_robot and aux[subject, s.ACTIVE] == 0.0 and event[s.EVENT_SIZE] < 4.0:
+    if aux[subject, s.ACTIVE] == 0.0 and entities[subject, s.ENTITY_KIND] == s.KIND_ROBOT and rows < 4:
         return s.YAW_MISSING
     return s.PENDING
 
@@ -152,143 +46,244 @@ def has_diverged(aux: Array, settings: Array, at: float, nis_over_gate: float) -
 
 
 @kernel(
-    "float64(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[::1], float64[::1], int64,"
-    " float64[::1], float64[:,::1], float64[:,:,::1], float64[::1], float64, float64[::1])"
+    "float64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
+    " float64[::1], float64[::1], int64, float64[::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,::1],"
+    " float64[::1])"
 )
-def prefer_other(
-    mean: Array,
-    P: Array,
-    entities: IntArray,
-    parameters: Array,
-    camera: Array,
-    event: Array,
-    rows: int,
-    z: Array,
-    R: Array,
-    work: Array,
-    y: Array,
-    nis: float,
-    out: Array,
-) -> float:
-    """Switch z, R, y and work to the alternative pose if the belief finds it more likely; returns the NIS in force."""
-    if event[s.EVENT_HAS_OTHER] == 0.0 or nis < 0.0:
-        return nis
-    z_other, R_other, y_other, work_other = np.zeros(4), np.zeros((4, 4)), np.zeros(4), np.zeros((4, 4, s.MAX_BLOCK))
-    if unpack(event, s.EVENT_OTHER, rows, z_other, R_other) != s.PENDING:
-        return nis
-    add_mounting_noise(camera, z_other, rows, R_other)
-    nis_other = linearise(mean, P, entities, parameters, camera, event, rows, z_other, R_other, work_other, y_other)
-    if nis_other < 0.0:
-        return nis
-    if nis_other + log_determinant(work_other[3], rows) >= nis + log_determinant(work[3], rows):
-        return nis
-    for i in range(4):
-        z[i], y[i] = z_other[i], y_other[i]
-        copy_matrix(R_other, R)
-        copy_matrix(work_other[i], work[i])
-    out[s.OUT_OTHER_CHOSEN] = 1.0
-    return nis_other
+def confront(
+    means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
+    sensor: Array, event: Array, rows: int, z: Array, R: Array, work: Array, y: Array, nis: Array,
+) -> float:  # fmt: skip
+    """Linearise in all modes; writes the NIS of each (-1: S not PD) and returns the log evidence of the hypothesis."""
+    modes = means.shape[0]
+    scores, best = np.empty(modes), -math.inf
+    for m in range(modes):
+        nis[m] = linearise(
+            means[m], covariances[m], entities[m], parameters[m], kernels, sensor, event, rows, z, R[m], work[m], y[m]
+        )
+        scores[m] = -math.inf
+        if nis[m] >= 0.0:
+            scores[m] = math.log(max(weights[m], 1e-300)) - 0.5 * (nis[m] + log_determinant(work[m, 3], rows))
+        best = max(best, scores[m])
+    if best == -math.inf:
+        return best
+    total = 0.0
+    for m in range(modes):
+        total += math.exp(scores[m] - best)
+    return best + math.log(total)
+
+
+@kernel("void(float64[::1], float64[::1], float64[:,:,:,::1], int64, float64)")
+def weigh(weights: Array, nis: Array, work: Array, rows: int, factor: float) -> None:
+    """Multiply the modes' probabilities by the likelihood of the observation as it was used (S times factor)."""
+    modes = weights.shape[0]
+    if modes == 1:
+        return
+    scores, best = np.empty(modes), -math.inf
+    for m in range(modes):
+        scores[m] = math.log(max(weights[m], 1e-300)) - 0.5 * (nis[m] / factor + log_determinant(work[m, 3], rows))
+        best = max(best, scores[m])
+    total = 0.0
+    for m in range(modes):
+        weights[m] = math.exp(scores[m] - best)
+        total += weights[m]
+    for m in range(modes):
+        weights[m] /= total
 
 
 @kernel(
-    "void(float64[::1], float64[:,::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[::1],"
-    " float64[::1], float64[::1])"
+    "boolean(float64[:,::1], float64[:,:,::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1], float64[:,:,::1],"
+    " int64[::1], float64[::1], float64[::1], float64[::1])"
 )
-def enter(
-    mean: Array, P: Array, aux: Array, entities: IntArray, parameters: Array, camera: Array, event: Array, z: Array
-) -> None:
+def settle(
+    means: Array, covariances: Array, aux: Array, entities: IntArray, parameters: Array, priors: Array,
+    kernels: IntArray, sensor: Array, event: Array, z: Array,
+) -> bool:  # fmt: skip
     """Let the subject join (again) where the measurement puts it, diffuse until the correction that follows."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    start = entities[observer, s.ENTITY_START]
-    seen_from, pose = mean[start : start + entities[observer, s.ENTITY_SIZE]], np.zeros(4)
-    model, p = entities[subject, s.ENTITY_MODEL], parameters[subject]
-    pose_from_observation(seen_from, p, model, camera, event[s.EVENT_ROLL], event[s.EVENT_PITCH], z, pose)
-    join(mean, P, entities[subject], p, pose)
+    subject, pose = int(event[s.EVENT_SUBJECT]), np.zeros(4)
+    for m in range(means.shape[0]):
+        arguments = (means[m], entities[m], parameters[m], sensor, event, z, pose)
+        if call_locate(kernels[s.SENSOR_LOCATE], arguments) == 0:
+            return False
+        join(means[m], covariances[m], entities[m, subject], priors[subject], pose)
     aux[subject, s.ACTIVE] = 1.0
     aux[subject, s.JOINED_AT] = event[s.EVENT_AT]
     aux[subject, s.STREAK] = 0.0
+    return True
+
+
+@kernel("int64(float64[::1], float64[::1])")
+def likeliest(weights: Array, nis: Array) -> int:
+    """Return the most probable mode in which the observation can be used, or -1."""
+    best = -1
+    for m in range(weights.shape[0]):
+        if nis[m] >= 0.0 and (best < 0 or weights[m] > weights[best]):
+            best = m
+    return best
+
+
+@kernel("float64(float64[::1])")
+def least(nis: Array) -> float:
+    """Return the smallest NIS of the modes in which the observation can be used."""
+    value = math.inf
+    for m in range(nis.shape[0]):
+        if 0.0 <= nis[m] < value:
+            value = nis[m]
+    return value
 
 
 @kernel(
-    "void(float64[::1], float64[:,::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[:,::1],"
-    " float64[::1], float64[::1], float64[::1])"
+    "int64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
+    " float64[::1], float64, float64[::1], int64, float64[:,::1], float64[:,:,:,::1], float64[:,:,:,:,::1],"
+    " float64[:,:,::1], float64[:,::1])"
+)
+def choose(
+    means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
+    sensor: Array, unused_s: float, event: Array, rows: int, z: Array, R: Array, work: Array, y: Array, nis: Array,
+) -> int:  # fmt: skip
+    """Confront the belief with the pose as measured and, if there is one, its alternative; 1 if that is likelier."""
+    evidence = confront(
+        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[0], R[0], work[0], y[0],
+        nis[0],
+    )  # fmt: skip
+    if event[s.EVENT_HAS_OTHER] == 0.0 or evidence == -math.inf:
+        return 0
+    if read(entities[0], parameters[0], kernels, sensor, unused_s, event, s.EVENT_OTHER, z[1], R[1, 0]) != rows:
+        return 0
+    for m in range(1, means.shape[0]):
+        copy_matrix(R[1, 0], R[1, m])
+    other = confront(
+        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[1], R[1], work[1], y[1],
+        nis[1],
+    )  # fmt: skip
+    return 1 if other > evidence else 0
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1],"
+    " float64[:,:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1])"
 )
 def observe(
-    mean: Array,
-    P: Array,
-    aux: Array,
-    entities: IntArray,
-    parameters: Array,
-    cameras: Array,
-    settings: Array,
-    event: Array,
-    out: Array,
-) -> None:
+    means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
+    priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
+) -> None:  # fmt: skip
     """Correct by one observation, or say why not: gate, choice of hypothesis, joining, re-initialisation."""
-    subject = int(event[s.EVENT_SUBJECT])
-    camera = cameras[int(event[s.EVENT_CAMERA])]
-    rows = int(event[s.EVENT_SIZE])
-    if entities[subject, s.ENTITY_MODEL] != s.ODOMETRY_ROBOT:
-        rows = 3
-    z, y, R, work = np.zeros(4), np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4, s.MAX_BLOCK))
-    verdict = refusal(entities, aux, event)
-    if verdict == s.PENDING:
-        verdict = unpack(event, s.EVENT_Z, rows, z, R)
-    out[s.OUT_VERDICT] = verdict
-    out[s.OUT_JOINED] = 0.0
-    out[s.OUT_OTHER_CHOSEN] = 0.0
-    if verdict != s.PENDING:
+    modes, subject, number = means.shape[0], int(event[s.EVENT_SUBJECT]), int(event[s.EVENT_SENSOR])
+    sensor, own, at = sensors[number], kernels[number], event[s.EVENT_AT]
+    # First axis: the pose as measured, and its alternative.
+    z, R, y, nis = np.zeros((2, 4)), np.zeros((2, modes, 4, 4)), np.zeros((2, modes, 4)), np.zeros((2, modes))
+    work = np.zeros((2, modes, 4, 4, s.MAX_BLOCK))
+    unused_s, use = at - pairs[number, subject], 0
+    out[s.OUT_JOINED] = out[s.OUT_OTHER_CHOSEN] = 0.0
+    rows = read(entities[0], parameters[0], own, sensor, unused_s, event, s.EVENT_Z, z[0], R[0, 0])
+    out[s.OUT_VERDICT] = -rows if rows < 0 else refusal(entities[0], aux, event, rows)
+    if out[s.OUT_VERDICT] != s.PENDING:
         return
-    add_mounting_noise(camera, z, rows, R)
-    gate = settings[s.SETTING_GATE + rows]
-    at, joined = event[s.EVENT_AT], aux[subject, s.ACTIVE] == 0.0
-    excess = 1.0
+    for m in range(1, modes):
+        copy_matrix(R[0, 0], R[0, m])
+    gate, joined, excess = settings[s.SETTING_GATE + rows], aux[subject, s.ACTIVE] == 0.0, 1.0
     if not joined:
-        nis = linearise(mean, P, entities, parameters, camera, event, rows, z, R, work, y)
-        nis = prefer_other(mean, P, entities, parameters, camera, event, rows, z, R, work, y, nis, out)
-        write_outcome(out, nis, rows, y, work)
-        if nis < 0.0:
+        use = choose(
+            means, covariances, weights, entities, parameters, own, sensor, unused_s, event, rows, z, R, work, y, nis
+        )
+        out[s.OUT_OTHER_CHOSEN] = use
+        mode = likeliest(weights, nis[use])
+        if mode < 0:
             out[s.OUT_VERDICT] = s.SINGULAR
             return
-        excess = nis / gate
+        write_outcome(out, nis[use, mode], rows, y[use, mode], work[use, mode])
+        excess = least(nis[use]) / gate
         joined = has_diverged(aux[subject], settings, at, excess)
         if excess > settings[s.SETTING_WILD] and not joined:
             out[s.OUT_VERDICT] = s.IMPLAUSIBLE
             return
     if joined:
-        enter(mean, P, aux, entities, parameters, camera, event, z)
-        linearise(mean, P, entities, parameters, camera, event, rows, z, R, work, y)
+        if not settle(means, covariances, aux, entities, parameters, priors, own, sensor, event, z[use]):
+            out[s.OUT_VERDICT] = s.NOT_LOCATED
+            return
+        confront(
+            means, covariances, weights, entities, parameters, own, sensor, event, rows, z[use], R[use], work[use],
+            y[use], nis[use],
+        )  # fmt: skip
         excess = 1.0
         out[s.OUT_JOINED] = 1.0
-    correct(mean, P, entities, event, rows, R, work, y, max(excess, 1.0))
+    excess = max(excess, 1.0)
+    for m in range(modes):
+        correct(means[m], covariances[m], entities[m], event, rows, R[use, m], work[use, m], y[use, m], excess)
+    weigh(weights, nis[use], work[use], rows, excess)
     aux[subject, s.CORRECTED_AT] = at
+    pairs[number, subject] = at
     out[s.OUT_VERDICT] = s.INFLATED if excess > 1.0 else s.ACCEPTED
 
 
+@kernel("void(float64[::1], float64[:,::1], int64[::1], float64[:,::1], float64[::1])")
+def place(mean: Array, P: Array, entity: IntArray, prior: Array, event: Array) -> None:
+    """Put an entity where the event says (x, y, z, yaw) and as surely, independent of all others."""
+    index, pose = np.empty(4, np.int64), np.empty(4)
+    for i in range(4):
+        pose[i] = event[s.EVENT_Z + i]
+    join(mean, P, entity, prior, pose)
+    at = (s.X, s.Y, entity[s.AT_Z], entity[s.AT_YAW])
+    for i in range(4):
+        index[i] = entity[s.ENTITY_START] + at[i] if at[i] >= 0 else -1
+    for i in range(4):
+        for j in range(4):
+            if index[i] >= 0 and index[j] >= 0:
+                P[index[i], index[j]] = event[s.EVENT_Z + 4 + 4 * i + j]
+
+
 @kernel(
-    "void(float64[::1], float64[:,::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[:,::1],"
-    " float64[::1], float64[::1], float64[::1])"
+    "void(float64[:,::1], float64[:,:,::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1], float64[::1],"
+    " float64[::1])"
+)
+def change(
+    means: Array, covariances: Array, aux: Array, entities: IntArray, priors: Array, event: Array, out: Array
+) -> None:
+    """Let an entity in, out, or put it somewhere."""
+    kind, subject = int(event[s.EVENT_KIND]), int(event[s.EVENT_SUBJECT])
+    out[s.OUT_VERDICT] = s.ACCEPTED
+    known = aux[subject, s.ACTIVE] != 0.0
+    enters = kind == s.EVENT_PLACED or (kind == s.EVENT_ADMITTED and entities[0, subject, s.ENTITY_PRESENT] != 0)
+    aux[subject, s.ADMITTED] = 0.0 if kind == s.EVENT_DISMISSED else 1.0
+    for m in range(means.shape[0]):
+        if kind == s.EVENT_DISMISSED:
+            clear(means[m], covariances[m], entities[m, subject])
+        elif kind == s.EVENT_PLACED:
+            place(means[m], covariances[m], entities[m, subject], priors[subject], event)
+        elif enters and not known:
+            enter(means[m], covariances[m], entities[m, subject], priors[subject])
+    if kind == s.EVENT_DISMISSED:
+        aux[subject, s.ACTIVE] = 0.0
+    elif enters:
+        aux[subject, s.ACTIVE] = 1.0
+        aux[subject, s.STREAK] = 0.0
+        aux[subject, s.JOINED_AT] = aux[subject, s.CORRECTED_AT] = event[s.EVENT_AT]
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1],"
+    " float64[:,:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1])"
 )
 def handle(
-    mean: Array,
-    P: Array,
-    aux: Array,
-    entities: IntArray,
-    parameters: Array,
-    cameras: Array,
-    settings: Array,
-    event: Array,
-    out: Array,
-) -> None:
+    means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
+    priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
+) -> None:  # fmt: skip
     """Do what one event asks for and write what became of it."""
-    kind, subject = int(event[s.EVENT_KIND]), int(event[s.EVENT_SUBJECT])
-    if kind == s.KIND_OBSERVATION:
-        observe(mean, P, aux, entities, parameters, cameras, settings, event, out)
-        return
-    out[s.OUT_VERDICT] = s.ACCEPTED
-    if kind == s.KIND_AIRBORNE:
-        aux[subject, s.AIRBORNE] = 1.0
-        return
-    aux[subject, s.AIRBORNE] = 0.0
-    aux[subject, s.ACTIVE] = 0.0
-    clear(mean, P, entities[subject])
+    if int(event[s.EVENT_KIND]) == s.EVENT_OBSERVATION:
+        observe(
+            means,
+            covariances,
+            weights,
+            aux,
+            entities,
+            parameters,
+            priors,
+            kernels,
+            sensors,
+            pairs,
+            settings,
+            event,
+            out,
+        )
+    else:
+        change(means, covariances, aux, entities, priors, event, out)

@@ -5,6 +5,7 @@ time. Whatever arrives makes its step dirty; `advance` restarts from the checkpo
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,12 +14,12 @@ from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, JointBelief
 from groundstation.estimation.correction import is_distribution
 from groundstation.estimation.event_log import EventLog, observation_columns
-from groundstation.estimation.gating import gate
 from groundstation.estimation.layout import EntityKind, Layout
-from groundstation.estimation.measurement import Correction, Measurement, Motion
-from groundstation.estimation.models import FixedMount, OdometryRobot
+from groundstation.estimation.measurement import Correction, Measurement, Motion, Reading
+from groundstation.estimation.models.protocol import DrivenModel
 from groundstation.estimation.parameters import EstimatorParameters
 from groundstation.estimation.replay import replay
+from groundstation.estimation.tables import empty_state, tables_from_parameters
 
 NS_PER_S = 1_000_000_000
 _FUTURE_NS = 100_000_000  # a measurement further ahead of now than this is an error of a clock
@@ -38,18 +39,21 @@ class FixedLagFilter:
         self._corrections: list[Correction] = []
         self._models = tuple(parameters.entities.values())
         self._index = {name: i for i, name in enumerate(self.names)}
+        self._sensors = tuple(parameters.sensors.values())
+        self._sensor_index = {name: i for i, name in enumerate(parameters.sensors)}
+        self._tables = tables_from_parameters(parameters)
         self._step_ns = round(parameters.step_s * NS_PER_S)
         self._lag_ns = round(parameters.max_lateness_s * NS_PER_S)
         self._delays = {
             i: (round(model.velocity_delay_s * NS_PER_S), round(model.height_delay_s * NS_PER_S))
             for i, model in enumerate(self._models)
-            if isinstance(model, OdometryRobot)
+            if isinstance(model, DrivenModel)
         }
-        slowest = max((max(pair) for pair in self._delays.values()), default=0)
-        self._ahead = _FUTURE_NS // self._step_ns + 2 + _IDLE_STEPS  # steps after now that a measurement may fall into
-        self._behind = (self._lag_ns + slowest) // self._step_ns + 3
-        self._build_tables()
-        self._build_state(self._behind + self._ahead)
+        delays = [delay for pair in self._delays.values() for delay in pair]
+        # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
+        self._ahead = (_FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
+        self._behind = (self._lag_ns + max(0, *delays, 0)) // self._step_ns + 3
+        self._build_state([float(model.admitted) for model in self._models])
 
     def add_motion(self, robot: str, motion: Motion, now_ns: int) -> Verdict:
         """Take one odometry sample; its velocity and height were true one calibrated delay before its stamp."""
@@ -65,6 +69,7 @@ class FixedLagFilter:
         row[s.SUM_VX] += vx
         row[s.SUM_VY] += vy
         row[s.SUM_VZ] += vz
+        row[s.SUM_RATE] += motion.yaw_rate_rad_s
         row[s.VELOCITY_COUNT] += 1.0
         row = self._touch(motion.stamp_ns, index)
         at = float(motion.stamp_ns - self._origin_ns)
@@ -76,25 +81,28 @@ class FixedLagFilter:
             row[s.HEIGHT_COUNT] += 1.0
         return verdict
 
-    def add_observation(self, m: Measurement, tie: str, now_ns: int) -> Verdict | None:
+    def add_observation(self, m: Measurement | Reading, tie: str, now_ns: int) -> Verdict | None:
         """Take one observation; None: `take_corrections` tells what it did after `advance`, else why it was refused.
 
         tie: orders observations of the same instant, so that their arrival cannot.
         """
-        camera, subject = self._camera_index.get(m.camera), self._index.get(m.subject)
-        if camera is None or subject is None or self._mounts[camera].carrier == m.subject:
+        name = m.camera if isinstance(m, Measurement) else m.sensor
+        number, subject = self._sensor_index.get(name), self._index.get(m.subject)
+        if number is None or subject is None:
             return Verdict.UNKNOWN_ENTITY
-        mount = self._mounts[camera]
-        if not mount.observes_targets and self._models[subject].kind is EntityKind.TARGET:
+        sensor = self._sensors[number]
+        if isinstance(m, Measurement) and sensor.carrier == m.subject:
+            return Verdict.UNKNOWN_ENTITY
+        if not sensor.observes_targets and self._models[subject].kind is EntityKind.TARGET:
             return Verdict.NOT_PERMITTED
         verdict = self._timing(m.stamp_ns, now_ns)
         if verdict is not Verdict.ACCEPTED:
             return verdict
         step = self._mark(m.stamp_ns)
-        observer = self._index[mount.carrier]
-        columns = observation_columns(m, self._seconds(m.stamp_ns), step, observer, subject, camera)
+        observer = self._index[sensor.carrier]
+        columns = observation_columns(m, self._seconds(m.stamp_ns), step, observer, subject, number)
         row = self._log.add(m.stamp_ns, tie, columns)
-        self._fresh[row] = (mount.carrier, m.subject, (now_ns - m.stamp_ns) / 1e6)
+        self._fresh[row] = (sensor.carrier, m.subject, (now_ns - m.stamp_ns) / 1e6)
         return None
 
     def set_airborne(self, robot: str, airborne: bool, stamp_ns: int, now_ns: int) -> Verdict:
@@ -105,13 +113,24 @@ class FixedLagFilter:
         index = self._index.get(robot)
         if index is None or self._models[index].kind is not EntityKind.ROBOT:
             return Verdict.UNKNOWN_ENTITY
-        if self._timing(stamp_ns, now_ns) is not Verdict.ACCEPTED:
-            stamp_ns = now_ns
-        step = self._mark(stamp_ns)
-        kind = s.KIND_AIRBORNE if airborne else s.KIND_GROUNDED
-        columns = [self._seconds(stamp_ns), kind, 0.0, index, 0.0, 0.0, 0.0, 0.0, step]
-        self._log.add(stamp_ns, f"@{robot}/{airborne:d}", columns)
-        return Verdict.ACCEPTED
+        return self.set_present(robot, airborne, stamp_ns, now_ns)
+
+    def set_present(self, name: str, present: bool, stamp_ns: int, now_ns: int) -> Verdict:
+        """Let an entity join, or take it out of the state; what has a prior (a fixed camera) joins at once by it.
+
+        Robots and targets join with the next observation that can place them. What leaves takes its correlations along.
+        """
+        kind = s.EVENT_ADMITTED if present else s.EVENT_DISMISSED
+        return self._change(name, kind, [], f"{present:d}", stamp_ns, now_ns)
+
+    def place(
+        self, name: str, pose: Sequence[float], variances: Sequence[float], stamp_ns: int, now_ns: int
+    ) -> Verdict:
+        """Put an entity at a known pose (x, y, z, yaw) with the given variances, independent of all others."""
+        columns = [*map(float, pose), *np.diag(np.asarray(variances, dtype=np.float64)).ravel().tolist()]
+        if len(columns) != 20 or not np.isfinite(columns).all() or min(variances) <= 0.0:
+            raise ValueError("a pose has 4 finite numbers and 4 positive variances")
+        return self._change(name, s.EVENT_PLACED, columns, "placed", stamp_ns, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Bring the belief to `now_ns`, through everything that has arrived; time never runs backwards."""
@@ -134,77 +153,67 @@ class FixedLagFilter:
 
     def is_sound(self) -> bool:
         """Return whether the belief is still a distribution: finite, and its covariance positive definite."""
-        return bool(is_distribution(self._mean, self._P, self._entities, self._aux))
+        return bool(is_distribution(self._mean, self._P, self._tables.entities[0], self._state.aux))
 
     def restart(self) -> None:
-        """Forget the belief and everything that arrived; who flies is kept, who is where must be seen again."""
-        airborne = self._aux[:, s.AIRBORNE].copy()
+        """Forget the belief and everything that arrived; who may join is kept, who is where must be seen again."""
         now_ns = self._now_ns
-        self._build_state(self._behind + self._ahead)
-        self._auxiliaries[:, :, s.AIRBORNE] = airborne
-        self._aux[:, s.AIRBORNE] = airborne
+        self._build_state(self._state.aux[:, s.ADMITTED].tolist())
         self._start(now_ns)
 
     def belief(self) -> JointBelief:
         """Return the belief over the entities that have joined."""
         layout = Layout()
         kept: list[int] = []
-        for name, model, entity, aux in zip(self.names, self._models, self._entities, self._aux, strict=True):
-            if aux[s.ACTIVE]:
+        for index, (name, model) in enumerate(zip(self.names, self._models, strict=True)):
+            if self._state.aux[index, s.ACTIVE] and model.labels:
                 layout = layout.with_entity(name, model.kind, model.labels)
-                kept.extend(range(entity[s.ENTITY_START], entity[s.ENTITY_START] + entity[s.ENTITY_SIZE]))
+                part = self._tables.part(index)
+                kept.extend(range(part.start, part.stop))
         return JointBelief(self._mean[kept], self._P[np.ix_(kept, kept)], layout, self._now_ns)
 
     def age_s(self, name: str) -> float:
         """Return the time since an entity was last corrected by an observation; infinite if it has not joined."""
-        aux = self._aux[self._index[name]]
+        aux = self._state.aux[self._index[name]]
         return self._seconds(self._now_ns) - float(aux[s.CORRECTED_AT]) if aux[s.ACTIVE] else math.inf
 
     def airborne(self, robot: str) -> bool:
         """Return whether a robot flies, as far as is known."""
-        return bool(self._aux[self._index[robot], s.AIRBORNE])
+        return bool(self._state.aux[self._index[robot], s.ADMITTED])
 
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
-        """Return a joined robot's velocity [m/s; world] from its last odometry and its scale state."""
+        """Return a joined robot's velocity [m/s; world] from its last odometry and what is known of its errors."""
         index = self._index[robot]
-        start, aux = int(self._entities[index, s.ENTITY_START]), self._aux[index]
-        gain = self._rows[index, s.VELOCITY_GAIN] * self._mean[start + s.SCALE]
-        c, n = math.cos(self._mean[start + s.YAW]) * gain, math.sin(self._mean[start + s.YAW]) * gain
-        vx, vy = aux[s.HELD_VX], aux[s.HELD_VY]
-        climb = self._mean[start + s.CLIMB] + self._rows[index, s.HAS_CLIMB_RATE] * aux[s.HELD_VZ]
-        return float(c * vx - n * vy), float(n * vx + c * vy), float(climb)
+        model = self._models[index]
+        assert isinstance(model, DrivenModel)
+        return model.velocity_m_s(self._mean[self._tables.part(index)], self._state.aux[index])
 
-    def _build_tables(self) -> None:
-        models, parameters = self._models, self.parameters
-        sizes = [len(model.labels) for model in models]
-        table = [[m.number, sum(sizes[:i]), sizes[i]] for i, m in enumerate(models)]
-        self._entities = np.array(table, dtype=np.int64).reshape(-1, s.ENTITY_COLUMNS)
-        self._rows = np.array([m.row() for m in models]).reshape(-1, s.PARAMETER_COLUMNS)
-        self._mounts = tuple(parameters.cameras.values())
-        self._camera_index = {name: i for i, name in enumerate(parameters.cameras)}
-        self._camera_rows = np.array([c.row() for c in self._mounts]).reshape(-1, s.CAMERA_COLUMNS)
-        gates = [gate(parameters.gate_probability, rows) for rows in range(1, 5)]
-        scalars = (parameters.step_s, parameters.wild_gates, parameters.divergence_count, parameters.divergence_s)
-        self._settings = np.array([*map(float, scalars), 0.0, *gates, 0.0])
+    def mode_probabilities(self) -> tuple[float, ...]:
+        """Return how likely each combination of modes is; one number where no target switches."""
+        return tuple(self._state.weights.tolist())
 
-    def _build_state(self, ring: int) -> None:
-        n, entities = int(self._entities[:, s.ENTITY_SIZE].sum()), len(self.names)
-        self._means, self._covariances = np.zeros((ring, n)), np.zeros((ring, n, n))
-        self._auxiliaries = np.zeros((ring, entities, s.AUXILIARY_COLUMNS))
-        self._odometry = np.zeros((ring, entities, s.ODOMETRY_COLUMNS))
+    def _build_state(self, admitted: list[float]) -> None:
+        ring, allowed = self._behind + self._ahead, np.array(admitted)
+        self._checkpoints = empty_state(self._tables, allowed, (ring,))
+        self._state = empty_state(self._tables, allowed)
+        self._odometry = np.zeros((ring, len(self.names), s.ODOMETRY_COLUMNS))
         self._odometry[:, :, s.NEWEST_AT] = -1.0
         self._log = EventLog()
         self._fresh: dict[int, tuple[str, str, float]] = {}
-        self._mean, self._P = np.zeros(n), np.zeros((n, n))
-        self._aux = np.zeros((entities, s.AUXILIARY_COLUMNS))
-        for model, entity, aux in zip(self._models, self._entities, self._auxiliaries[0], strict=True):
-            if isinstance(model, FixedMount):
-                part = slice(entity[s.ENTITY_START], entity[s.ENTITY_START] + entity[s.ENTITY_SIZE])
-                self._means[0, part], variances = model.prior()
-                self._covariances[0, part, part] = np.diag(variances)
-                aux[s.ACTIVE] = 1.0
+        self._mean, self._P = self._state.means[0].copy(), self._state.covariances[0].copy()
         self._started = False
         self._origin_ns = self._now_ns = self._last = self._dirty = 0
+
+    def _change(self, name: str, kind: int, columns: list[float], tie: str, stamp_ns: int, now_ns: int) -> Verdict:
+        index = self._index.get(name)
+        if index is None:
+            return Verdict.UNKNOWN_ENTITY
+        if self._timing(stamp_ns, now_ns) is not Verdict.ACCEPTED:
+            stamp_ns = now_ns
+        step = self._mark(stamp_ns)
+        leading = [self._seconds(stamp_ns), kind, 0.0, index, 0.0, 0.0, 0.0, 0.0, step]
+        self._log.add(stamp_ns, f"@{name}/{tie}", leading + columns)
+        return Verdict.ACCEPTED
 
     def _start(self, now_ns: int) -> None:
         if not self._started:
@@ -239,29 +248,31 @@ class FixedLagFilter:
 
     def _replay_to(self, now_ns: int) -> None:
         last = self._step_of(now_ns)
-        ring = len(self._means)
+        ring = len(self._odometry)
         for step in range(self._last + self._ahead + 1, last + self._ahead + 1):
             self._odometry[step % ring] = 0.0
             self._odometry[step % ring, :, s.NEWEST_AT] = -1.0
         first = min(self._dirty, self._last)
+        tables, log = self._tables, self._log
         replay(
-            self._entities,
-            self._rows,
-            self._camera_rows,
-            self._settings,
-            self._means,
-            self._covariances,
-            self._auxiliaries,
+            tables.entities,
+            tables.parameters,
+            tables.priors,
+            tables.kernels,
+            tables.sensors,
+            tables.settings,
+            tables.transition,
+            *self._checkpoints.arrays(),
             self._odometry,
-            self._log.events,
-            self._log.rows_from(self._origin_ns + first * self._step_ns),
-            self._log.outcomes,
+            log.events,
+            log.rows_from(self._origin_ns + first * self._step_ns),
+            log.outcomes,
             first,
             last,
             self._seconds(now_ns),
+            *self._state.arrays(),
             self._mean,
             self._P,
-            self._aux,
         )
         self._now_ns, self._last, self._dirty = now_ns, last, last
         self._log.forget_before(self._origin_ns + (last - self._behind) * self._step_ns)

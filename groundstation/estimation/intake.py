@@ -1,7 +1,7 @@
 """From bus messages to the filter: clocks, duplicates, what can be used, and a verdict for what cannot."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container
 
 from groundstation.bus.messages import (
     ClockOffset,
@@ -14,7 +14,6 @@ from groundstation.bus.messages import (
 )
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import Measurement, Motion
-from groundstation.estimation.models import MountedCamera
 
 _AIRBORNE = {
     FlightState.FLYING: True,
@@ -39,7 +38,7 @@ REASONS = {
 class Intake:
     """Feeds a filter with messages; `clock` is the id of the boot clock that `now_ns` is read from."""
 
-    def __init__(self, joint: FixedLagFilter, cameras: Mapping[str, MountedCamera], clock: str) -> None:
+    def __init__(self, joint: FixedLagFilter, cameras: Container[str], clock: str) -> None:
         self._filter = joint
         self._cameras = cameras
         self._clock = clock

@@ -10,10 +10,12 @@ class EntityKind(StrEnum):
     ROBOT = "robot"
     TARGET = "target"
     CAMERA = "camera"
+    LANDMARK = "landmark"
 
 
 ROBOT_CORE = ("x", "y", "z", "yaw")
 TARGET_CORE = ("x", "y", "vx", "vy")
+CARRIER_LABELS = (*ROBOT_CORE, "roll_error", "pitch_error")
 CORE_SIZE = 4
 
 

@@ -21,14 +21,35 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True)
+class Reading:
+    """One reading of any sensor: z (1 to 4 rows as its model says) with its covariance (row-major), of one subject.
+
+    subject: the carrier itself where the sensor looks at nothing else (a heading). roll, pitch: the carrier's, as
+    reported.
+    """
+
+    stamp_ns: int
+    sensor: str
+    subject: str
+    z: tuple[float, ...]
+    covariance: tuple[float, ...]
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Motion:
-    """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground."""
+    """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground.
+
+    yaw_rate_rad_s: for vehicles that are commanded, or measure, a turn rate and no heading.
+    """
 
     stamp_ns: int
     velocity_m_s: tuple[float, float, float]
-    yaw_rad: float
+    yaw_rad: float = 0.0
     height_m: float | None = None
     reset: int = 0
+    yaw_rate_rad_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

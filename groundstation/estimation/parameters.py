@@ -12,6 +12,7 @@ from groundstation.estimation.models import (
     FixedMount,
     MotionModel,
     MountedCamera,
+    ObservationModel,
     OdometryRobot,
 )
 from groundstation.geometry.rotations import base_from_tilted_optical
@@ -22,7 +23,7 @@ WORLD_FROM_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
 
 @dataclass(frozen=True, slots=True)
 class EstimatorParameters:
-    """Entities and cameras by name, and the settings of the filter.
+    """Entities and sensors by name, and the settings of the filter.
 
     step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
     wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
@@ -30,7 +31,7 @@ class EstimatorParameters:
     """
 
     entities: Mapping[str, MotionModel]
-    cameras: Mapping[str, MountedCamera] = field(default_factory=dict)
+    sensors: Mapping[str, ObservationModel] = field(default_factory=dict)
     step_s: float = 0.01
     max_lateness_s: float = 0.5
     gate_probability: float = 0.997
@@ -48,7 +49,9 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
         marker_height_m=target["marker"]["height_m"], acceleration_std_m_s2=target["acceleration_std_m_s2"]
     )
     entities |= {name: _mount(camera) for name, camera in resolved["cameras"].items()}
-    cameras = {name: _world_camera(name, camera) for name, camera in resolved["cameras"].items()}
+    cameras: dict[str, ObservationModel] = {
+        name: _world_camera(name, camera) for name, camera in resolved["cameras"].items()
+    }
     cameras |= {name: _onboard_camera(name, drone["camera"]) for name, drone in drones.items()}
     return EstimatorParameters(
         entities,

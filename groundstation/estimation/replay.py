@@ -2,106 +2,99 @@
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.correction import correct_sum
+from groundstation.estimation.dispatch import call_begin
 from groundstation.estimation.events import handle
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import copy_matrix, wrap
+from groundstation.estimation.linear import copy_matrix
+from groundstation.estimation.modes import combine, mix
 from groundstation.estimation.motion import predict
 
 
-@kernel("void(float64[::1], float64[::1], float64[::1], float64)")
-def take_odometry(condensed: Array, aux: Array, p: Array, step: float) -> None:
-    """Turn one step's condensed odometry into the velocity and yaw rate held during that step."""
-    aux[s.YAW_RATE] = 0.0
-    aux[s.ODOMETRY_AGE] += step
-    count = condensed[s.VELOCITY_COUNT]
-    if count > 0.0:
-        aux[s.HELD_VX] = condensed[s.SUM_VX] / count
-        aux[s.HELD_VY] = condensed[s.SUM_VY] / count
-        aux[s.HELD_VZ] = condensed[s.SUM_VZ] / count
-        aux[s.ODOMETRY_AGE] = 0.0
-    elif aux[s.ODOMETRY_AGE] > p[s.HOLD_S]:
-        aux[s.HELD_VX] = aux[s.HELD_VY] = aux[s.HELD_VZ] = 0.0
-    if condensed[s.NEWEST_AT] < 0.0:
-        return
-    # An increment across a reset is void: the vehicle's own heading jumped, the vehicle did not.
-    if aux[s.HAS_YAW] != 0.0 and aux[s.LAST_RESET] == condensed[s.NEWEST_RESET]:
-        aux[s.YAW_RATE] = wrap(condensed[s.NEWEST_YAW] - aux[s.LAST_YAW]) / step
-    aux[s.LAST_YAW], aux[s.LAST_RESET], aux[s.HAS_YAW] = condensed[s.NEWEST_YAW], condensed[s.NEWEST_RESET], 1.0
-
-
 @kernel(
-    "void(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1])"
+    "void(float64[:,::1], float64[:,:,::1], int64[:,:,::1], float64[:,:,::1], float64[:,::1], float64[:,::1],"
+    " float64[::1])"
 )
 def begin_step(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, condensed: Array, settings: Array
-) -> None:
-    """Take the odometry of a step for all robots and correct by their heights."""
-    for e in range(entities.shape[0]):
-        if entities[e, s.ENTITY_MODEL] != s.ODOMETRY_ROBOT:
-            continue
-        take_odometry(condensed[e], aux[e], parameters[e], settings[s.SETTING_STEP])
-        if aux[e, s.ACTIVE] != 0.0 and condensed[e, s.HEIGHT_COUNT] > 0.0:
-            height = condensed[e, s.HEIGHT_SUM] / condensed[e, s.HEIGHT_COUNT]
-            start = entities[e, s.ENTITY_START]
-            gate, variance = settings[s.SETTING_GATE + 1], parameters[e, s.HEIGHT_VARIANCE]
-            correct_sum(mean, P, start + s.Z, start + s.HEIGHT_ERROR, height, variance, gate)
+    means: Array, covariances: Array, entities: IntArray, parameters: Array, aux: Array, odometry: Array,
+    settings: Array,
+) -> None:  # fmt: skip
+    """Let all entities that are driven take the odometry of a step: inputs once, heights in every mode."""
+    step, gate = settings[s.SETTING_STEP], settings[s.SETTING_GATE + 1]
+    before = aux.copy()
+    for m in range(means.shape[0]):
+        if m > 0:
+            copy_matrix(before, aux)
+        for e in range(entities.shape[1]):
+            if entities[m, e, s.ENTITY_BEGIN] != 0:
+                arguments = (means[m], covariances[m], entities[m], parameters[m], aux, odometry, e, step, gate)
+                call_begin(entities[m, e, s.ENTITY_BEGIN], arguments)
 
 
 @kernel(
-    "void(int64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
-    " float64[:,::1], float64[:,:,::1], float64[:,:,::1], float64[:,:,::1],"
-    " float64[:,::1], int64[::1], float64[:,::1], int64, int64, float64,"
-    " float64[::1], float64[:,::1], float64[:,::1])"
+    "void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], float64[:,::1],"
+    " float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], float64[:,::1])"
+)
+def copy_state(
+    means: Array, covariances: Array, weights: Array, aux: Array, pairs: Array,
+    to_means: Array, to_covariances: Array, to_weights: Array, to_aux: Array, to_pairs: Array,
+) -> None:  # fmt: skip
+    """Copy all that a checkpoint holds."""
+    copy_matrix(means, to_means)
+    for m in range(weights.shape[0]):
+        copy_matrix(covariances[m], to_covariances[m])
+        to_weights[m] = weights[m]
+    copy_matrix(aux, to_aux)
+    copy_matrix(pairs, to_pairs)
+
+
+@kernel(
+    "void(int64[:,:,::1], float64[:,:,::1], float64[:,:,::1], int64[:,::1], float64[:,::1], float64[::1],"
+    " float64[:,::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1],"
+    " float64[:,:,::1], float64[:,::1], int64[::1], float64[:,::1], int64, int64, float64,"
+    " float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])"
 )
 def replay(
-    entities: IntArray,
-    parameters: Array,
-    cameras: Array,
-    settings: Array,
-    means: Array,
-    covariances: Array,
-    auxiliaries: Array,
-    odometry: Array,
-    events: Array,
-    order: IntArray,
-    outcomes: Array,
-    first: int,
-    last: int,
-    now: float,
-    mean: Array,
-    P: Array,
-    aux: Array,
-) -> None:
+    entities: IntArray, parameters: Array, priors: Array, kernels: IntArray, sensors: Array, settings: Array,
+    transition: Array, ring_means: Array, ring_covariances: Array, ring_weights: Array, ring_aux: Array,
+    ring_pairs: Array, odometry: Array, events: Array, order: IntArray, outcomes: Array, first: int, last: int,
+    now: float, means: Array, covariances: Array, weights: Array, aux: Array, pairs: Array, mean: Array, P: Array,
+) -> None:  # fmt: skip
     """Run steps first..last from the checkpoint of step `first`, renewing checkpoints; leaves the belief at `now`.
 
     Checkpoint k is the state at time k * step before anything of step k; rings are indexed modulo their length.
     `order` lists rows of `events` by time, none before step `first`.
     """
-    ring = means.shape[0]
-    step = settings[s.SETTING_STEP]
-    for j in range(mean.shape[0]):
-        mean[j] = means[first % ring, j]
-    copy_matrix(covariances[first % ring], P)
-    copy_matrix(auxiliaries[first % ring], aux)
+    ring, step = ring_means.shape[0], settings[s.SETTING_STEP]
+    slot = first % ring
+    copy_state(
+        ring_means[slot], ring_covariances[slot], ring_weights[slot], ring_aux[slot], ring_pairs[slot],
+        means, covariances, weights, aux, pairs,
+    )  # fmt: skip
     i = 0
     for k in range(first, last + 1):
         slot = k % ring
         if k > first:
-            for j in range(mean.shape[0]):
-                means[slot, j] = mean[j]
-            copy_matrix(P, covariances[slot])
-            copy_matrix(aux, auxiliaries[slot])
-        begin_step(mean, P, entities, parameters, aux, odometry[slot], settings)
+            copy_state(
+                means, covariances, weights, aux, pairs,
+                ring_means[slot], ring_covariances[slot], ring_weights[slot], ring_aux[slot], ring_pairs[slot],
+            )  # fmt: skip
+        mix(means, covariances, weights, transition, entities[0])
+        begin_step(means, covariances, entities, parameters, aux, odometry[slot], settings)
         t = k * step
         end = min((k + 1) * step, max(now, t))
         while i < order.shape[0] and events[order[i], s.EVENT_STEP] == k and events[order[i], s.EVENT_AT] <= now:
             row = order[i]
             at = min(max(events[row, s.EVENT_AT], t), end)
             if at > t:
-                predict(mean, P, entities, parameters, aux, at - t)
+                for m in range(weights.shape[0]):
+                    predict(means[m], covariances[m], entities[m], parameters[m], aux, at - t)
                 t = at
-            handle(mean, P, aux, entities, parameters, cameras, settings, events[row], outcomes[row])
+            handle(
+                means, covariances, weights, aux, entities, parameters, priors, kernels, sensors, pairs, settings,
+                events[row], outcomes[row],
+            )  # fmt: skip
             i += 1
         if end > t:
-            predict(mean, P, entities, parameters, aux, end - t)
+            for m in range(weights.shape[0]):
+                predict(means[m], covariances[m], entities[m], parameters[m], aux, end - t)
+    combine(means, covariances, weights, entities[0], mean, P)

@@ -1,47 +1,51 @@
-"""Columns of the flat arrays that the compiled filter works on; plain ints, so that they compile to constants."""
+"""Columns of the flat arrays that the compiled filter works on; plain ints, so that they compile to constants.
 
-# Blocks of the state. Robots: position, yaw, then slow states; fixed cameras: the first six; targets: VX, VY at 2, 3.
-X, Y, Z, YAW, ROLL_ERROR, PITCH_ERROR, CLIMB, SCALE, HEIGHT_ERROR = range(9)
-VX, VY = 2, 3
-MAX_BLOCK = 9
+Nothing here belongs to one model: what only one model reads has its columns in that model's file.
+"""
 
-# Entity table (int64): motion model, first entry of the state, number of entries.
-ENTITY_MODEL, ENTITY_START, ENTITY_SIZE = range(3)
-ENTITY_COLUMNS = 3
-
-# Motion model numbers; one each per file that implements one (see models.py).
-ODOMETRY_ROBOT, CONSTANT_VELOCITY, FIXED_MOUNT = 0, 1, 2
-
-# Parameters of any entity: where its marker is [base], then what its motion model needs.
-MARKER_X, MARKER_Y, MARKER_Z = range(3)
+# Entity table (int64): addresses of the model's kernels (0: none), place in the state, then where in the block stand
+# those entries that other entities' models may ask for (-1: the block has none).
 (
-    VELOCITY_GAIN,
-    VELOCITY_DENSITY,
-    YAW_DENSITY,
-    SCALE_DENSITY,
-    CLIMB_STD,
-    CLIMB_TAU,
-    ATTITUDE_STD,
-    ATTITUDE_TAU,
-    SCALE_STD,
-    HAS_CLIMB_RATE,
-    HEIGHT_VARIANCE,
-    HEIGHT_STD,
-    HEIGHT_TAU,
-    HOLD_S,
-) = range(3, 17)
-ACCELERATION_DENSITY, SPEED_STD = 3, 4
-POSITION_DRIFT, ANGLE_DRIFT = 3, 4
-PARAMETER_COLUMNS = 17
+    ENTITY_PREDICT,
+    ENTITY_BEGIN,
+    ENTITY_START,
+    ENTITY_SIZE,
+    ENTITY_KIND,
+    ENTITY_PRESENT,
+    AT_Z,
+    AT_YAW,
+    AT_ROLL_ERROR,
+    AT_PITCH_ERROR,
+    AT_YAW_OFFSET,
+    AT_RANGE_BIAS,
+    AT_BEARING_BIAS,
+) = range(13)
+ENTITY_COLUMNS = 13
+SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "bearing_bias")
+FIRST_SHARED = AT_Z
+KIND_ROBOT, KIND_TARGET, KIND_CAMERA, KIND_LANDMARK = range(4)
 
-# Camera table: rotation (9) and translation (3) carrier_from_camera, mounting variances.
-CAMERA_ROTATION, CAMERA_TRANSLATION, CAMERA_ATTITUDE_VARIANCE, CAMERA_POSITION_VARIANCE = 0, 9, 12, 13
-CAMERA_COLUMNS = 14
+# Entries of every block that has any: a robot or camera begins with x, y, z, yaw; a target with x, y, vx, vy.
+X, Y, Z, YAW = range(4)
+VX, VY = 2, 3
+MAX_BLOCK = 16
+
+# Parameters of any entity: its marker [base] (or, without a block, its place [world]); then its model's own.
+PLACE_X, PLACE_Y, PLACE_Z = range(3)
+FIRST_OWN = 3
+PARAMETER_COLUMNS = 32
+
+# Sensor table: addresses of the model's kernels apart (int64); here which rows of a measurement are angles, how long an
+# error of one pair repeats, then the model's own.
+SENSOR_MEASURE, SENSOR_PREPARE, SENSOR_LOCATE = range(3)
+SENSOR_KERNELS = 3
+SENSOR_ANGLES, SENSOR_REPEAT_S, FIRST_SENSOR_OWN = 0, 4, 5
+SENSOR_COLUMNS = 20
 
 # Per entity beside mean and covariance, part of every checkpoint.
 (
     ACTIVE,
-    AIRBORNE,
+    ADMITTED,
     HELD_VX,
     HELD_VY,
     HELD_VZ,
@@ -58,35 +62,48 @@ CAMERA_COLUMNS = 14
 AUXILIARY_COLUMNS = 14
 
 # Odometry condensed into one step of one robot: sums, counts, and the newest yaw.
-(SUM_VX, SUM_VY, SUM_VZ, VELOCITY_COUNT, NEWEST_YAW, NEWEST_RESET, NEWEST_AT, HEIGHT_SUM, HEIGHT_COUNT) = range(9)
-ODOMETRY_COLUMNS = 9
+(
+    SUM_VX,
+    SUM_VY,
+    SUM_VZ,
+    SUM_RATE,
+    VELOCITY_COUNT,
+    NEWEST_YAW,
+    NEWEST_RESET,
+    NEWEST_AT,
+    HEIGHT_SUM,
+    HEIGHT_COUNT,
+) = range(10)
+ODOMETRY_COLUMNS = 10
 
-# One event: a camera observation or a change of flight state, at its time of measurement.
+# One event at its time of measurement: an observation, or a change of who may be in the state.
 (
     EVENT_AT,
     EVENT_KIND,
     EVENT_OBSERVER,
     EVENT_SUBJECT,
-    EVENT_CAMERA,
+    EVENT_SENSOR,
     EVENT_ROLL,
     EVENT_PITCH,
     EVENT_HAS_OTHER,
     EVENT_STEP,
 ) = range(9)
 EVENT_Z = 9  # measurement (4) and covariance (16)
-EVENT_SIZE = 29  # rows of the measurement: 3 or 4
+EVENT_SIZE = 29  # rows of the measurement: 1 to 4
 EVENT_OTHER = 30  # the alternative hypothesis, laid out as at EVENT_Z
 EVENT_COLUMNS = 50
-KIND_OBSERVATION, KIND_AIRBORNE, KIND_GROUNDED = 0, 1, 2
+# ADMITTED: may join, and does at once if it has a prior; DISMISSED: leaves; PLACED: is put where the event says.
+EVENT_OBSERVATION, EVENT_ADMITTED, EVENT_DISMISSED, EVENT_PLACED = range(4)
 
 # What became of an event: verdict, NIS, rows, residual (4), its covariance (16), flags.
 OUT_VERDICT, OUT_NIS, OUT_SIZE, OUT_RESIDUAL, OUT_COVARIANCE, OUT_OTHER_CHOSEN, OUT_JOINED = 0, 1, 2, 3, 7, 23, 24
 OUT_COLUMNS = 25
 
-# Verdicts of the compiled filter (names in fixed_lag.py).
+# Verdicts of the compiled filter (names in event_log.py).
 (PENDING, ACCEPTED, INFLATED, IMPLAUSIBLE, OUT_OF_VIEW, SINGULAR, OBSERVER_UNKNOWN, SUBJECT_GROUNDED, YAW_MISSING) = (
     range(9)
 )
+NOT_LOCATED = 9
 
 # Filter settings handed to the kernels.
 SETTING_STEP, SETTING_WILD, SETTING_STREAK, SETTING_STREAK_S, SETTING_GATE = range(5)  # gates by rows follow

@@ -13,7 +13,7 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-FLIGHT = ("estimation", "geometry", "planning", "sensing")
+FLIGHT = ("estimation", "estimation/models", "geometry", "planning", "sensing")
 """Packages whose kernels fly."""
 
 EVERYTHING = (*FLIGHT, "planning/planar", "experiments")

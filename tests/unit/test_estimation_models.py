@@ -6,34 +6,93 @@ import numpy as np
 import pytest
 
 from groundstation.estimation import slots as s
+from groundstation.estimation.dispatch import call_locate
 from groundstation.estimation.gating import gate
-from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
+from groundstation.estimation.kernel import kernel
+from groundstation.estimation.models import (
+    CommandedRobot,
+    ConstantVelocityTarget,
+    CoordinatedTurnTarget,
+    FixedMount,
+    HeadingSensor,
+    Landmark,
+    ManoeuvringTarget,
+    MountedCamera,
+    OdometryRobot,
+    RangeBearingSensor,
+)
+from groundstation.estimation.models.odometry_robot import SLOW_STATES
 from groundstation.estimation.motion import predict
-from groundstation.estimation.parameters import WORLD_FROM_DOWN
-from groundstation.estimation.relative_pose import pose_from_observation, relative_pose
+from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
+from groundstation.estimation.tables import empty_state, tables_from_parameters
+from groundstation.estimation.update import linearise
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler, rotation_z
 
-MODELS = (OdometryRobot(), ConstantVelocityTarget(), FixedMount((0, 0, 4), 0.003, 0.01))
 YAWS = (0.3, math.pi - 1e-9, -math.pi + 1e-9, 3.1, -2.0)
-CAMERA = MountedCamera("a", base_from_tilted_optical(math.radians(45)), (0.09, 0.01, -0.02))
+ROBOT = OdometryRobot(marker_position_m=(0.05, -0.03, 0.08), slow_states=SLOW_STATES, velocity_bias_std_m_s=0.1)
+ENTITIES = {
+    "full": ROBOT,
+    "bare": OdometryRobot(marker_position_m=(0.05, -0.03, 0.08), slow_states=()),
+    "ground": CommandedRobot(marker_position_m=(0.1, 0.02, 0.0)),
+    "straight": ConstantVelocityTarget(),
+    "pointing": ConstantVelocityTarget(heading=True),
+    "turning": CoordinatedTurnTarget(),
+    "turning_pointing": CoordinatedTurnTarget(heading=True),
+    "mount": FixedMount((0.0, 0.0, 4.0), 0.003, 0.01),
+    "post": Landmark((1.5, -0.7, 0.2)),
+}
+TILTED = base_from_tilted_optical(math.radians(45))
+SENSORS = {
+    **{name: MountedCamera(name, TILTED, (0.09, 0.01, -0.02)) for name in ("full", "bare", "mount")},
+    "both": RangeBearingSensor("ground"),
+    "range": RangeBearingSensor("ground", "range"),
+    "bearing": RangeBearingSensor("full", "bearing"),
+    "heading": HeadingSensor("full"),
+}
+TABLES = tables_from_parameters(EstimatorParameters(ENTITIES, SENSORS))
+NAMES = list(ENTITIES)
 
 
-def tables():
-    sizes = [len(model.labels) for model in MODELS]
-    entities = np.array([[m.number, sum(sizes[:i]), sizes[i]] for i, m in enumerate(MODELS)], dtype=np.int64)
-    aux = np.zeros((3, s.AUXILIARY_COLUMNS))
+def random_state(seed: int, yaw: float) -> tuple[np.ndarray, np.ndarray]:
+    """A state with every heading at `yaw`, and inputs of all driven entities."""
+    rng = np.random.default_rng(seed)
+    state = empty_state(TABLES, np.ones(len(NAMES)))
+    mean, aux = state.means[0], state.aux
+    mean[:] = rng.normal(0.0, 0.3, mean.size)
+    for index, model in enumerate(ENTITIES.values()):
+        part = TABLES.part(index)
+        for offset, label in enumerate(model.labels):
+            if label == "yaw":
+                mean[part.start + offset] = yaw
+            if label == "velocity_scale":
+                mean[part.start + offset] = 1.1
+    mean[TABLES.part(NAMES.index("mount")).start + 2] = 4.0
     aux[:, s.ACTIVE] = 1.0
-    aux[0, [s.HELD_VX, s.HELD_VY, s.YAW_RATE]] = (0.5, -0.2, 0.8)
-    return entities, np.array([m.row() for m in MODELS]), aux
+    aux[:, s.HELD_VX], aux[:, s.HELD_VY], aux[:, s.YAW_RATE] = 0.5, -0.2, 0.8
+    return mean, aux
+
+
+def headings() -> list[int]:
+    return [
+        TABLES.part(i).start + model.labels.index("yaw")
+        for i, model in enumerate(ENTITIES.values())
+        if "yaw" in model.labels
+    ]
+
+
+def difference(a: np.ndarray, b: np.ndarray, angles: list[int]) -> np.ndarray:
+    d = a - b
+    for index in angles:
+        d[index] = math.remainder(d[index], math.tau)
+    return d
 
 
 @pytest.mark.parametrize("yaw", YAWS)
-def test_prediction_jacobian_is_that_of_the_mean(yaw: float) -> None:
-    entities, rows, aux = tables()
-    n, dt, step = int(entities[:, s.ENTITY_SIZE].sum()), 0.01, 1e-6
-    rng = np.random.default_rng(1)
-    mean = rng.normal(0.0, 0.1, n)
-    mean[s.YAW], mean[s.SCALE] = yaw, 1.1
+@pytest.mark.parametrize("dt", [0.01, 0.2])
+def test_prediction_jacobian_is_that_of_the_mean(yaw: float, dt: float) -> None:
+    mean, aux = random_state(1, yaw)
+    n, step, rng = mean.size, 1e-6, np.random.default_rng(2)
+    entities, rows = TABLES.entities[0], TABLES.parameters[0]
 
     def moved(x):
         x = x.copy()
@@ -42,11 +101,11 @@ def test_prediction_jacobian_is_that_of_the_mean(yaw: float) -> None:
 
     F = np.empty((n, n))
     for j in range(n):
-        difference = moved(mean + step * np.eye(n)[j]) - moved(mean - step * np.eye(n)[j])
-        difference[s.YAW] = math.remainder(difference[s.YAW], math.tau)
-        F[:, j] = difference / (2 * step)
+        e = step * np.eye(n)[j]
+        F[:, j] = difference(moved(mean + e), moved(mean - e), headings()) / (2 * step)
     Q = np.zeros((n, n))
     predict(mean.copy(), Q, entities, rows, aux, dt)
+    assert np.linalg.eigvalsh(Q)[0] > -1e-15
     root = rng.normal(size=(n, n))
     P = root @ root.T
     predicted = P.copy()
@@ -55,65 +114,149 @@ def test_prediction_jacobian_is_that_of_the_mean(yaw: float) -> None:
     assert np.array_equal(predicted, predicted.T)
 
 
-def observe(observer, subject, p, model, rows=4):
-    h, Ho, Hs = np.zeros(4), np.zeros((4, s.MAX_BLOCK)), np.zeros((4, s.MAX_BLOCK))
-    relative_pose(observer, subject, p, model, CAMERA.row(), 0.05, -0.08, rows, h, Ho, Hs)
-    return h, Ho, Hs
+@pytest.mark.parametrize("rate", [0.0, 1e-9, 2e-4, -3e-3, 0.7])
+def test_turning_is_exact_at_any_rate(rate: float) -> None:
+    """Against a thousand small steps, also where series replace quotients."""
+    entities, rows = TABLES.entities[0], TABLES.parameters[0]
+    part = TABLES.part(NAMES.index("turning"))
+    mean, aux = random_state(3, 0.0)
+    aux[:, s.ACTIVE] = 0.0
+    aux[NAMES.index("turning"), s.ACTIVE] = 1.0
+    mean[part] = (0.0, 0.0, 0.3, 0.1, rate)
+    predict(mean, np.zeros((mean.size, mean.size)), entities, rows, aux, 0.5)
+    place, velocity = 0j, 0.3 + 0.1j
+    for _ in range(1000):
+        place += 0.0005 * velocity * np.exp(0.5j * rate * 0.0005)
+        velocity *= np.exp(1j * rate * 0.0005)
+    np.testing.assert_allclose(mean[part][:4], [place.real, place.imag, velocity.real, velocity.imag], atol=1e-8)
+
+
+def observed(mean: np.ndarray, sensor: str, subject: str, rows: int, roll: float = 0.05, pitch: float = -0.08):
+    """h(x) and its Jacobian by the whole state, through the filter's own linearisation."""
+    number = list(SENSORS).index(sensor)
+    event = np.zeros(s.EVENT_COLUMNS)
+    observer = NAMES.index(SENSORS[sensor].carrier)
+    event[[s.EVENT_OBSERVER, s.EVENT_SUBJECT, s.EVENT_SENSOR]] = observer, NAMES.index(subject), number
+    event[[s.EVENT_ROLL, s.EVENT_PITCH]] = roll, pitch
+    work, y = np.zeros((4, 4, s.MAX_BLOCK)), np.zeros(4)
+    linearise(
+        mean, np.eye(mean.size), TABLES.entities[0], TABLES.parameters[0], TABLES.kernels[number],
+        TABLES.sensors[number], event, rows, np.zeros(4), np.eye(4), work, y,
+    )  # fmt: skip
+    H = np.zeros((rows, mean.size))
+    for block, index in ((work[0], observer), (work[1], NAMES.index(subject))):
+        part = TABLES.part(index)
+        H[:, part] += block[:rows, : part.stop - part.start]
+    return -y[:rows], H, event
+
+
+PAIRS = [
+    ("full", "bare", 4),
+    ("bare", "full", 4),
+    ("mount", "full", 4),
+    ("full", "straight", 3),
+    ("bare", "turning", 3),
+    ("full", "pointing", 4),
+    ("full", "turning_pointing", 4),
+    ("full", "ground", 4),
+    ("full", "post", 3),
+    ("both", "post", 2),
+    ("both", "full", 2),
+    ("both", "turning", 2),
+    ("range", "bare", 1),
+    ("bearing", "straight", 1),
+    ("heading", "full", 1),
+]
 
 
 @pytest.mark.parametrize("yaw", YAWS)
-@pytest.mark.parametrize("model", [OdometryRobot(marker_position_m=(0.05, -0.03, 0.08)), ConstantVelocityTarget()])
-def test_observation_jacobians_agree_with_central_differences(yaw: float, model) -> None:
-    observer = np.array([0.1, -0.2, 2.1, yaw, 0.01, -0.02, 0.0, 1.0, 0.0])
-    robot = model.number == s.ODOMETRY_ROBOT
-    subject = np.array([1.2, 0.4, 1.1, -yaw, 0.0, 0.0, 0.0, 1.0, 0.0]) if robot else np.array([1.2, 0.4, 0.1, -0.1])
-    rows, p, step = (4 if robot else 3), model.row(), 1e-6
-    _, Ho, Hs = observe(observer, subject, p, model.number, rows)
-    for block, H, which in ((observer, Ho, 0), (subject, Hs, 1)):
-        for j in range(len(block)):
-            sides = []
-            for sign in (1, -1):
-                moved = block.copy()
-                moved[j] += sign * step
-                pair = (moved, subject) if which == 0 else (observer, moved)
-                sides.append(observe(*pair, p, model.number, rows)[0])
-            difference = sides[0] - sides[1]
-            difference[3] = math.remainder(difference[3], math.tau)
-            np.testing.assert_allclose(H[:rows, j], (difference / (2 * step))[:rows], atol=1e-7)
+@pytest.mark.parametrize(("sensor", "subject", "rows"), PAIRS)
+def test_observation_jacobians_agree_with_central_differences(sensor: str, subject: str, rows: int, yaw: float) -> None:
+    step, angles = 1e-6, list(SENSORS[sensor].angles)
+    for seed in range(3):
+        mean, _ = random_state(seed, yaw)
+        _, H, _ = observed(mean, sensor, subject, rows)
+        numeric = np.empty_like(H)
+        for j in range(mean.size):
+            e = step * np.eye(mean.size)[j]
+            sides = [observed(mean + sign * e, sensor, subject, rows)[0] for sign in (1, -1)]
+            numeric[:, j] = difference(*sides, [a for a in angles if a < rows]) / (2 * step)
+        np.testing.assert_allclose(H, numeric, atol=2e-7 * max(1.0, np.abs(H).max() ** 2))
 
 
-def test_observation_follows_the_geometry_of_the_frames() -> None:
+def test_a_camera_follows_the_geometry_of_the_frames() -> None:
     """Against rotation matrices written out independently of the kernel."""
-    observer = np.array([0.1, -0.2, 2.1, 0.7, 0.0, 0.0, 0.0, 1.0, 0.0])
-    subject = np.array([1.2, 0.4, 1.1, 2.0, 0.0, 0.0, 0.0, 1.0, 0.0])
-    p = OdometryRobot(marker_position_m=(0.05, -0.03, 0.08)).row()
-    h, _, _ = observe(observer, subject, p, s.ODOMETRY_ROBOT)
-    marker = subject[:3] + rotation_z(2.0) @ p[:3]
+    mean, _ = random_state(0, 0.7)
+    observer, subject = TABLES.part(NAMES.index("full")), TABLES.part(NAMES.index("bare"))
+    mean[observer][:] = 0.0
+    mean[observer][:4] = (0.1, -0.2, 2.1, 0.7)
+    mean[subject] = (1.2, 0.4, 1.1, 2.0)
+    h, _, _ = observed(mean, "full", "bare", 4)
+    marker = np.array([1.2, 0.4, 1.1]) + rotation_z(2.0) @ (0.05, -0.03, 0.08)
     base = rotation_from_euler(0.05, -0.08, 0.7)
-    expected = CAMERA.rotation.T @ (base.T @ (marker - observer[:3]) - np.array(CAMERA.translation))
+    expected = TILTED.T @ (base.T @ (marker - (0.1, -0.2, 2.1)) - (0.09, 0.01, -0.02))
     np.testing.assert_allclose(h[:3], expected, atol=1e-12)
     assert h[3] == pytest.approx(1.3)
 
 
+def test_range_and_bearing_follow_plane_geometry() -> None:
+    mean, _ = random_state(0, 0.0)
+    mean[TABLES.part(NAMES.index("ground"))] = (0.5, -0.7, 0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.03, -0.01)
+    h, _, _ = observed(mean, "both", "post", 2)
+    np.testing.assert_allclose(h, (1.03, -math.pi / 2 - 0.01), atol=1e-12)
+
+
 def test_a_point_below_the_ceiling_camera_is_in_front_of_it() -> None:
-    camera = MountedCamera("ceiling", WORLD_FROM_DOWN)
-    mount = np.array([0.0, 0.0, 4.2, 0.0, 0.0, 0.0])
-    h, Ho, Hs = np.zeros(4), np.zeros((4, s.MAX_BLOCK)), np.zeros((4, s.MAX_BLOCK))
-    robot = np.array([0.5, 0.3, 1.2, 0.4, 0.0, 0.0, 0.0, 1.0, 0.0])
-    p = OdometryRobot(marker_position_m=(0.0, 0.0, 0.1)).row()
-    relative_pose(mount, robot, p, s.ODOMETRY_ROBOT, camera.row(), 0.0, 0.0, 4, h, Ho, Hs)
-    np.testing.assert_allclose(h, [0.5, -0.3, 2.9, 0.4], atol=1e-12)
+    assert np.allclose(WORLD_FROM_DOWN.T @ (np.array([0.5, 0.3, 1.3]) - (0.0, 0.0, 4.2)), [0.5, -0.3, 2.9])
+
+
+LOCATE_LOOP = (
+    "int64(int64, float64[::1], int64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1])"
+)
+
+
+@kernel(LOCATE_LOOP)
+def locate(address, mean, entities, parameters, sensor, event, z, pose):
+    return call_locate(address, (mean, entities, parameters, sensor, event, z, pose))
 
 
 @pytest.mark.parametrize("yaw", YAWS)
-def test_an_observation_without_noise_gives_back_the_pose(yaw: float) -> None:
-    observer = np.array([0.1, -0.2, 2.1, yaw, 0.01, -0.02, 0.0, 1.0, 0.0])
-    subject = np.array([1.2, 0.4, 1.1, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
-    p = OdometryRobot(marker_position_m=(0.05, -0.03, 0.08)).row()
-    z, _, _ = observe(observer, subject, p, s.ODOMETRY_ROBOT)
-    pose = np.zeros(4)
-    pose_from_observation(observer, p, s.ODOMETRY_ROBOT, CAMERA.row(), 0.05, -0.08, z, pose)
-    np.testing.assert_allclose(pose, subject[:4], atol=1e-12)
+@pytest.mark.parametrize(("sensor", "subject", "rows"), [p for p in PAIRS if p[1] != "post"])
+def test_an_observation_without_noise_gives_back_the_place(sensor: str, subject: str, rows: int, yaw: float) -> None:
+    mean, _ = random_state(5, yaw)
+    mean[TABLES.part(NAMES.index("ground")).start + 7 :][:2] = 0.0  # biases: what is located is located without them
+    z = np.zeros(4)
+    z[:rows], _, event = observed(mean, sensor, subject, rows)
+    number, pose = list(SENSORS).index(sensor), np.zeros(4)
+    placed = locate(
+        TABLES.kernels[number, s.SENSOR_LOCATE], mean, TABLES.entities[0], TABLES.parameters[0],
+        TABLES.sensors[number], event, z, pose,
+    )  # fmt: skip
+    if sensor in ("range", "bearing", "heading"):
+        assert placed == 0
+        return
+    assert placed == 1
+    if rows == 4:
+        model = ENTITIES[subject]
+        at = [model.labels.index(label) if label in model.labels else None for label in ("x", "y", "z", "yaw")]
+        block = mean[TABLES.part(NAMES.index(subject))]
+        for value, offset in zip(pose, at, strict=True):
+            if offset is not None:
+                assert math.remainder(value - block[offset], math.tau) == pytest.approx(0.0, abs=1e-9)
+    elif rows == 2 and subject == "turning":
+        np.testing.assert_allclose(pose[:2], mean[TABLES.part(NAMES.index(subject))][:2], atol=1e-9)
+
+
+def test_modes_of_one_target_must_fit_together() -> None:
+    with pytest.raises(ValueError, match="same labels"):
+        ManoeuvringTarget((ConstantVelocityTarget(), CoordinatedTurnTarget()))
+    with pytest.raises(ValueError, match="joint beliefs"):
+        tables_from_parameters(EstimatorParameters({f"t{i}": ManoeuvringTarget() for i in range(4)}))
+    chances = tables_from_parameters(
+        EstimatorParameters({"a": ManoeuvringTarget(), "b": ManoeuvringTarget()})
+    ).transition
+    assert chances.shape == (4, 4)
+    np.testing.assert_allclose(chances.sum(axis=1), 1.0)
 
 
 def test_gates_are_chi_square_quantiles() -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from groundstation.estimation.correction import apply, bound_precision, correct_sum, project, project_columns, surprise
+from groundstation.estimation.correction import apply, bound_precision, project, project_columns, surprise
+from groundstation.estimation.models.height import correct_height
 
 
 def correct(P, R, H, y):
@@ -47,21 +48,21 @@ def test_covariance_stays_positive_definite(prior: float, noise: float) -> None:
         np.linalg.cholesky(P)
 
 
-def test_sum_of_two_states_is_corrected_like_any_other_measurement() -> None:
+def test_a_height_is_corrected_like_any_other_measurement() -> None:
     rng = np.random.default_rng(5)
     root = rng.normal(size=(6, 6))
     P = root @ root.T
     expected, other, mean = P.copy(), P.copy(), np.zeros(6)
     H = np.zeros((1, 6))
-    H[0, [1, 4]] = 1.0
+    H[0, [1, 4, 5]] = 1.0, 1.0, -1.0
     reference, _ = correct(expected, np.array([[0.3]]), H, np.array([0.7]))
-    correct_sum(mean, other, 1, 4, 0.7, 0.3, 1e9)
-    np.testing.assert_allclose(other, expected, atol=1e-12)
-    np.testing.assert_allclose(mean, reference, atol=1e-12)
+    correct_height(mean, other, 1, 4, 5, 0.7, 0.3, 1e9)
+    np.testing.assert_allclose(other, expected, atol=1e-9)
+    np.testing.assert_allclose(mean, reference, atol=1e-9)
 
 
 def test_a_soft_gate_bounds_the_pull_of_an_outlier() -> None:
     P, mean = np.eye(2), np.zeros(2)
-    correct_sum(mean, P, 0, 1, 1000.0, 0.1, 9.0)
+    correct_height(mean, P, 0, 1, -1, 1000.0, 0.1, 9.0)
     assert 0.0 < mean.sum() < 1.0
     np.linalg.cholesky(P)

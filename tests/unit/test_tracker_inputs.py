@@ -276,7 +276,7 @@ def test_reported_velocity_moves_the_robot_in_its_own_frame(tracking: Flight) ->
 def test_a_broken_covariance_means_hold_hover_and_a_new_epoch(tracking: Flight) -> None:
     t = tracking
     epoch = t.tracker.epoch
-    t.tracker.filter._covariances[:] = np.nan
+    t.tracker.filter._checkpoints.covariances[:] = np.nan
     t.run(0.02, look=False, onboard=False)
     assert t.tracker.holding
     assert t.tracker.epoch == epoch + 1

@@ -1,0 +1,30 @@
+"""Motion and observation models, one file each; `protocol.py` says what a new one has to provide."""
+
+from groundstation.estimation.models.camera import MountedCamera
+from groundstation.estimation.models.commanded_robot import CommandedRobot
+from groundstation.estimation.models.constant_velocity import ConstantVelocityTarget
+from groundstation.estimation.models.coordinated_turn import CoordinatedTurnTarget
+from groundstation.estimation.models.fixed_mount import FixedMount
+from groundstation.estimation.models.heading import HeadingSensor
+from groundstation.estimation.models.landmark import Landmark
+from groundstation.estimation.models.manoeuvring import ManoeuvringTarget
+from groundstation.estimation.models.odometry_robot import OdometryRobot
+from groundstation.estimation.models.protocol import DrivenModel, MotionModel, ObservationModel, SwitchingModel
+from groundstation.estimation.models.range_bearing import RangeBearingSensor
+
+__all__ = [
+    "CommandedRobot",
+    "ConstantVelocityTarget",
+    "CoordinatedTurnTarget",
+    "DrivenModel",
+    "FixedMount",
+    "HeadingSensor",
+    "Landmark",
+    "ManoeuvringTarget",
+    "MotionModel",
+    "MountedCamera",
+    "ObservationModel",
+    "OdometryRobot",
+    "RangeBearingSensor",
+    "SwitchingModel",
+]

@@ -1,0 +1,103 @@
+"""What a model is: the figures that Python holds, and the addresses of the kernels that do the work.
+
+A new model is one file: a frozen dataclass of its figures with these members, and its kernels, declared with the
+signatures of dispatch.py. Nothing else has to know it.
+"""
+
+from typing import Protocol, runtime_checkable
+
+from groundstation.estimation.belief import Array
+from groundstation.estimation.layout import EntityKind
+
+Vector3 = tuple[float, float, float]
+
+
+class MotionModel(Protocol):
+    """How one entity moves: x' = f(x), F and Q are in the kernel behind `kernels`."""
+
+    @property
+    def kind(self) -> EntityKind:
+        """What the block describes."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Entries of the block, which begins as layout.py says."""
+
+    @property
+    def kernels(self) -> tuple[int, int]:
+        """Addresses of PREDICT and BEGIN (dispatch.py); 0 where the model does nothing."""
+
+    @property
+    def present(self) -> bool:
+        """Whether its prior alone puts it into the state."""
+
+    @property
+    def admitted(self) -> bool:
+        """Whether it may be in the state before anybody says so (a vehicle that must fly may not)."""
+
+    def row(self) -> Array:
+        """Return the parameters in the columns that the kernels read."""
+
+    def prior(self) -> Array:
+        """Return mean and variances (2, size) of what joins; pose entries are overwritten where a pose was measured."""
+
+
+@runtime_checkable
+class DrivenModel(MotionModel, Protocol):
+    """An entity with odometry: what its samples are late by, and how fast its state says that it moves."""
+
+    @property
+    def velocity_delay_s(self) -> float:
+        """How long before its stamp a velocity was true; negative for a command that is followed later."""
+
+    @property
+    def height_delay_s(self) -> float:
+        """How long before its stamp a height was true."""
+
+    def velocity_m_s(self, block: Array, aux: Array) -> Vector3:
+        """Return the velocity [world] from the block's mean and the inputs held in its auxiliary row."""
+
+
+@runtime_checkable
+class SwitchingModel(MotionModel, Protocol):
+    """An entity that moves by one of several models with equal labels."""
+
+    @property
+    def modes(self) -> tuple[MotionModel, ...]:
+        """The models."""
+
+    @property
+    def stay_s(self) -> tuple[float, ...]:
+        """How long it stays with each, on average."""
+
+
+class ObservationModel(Protocol):
+    """How one sensor measures: z = h(x) + v with h and its Jacobians behind `kernels`."""
+
+    @property
+    def carrier(self) -> str:
+        """The entity that it is on: a robot, or what stands fixed in the world."""
+
+    @property
+    def observes_targets(self) -> bool:
+        """Whether it may be used for targets."""
+
+    @property
+    def repeats_s(self) -> float:
+        """For how long an error of one pair repeats: readings within it share one reading's information."""
+
+    @property
+    def kernels(self) -> tuple[int, int, int]:
+        """Addresses of MEASURE, PREPARE and LOCATE (dispatch.py)."""
+
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Rows of z that are angles."""
+
+    def row(self) -> Array:
+        """Return the parameters in the columns that the kernels read, from FIRST_SENSOR_OWN on."""
+
+
+def place_of(labels: tuple[str, ...], wanted: str) -> int:
+    """Return where a label stands in a block, or -1."""
+    return labels.index(wanted) if wanted in labels else -1

@@ -37,6 +37,7 @@ VERBS: dict[str, Verb] = {
     "console": Verb(
         "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."
     ),
+    "view": Verb("Look", "groundstation.cli.view:view", "Live engineering view in Rerun or Foxglove."),
     "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
     "replay": Verb("Look", "groundstation.cli.replay:replay", "A recorded run in the console, or once more computed."),
     "recording": Verb(

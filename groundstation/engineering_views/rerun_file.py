@@ -1,14 +1,11 @@
 """A recorded run as an .rrd file for the Rerun viewer."""
 
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from groundstation.engineering_views.extras import require_rerun
+from groundstation.engineering_views.field import field_of
 from groundstation.errors import MessageError
 from groundstation.recording.copies import require_absent
-from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.schemas import is_picture
@@ -40,7 +37,7 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
 
     from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
 
-    field = field_of(run)
+    field = field_of(run.attachments)
     unread: dict[str, None] = {}
     count = 0
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.paths[0].parent.name}-{run.start_ns}")
@@ -59,12 +56,3 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     stream.flush()
     stream.disconnect()
     return count, list(unread)
-
-
-def field_of(run: RecordedRun) -> dict[str, Any]:
-    """Return the resolved field of a run; a bare one where none is attached, so that the rest can still be shown."""
-    try:
-        found: dict[str, Any] = msgspec.json.decode(run.attachments.get(FIELD_NAME, b"{}"), type=dict)
-    except msgspec.DecodeError:
-        return {}
-    return found

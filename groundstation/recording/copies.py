@@ -128,7 +128,7 @@ def recover(path: Path, target: Path) -> tuple[int, list[str]]:
     Raises RecordingError when the file is none of ours, or when not a single message is left of it.
     """
     opened, index = open_recording(path), FileIndex(path)
-    with CopyWriter(target, _preamble(opened, {})) as writer:
+    with CopyWriter(target, preamble_copy(opened, {})) as writer:
         for message in messages_of(index):
             writer.write(message)
         if not writer.written:
@@ -147,7 +147,7 @@ def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) 
     latched = run.latest_before(from_ns, LATCHED_TOPICS.__contains__)
     opened = open_recording(indexes[0].path)
     note = {"cut": {"from_unix_ns": str(from_ns), "until_unix_ns": str(until_ns)}}
-    with CopyWriter(target, _preamble(opened, note)) as writer:
+    with CopyWriter(target, preamble_copy(opened, note)) as writer:
         for message in _latched_copies(indexes, latched.values(), from_ns):
             writer.write(message)
         for index in indexes:
@@ -156,7 +156,8 @@ def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) 
     return writer.written
 
 
-def _preamble(opened: Recording, note: Mapping[str, Mapping[str, str]]) -> Preamble:
+def preamble_copy(opened: Recording, note: Mapping[str, Mapping[str, str]]) -> Preamble:
+    """Return the preamble of a recording for a copy of it, with a note on what the copy is."""
     created = int(opened.metadata.get("run", {}).get("created_unix_ns", "0"))
     typed = {name: (opened.media_types[name], data) for name, data in opened.attachments.items()}
     return Preamble({**opened.metadata, **note}, typed, created)

@@ -11,8 +11,9 @@ from groundstation.recording.protobuf import Field, Kind, Type, blob, descriptor
 
 TF_CHANNEL = "/tf"
 LOG_CHANNEL = "/log"
+SCENE_CHANNEL = "/scene"
 # Derived from messages that are recorded on their own channels too; our reader passes them over.
-VIEWER_CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL))
+VIEWER_CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL, SCENE_CHANNEL))
 
 _HEADER_FIELD = 1000
 _STAMP = ".google.protobuf.Timestamp"

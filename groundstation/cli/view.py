@@ -1,0 +1,100 @@
+"""`groundstation view`: live engineering views of a run, in Rerun or Foxglove."""
+
+import os
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.monitor import choose
+
+if TYPE_CHECKING:
+    from groundstation.engineering_views.watch import View
+    from groundstation.supervisor.runtime_file import RuntimeRecord
+
+_FOXGLOVE_PORT = 8766
+_RERUN_PORT = 9876
+_RERUN_PAGE_PORT = 9090
+_PORT = click.IntRange(1024, 65535)
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation view --foxglove          then open ws://127.0.0.1:8766 in Foxglove\n"
+    "  groundstation view --rerun             then open the page that it names\n"
+    "  groundstation view --rerun --save flight.rrd"
+)
+@click.option("--rerun", "viewer", flag_value="rerun", help="Serve Rerun's web viewer; extra [rerun].")
+@click.option("--foxglove", "viewer", flag_value="foxglove", help="Serve Foxglove and Lichtblick; extra [foxglove].")
+@click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
+@click.option("--port", type=_PORT, help=f"Where viewers connect (Foxglove {_FOXGLOVE_PORT}, Rerun {_RERUN_PORT}).")
+@click.option("--page-port", type=_PORT, default=_RERUN_PAGE_PORT, show_default=True, help="Rerun's page.")
+@click.option("--save", type=click.Path(path_type=Path), help="Rerun: write to this new file instead of serving.")
+def view(viewer: str | None, name: str | None, port: int | None, page_port: int, save: Path | None) -> int:
+    """Show a running ground station to an engineer's viewer, on loopback. It takes no orders and stops nothing."""
+    from groundstation.bus.zenoh_bus import open_bus
+    from groundstation.engineering_views.watch import watch
+
+    if viewer is None:
+        raise click.UsageError("say which viewer: --rerun or --foxglove")
+    if save is not None and viewer != "rerun":
+        raise click.UsageError("--save goes with --rerun; a recording opens in Foxglove as it is")
+    _require(viewer)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
+    record = choose(name)
+    bus = open_bus(record.endpoint, record.site, f"view_{os.getpid()}", timeout_s=2.0)
+    shown: View | None = None
+    try:
+        shown = _open(viewer, record, port, page_port, save)
+        dropped = watch(bus, shown, lambda: record.alive)
+        click.echo("the run has ended" if shown.alive else "the viewer's server has ended", err=True)
+        if dropped:
+            click.echo(f"{dropped} samples were dropped: this machine is too slow to show all", err=True)
+        return ExitCode.OK if shown.alive else ExitCode.FAULT
+    except KeyboardInterrupt:
+        return ExitCode.OK
+    finally:
+        bus.close()
+        if shown is not None:
+            shown.close()
+
+
+def _require(viewer: str) -> None:
+    from groundstation.engineering_views.extras import require_foxglove, require_rerun
+
+    {"rerun": require_rerun, "foxglove": require_foxglove}[viewer]()
+
+
+def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int, save: Path | None) -> "View":
+    from groundstation.bus import clock
+    from groundstation.recording.timeline import Timeline
+
+    field, timeline = _field_of(record), Timeline(clock.clock_id(), clock.unix_offset_ns())
+    if viewer == "foxglove":
+        from groundstation.engineering_views.foxglove_live import FoxgloveView
+
+        foxglove = FoxgloveView(record.name, field, timeline, port or _FOXGLOVE_PORT)
+        click.echo(f"{record.name} at {foxglove.address} (Ctrl-C leaves it; the flight goes on)")
+        return foxglove
+    from groundstation.engineering_views.rerun_live import RerunServer, RerunView
+    from groundstation.recording.copies import require_absent
+
+    if save is not None:
+        require_absent(save)
+    server = None if save is not None else RerunServer(port or _RERUN_PORT, page_port)
+    click.echo(f"{record.name} {f'to {save}' if server is None else f'at {server.page}'} (Ctrl-C leaves it)")
+    now_ns = clock.now_ns() + timeline.unix_offset_ns
+    return RerunView(record.name, field, timeline, now_ns, server, save)
+
+
+def _field_of(record: "RuntimeRecord") -> dict[str, Any]:
+    """Return the resolved field from the recording that is being written, or {}."""
+    from groundstation.engineering_views.field import field_of
+    from groundstation.recording.reader import RecordingError, open_recording, parts
+    from groundstation.recording.selection import STATE
+
+    try:
+        return field_of(open_recording(parts(Path(record.run_dir), STATE)[0]).attachments)
+    except (RecordingError, IndexError):
+        return {}

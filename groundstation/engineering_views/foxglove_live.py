@@ -1,0 +1,90 @@
+"""A Foxglove WebSocket server on loopback that says what a recording would hold, and the scene. Extra [foxglove]."""
+
+from typing import Any
+
+import foxglove
+
+from groundstation.bus import codec, keys
+from groundstation.bus.api import Sample
+from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
+from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_schema
+from groundstation.errors import MessageError, OperatorMistake
+from groundstation.recording.capture import Capture, Entry
+from groundstation.recording.derived import ViewerChannels, camera_frames
+from groundstation.recording.timeline import Timeline
+from groundstation.recording.viewers import SCENE_CHANNEL
+
+HOST = "127.0.0.1"
+# Messages that wait for one slow viewer before the oldest are dropped for it alone.
+_BACKLOG = 512
+_DRAWN = frozenset(topic.name for topic in (ESTIMATE, PLAN, SETPOINT))
+
+
+class FoxgloveView:
+    """Serves until closed; viewers come and go. It takes no orders: no services, nothing can be published to it."""
+
+    def __init__(self, name: str, field: dict[str, Any], timeline: Timeline, port: int) -> None:
+        self._context = foxglove.Context()
+        self._channels: dict[str, foxglove.Channel] = {}
+        self._capture = Capture(timeline)
+        self._viewers = ViewerChannels(camera_frames(field))
+        self._scene = FoxgloveScene(field)
+        self._scene_channel = foxglove.Channel(
+            SCENE_CHANNEL, schema=scene_schema(), message_encoding="protobuf", context=self._context
+        )
+        try:
+            self._server = foxglove.start_server(
+                name=name, host=HOST, port=port, capabilities=[], context=self._context, message_backlog_size=_BACKLOG
+            )
+        except (RuntimeError, OSError) as error:
+            raise OperatorMistake(f"port {port} cannot be served ({error}): choose another with --port") from error
+
+    @property
+    def address(self) -> str:
+        """Return what to enter in the viewer's connection dialogue."""
+        return f"ws://{HOST}:{self._server.port}"
+
+    @property
+    def alive(self) -> bool:
+        """Return whether viewers can still connect."""
+        return True
+
+    def take(self, sample: Sample, now_ns: int) -> None:
+        """Say on what arrived at a boot-clock time."""
+        entry = self._capture.entry(sample, now_ns)
+        if entry is None:
+            return
+        self._say(entry)
+        derived = self._viewers.derived(entry)
+        if derived is not None:
+            self._say(derived)
+        if entry.facts["topic"] in _DRAWN:
+            self._draw(entry)
+
+    def _say(self, entry: Entry) -> None:
+        channel = self._channels.get(entry.channel)
+        if channel is None:
+            described = entry.description
+            schema = foxglove.Schema(
+                name=described.schema_name, encoding=described.schema_encoding, data=described.schema
+            )
+            channel = self._channels[entry.channel] = foxglove.Channel(
+                entry.channel,
+                schema=schema,
+                message_encoding=described.message_encoding,
+                context=self._context,
+                metadata=entry.facts,
+            )
+        channel.log(bytes(entry.data), log_time=entry.log_time_ns)
+
+    def _draw(self, entry: Entry) -> None:
+        try:
+            update = self._scene.take(entry.log_time_ns, codec.decode(keys.parse(entry.channel), entry.data))
+        except MessageError:
+            return
+        if update is not None:
+            self._scene_channel.log(update, log_time=entry.log_time_ns)
+
+    def close(self) -> None:
+        """Let all viewers go."""
+        self._server.stop()

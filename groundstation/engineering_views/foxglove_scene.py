@@ -1,0 +1,127 @@
+"""Room, drones, ellipses, links and arrows as a Foxglove SceneUpdate. Needs the extra [foxglove]."""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from foxglove import Schema
+from foxglove import messages as fm
+
+from groundstation.bus import messages as m
+from groundstation.bus.clock import NS_PER_S
+from groundstation.engineering_views.scene import LINK_COLOUR, Array, Body, Link, Rgb, Scene
+from groundstation.geometry.angles import quaternion_from_euler
+
+_PERIOD_NS = NS_PER_S // 10
+_FRAME = "world"
+_HALF_BODY_M = 0.25
+_ROOM_COLOUR: Rgb = (120, 120, 120)
+_FENCE_COLOUR: Rgb = (213, 94, 0)
+
+
+def scene_schema() -> Schema:
+    """Return the schema of the encoded updates."""
+    return fm.SceneUpdate.get_schema()
+
+
+class FoxgloveScene:
+    """Follows the messages and gives a new scene at most ten times a second."""
+
+    def __init__(self, field: dict[str, Any]) -> None:
+        self._scene = Scene(field)
+        self._static = _static(field)
+        self._links: list[Link] = []
+        self._arrows: dict[str, tuple[Array, Array]] = {}
+        self._next_ns = 0
+
+    def take(self, time_ns: int, message: m.Message) -> bytes | None:
+        """Return an encoded SceneUpdate when an estimate asks for a new picture."""
+        match message:
+            case m.Plan():
+                self._links = self._scene.links(message)
+            case m.VelocitySetpoint():
+                arrow = self._scene.arrow(message)
+                if arrow is not None:
+                    self._arrows[message.header.entity] = arrow
+            case m.Estimate():
+                bodies = self._scene.take_estimate(message)
+                if not self._next_ns - _PERIOD_NS <= time_ns < self._next_ns:
+                    self._next_ns = time_ns + _PERIOD_NS
+                    return self._update(time_ns, bodies)
+        return None
+
+    def _update(self, time_ns: int, bodies: list[Body]) -> bytes:
+        stamp = fm.Timestamp(*divmod(time_ns, NS_PER_S))
+
+        def entity(name: str, **parts: Any) -> fm.SceneEntity:
+            return fm.SceneEntity(timestamp=stamp, frame_id=_FRAME, id=name, **parts)
+
+        links = [_line([link.begin_m, link.end_m], LINK_COLOUR, 2 * link.half_width_m) for link in self._links]
+        arrows = [_arrow(*arrow, self._scene.colour(name)) for name, arrow in self._arrows.items()]
+        drawn = [self._body(entity, body) for body in bodies]
+        parts = [entity("room", lines=self._static), *drawn, entity("links", lines=links)]
+        return fm.SceneUpdate(entities=[*parts, entity("commanded", arrows=arrows)]).encode()
+
+    def _body(self, entity: Callable[..., fm.SceneEntity], body: Body) -> fm.SceneEntity:
+        colour = self._scene.colour(body.name)
+        x, y, z = body.position_m
+        label = fm.TextPrimitive(
+            pose=_pose((x, y, z + 0.3), 0.0, 0.0), billboard=True, font_size=0.15, color=_colour(colour), text=body.name
+        )
+        cube = fm.CubePrimitive(
+            pose=_pose(body.position_m, 0.0, body.yaw_rad),
+            size=fm.Vector3(x=2 * _HALF_BODY_M, y=2 * _HALF_BODY_M, z=0.1),
+            color=_colour(colour),
+        )
+        ring = _line(body.ring_m.tolist(), colour, 0.015)
+        return entity(body.name, cubes=[cube], texts=[label], lines=[ring])
+
+
+def _static(field: dict[str, Any]) -> list[fm.LinePrimitive]:
+    room = field.get("room")
+    if not room:
+        return []
+    x, y, z = (float(size) for size in room["size_m"])
+    fence = [room["fence"][axis] for axis in ("x_m", "y_m", "z_m")]
+    whole = [(-x / 2, x / 2), (-y / 2, y / 2), (0.0, z)]
+    return [*_box(whole, _ROOM_COLOUR), *_box(fence, _FENCE_COLOUR)]
+
+
+def _box(sides: Iterable[tuple[float, float]], colour: Rgb) -> list[fm.LinePrimitive]:
+    (x0, x1), (y0, y1), (z0, z1) = sides
+    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
+    rings = [_line([(x, y, z) for x, y in corners], colour, 0.01) for z in (z0, z1)]
+    return [*rings, *(_line([(x, y, z0), (x, y, z1)], colour, 0.01) for x, y in corners[:4])]
+
+
+def _line(points: Iterable[Iterable[float]], colour: Rgb, thickness_m: float) -> fm.LinePrimitive:
+    placed = [fm.Point3(x=x, y=y, z=z) for x, y, z in points]
+    kind = fm.LinePrimitiveLineType.LineStrip
+    return fm.LinePrimitive(type=kind, thickness=thickness_m, points=placed, color=_colour(colour))
+
+
+def _arrow(origin_m: Array, vector_m: Array, colour: Rgb) -> fm.ArrowPrimitive:
+    length = float(np.linalg.norm(vector_m))
+    yaw = math.atan2(vector_m[1], vector_m[0])
+    pitch = -math.atan2(vector_m[2], math.hypot(vector_m[0], vector_m[1]))  # nose down is positive
+    x, y, z = origin_m.tolist()
+    return fm.ArrowPrimitive(
+        pose=_pose((x, y, z), pitch, yaw),
+        shaft_length=0.8 * length,
+        shaft_diameter=0.04,
+        head_length=0.2 * length,
+        head_diameter=0.09,
+        color=_colour(colour),
+    )
+
+
+def _pose(position_m: tuple[float, float, float], pitch_rad: float, yaw_rad: float) -> fm.Pose:
+    w, qx, qy, qz = quaternion_from_euler(0.0, pitch_rad, yaw_rad)
+    x, y, z = position_m
+    return fm.Pose(position=fm.Vector3(x=x, y=y, z=z), orientation=fm.Quaternion(x=qx, y=qy, z=qz, w=w))
+
+
+def _colour(rgb: Rgb) -> fm.Color:
+    r, g, b = (part / 255.0 for part in rgb)
+    return fm.Color(r=r, g=g, b=b, a=1.0)

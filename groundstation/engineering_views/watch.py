@@ -1,0 +1,40 @@
+"""The loop of a live view: a client of the bus like any other, that drops rather than delays."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus, Sample
+from groundstation.bus.topics import IMU, JOURNAL, ODOMETRY
+from groundstation.recording.selection import IMAGE_TOPICS, STATE_TOPICS
+
+_PERIOD_S = 0.05
+# Nobody looks at hundreds of samples a second; recordings have them.
+_SHOWN = tuple(topic for topic in STATE_TOPICS if topic not in (IMU, ODOMETRY, JOURNAL))
+
+
+class View(Protocol):
+    """Something that shows samples."""
+
+    @property
+    def alive(self) -> bool:
+        """Return whether it still can."""
+
+    def take(self, sample: Sample, now_ns: int) -> None:
+        """Show a sample that arrived at a boot-clock time."""
+
+    def close(self) -> None:
+        """End it, handing over what is left."""
+
+
+def watch(bus: Bus, view: View, goes_on: Callable[[], bool]) -> int:
+    """Show what comes until `goes_on` says no or the view is gone; returns how many samples were dropped."""
+    queues = (bus.subscribe(_SHOWN, capacity=4096), bus.subscribe(IMAGE_TOPICS, capacity=64))
+    while view.alive and goes_on():
+        now_ns = clock.now_ns()
+        for queue in queues:
+            for sample in queue.drain_samples():
+                view.take(sample, now_ns)
+        time.sleep(_PERIOD_S)
+    return sum(queue.overflowed for queue in queues)

@@ -12,6 +12,7 @@ from groundstation.process.child import Child
 from sim_bridge.cameras import Cameras, render_specs
 from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.devices.ardrone_firmware import FIRMWARES
 from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.devices.mavlink_open import open_vehicle
@@ -113,15 +114,12 @@ class Harness:
             self._readers[vehicle.socket.fileno()] = vehicle.receive
         for name, drone in self.world.ardrones.items():
             address = order.addresses[name]
-            rate_hz = order.scenario.drones.navdata_hz
-            emulator = ArDroneEmulator(name, address, drone, self.world.onboard[name], rate_hz)
+            drones = order.scenario.drones
+            firmware = FIRMWARES[drones.firmware_of(name)].without(drones.omit_options)
+            emulator = ArDroneEmulator(name, address, drone, self.world.onboard[name], drones.navdata_hz, firmware)
             self.emulators[name] = emulator
-            for udp, reader in (
-                (emulator.navdata_socket, emulator.receive_navdata_requests),
-                (emulator.at_socket, emulator.receive_commands),
-            ):
-                self._poll.register(udp, select.POLLIN)
-                self._readers[udp.fileno()] = reader
+            self._poll.register(emulator, select.POLLIN)
+            self._readers[emulator.fileno()] = emulator.receive
 
     @property
     def _inventory(self) -> str:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from drivers.ardrone.wire.tags import OPTION_SIZES
 from groundstation.errors import SettingsError
 
 
@@ -62,15 +63,33 @@ class TargetScenario(_Section):
     slip: Annotated[float, Field(ge=0, le=0.5)] = 0.05
 
 
-class DroneScenario(_Section):
-    """Every emulated AR.Drone: rate and errors of its navdata, battery, unrest of the air, wake of the others."""
+def _known_firmware(name: str) -> str:
+    if name not in OPTION_SIZES:
+        raise PydanticCustomError("firmware", f"known firmwares: {', '.join(OPTION_SIZES)}")
+    return name
 
+
+Firmware = Annotated[str, AfterValidator(_known_firmware)]
+
+
+class DroneScenario(_Section):
+    """Every emulated AR.Drone: firmware, rate and errors of its navdata, battery, unrest of the air, the others' wake.
+
+    firmware_by_drone: of those that differ; omit_options: numbers of navdata options that are never sent;
+    attitude_bias_deg: before the flat trim, one sigma; ultrasound_crosstalk: drones near each other with the same
+    `pic:ultrasound_freq` hear each other's echoes.
+    """
+
+    firmware: Firmware = "ar2-2.3"
+    firmware_by_drone: dict[str, Firmware] = {}
+    omit_options: tuple[Annotated[int, Field(ge=1, le=27)], ...] = ()
     navdata_hz: Annotated[float, Field(ge=1, le=200)] = 200.0
     velocity_gain: Annotated[tuple[Gain, Gain], AfterValidator(_rising)] = (0.80, 0.90)
     velocity_delay_ms: Annotated[tuple[Delay, Delay], AfterValidator(_rising)] = (20.0, 40.0)
     velocity_noise_m_s: Annotated[float, Field(ge=0, le=1)] = 0.03
     height_noise_m: Annotated[float, Field(ge=0, le=1)] = 0.034
     height_delay_ms: Annotated[float, Field(ge=0, le=500)] = 85.0
+    attitude_bias_deg: Annotated[float, Field(ge=0, le=10)] = 0.8
     attitude_noise_deg: Annotated[float, Field(ge=0, le=20)] = 1.0
     attitude_correlation_s: Annotated[float, Field(gt=0, le=1000)] = 5.0
     yaw_wander_deg: Annotated[float, Field(ge=0, le=90)] = 3.0
@@ -80,6 +99,11 @@ class DroneScenario(_Section):
     battery_drain_per_min: Annotated[float, Field(ge=0, le=10)] = 0.06
     air_unrest_m_s2: Annotated[float, Field(ge=0, le=5)] = 0.08
     downwash: bool = True
+    ultrasound_crosstalk: bool = True
+
+    def firmware_of(self, name: str) -> str:
+        """Return the firmware of one drone."""
+        return self.firmware_by_drone.get(name, self.firmware)
 
 
 class CopterScenario(_Section):
@@ -191,6 +215,8 @@ _HONEST: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
         lambda s: _at_least(s.drones.yaw_jump_at_lift_off_deg, 60, 143),
     ),
     ("drones.downwash: true", lambda s: s.drones.downwash),
+    ("drones.ultrasound_crosstalk: true", lambda s: s.drones.ultrasound_crosstalk),
+    ("drones.attitude_bias_deg: >= 0.8", lambda s: s.drones.attitude_bias_deg >= 0.8),
     ("cameras.fps: <= 15", lambda s: s.cameras.fps <= 15),
     ("cameras.video_delay_ms: >= 120", lambda s: s.cameras.video_delay_ms >= 120),
     ("cameras.video_jitter_ms: >= 20", lambda s: s.cameras.video_jitter_ms >= 20),

@@ -1,11 +1,19 @@
-"""An AR.Drone at the wire: UDP 5554 (navdata) and 5556 (AT commands) of its own loopback address."""
+"""An AR.Drone at the wire: UDP 5554 (navdata), 5556 (AT commands) and its lesser ports, at its own loopback address."""
 
+import math
+import selectors
 import socket
 from contextlib import suppress
 
 from groundstation.errors import GroundStationError
+from sim_bridge.devices.ardrone_audience import Listener
 from sim_bridge.devices.ardrone_control import FlightControl
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
 from sim_bridge.devices.ardrone_navdata import NavdataState, NavdataWriter
+from sim_bridge.devices.ardrone_ports import Ports, open_udp
+from sim_bridge.devices.ardrone_state import control_state, state_word
+from sim_bridge.world.autopilot import Phase
+from sim_bridge.world.motors import flight_pwm, ramp_pwm
 from sim_bridge.world.onboard import Onboard
 from sim_bridge.world.quadrotor import Quadrotor
 from sim_bridge.world.world import TICK_NS
@@ -15,7 +23,9 @@ AT_PORT = 5556
 # WIRE: demo mode sends every 13th of the 200 Hz packets: 15.4 Hz.
 DEMO_SUBSAMPLING = 13
 _LARGEST_DATAGRAM = 2048
-_DATAGRAMS_PER_TICK = 64
+# Programs that land in a loop without a pause send 19,000 datagrams a second: 95 in a tick.
+_DATAGRAMS_PER_TICK = 256
+_RECEIVE_BUFFER = 1 << 20
 
 
 class ArDroneEmulator:
@@ -25,94 +35,149 @@ class ArDroneEmulator:
     frozen does not see 2 s of silence that nobody kept.
     """
 
-    def __init__(self, name: str, address: str, drone: Quadrotor, onboard: Onboard, navdata_hz: float = 200.0) -> None:
+    def __init__(
+        self,
+        name: str,
+        address: str,
+        drone: Quadrotor,
+        onboard: Onboard,
+        navdata_hz: float = 200.0,
+        firmware: Firmware = FIRMWARES[DEFAULT],
+    ) -> None:
         self.name = name
         self.silent = False
         self.deaf = False
-        self.control = FlightControl(drone)
+        self.control = FlightControl(drone, onboard, firmware)
         self._drone, self._onboard = drone, onboard
         self._subsampling = max(1, round(200.0 / navdata_hz))
-        self._writer = NavdataWriter()
+        self._writer = NavdataWriter(firmware)
         self._state = NavdataState()
         self._ticks = 0
-        self.navdata_socket = _open(name, address, NAVDATA_PORT)
+        self._selector = selectors.DefaultSelector()
+        self._sockets: list[socket.socket] = []
+        self._ports: Ports | None = None
         try:
-            self.at_socket = _open(name, address, AT_PORT)
+            self._navdata = self._open(address, NAVDATA_PORT, self._take_requests)
+            self._at = self._open(address, AT_PORT, self._take_commands)
+            self._ports = Ports(name, address, self._selector, firmware.version)
         except GroundStationError:
-            self.navdata_socket.close()
+            self.close()
             raise
 
-    def receive_navdata_requests(self) -> None:
-        """Take all waiting navdata requests: any bytes ask for packets to where they came from."""
-        for _, client in _waiting(self.navdata_socket):
-            if not self.deaf and self.control.session.request(client, self._now_ns):
-                self._send(self._status_packet())
+    def fileno(self) -> int:
+        """Return a descriptor that can be read from when something waits to be received."""
+        return self._selector.fileno()
 
-    def receive_commands(self) -> None:
-        """Take all waiting AT datagrams."""
-        now_ns = self._now_ns
-        for datagram, _ in _waiting(self.at_socket):
-            if not self.deaf:
-                self.control.obey_datagram(datagram, now_ns)
+    def receive(self) -> None:
+        """Take what waits at all ports, without waiting for any."""
+        for key, mask in self._selector.select(0):
+            key.data(mask)
 
     def send(self) -> None:
         """End a tick: watch the link, and send what is due."""
         self._ticks += 1
         control = self.control
         control.watch(self._now_ns)
-        if control.session.client is None:
+        if control.dump_wanted or control.custom_dump_wanted:
+            self._dump()
+        listeners = list(control.audience)
+        if not listeners:
             return
-        demo = control.session.bootstrap or control.configuration.flag("general:navdata_demo")
-        if control.status_wanted and demo:
-            control.status_wanted = False
-            self._send(self._status_packet())
-        elif self._ticks % (DEMO_SUBSAMPLING if demo else self._subsampling) == 0:
-            self._send(self._packet(demo))
+        demo_due = self._ticks % DEMO_SUBSAMPLING == 0
+        due = demo_due if control.demo else self._ticks % self._subsampling == 0
+        status = control.status_wanted and (control.demo or control.audience.bootstrap)
+        control.status_wanted = False
+        ready = [listener for listener in listeners if not listener.bootstrap]
+        for listener in listeners:
+            if status or (listener.bootstrap and demo_due):
+                self._send_status(listener)
+        if ready and due and not status:
+            self._send_readings(ready)
+        if status or (due if ready else demo_due):
+            control.session.sent()
 
     def close(self) -> None:
-        """Close both ports."""
-        self.navdata_socket.close()
-        self.at_socket.close()
+        """Close all ports; idempotent."""
+        for udp in self._sockets:
+            udp.close()
+        self._sockets.clear()
+        if self._ports is not None:
+            self._ports.close()
+            self._ports = None
+        self._selector.close()
 
     @property
     def _now_ns(self) -> int:
         return self._ticks * TICK_NS
 
-    def _status_packet(self) -> bytearray:
-        return self._writer.status(self.control.state_word(self._now_ns), self.control.session.next_packet())
+    def _open(self, address: str, port: int, reader: object) -> socket.socket:
+        udp = open_udp(self.name, address, port)
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        self._sockets.append(udp)
+        self._selector.register(udp, selectors.EVENT_READ, reader)
+        return udp
 
-    def _packet(self, demo: bool) -> bytearray:
+    def _take_requests(self, _mask: int) -> None:
+        """Take navdata requests: any bytes ask for packets to where they came from."""
+        for _, client in _waiting(self._navdata):
+            if not self.deaf:
+                listener = self.control.audience.request(client, self._now_ns)
+                if listener is not None:
+                    self._send_status(listener)
+
+    def _take_commands(self, _mask: int) -> None:
+        """Take AT datagrams."""
+        now_ns = self._now_ns
+        for datagram, _ in _waiting(self._at):
+            if not self.deaf:
+                self.control.obey_datagram(datagram, now_ns)
+
+    def _dump(self) -> None:
+        """Answer CTRL 4 and 6, once somebody has connected to hear it."""
+        control, ports = self.control, self._ports
+        if ports is None or not ports.control.connected:
+            return
+        if control.dump_wanted:
+            ports.control.dump(control.configuration)
+        if control.custom_dump_wanted:
+            ports.control.custom_dump(control.configuration)
+        control.dump_wanted = control.custom_dump_wanted = False
+
+    def _send_status(self, listener: Listener) -> None:
+        word = state_word(self._drone, self.control, self._now_ns, listener.bootstrap)
+        self._send(listener, self._writer.status(word, listener.next_sequence()))
+
+    def _send_readings(self, listeners: list[Listener]) -> None:
         control, state, session = self.control, self._state, self.control.session
-        if session.bootstrap:
-            return self._status_packet()
-        state.word = control.state_word(self._now_ns)
-        state.control_state = control.control_state(self._now_ns)
-        state.motors_on = self._drone.autopilot.motors_on
-        state.pcmd_sequence, state.at_sequence = control.pcmd_sequence, session.at_sequence
-        if demo:
+        state.word = state_word(self._drone, control, self._now_ns, bootstrap=False)
+        state.control_state = control_state(self._drone, control, self._now_ns)
+        state.pwm = self._pwm()
+        state.pcmd_sequence = control.pcmd_sequence
+        state.at_sequence, state.at_gap_ms = session.at_sequence, session.mean_gap_ms
+        first, *others = listeners
+        if control.demo:
             mask = control.configuration.integer("general:navdata_options")
-            return self._writer.demo(mask, state, self._onboard, self._ticks, session.next_packet())
-        return self._writer.full(state, self._onboard, self._ticks, session.next_packet())
+            packet = self._writer.demo(mask, state, self._onboard, self._ticks, first.next_sequence())
+        else:
+            packet = self._writer.full(state, self._onboard, self._ticks, first.next_sequence())
+        self._send(first, packet)
+        for listener in others:
+            self._send(listener, self._writer.again(listener.next_sequence()))
 
-    def _send(self, packet: bytearray) -> None:
-        client = self.control.session.client
-        if client is not None and not self.silent:
+    def _pwm(self) -> tuple[int, int, int, int]:
+        autopilot, body = self._drone.autopilot, self._drone.airframe
+        if not autopilot.motors_on:
+            return 0, 0, 0, 0
+        if autopilot.phase is Phase.TAKING_OFF and body.on_ground:
+            pwm = ramp_pwm(autopilot.since_s)
+        else:
+            pwm = flight_pwm(body.az, math.hypot(body.roll, body.pitch))
+        return pwm, pwm, pwm, pwm
+
+    def _send(self, listener: Listener, packet: bytearray) -> None:
+        if not self.silent:
             with suppress(OSError):  # a full buffer or a vanished client loses packets, as radio does
-                self.navdata_socket.sendto(packet, client)
-        self.control.session.sent()
-
-
-def _open(name: str, address: str, port: int) -> socket.socket:
-    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    udp.setblocking(False)
-    try:
-        udp.bind((address, port))
-    except OSError as error:
-        udp.close()
-        raise GroundStationError(
-            f"emulated {name}: cannot listen on {address}:{port} (UDP): is another run using this address? ({error})"
-        ) from error
-    return udp
+                self._navdata.sendto(packet, listener.address)
 
 
 def _waiting(udp: socket.socket) -> list[tuple[bytes, tuple[str, int]]]:

@@ -1,4 +1,4 @@
-"""Navdata as an AR.Drone 2 (firmware 2.3) writes it: a template packet with the living fields written in place.
+"""Navdata as an AR.Drone writes it: a template packet of its firmware with the living fields written in place.
 
 This file writes native units and axes (mdeg, mm, mg; forward-right-down) by itself and by offsets of its own, taken
 from the protocol sheet: it shares neither the driver's conversions nor the layouts that the driver decodes with.
@@ -10,22 +10,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.ardrone.wire.tags import OPTION_SIZES
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
 from sim_bridge.world.airframe import GRAVITY_M_S2
 from sim_bridge.world.onboard import Onboard
 
-PROFILE = "ar2-2.3"
 DEFAULT_OPTIONS = 65537  # DEMO and VISION_DETECT
-_DEMO, _TIME, _RAW, _PHYS, _EULER, _REFERENCES, _PWM, _ALTITUDE, _VISION_DETECT = 0, 1, 2, 3, 5, 6, 9, 10, 16
-_VIDEO_STREAM, _PRESSURE, _MAGNETO = 19, 21, 22
+_DEMO, _TIME, _RAW, _PHYS, _EULER, _REFERENCES, _PWM, _ALTITUDE = 0, 1, 2, 3, 5, 6, 9, 10
+_VISION, _VISION_DETECT, _VIDEO_STREAM, _PRESSURE, _MAGNETO, _KALMAN = 13, 16, 19, 21, 22, 24
 
 _HEADER = struct.Struct("<IIII")
 _CHECKSUM = struct.Struct("<HHI")
-_DEMO_FIELDS = struct.Struct("<II3fi3f")  # control state, battery, theta phi psi, altitude, vx vy vz
+_DEMO_FIELDS = struct.Struct("<II3fi3fI")  # control state, battery, theta phi psi, altitude, vx vy vz, pictures
 _PHYS_FIELDS = struct.Struct("<3f3f")
 _EULER_FIELDS = struct.Struct("<2f")
 _ALTITUDE_FIELDS = struct.Struct("<ifii")  # vision, vz, reference, raw
 _MAGNETO_FIELDS = struct.Struct("<3f")  # heading: unwrapped, gyro, fusion [deg]
+_KALMAN_FIELDS = struct.Struct("<2f")  # height [mm], climb [m/s]
+_VELOCITY_FIELDS = struct.Struct("<3f")
+_AT_FIELDS = struct.Struct("<II")  # sequence number, mean gap
+_PWM_FIELDS = struct.Struct("<4B")
 _RAW_FIELDS = struct.Struct("<3H3h")
 _WORD = struct.Struct("<I")
 _SIGNED = struct.Struct("<i")
@@ -33,27 +36,31 @@ _SIGNED = struct.Struct("<i")
 _MDEG = math.degrees(1.0) * 1000.0
 _DEG = math.degrees(1.0)
 _MG = 1000.0 / GRAVITY_M_S2
-# WIRE: on the ground the ultrasound still reads about 240 mm while DEMO says 0.
-_GROUND_ECHO_MM = 243
 _MICROSECONDS_PER_TICK = 5000
+_PICTURES_PER_SECOND = 30
 
 
 @dataclass(slots=True)
 class NavdataState:
-    """What the packet says besides the sensor readings; `pcmd_sequence` is that of the last PCMD obeyed."""
+    """What the packet says besides the sensor readings.
+
+    pcmd_sequence: of the last PCMD obeyed; pwm: of the four motors; at_gap_ms: between the last two AT datagrams.
+    """
 
     word: int = 0
     control_state: int = 2 << 16
-    motors_on: bool = False
+    pwm: tuple[int, int, int, int] = (0, 0, 0, 0)
     pcmd_sequence: int = 0
     at_sequence: int = 0
+    at_gap_ms: int = 0
 
 
 class _Packet:
     """A buffer with the given options, zero but for constants, and the offset of each."""
 
-    def __init__(self, tags: list[int]) -> None:
-        sizes = OPTION_SIZES[PROFILE]
+    def __init__(self, firmware: Firmware, mask: int) -> None:
+        sizes = firmware.sizes
+        tags = [tag for tag in sorted(sizes) if mask >> tag & 1]
         self.at: dict[int, int] = {}
         offset = _HEADER.size
         for tag in tags:
@@ -96,11 +103,13 @@ _CONSTANTS: tuple[tuple[int, int, str, tuple[float, ...]], ...] = (
 class NavdataWriter:
     """Writes the packets of one drone; the returned buffers are reused by the next call."""
 
-    def __init__(self) -> None:
-        self._status = _Packet([])
-        self._full = _Packet(sorted(OPTION_SIZES[PROFILE]))
-        self._demo = _Packet([_DEMO, _VISION_DETECT])
+    def __init__(self, firmware: Firmware = FIRMWARES[DEFAULT]) -> None:
+        self._firmware = firmware
+        self._status = _Packet(firmware, 0)
+        self._full = _Packet(firmware, -1)
+        self._demo = _Packet(firmware, DEFAULT_OPTIONS)
         self._mask = DEFAULT_OPTIONS
+        self._last, self._word = self._status, 0
 
     def status(self, word: int, sequence: int) -> bytearray:
         """Return a packet of header and checksum only."""
@@ -110,24 +119,32 @@ class NavdataWriter:
         """Return the packet of demo mode with the options of the mask; DEMO and VISION_DETECT always come."""
         if mask != self._mask:
             self._mask = mask
-            wanted = mask | DEFAULT_OPTIONS
-            self._demo = _Packet([tag for tag in sorted(OPTION_SIZES[PROFILE]) if wanted >> tag & 1])
+            self._demo = _Packet(self._firmware, mask | DEFAULT_OPTIONS)
         return self._fill(self._demo, state, onboard, ticks, sequence)
 
     def full(self, state: NavdataState, onboard: Onboard, ticks: int, sequence: int) -> bytearray:
-        """Return the packet of full mode: all 28 options, 1916 bytes."""
+        """Return the packet of full mode: all options of the firmware."""
         return self._fill(self._full, state, onboard, ticks, sequence)
+
+    def again(self, sequence: int) -> bytearray:
+        """Return the last packet that was not a status with another number, for the next client."""
+        return self._last.finish(self._word, sequence)
 
     def _fill(self, packet: _Packet, state: NavdataState, onboard: Onboard, ticks: int, sequence: int) -> bytearray:
         buffer, at = packet.buffer, packet.at
         theta, phi, psi = -onboard.pitch * _MDEG, onboard.roll * _MDEG, -onboard.yaw * _MDEG
+        height_mm = round(onboard.height * 1000)
+        if self._firmware.generation == 1:
+            height_mm = height_mm or round(onboard.echo * 1000)  # WIRE: a real AR.Drone 1 says 261 mm on the floor
         _DEMO_FIELDS.pack_into(
             buffer, at[_DEMO] + 4, state.control_state, round(onboard.battery * 100), theta, phi, psi,
-            round(onboard.height * 1000), onboard.vx * 1000, -onboard.vy * 1000, 0.0,
+            height_mm, onboard.vx * 1000, -onboard.vy * 1000, 0.0, ticks * _PICTURES_PER_SECOND // 200,
         )  # fmt: skip
         if len(at) > 2:
             _fill_measures(buffer, at, onboard, ticks)
-            _fill_control(buffer, at, state, psi)
+            _fill_height(buffer, at, onboard, height_mm)
+            _fill_control(buffer, at, state, onboard, self._firmware.generation == 2)
+        self._last, self._word = packet, state.word
         return packet.finish(state.word, sequence)
 
 
@@ -146,28 +163,37 @@ def _fill_measures(buffer: bytearray, at: dict[int, int], onboard: Onboard, tick
             *(max(-32768, min(32767, round(939.0 * g))) for g in (gx, -gy, -gz)),
         )  # fmt: skip
         _WORD.pack_into(buffer, at[_RAW] + 20, round(11000 + 1400 * onboard.battery))
-        _SIGNED.pack_into(buffer, at[_RAW] + 46, round(onboard.height * 1000) or _GROUND_ECHO_MM)
     if _PHYS in at:
         _PHYS_FIELDS.pack_into(
             buffer, at[_PHYS] + 10, fx * _MG, -fy * _MG, -fz * _MG, gx * _DEG, -gy * _DEG, -gz * _DEG
         )
     if _EULER in at:  # from the accelerometers alone
         _EULER_FIELDS.pack_into(buffer, at[_EULER] + 4, math.atan2(fx, fz) * _MDEG, math.atan2(fy, fz) * _MDEG)
+
+
+def _fill_height(buffer: bytearray, at: dict[int, int], onboard: Onboard, height_mm: int) -> None:
+    # WIRE: on the ground the ultrasound still reads about 240 mm while DEMO says 0.
+    echo_mm = round(onboard.echo * 1000)
     if _ALTITUDE in at:
-        height = round(onboard.height * 1000)
-        _ALTITUDE_FIELDS.pack_into(
-            buffer, at[_ALTITUDE] + 4, height, onboard.vz * 1000, height, height or _GROUND_ECHO_MM
-        )
+        _ALTITUDE_FIELDS.pack_into(buffer, at[_ALTITUDE] + 4, height_mm, onboard.vz * 1000, height_mm, echo_mm)
+    if _KALMAN in at:
+        _KALMAN_FIELDS.pack_into(buffer, at[_KALMAN] + 8, height_mm, onboard.vz)
+        _WORD.pack_into(buffer, at[_KALMAN] + 52, onboard.rejected)
 
 
-def _fill_control(buffer: bytearray, at: dict[int, int], state: NavdataState, psi_mdeg: float) -> None:
+def _fill_control(buffer: bytearray, at: dict[int, int], state: NavdataState, onboard: Onboard, second: bool) -> None:
+    if _PWM in at:
+        _PWM_FIELDS.pack_into(buffer, at[_PWM] + 4, *state.pwm)
+    if _VISION in at:
+        _VELOCITY_FIELDS.pack_into(buffer, at[_VISION] + 52, onboard.vx * 1000, -onboard.vy * 1000, 0.0)
+    if _VIDEO_STREAM in at:
+        _AT_FIELDS.pack_into(buffer, at[_VIDEO_STREAM] + 13, state.at_sequence & 0xFFFFFFFF, state.at_gap_ms)
+    if not second:
+        return  # WIRE: the fields below lie beyond the shorter options of an AR.Drone 1
     if _REFERENCES in at:
         _SIGNED.pack_into(buffer, at[_REFERENCES] + 84, state.pcmd_sequence)
-    if _PWM in at:
-        pwm = 170 if state.motors_on else 0  # 67 % of 255 carries an AR2 with its indoor hull
-        struct.pack_into("<4B", buffer, at[_PWM] + 4, pwm, pwm, pwm, pwm)
+    if _RAW in at:
+        _SIGNED.pack_into(buffer, at[_RAW] + 46, round(onboard.echo * 1000))
     if _MAGNETO in at:  # WIRE: degrees, whatever the SDK header says; fusion equals psi
-        heading = psi_mdeg / 1000
+        heading = -onboard.yaw * _DEG
         _MAGNETO_FIELDS.pack_into(buffer, at[_MAGNETO] + 46, heading, heading, heading)
-    if _VIDEO_STREAM in at:
-        _WORD.pack_into(buffer, at[_VIDEO_STREAM] + 13, state.at_sequence & 0xFFFFFFFF)

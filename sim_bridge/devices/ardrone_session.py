@@ -1,15 +1,12 @@
-"""The link to one client as the drone keeps it: bootstrap, sequence rules, command ack, watchdogs. Pure."""
+"""The command link of an emulated AR.Drone: sequence rules, command ack, watchdogs. Pure."""
 
 from enum import Enum, auto
 
 COM_WATCHDOG_NS = 50_000_000
 COM_LOST_NS = 2_000_000_000
 LAND_AFTER_LOST_NS = 1_000_000_000
-_BOOTSTRAP_PATIENCE_NS = 1_000_000_000
 # WIRE: an ack that comes and goes within one packet is missed by real clients: hold bit 6 for two.
-_ACK_PACKETS = 2
-
-Address = tuple[str, int]
+ACK_PACKETS = 2
 
 
 class Link(Enum):
@@ -21,34 +18,21 @@ class Link(Enum):
 
 
 class Session:
-    """One client's session; times are of the emulator's clock [ns]."""
+    """Whoever sends commands; times are of the emulator's clock [ns]."""
 
     def __init__(self) -> None:
-        self.client: Address | None = None
-        self.bootstrap = True
-        self.navdata_sequence = 0
         self.at_sequence = 0
         self.ack = False
+        self.mean_gap_ms = 0
         self._last_at_ns: int | None = None
-        self._last_request_ns = 0
         self._fresh = True
         self._ack_packets = 0
         self._ack_cleared = False
-        self._configured_ns: int | None = None
-
-    def request(self, client: Address, now_ns: int) -> bool:
-        """Take a navdata request; returns whether it opened a new session (True) or was repeated (False)."""
-        self._last_request_ns = now_ns
-        if client == self.client:
-            return False
-        self.client = client
-        self.bootstrap = True
-        self.navdata_sequence = 0
-        self._configured_ns = None
-        return True
 
     def hear(self, now_ns: int) -> None:
         """Note an AT datagram, whatever it holds: any traffic feeds the watchdogs."""
+        if self._last_at_ns is not None:
+            self.mean_gap_ms = (now_ns - self._last_at_ns) // 1_000_000
         self._last_at_ns = now_ns
 
     def accept(self, sequence: int) -> bool:
@@ -71,18 +55,10 @@ class Session:
         return COM_LOST_NS * 1000 if self._last_at_ns is None else now_ns - self._last_at_ns
 
     def forget_silent(self, now_ns: int) -> None:
-        """Drop a client that neither commands nor asks for 2 s: it has to ask for navdata again, with any number."""
-        if self.silence_ns(now_ns) <= COM_LOST_NS:
-            return
-        self.at_sequence = 0
-        self._fresh = True
-        if self.client is None or now_ns - self._last_request_ns <= COM_LOST_NS:
-            return
-        self.client = None
-        self.bootstrap = True
-        self.navdata_sequence = 0
-        self.ack = False
-        self._configured_ns = None
+        """After 2 s without commands, take any sequence number for the next."""
+        if self.silence_ns(now_ns) > COM_LOST_NS:
+            self.at_sequence = 0
+            self._fresh = True
 
     def raise_ack(self) -> None:
         """Set the command bit."""
@@ -95,26 +71,15 @@ class Session:
         self._ack_cleared = True
         self._settle_ack()
 
-    def configured(self, now_ns: int) -> None:
-        """Note that the client has chosen its navdata mode."""
-        if self.bootstrap and self._configured_ns is None:
-            self._configured_ns = now_ns
-
-    def leave_bootstrap(self, now_ns: int) -> None:
-        """End the bootstrap when the mode is chosen and acknowledged; clients that never acknowledge wait 1 s."""
-        if self.bootstrap and self._configured_ns is not None:
-            self.bootstrap = self.ack and now_ns - self._configured_ns < _BOOTSTRAP_PATIENCE_NS
-
-    def next_packet(self) -> int:
-        """Return the sequence number of the navdata packet about to be sent."""
-        self.navdata_sequence += 1
-        return self.navdata_sequence
+    def drop_ack(self) -> None:
+        """Clear the command bit at once: nobody is left to see it."""
+        self.ack = self._ack_cleared = False
 
     def sent(self) -> None:
-        """Note that a packet has gone out."""
+        """Note that a packet has gone out to everybody who listens."""
         self._ack_packets += self.ack
         self._settle_ack()
 
     def _settle_ack(self) -> None:
-        if self._ack_cleared and self._ack_packets >= _ACK_PACKETS:
+        if self._ack_cleared and self._ack_packets >= ACK_PACKETS:
             self.ack = self._ack_cleared = False

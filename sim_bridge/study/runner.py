@@ -61,6 +61,8 @@ class Study:
         self._tick_every = round(1e9 / field["estimator"]["rate_hz"]) // TICK_NS
         self._plan_every = round(1e9 / field["planner"]["rate_hz"]) // TICK_NS
         world = self.world
+        for onboard in world.onboard.values():
+            onboard.trim()  # as the driver does at connect
         lifetime = field["safety"]["setpoint_lifetime_ms"] / 1000
         self._links = {n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.copters.items()}
         self._telemetry: dict[str, Telemetry | CopterLink] = {

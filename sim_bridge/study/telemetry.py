@@ -13,6 +13,7 @@ _STATES = {
     Phase.HOVERING: FlightState.HOVERING,
     Phase.FLYING: FlightState.FLYING,
     Phase.BRAKING: FlightState.FLYING,
+    Phase.LOOPING: FlightState.FLYING,
     Phase.LANDING: FlightState.LANDING,
     Phase.CUT: FlightState.EMERGENCY,
 }

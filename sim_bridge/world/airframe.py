@@ -106,6 +106,23 @@ class Airframe:
         self.pitch += self.pitch_rate * tick_s
         self.yaw = math.remainder(self.yaw + self.yaw_rate * tick_s, math.tau)
 
+    def tumble(self, tick_s: float, roll_rate: float, pitch_rate: float) -> None:
+        """Turn over in free fall for one tick [rad/s]; a drone that meets the floor so stands on it again."""
+        self.roll_rate, self.pitch_rate, self.yaw_rate = roll_rate, pitch_rate, 0.0
+        self.roll = math.remainder(self.roll + roll_rate * tick_s, math.tau)
+        self.pitch = math.remainder(self.pitch + pitch_rate * tick_s, math.tau)
+        self.ax, self.ay, self.az = 0.0, 0.0, -GRAVITY_M_S2
+        self.vz += self.az * tick_s
+        self.x += self.vx * tick_s
+        self.y += self.vy * tick_s
+        self.z += self.vz * tick_s
+        if self.z <= STANDING_HEIGHT_M:
+            self.stand()
+
+    def level(self) -> None:
+        """End a tumble upright."""
+        self.roll = self.pitch = self.roll_rate = self.pitch_rate = 0.0
+
     def stand(self) -> None:
         """Come to rest on the floor, level."""
         self.z = STANDING_HEIGHT_M

@@ -6,6 +6,7 @@ from enum import Enum, auto
 
 from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import DelayLine, Draw, GaussMarkov
+from sim_bridge.world.stunts import FLIP_KICK_M_S2, FLIP_KICK_S, FLIP_TURN_S, FLIPS, Animation, motion_at
 
 # Profile of a recorded take-off: motors idle, lift-off at 3.1 s, 0.62 m at 3.77 s, peak 0.82 m, settled at 0.76 m.
 LIFT_OFF_S = 3.1
@@ -19,6 +20,8 @@ _HEIGHT_GAIN = 0.8
 _BRAKE_GAIN, _HOLD_GAIN = 2.2, 1.0
 _BRAKED_M_S = 0.1
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
+# The magnetometer is calibrated by one turn on the spot.
+_CALIBRATION_RAD_S, _CALIBRATION_S = -math.tau / 4.0, 4.1
 
 
 class Phase(Enum):
@@ -29,11 +32,13 @@ class Phase(Enum):
     HOVERING = auto()
     FLYING = auto()
     BRAKING = auto()
+    LOOPING = auto()
     LANDING = auto()
     CUT = auto()
 
 
-AIRBORNE = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING, Phase.LANDING})
+AIRBORNE = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING, Phase.LOOPING, Phase.LANDING})
+_STEERED = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING})
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +53,13 @@ class FlightLimits:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """References while FLYING [rad, rad, m/s, rad/s; FLU]."""
+    """References while FLYING [rad, rad, m/s, rad/s; FLU]; coordinated: turns bank like an aircraft's."""
 
     roll_rad: float
     pitch_rad: float
     climb_m_s: float
     yaw_rate_rad_s: float
+    coordinated: bool = False
 
 
 class Autopilot:
@@ -69,6 +75,8 @@ class Autopilot:
         self._delayed: DelayLine[Motion | None] = DelayLine(COMMAND_DELAY_S, tick_s, None)
         self._held_height_m: float | None = None
         self._drift = (0.0, 0.0)
+        self._stunt: Animation | None = None
+        self._stunt_s = self._stunt_end_s = self._calibration_s = 0.0
         # Optical flow is biased for seconds at a time: that is why a hovering drone wanders.
         self._flow_error = (GaussMarkov(0.015, 8.0, tick_s, draw), GaussMarkov(0.015, 8.0, tick_s, draw))
 
@@ -76,6 +84,16 @@ class Autopilot:
     def motors_on(self) -> bool:
         """Whether the propellers turn."""
         return self.phase not in (Phase.LANDED, Phase.CUT)
+
+    @property
+    def since_s(self) -> float:
+        """Return how long the phase has lasted."""
+        return self._since_s
+
+    @property
+    def calibrating(self) -> bool:
+        """Whether it turns to calibrate the magnetometer."""
+        return self._calibration_s > 0.0 and self.phase is Phase.HOVERING
 
     def take_off(self) -> None:
         """Start the motors, if landed."""
@@ -106,11 +124,26 @@ class Autopilot:
             _clamp(motion.pitch_rad, limits.tilt_rad),
             _clamp(motion.climb_m_s, limits.climb_m_s),
             _clamp(motion.yaw_rate_rad_s, limits.yaw_rate_rad_s),
+            motion.coordinated,
         )
 
     def hover(self) -> None:
         """Brake and hold position by optical flow."""
         self._wanted = None
+
+    def animate(self, animation: Animation, duration_s: float) -> None:
+        """Perform an animation; ignored on the ground, in transitions and during another one."""
+        if self.phase not in _STEERED or self._stunt is not None:
+            return
+        self._stunt, self._stunt_s, self._stunt_end_s = animation, 0.0, duration_s
+        if animation in FLIPS:
+            self._enter(Phase.LOOPING)
+            self._stunt = animation
+
+    def calibrate(self) -> None:
+        """Turn once on the spot; only while hovering."""
+        if self.phase is Phase.HOVERING:
+            self._calibration_s = _CALIBRATION_S
 
     def step(self, push: tuple[float, float, float]) -> None:
         """Advance the airframe by one tick; push: acceleration by the air [m/s^2; world]."""
@@ -125,6 +158,8 @@ class Autopilot:
                 self._step_take_off(push)
             case Phase.LANDING:
                 self._step_landing(push)
+            case Phase.LOOPING:
+                self._step_flip(push)
             case Phase.HOVERING | Phase.FLYING | Phase.BRAKING:
                 self._step_flight(motion, push)
 
@@ -134,6 +169,9 @@ class Autopilot:
             self._since_s = 0.0
             self._drift = (0.0, 0.0)
             self._held_height_m = None
+            self._calibration_s = 0.0
+            if phase is not Phase.FLYING:
+                self._stunt = None
 
     def _fall(self, push: tuple[float, float, float]) -> None:
         if not self._airframe.on_ground:
@@ -159,18 +197,48 @@ class Autopilot:
 
     def _step_flight(self, motion: Motion | None, push: tuple[float, float, float]) -> None:
         body = self._airframe
+        if self._stunt is not None:
+            motion = self._perform(self._stunt)
         if motion is None:
             if self.phase is Phase.FLYING:
                 self._enter(Phase.BRAKING)
             elif self.phase is Phase.BRAKING and math.hypot(body.vx, body.vy) < _BRAKED_M_S:
                 self._enter(Phase.HOVERING)
-            body.step(self._tick_s, self._hover_tilt(), self._climb(0.0), 0.0, push)
+            turn = _CALIBRATION_RAD_S if self.calibrating else 0.0
+            self._calibration_s -= self._tick_s
+            body.step(self._tick_s, self._hover_tilt(), self._climb(0.0), turn, push)
         else:
             self._enter(Phase.FLYING)
-            tilt = (motion.roll_rad, motion.pitch_rad)
+            roll = motion.roll_rad + (self._bank(motion.yaw_rate_rad_s) if motion.coordinated else 0.0)
+            tilt = (roll, motion.pitch_rad)
             body.step(self._tick_s, tilt, self._climb(motion.climb_m_s), motion.yaw_rate_rad_s, push)
         if body.on_ground:
             self._enter(Phase.LANDED)
+
+    def _perform(self, stunt: Animation) -> Motion | None:
+        """Return the references of an animation, None at its end."""
+        self._stunt_s += self._tick_s
+        if self._stunt_s > self._stunt_end_s:
+            self._stunt = self._wanted = None
+            return None
+        return Motion(*motion_at(stunt, self._stunt_s))
+
+    def _step_flip(self, push: tuple[float, float, float]) -> None:
+        body, stunt = self._airframe, self._stunt
+        if self._since_s <= FLIP_KICK_S or stunt is None:
+            body.step(self._tick_s, (0.0, 0.0), FLIP_KICK_M_S2, 0.0, push)
+        elif self._since_s <= FLIP_KICK_S + FLIP_TURN_S:
+            roll, pitch = FLIPS[stunt]
+            rate = math.tau / FLIP_TURN_S
+            body.tumble(self._tick_s, roll * rate, pitch * rate)
+        else:
+            body.level()
+            self._enter(Phase.BRAKING)
+
+    def _bank(self, yaw_rate_rad_s: float) -> float:
+        """Return the roll that carries the present forward speed around a turn."""
+        forward, _ = self._airframe.velocity_stabilized()
+        return _clamp(-math.atan(forward * yaw_rate_rad_s / GRAVITY_M_S2), self.limits.tilt_rad)
 
     def _climb(self, climb_m_s: float) -> float:
         """Return the vertical acceleration that follows a climb rate, or holds the height when it is zero."""

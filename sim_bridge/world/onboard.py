@@ -14,13 +14,19 @@ from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
 
 LIFT_OFF_SEEN_M = 0.2  # the ultrasound reads nothing below
+GROUND_ECHO_M = 0.243  # what it still says on the floor
 _HEIGHT_TICKS = 3  # a new height about every 15 ms
+# Echoes of a neighbour's ultrasound: how often they come, and how far from the height one may be to be believed.
+_FOREIGN_ECHOES, _BELIEVED_M = 0.25, 0.15
 _HEIGHT_CORRELATION_S = 2.0
 _HEIGHT_WHITE_M = 0.005
 _VELOCITY_CORRELATION_S = 0.4
 _ACCELEROMETER_GAIN = 0.92
-_GYRO_NOISE_RAD_S, _ACCELEROMETER_NOISE_M_S2 = 0.03, 0.045
-_STILL_SHARE = 0.03  # of those noises while the motors are off
+# Recorded noise of the gyros [rad/s] and accelerometers [m/s^2], x y z: motors off, idling on the floor, in flight.
+_STILL = ((7.5e-4, 7.5e-4, 7.5e-4), (0.031, 0.001, 0.017))
+_IDLING = ((0.016, 0.016, 0.048), (0.13, 0.10, 0.07))
+_FLYING = ((0.031, 0.032, 0.044), (0.045, 0.045, 0.045))
+_Noise = tuple[float, float, float]
 _YAW_DRIFT_RAD_S = math.radians(0.0185)
 
 
@@ -35,16 +41,31 @@ class Onboard:
     """Readings of one drone after each `step`; never the true values.
 
     vx, vy [m/s; base_stabilized, FLU], vz; height [m], 0 on the floor; roll, pitch [rad; FLU];
-    yaw [rad, counter-clockwise, from power-on, jumps once at lift-off]; gyros [rad/s], accelerometers [m/s^2; base];
-    battery 0..1.
+    yaw [rad, counter-clockwise, from power-on, jumps once at lift-off if there is a magnetometer]; gyros [rad/s],
+    accelerometers [m/s^2; base]; echo [m], what the ultrasound alone says; rejected, echoes not believed in a row;
+    battery 0..1. Until `trim` the attitude is off by what the factory left.
     """
 
-    def __init__(self, scenario: DroneScenario, tick_s: float, start: Airframe, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        scenario: DroneScenario,
+        tick_s: float,
+        start: Airframe,
+        rng: np.random.Generator,
+        magnetometer: bool = True,
+    ) -> None:
         draw = self._draw = standard_normals(rng)
         self.velocity_gain = float(rng.uniform(*scenario.velocity_gain))
         self.velocity_delay_s = float(rng.uniform(*scenario.velocity_delay_ms)) / 1000
         jump = math.radians(float(rng.uniform(*scenario.yaw_jump_at_lift_off_deg)))
         self.yaw_jump_rad = jump if rng.random() < 0.5 else -jump
+        # A generator of its own: what is drawn for one thing does not change the others.
+        (aside,) = rng.spawn(1)
+        bias = math.radians(scenario.attitude_bias_deg)
+        self._level = (float(aside.normal(0.0, bias)), float(aside.normal(0.0, bias)))
+        self._chance = aside.random
+        self._magnetometer = magnetometer
+        self.echo, self.rejected = GROUND_ECHO_M, 0
         self.vx = self.vy = self.vz = self.height = self.roll = self.pitch = self.yaw = 0.0
         self.gyros = self.accelerometers = (0.0, 0.0, 0.0)
         self.battery = 1.0
@@ -66,8 +87,15 @@ class Onboard:
         self._wander = GaussMarkov(wander, scenario.yaw_wander_correlation_s, tick_s, draw)
         self._yaw_offset -= self._wander.value
 
-    def step(self, drone: Senses, motors_on: bool) -> None:
-        """Measure the true state once; call it once per tick."""
+    def trim(self) -> None:
+        """Take the present attitude as level; the drone stands on the floor."""
+        self._level = (0.0, 0.0)
+
+    def step(self, drone: Senses, motors_on: bool, crosstalk: bool = False) -> None:
+        """Measure the true state once; call it once per tick.
+
+        crosstalk: another drone's ultrasound of the same rate is in reach.
+        """
         body = drone.airframe
         draw = self._draw
         forward, left = self._velocity.push(body.velocity_stabilized())
@@ -77,36 +105,48 @@ class Onboard:
             self.vy = gain * left + self._slow[1].step() + white * draw()
         else:
             self.vx = self.vy = 0.0
-        self._measure_height(body)
-        self.roll = body.roll + self._tilt_error[0].step()
-        self.pitch = body.pitch + self._tilt_error[1].step()
+        self._measure_height(body, crosstalk)
+        self.roll = body.roll + self._level[0] + self._tilt_error[0].step()
+        self.pitch = body.pitch + self._level[1] + self._tilt_error[1].step()
         self._measure_yaw(body)
-        self._measure_inertia(body, 1.0 if motors_on else _STILL_SHARE)
+        self._measure_inertia(body, (_IDLING if body.on_ground else _FLYING) if motors_on else _STILL)
         self.battery = drone.battery
         self._ticks += 1
 
-    def _measure_height(self, body: Airframe) -> None:
+    def _measure_height(self, body: Airframe, crosstalk: bool) -> None:
         height, climb = self._vertical.push((body.z, body.vz))
         if self._ticks % _HEIGHT_TICKS:
             return
         error = self._height_error.step() + _HEIGHT_WHITE_M * self._draw()
         if height <= STANDING_HEIGHT_M + 1e-6:
             self.height = self.vz = 0.0
-        else:
-            self.height = max(0.0, height + error) if height > LIFT_OFF_SEEN_M else 0.0
-            self.vz = climb + 0.05 * self._draw()
+            self.echo, self.rejected = GROUND_ECHO_M, 0
+            return
+        self.vz = climb + 0.05 * self._draw()
+        seen = height > LIFT_OFF_SEEN_M
+        self.echo = max(0.0, height + error) if seen else GROUND_ECHO_M
+        believed = self.echo if seen else 0.0
+        if crosstalk and self._chance() < _FOREIGN_ECHOES:
+            self.echo = GROUND_ECHO_M + (2.0 * height) * self._chance()
+            if abs(self.echo - believed) > _BELIEVED_M and self.height > 0.0:
+                self.rejected += 1
+                self.height += self.vz * self._tick_s * _HEIGHT_TICKS
+                return
+            believed = self.echo
+        self.rejected = 0
+        self.height = believed
 
     def _measure_yaw(self, body: Airframe) -> None:
         if not self._jumped and body.z > LIFT_OFF_SEEN_M:
             self._jumped = True  # the magnetometer is switched in
-            self._yaw_offset += self.yaw_jump_rad
+            self._yaw_offset += self.yaw_jump_rad if self._magnetometer else 0.0
         self._yaw_offset += _YAW_DRIFT_RAD_S * self._tick_s
         self.yaw = math.remainder(body.yaw + self._yaw_offset + self._wander.step(), math.tau)
 
-    def _measure_inertia(self, body: Airframe, share: float) -> None:
-        draw, turn, shake = self._draw, share * _GYRO_NOISE_RAD_S, share * _ACCELEROMETER_NOISE_M_S2
+    def _measure_inertia(self, body: Airframe, noise: tuple[_Noise, _Noise]) -> None:
+        draw, ((tx, ty, tz), (sx, sy, sz)) = self._draw, noise
         wx, wy, wz = body.body_rates()
-        self.gyros = (wx + turn * draw(), wy + turn * draw(), wz + turn * draw())
+        self.gyros = (wx + tx * draw(), wy + ty * draw(), wz + tz * draw())
         fx, fy, fz = (0.0, 0.0, GRAVITY_M_S2) if body.on_ground else body.specific_force()
         gain = _ACCELEROMETER_GAIN
-        self.accelerometers = (gain * fx + shake * draw(), gain * fy + shake * draw(), gain * fz + shake * draw())
+        self.accelerometers = (gain * fx + sx * draw(), gain * fy + sy * draw(), gain * fz + sz * draw())

@@ -12,7 +12,10 @@ _UNREST_CORRELATION_S = 0.8
 
 
 class Quadrotor:
-    """A drone standing on its pad. `autopilot` takes the requests, `airframe` holds the true state."""
+    """A drone standing on its pad. `autopilot` takes the requests, `airframe` holds the true state.
+
+    ultrasound_code: rate of its ultrasound as configured (7: 22.22 Hz, 8: 25 Hz); those of one rate disturb each other.
+    """
 
     def __init__(
         self,
@@ -25,6 +28,7 @@ class Quadrotor:
         draw = standard_normals(rng)
         self.airframe = Airframe(*pad_m, yaw_rad)
         self.autopilot = Autopilot(self.airframe, tick_s, draw)
+        self.ultrasound_code = 8
         self.battery = float(rng.uniform(*scenario.battery))
         self._drain = scenario.battery_drain_per_min / 60.0 * tick_s
         self._unrest = tuple(

@@ -1,5 +1,9 @@
 """The room with everything that moves in it, advanced in fixed steps of 5 ms; no clock of its own."""
 
+import itertools
+import math
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +19,9 @@ from sim_bridge.world.unicycle import Unicycle
 TICK_S = 0.005
 TICK_NS = 5_000_000
 _STILL_AIR = (0.0, 0.0, 0.0)
+# How far a drone's ultrasound disturbs another's, and how often that is looked at.
+CROSSTALK_M = 2.0
+_CROSSTALK_TICKS = 8
 
 
 class World:
@@ -35,12 +42,15 @@ class World:
             body = Quadrotor(drone.pad_m, drone.pad_yaw_rad, scenario.drones, TICK_S, generator_of(seed, name))
             self.drones[name] = body
             sensors = generator_of(seed, f"{name}/onboard")
-            self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors)
+            magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
+            self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
         self.target_name = site.target.name
         self.target = Unicycle(scenario.target, TICK_S, generator_of(seed, site.target.name))
         self._departs_after_s = scenario.target.departs_after_team_s or 0.0
         self._together_s = 0.0
         self._downwash = scenario.drones.downwash
+        self._crosstalk = scenario.drones.ultrasound_crosstalk
+        self._disturbed: frozenset[str] = frozenset()
         self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         self._states = np.zeros((len(self.bodies), WIDTH))
 
@@ -58,13 +68,15 @@ class World:
         """Advance everything by one tick."""
         drones = self.drones
         wakes = {name: self._wake(name) for name in drones} if self._downwash and len(drones) > 1 else {}
+        if self._crosstalk and self.ticks % _CROSSTALK_TICKS == 0:
+            self._disturbed = _disturbed(self.ardrones)
         for name, drone in drones.items():
             drone.step(wakes.get(name, _STILL_AIR))
             drone.airframe.confine(*self._half_room)
             if isinstance(drone, Copter):
                 drone.estimate.step(drone.airframe, drone.motors_on)
             else:
-                self.onboard[name].step(drone, drone.autopilot.motors_on)
+                self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed)
         self._let_target_depart()
         self.target.step()
         self.target.confine(self._half_room[0], self._half_room[1])
@@ -102,6 +114,17 @@ class World:
             if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
                 strongest = push  # wakes do not add
         return strongest
+
+
+def _disturbed(drones: Mapping[str, Quadrotor]) -> frozenset[str]:
+    """Return the flying drones that have another one of the same ultrasound rate near them."""
+    flying = [(name, drone) for name, drone in drones.items() if drone.airborne]
+    near = set()
+    for (name, drone), (other_name, other) in itertools.combinations(flying, 2):
+        a, b = drone.airframe, other.airframe
+        if drone.ultrasound_code == other.ultrasound_code and math.hypot(a.x - b.x, a.y - b.y) < CROSSTALK_M:
+            near |= {name, other_name}
+    return frozenset(near)
 
 
 def _copter(drone: SiteDrone, identity: MavlinkIdentity, scenario: Scenario, rng: np.random.Generator) -> Copter:

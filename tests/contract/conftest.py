@@ -66,8 +66,7 @@ class Bench:
         """Advance by 5 ms each and return the packets that came."""
         came = []
         for _ in range(count):
-            self.emulator.receive_navdata_requests()
-            self.emulator.receive_commands()
+            self.emulator.receive()
             self.world.step()
             self.emulator.send()
             came += self.receive(self.navdata)

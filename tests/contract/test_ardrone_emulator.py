@@ -240,10 +240,35 @@ def test_two_seconds_of_silence_end_the_stream(bench: Any) -> None:
     assert bench.state & COM_LOST
 
 
-def test_a_new_client_takes_over(bench: Any) -> None:
+def test_a_second_client_is_served_beside_the_first(bench: Any) -> None:
     bench.connect()
     other = bench.client()
     other.sendto(b"\x01", (bench.address, 5554))
-    assert bench.tick(14) == []
-    assert struct.unpack_from("<I", bench.receive(other)[0], 8)[0] == 1
+    assert len(bench.tick(14)) == 14, "the first is not disturbed"
+    packet = bench.receive(other)[0]
+    assert struct.unpack_from("<I", packet, 8)[0] == 1, "counted by itself"
+    assert struct.unpack_from("<I", packet, 4)[0] & BOOTSTRAP
+    bench.keep(1.2)
+    bench.receive(other)
+    bench.tick(5)
+    packets = bench.receive(other)
+    assert len(packets[-1]) == 1916, "who only listens joins the stream that the other has chosen"
+    assert packets[-1][16:-8] == bench.packets[-1][16:-8], "the same readings"
+    sequences = [struct.unpack_from("<I", packet, 8)[0] for packet in packets]
+    assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
     other.close()
+
+
+def test_programs_that_restart_without_goodbye_do_not_pile_up(bench: Any) -> None:
+    bench.connect()
+    clients = [bench.client() for _ in range(9)]
+    for client in clients:
+        client.sendto(b"\x01", (bench.address, 5554))
+        bench.keep(0.05)
+    for client in clients:
+        bench.receive(client)
+    bench.keep(0.2)
+    served = [bool(bench.receive(client)) for client in clients]
+    assert served == [False] * 5 + [True] * 4, "the newest four"
+    for client in clients:
+        client.close()

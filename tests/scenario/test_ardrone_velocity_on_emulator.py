@@ -17,6 +17,7 @@ from drivers.authority import Action
 from groundstation.bus.messages import FlightState
 from sim_bridge.devices.ardrone_control import FlightControl
 from sim_bridge.devices.ardrone_navdata import NavdataState, NavdataWriter
+from sim_bridge.devices.ardrone_state import control_state, state_word
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.onboard import Onboard
@@ -48,8 +49,8 @@ class Flight:
         scenario = DroneScenario().model_copy(update=changes)
         self.drone = Quadrotor((0.0, 0.0), 0.4, scenario, TICK_S, generator_of(seed, "drone"))
         self.onboard = Onboard(scenario, TICK_S, self.drone.airframe, generator_of(seed, "onboard"))
-        self.control = FlightControl(self.drone)
-        self.control.session.request(("127.0.0.1", 1), 0)
+        self.control = FlightControl(self.drone, self.onboard)
+        self.listener = self.control.audience.request(("127.0.0.1", 1), 0)
         self.writer, self.state = NavdataWriter(), NavdataState()
         self.session = Session(partial(wishes, self.settings), ids_of("drone_1"), NoTcp())
         self.scale = scale_from_settings(self.settings)
@@ -71,11 +72,12 @@ class Flight:
     def hear(self):
         control, state, now_ns = self.control, self.state, self.ticks * TICK_NS
         control.watch(now_ns)
-        state.word, state.control_state = control.state_word(now_ns), control.control_state(now_ns)
-        if control.session.bootstrap:
-            datagram = self.writer.status(state.word, control.session.next_packet())
+        state.word = state_word(self.drone, control, now_ns, self.listener.bootstrap)
+        state.control_state = control_state(self.drone, control, now_ns)
+        if self.listener.bootstrap:
+            datagram = self.writer.status(state.word, self.listener.next_sequence())
         else:
-            datagram = self.writer.full(state, self.onboard, self.ticks, control.session.next_packet())
+            datagram = self.writer.full(state, self.onboard, self.ticks, self.listener.next_sequence())
         control.session.sent()
         self.packet = navdata.decode(bytes(datagram))
         motion, demo = motion_from_navdata(self.packet), self.packet.read(DEMO)

@@ -53,6 +53,7 @@ def long_hover() -> np.ndarray:
     for seed in range(12):
         puppet = Puppet().lift()
         onboard = sensors(puppet, seed)
+        onboard.trim()
         record(onboard, puppet, 1.0, "vx")
         runs.append(record(onboard, puppet, 60.0, "height", "roll", "pitch", "vx", "vy"))
     return np.array(runs)

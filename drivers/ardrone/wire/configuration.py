@@ -3,6 +3,7 @@
 WIRE: keys and defaults of the SDK 2.0.1 and of dumps of real drones (AR.Drone sheet 5.4).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -30,7 +31,10 @@ class Access(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One configuration key; the type of `default` is the type of the key."""
+    """One configuration key; the type of `default` is the type of the key.
+
+    generation: of the drones that have it, 0 for both; double: dumped with the digits of one.
+    """
 
     name: str
     default: Scalar
@@ -38,6 +42,8 @@ class Key:
     access: Access = Access.WRITE
     minimum: float | None = None
     maximum: float | None = None
+    generation: int = 0
+    double: bool = False
 
 
 _A, _U, _S = Category.APPLICATION, Category.USER, Category.SESSION
@@ -50,6 +56,11 @@ _KEYS = (
     Key("general:num_version_soft", "2.3.3", access=_READ),
     Key("general:drone_serial", "XXXXXXXXXX", access=_READ),
     Key("general:soft_build_date", "2013-01-01 00:00", access=_READ),
+    *(
+        Key(f"general:motor{motor}_{part}", value, access=_READ)
+        for motor in (1, 2, 3, 4)
+        for part, value in (("soft", "1.43"), ("hard", "5.0"), ("supplier", "1.1"))
+    ),
     Key("general:ardrone_name", "My ARDrone"),
     Key("general:flying_time", 0, access=_READ),
     Key("general:navdata_demo", False),
@@ -58,7 +69,30 @@ _KEYS = (
     Key("general:video_enable", True),
     Key("general:vision_enable", True),
     Key("general:vbat_min", 9000, access=_READ),
-    Key("general:localtime", 0),
+    Key("general:localtime", 0, generation=2),
+    # Calibration of one real drone's sensors: vectors and matrices are texts here.
+    Key("control:accs_offset", "{ -2.1043848e+03 2.0381230e+03 1.9920460e+03 }", access=_READ),
+    Key(
+        "control:accs_gains",
+        "{ 9.8449361e-01 7.0283208e-03 1.6613559e-02 -5.0721392e-03 9.9463403e-01 -8.1147715e-03 "
+        "-3.5212679e-03 -2.4381000e-02 9.8026478e-01 }",
+        access=_READ,
+    ),
+    Key("control:gyros_offset", "{ -2.2610001e+01 1.1600000e+01 3.0400000e+00 }", access=_READ),
+    Key("control:gyros_gains", "{ 1.0666636e-03 -1.0657152e-03 -1.0655431e-03 }", access=_READ),
+    Key("control:gyros110_offset", "{ 1.6625000e+03 1.6625000e+03 }", access=_READ),
+    Key("control:gyros110_gains", "{ 1.5271631e-03 -1.5271631e-03 }", access=_READ),
+    Key("control:magneto_offset", "{ 3.3430099e+01 -6.6152016e+01 8.9284515e+01 }", access=_READ, generation=2),
+    Key("control:magneto_radius", 2.0519073e02, access=_READ, generation=2),
+    Key("control:gyro_offset_thr_x", 4.0, access=_READ),
+    Key("control:gyro_offset_thr_y", 4.0, access=_READ),
+    Key("control:gyro_offset_thr_z", 0.5, access=_READ),
+    Key("control:pwm_ref_gyros", 500, access=_READ),
+    Key("control:osctun_value", 63, access=_READ),
+    Key("control:osctun_test", True, access=_READ),
+    Key("control:shield_enable", True, generation=1),
+    Key("control:brushless", True, access=_READ, generation=1),
+    Key("control:control_trim_z", 0.0, generation=1),
     Key("control:control_level", 0, _A),
     Key("control:euler_angle_max", 0.20943999, _U, _RW, 0.0, 0.52),
     Key("control:altitude_max", 3000, _COMMON, _RW, 500, 100000),
@@ -84,6 +118,15 @@ _KEYS = (
     Key("network:wifi_mode", 0),
     Key("network:wifi_rate", 0),
     Key("network:owner_mac", "00:00:00:00:00:00"),
+    Key("network:secure", False, generation=1),
+    Key("network:passkey", "9F1C3EE11CBA230B27BF1C1B6F", generation=1),
+    Key("network:navdata_port", 5554, generation=1),
+    Key("network:video_port", 5555, generation=1),
+    Key("network:at_port", 5556, generation=1),
+    Key("network:cmd_port", 5559, generation=1),
+    Key("network:owner_ip_address", 0, generation=1),
+    Key("network:local_ip_address", 0, generation=1),
+    Key("network:broadcast_address", 0, generation=1),
     Key("pic:ultrasound_freq", 8, _COMMON, _RW, 7, 8),
     Key("pic:ultrasound_watchdog", 3),
     Key("pic:pic_version", 184877090, access=_READ),
@@ -98,10 +141,10 @@ _KEYS = (
     Key("video:bitrate", 1000, _A, _CUSTOM),
     Key("video:max_bitrate", 1000, _S, _CUSTOM, 250, 4000),
     Key("video:bitrate_ctrl_mode", 0, _A, _CUSTOM),
-    Key("video:bitrate_storage", 4000, _A),
+    Key("video:bitrate_storage", 4000, _A, generation=2),
     Key("video:video_channel", 0, _S),
-    Key("video:video_on_usb", True),
-    Key("video:video_file_index", 1),
+    Key("video:video_on_usb", True, generation=2),
+    Key("video:video_file_index", 1, generation=2),
     Key("leds:leds_anim", "0,0,0"),
     Key("detect:enemy_colors", 1),
     Key("detect:groundstripe_colors", 16, _S),
@@ -113,10 +156,10 @@ _KEYS = (
     Key("syslog:output", 7),
     Key("syslog:max_size", 102400),
     Key("syslog:nb_files", 5),
-    Key("userbox:userbox_cmd", "0", _S),
-    Key("gps:latitude", 500.0, _S),
-    Key("gps:longitude", 500.0, _S),
-    Key("gps:altitude", 0.0, _S),
+    Key("userbox:userbox_cmd", "0", _S, generation=2),
+    Key("gps:latitude", 500.0, _S, generation=2, double=True),
+    Key("gps:longitude", 500.0, _S, generation=2, double=True),
+    Key("gps:altitude", 0.0, _S, generation=2, double=True),
     Key("custom:application_id", "00000000", _S),
     Key("custom:profile_id", "00000000", _S),
     Key("custom:session_id", "00000000", _S),
@@ -176,6 +219,23 @@ def format_value(value: Scalar) -> str:
     return str(value)
 
 
-def format_dump(values: dict[str, Scalar]) -> bytes:
+def format_dump(values: Mapping[str, Scalar]) -> bytes:
     """Return the configuration dump of TCP port 5559: `key = value` lines ended by a NUL."""
-    return "".join(f"{name} = {format_value(value)}\n" for name, value in values.items()).encode("latin-1") + b"\0"
+    lines = []
+    for name, value in values.items():
+        key = CONFIGURATION.get(name)
+        double = key is not None and key.double and isinstance(value, float)
+        lines.append(f"{name} = {f'{value:.16e}' if double else format_value(value)}\n")
+    return "".join(lines).encode("latin-1") + b"\0"
+
+
+def format_custom_dump(sets: Mapping[Category, Mapping[str, str]]) -> bytes:
+    """Return the answer to CTRL 6: the ids and descriptions of each category's sets.
+
+    WIRE: a header `[applis]`, `[profiles]`, `[sessions]`, then `id,description`, each ended by CR; a NUL at the end.
+    """
+    lines = []
+    for category, described in sets.items():
+        lines.append(f"[{category.value}]\r")
+        lines += [f"{name},{description}\r" for name, description in described.items()]
+    return "".join(lines).encode("latin-1", "replace") + b"\0"

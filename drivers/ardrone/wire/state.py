@@ -58,8 +58,11 @@ class ControlState(IntEnum):
     TRANS_LOOPING = 9
 
 
-# WIRE: minor states of HOVERING that mean "landing because the link was lost" (SDK control_states.h).
+# WIRE: some minor states (SDK control_states.h, AR.Drone sheet 4.2).
+TAKE_OFF_AUTO = 1
+FLYING_COMBINED_YAW = 4
 HOVERING_LOST_COM = 8
+HOVERING_MAGNETO_CALIB = 12
 
 
 def bit_names(word: int) -> tuple[str, ...]:

@@ -1,0 +1,115 @@
+"""The lesser ports of an emulated AR.Drone: configuration dump, version file, pairing."""
+
+import selectors
+import socket
+from contextlib import suppress
+
+from drivers.ardrone.wire.configuration import format_custom_dump, format_dump
+from groundstation.errors import GroundStationError
+from sim_bridge.devices.ardrone_config import Configuration
+from sim_bridge.devices.ardrone_ftp import FtpServer
+from sim_bridge.devices.ardrone_tcp import Connection, Selector, TcpPort, taken
+
+CONTROL_PORT = 5559
+VERSION_PORT = 5551
+DATA_PORT = 21
+PAIRING_PORT = 5552
+_PAIRING_DATAGRAMS = 8
+
+
+class ControlPort:
+    """TCP 5559: sends the configuration to everybody connected when it is asked for by CTRL."""
+
+    def __init__(self, name: str, address: str, selector: Selector) -> None:
+        self._port = TcpPort(name, address, CONTROL_PORT, selector, _Deaf)
+
+    @property
+    def connected(self) -> bool:
+        """Whether somebody would get a dump."""
+        return any(connection.open for connection in self._port.connections)
+
+    def dump(self, configuration: Configuration) -> None:
+        """Send all keys and values in force."""
+        self._send(format_dump(configuration.values))
+
+    def custom_dump(self, configuration: Configuration) -> None:
+        """Send ids and descriptions of all sets."""
+        self._send(format_custom_dump(configuration.descriptions))
+
+    def close(self) -> None:
+        """Close the port; idempotent."""
+        self._port.close()
+
+    def _send(self, text: bytes) -> None:
+        for connection in self._port.connections:
+            connection.send(text)
+
+
+class _Deaf:
+    """The control port listens to nobody: what to send is asked for by AT commands."""
+
+    def __init__(self, connection: Connection) -> None:
+        pass
+
+    def hear(self, data: bytes) -> None:
+        """Ignore what is said."""
+
+    def end(self) -> None:
+        """Nothing belongs to it."""
+
+
+class Pairing:
+    """UDP 5552: says yes to whoever wants to be paired. WIRE: `PARROT AUTH`, answered by `PARROT AUTH OK`."""
+
+    def __init__(self, name: str, address: str, selector: Selector) -> None:
+        self._selector = selector
+        self._udp = open_udp(name, address, PAIRING_PORT)
+        selector.register(self._udp, selectors.EVENT_READ, self._answer)
+
+    def close(self) -> None:
+        """Close the port."""
+        self._selector.unregister(self._udp)
+        self._udp.close()
+
+    def _answer(self, _mask: int) -> None:
+        with suppress(OSError):
+            for _ in range(_PAIRING_DATAGRAMS):
+                datagram, client = self._udp.recvfrom(64)
+                if datagram.startswith(b"PARROT AUTH"):
+                    self._udp.sendto(b"PARROT AUTH OK", client)
+
+
+class Ports:
+    """All of them; port 21 only where the operating system lets us have it."""
+
+    def __init__(self, name: str, address: str, selector: Selector, version: str) -> None:
+        self._opened: list[ControlPort | FtpServer | Pairing] = []
+        try:
+            self.control = ControlPort(name, address, selector)
+            self._opened.append(self.control)
+            files = {"version.txt": f"{version}\n".encode()}
+            self._opened.append(FtpServer(name, address, VERSION_PORT, selector, files))
+            self._opened.append(Pairing(name, address, selector))
+        except GroundStationError:
+            self.close()
+            raise
+        with suppress(GroundStationError):
+            self._opened.append(FtpServer(name, address, DATA_PORT, selector, {}))
+
+    def close(self) -> None:
+        """Close them."""
+        for port in self._opened:
+            port.close()
+        self._opened.clear()
+
+
+def open_udp(name: str, address: str, port: int) -> socket.socket:
+    """Return a bound datagram socket that never blocks; raises GroundStationError naming a port that is taken."""
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp.setblocking(False)
+    try:
+        udp.bind((address, port))
+    except OSError as error:
+        udp.close()
+        raise taken(name, address, port, "UDP", error) from error
+    return udp

@@ -1,0 +1,71 @@
+"""What the state word and the control state of an emulated AR.Drone say of it."""
+
+from drivers.ardrone.wire.state import (
+    FLYING_COMBINED_YAW,
+    HEALTHY,
+    HOVERING_LOST_COM,
+    HOVERING_MAGNETO_CALIB,
+    TAKE_OFF_AUTO,
+    ControlState,
+    StateBit,
+    join_control_state,
+)
+from sim_bridge.devices.ardrone_control import BATTERY_LOW, FlightControl
+from sim_bridge.devices.ardrone_session import Link
+from sim_bridge.world.autopilot import Phase
+from sim_bridge.world.quadrotor import Quadrotor
+
+_MAJOR = {
+    Phase.LANDED: ControlState.LANDED,
+    Phase.TAKING_OFF: ControlState.TRANS_TAKEOFF,
+    Phase.HOVERING: ControlState.HOVERING,
+    Phase.FLYING: ControlState.FLYING,
+    Phase.BRAKING: ControlState.TRANS_GOTOFIX,
+    Phase.LOOPING: ControlState.TRANS_LOOPING,
+    Phase.LANDING: ControlState.TRANS_LANDING,
+    Phase.CUT: ControlState.LANDED,
+}
+
+
+def state_word(drone: Quadrotor, control: FlightControl, now_ns: int, bootstrap: bool) -> int:
+    """Return the 32 bits of a packet's header for a client that is, or is not, in its bootstrap."""
+    autopilot, session = drone.autopilot, control.session
+    link = session.link(now_ns)
+    word = HEALTHY | StateBit.ALTITUDE
+    if control.firmware.generation == 2:
+        word |= StateBit.CAMERA  # WIRE: on an AR.Drone 1 the bit acknowledges a trim
+    if autopilot.motors_on or not drone.airframe.on_ground:
+        word |= StateBit.FLY | StateBit.VISION
+    if control.start:
+        word |= StateBit.USER_FEEDBACK_START
+    if session.ack:
+        word |= StateBit.COMMAND
+    if bootstrap:
+        word |= StateBit.NAVDATA_BOOTSTRAP
+    elif control.demo:
+        word |= StateBit.NAVDATA_DEMO
+    if drone.battery <= BATTERY_LOW:
+        word |= StateBit.VBAT_LOW
+    if link is not Link.ALIVE:
+        word |= StateBit.COM_WATCHDOG
+        if link is Link.LOST:
+            word |= StateBit.COM_LOST
+    if autopilot.phase is Phase.CUT:
+        word |= StateBit.EMERGENCY | (StateBit.CUTOUT if control.cut_out else StateBit.USER_EL)
+    return int(word)
+
+
+def control_state(drone: Quadrotor, control: FlightControl, now_ns: int) -> int:
+    """Return flight phase and minor state of the DEMO option."""
+    autopilot, minor = drone.autopilot, 0
+    phase = autopilot.phase
+    if phase is Phase.TAKING_OFF:
+        minor = TAKE_OFF_AUTO if drone.airborne else 0
+    elif phase is Phase.FLYING:
+        minor = FLYING_COMBINED_YAW if control.combined_yaw else 0
+    elif phase is Phase.HOVERING:
+        if autopilot.calibrating:
+            minor = HOVERING_MAGNETO_CALIB
+        elif control.session.link(now_ns) is Link.LOST:
+            minor = HOVERING_LOST_COM
+    return join_control_state(_MAJOR[phase], minor)

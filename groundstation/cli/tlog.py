@@ -6,11 +6,10 @@ from pathlib import Path
 from drivers.datagrams import unpack
 from groundstation.bus.topics import RAW_RX, RAW_TX
 from groundstation.errors import MessageError
-from groundstation.recording.copies import require_absent
 from groundstation.recording.origin import RecordingError
+from groundstation.recording.outputs import new_file, require_absent
 from groundstation.recording.reader import payload
 from groundstation.recording.run import RecordedRun
-from groundstation.recording.table_files import no_room_named
 
 _MAGIC = 0xFD
 _STAMP = struct.Struct(">Q")
@@ -32,7 +31,7 @@ def write_tlogs(run: RecordedRun, folder: Path) -> dict[Path, int]:
     for path in targets.values():
         require_absent(path)
     for entity, path in targets.items():
-        with no_room_named(path), path.open("wb") as file:
+        with new_file(path) as partial, partial.open("wb") as file:
             for stamp_ns, data in sorted(frames[entity], key=lambda pair: pair[0]):
                 file.write(_STAMP.pack(max(0, stamp_ns) // 1000) + data)
     return {path: len(frames[entity]) for entity, path in targets.items()}

@@ -78,7 +78,7 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
         click.echo(f"{record.name} at {foxglove.address} (Ctrl-C leaves it; the flight goes on)")
         return foxglove
     from groundstation.engineering_views.rerun_live import RerunServer, RerunView
-    from groundstation.recording.copies import require_absent
+    from groundstation.recording.outputs import require_absent
 
     if save is not None:
         require_absent(save)

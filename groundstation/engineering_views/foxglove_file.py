@@ -8,10 +8,9 @@ from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
 from groundstation.engineering_views.extras import require_foxglove
 from groundstation.engineering_views.field import field_of
 from groundstation.errors import MessageError
-from groundstation.recording.copies import Copied, CopyWriter, messages_of, preamble_copy
+from groundstation.recording.copies import Copied, CopyWriter, messages_of, new_copy, preamble_copy
 from groundstation.recording.reader import decode, open_recording
 from groundstation.recording.run import RecordedRun
-from groundstation.recording.table_files import no_room_named
 from groundstation.recording.viewers import SCENE_CHANNEL
 
 _DRAWN = (ESTIMATE, PLAN, SETPOINT)
@@ -21,12 +20,12 @@ def write_with_scene(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     """Write all parts of a run into one new file, with a scene ten times a second; returns how many scenes.
 
     The second value says what could not be decoded. Raises OperatorMistake when the extra is missing or the file
-    exists, ExportError when it cannot be written.
+    exists, OutputError when it cannot be written.
     """
     require_foxglove()
     opened = open_recording(run.paths[0])
     unread: dict[str, None] = {}
-    with no_room_named(path), CopyWriter(path, preamble_copy(opened, {"scene": {"channel": SCENE_CHANNEL}})) as writer:
+    with new_copy(path, preamble_copy(opened, {"scene": {"channel": SCENE_CHANNEL}})) as writer:
         for index in run.indexes:
             for message in messages_of(index):
                 writer.write(message)

@@ -5,11 +5,10 @@ from pathlib import Path
 from groundstation.engineering_views.extras import require_rerun
 from groundstation.engineering_views.field import field_of
 from groundstation.errors import MessageError
-from groundstation.recording.copies import require_absent
+from groundstation.recording.outputs import OutputError, new_file
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.schemas import is_picture
-from groundstation.recording.table_files import no_room_named
 
 APPLICATION = "skein"
 
@@ -17,19 +16,12 @@ APPLICATION = "skein"
 def write_rrd(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     """Write a new .rrd file; returns how many messages it was made of, and what could not be decoded.
 
-    Raises OperatorMistake when the extra is not installed or the file exists, ExportError when it cannot be written.
+    Raises OperatorMistake when the extra is not installed or the file exists, OutputError when it cannot be written.
     """
     require_rerun()
-    require_absent(path)
-    partial = path.with_name(f".{path.name}.partial")
-    with no_room_named(path):
-        try:
-            partial.touch()  # the library itself would only log that it cannot write
-            found = _write(run, partial)
-            partial.rename(path)
-        finally:
-            partial.unlink(missing_ok=True)
-    return found
+    with new_file(path) as partial:
+        partial.touch()  # the library itself would only log that it cannot write
+        return _write(run, partial)
 
 
 def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
@@ -53,6 +45,10 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
             unread[str(error)] = None
             continue
         count += 1
-    stream.flush()
-    stream.disconnect()
+    try:
+        stream.flush()
+    except RuntimeError as error:  # the library says neither where nor why
+        raise OutputError(f"{path.parent}: the file cannot be written ({error}); is the disk full?") from error
+    finally:
+        stream.disconnect()
     return count, list(unread)

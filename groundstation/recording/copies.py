@@ -1,12 +1,10 @@
 """Valid files from recordings: all that is sound of a cut one, or a stretch of a run."""
 
-import shutil
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Self
+from typing import IO
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
@@ -16,6 +14,7 @@ from groundstation.recording.chunks import RawRecord, inner_records, message_of
 from groundstation.recording.index import FileIndex
 from groundstation.recording.mcap_file import write_preamble
 from groundstation.recording.origin import PROFILE, RecordingError
+from groundstation.recording.outputs import new_file
 from groundstation.recording.preamble import Preamble
 from groundstation.recording.reader import Recording, open_recording
 from groundstation.recording.run import RecordedRun
@@ -52,30 +51,15 @@ def messages_of(index: FileIndex, from_ns: int = 0, until_ns: int = _FOR_EVER) -
 
 
 class CopyWriter:
-    """Writes a new file under a temporary name that becomes the real one only when it is complete.
+    """Writes messages of recordings to a new one: `with new_copy(path, preamble) as writer`."""
 
-    Raises RecordingError when something is there already; OSError when the disk is full, and leaves nothing behind.
-    """
-
-    def __init__(self, path: Path, preamble: Preamble) -> None:
-        require_absent(path)
-        self._path = path
-        self._partial = path.with_name(f".{path.name}.partial")
-        self._preamble = preamble
+    def __init__(self, stream: IO[bytes], preamble: Preamble) -> None:
+        self._writer = Writer(stream, compression=CompressionType.ZSTD)
         self._channels: dict[str, int] = {}
         self._schemas: dict[tuple[str, bytes], int] = {}
         self.written = 0
-
-    def __enter__(self) -> Self:
-        self._stream: IO[bytes] = self._partial.open("wb")
-        self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
-        try:
-            self._writer.start(profile=PROFILE, library="skein")
-            write_preamble(self._writer, self._preamble)
-        except OSError:
-            self._discard()
-            raise
-        return self
+        self._writer.start(profile=PROFILE, library="skein")
+        write_preamble(self._writer, preamble)
 
     def write(self, message: Copied) -> None:
         """Add a message under its channel's name, with the schema it was recorded with."""
@@ -95,31 +79,21 @@ class CopyWriter:
         self._channels[channel.topic] = added
         return added
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is not None:
-            self._discard()
-            return
-        try:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.close()
-            require_absent(self._path)
-            self._partial.rename(self._path)
-        except (OSError, RecordingError):
-            self._discard()
-            raise
-
-    def _discard(self) -> None:
-        with suppress(OSError):
-            self._stream.close()
-        self._partial.unlink(missing_ok=True)
+    def finish(self) -> None:
+        """Write the indexes."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
 
 
-def require_absent(path: Path) -> None:
-    """Raise RecordingError when there is something at a path that is to be written."""
-    if path.exists():
-        raise RecordingError(f"{path}: exists already; name another place with --output")
+@contextmanager
+def new_copy(path: Path, preamble: Preamble) -> Iterator[CopyWriter]:
+    """Yield a writer whose file appears at the path only when it is complete.
+
+    Raises RecordingError when something is there already, OutputError when the disk refuses.
+    """
+    with new_file(path) as partial, partial.open("wb") as stream:
+        writer = CopyWriter(stream, preamble)
+        yield writer
+        writer.finish()
 
 
 def recover(path: Path, target: Path) -> tuple[int, list[str]]:
@@ -128,7 +102,7 @@ def recover(path: Path, target: Path) -> tuple[int, list[str]]:
     Raises RecordingError when the file is none of ours, or when not a single message is left of it.
     """
     opened, index = open_recording(path), FileIndex(path)
-    with CopyWriter(target, preamble_copy(opened, {})) as writer:
+    with new_copy(target, preamble_copy(opened, {})) as writer:
         for message in messages_of(index):
             writer.write(message)
         if not writer.written:
@@ -147,7 +121,7 @@ def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) 
     latched = run.latest_before(from_ns, LATCHED_TOPICS.__contains__)
     opened = open_recording(indexes[0].path)
     note = {"cut": {"from_unix_ns": str(from_ns), "until_unix_ns": str(until_ns)}}
-    with CopyWriter(target, preamble_copy(opened, note)) as writer:
+    with new_copy(target, preamble_copy(opened, note)) as writer:
         for message in _latched_copies(indexes, latched.values(), from_ns):
             writer.write(message)
         for index in indexes:
@@ -172,18 +146,3 @@ def _latched_copies(indexes: list[FileIndex], latched: Iterable[RawRecord], from
             if raw is not None:
                 schema = index.schemas.get(channel.schema_id)
                 yield Copied(channel, schema, raw.sequence, from_ns, raw.publish_time_ns, raw.data)
-
-
-@contextmanager
-def new_folder(path: Path) -> Iterator[None]:
-    """Make a folder to be filled; what was written is removed again when that fails.
-
-    Raises RecordingError when there is something already.
-    """
-    require_absent(path)
-    path.mkdir(parents=True)
-    try:
-        yield
-    except BaseException:
-        shutil.rmtree(path, ignore_errors=True)
-        raise

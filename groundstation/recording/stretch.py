@@ -4,8 +4,9 @@ import shutil
 from pathlib import Path
 
 from groundstation.bus.clock import NS_PER_S
-from groundstation.recording.copies import cut, new_folder, require_absent
+from groundstation.recording.copies import cut
 from groundstation.recording.origin import RecordingError
+from groundstation.recording.outputs import new_folder, require_absent
 from groundstation.recording.run import RecordedRun, open_run
 
 # What reports and replays look for beside the files of a run.

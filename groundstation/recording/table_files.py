@@ -1,27 +1,21 @@
 """Tables of a run as CSV or Parquet files, and which column has which unit in `columns.csv`."""
 
 import csv
-import errno
 import json
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any, Protocol
 
 from groundstation.bus.clock import NS_PER_S
-from groundstation.errors import GroundStationError, MessageError
+from groundstation.errors import MessageError
 from groundstation.recording.chunks import RawRecord
-from groundstation.recording.copies import new_folder
+from groundstation.recording.outputs import new_folder
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.tables import COMMON, Cell, Row, Table, column, tables_of
 
 _BATCH_ROWS = 20_000
 _COLUMNS_FILE = "columns.csv"
-
-
-class ExportError(GroundStationError):
-    """The files cannot be written."""
 
 
 class TableFile(Protocol):
@@ -146,10 +140,10 @@ def write_tables(
 ) -> tuple[dict[str, int], list[str]]:
     """Write all topics of a run into a new folder; returns rows by table, and what could not be decoded.
 
-    Raises RecordingError when the folder exists, ExportError when there is no room; nothing is left behind then.
+    Raises RecordingError when the folder exists, OutputError when there is no room; nothing is left behind then.
     """
     unread: dict[str, None] = {}
-    with no_room_named(folder), new_folder(folder), ExitStack() as stack:
+    with new_folder(folder), ExitStack() as stack:
         writer = _Writer(folder, kind, run.start_ns, stack)
         for raw in run.records_from(run.start_ns):
             try:
@@ -159,13 +153,3 @@ def write_tables(
         with (folder / _COLUMNS_FILE).open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream).writerows([("file", "column", "unit"), *writer.units])
     return writer.counts, list(unread)
-
-
-@contextmanager
-def no_room_named(path: Path) -> Iterator[None]:
-    """Turn errors of the disk into an ExportError that names the place and the remedy."""
-    try:
-        yield
-    except OSError as error:
-        remedy = " Free some, or name another place with --output." if error.errno == errno.ENOSPC else ""
-        raise ExportError(f"{path}: {error.strerror or error}.{remedy}") from error

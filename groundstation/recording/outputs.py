@@ -1,0 +1,65 @@
+"""Where output goes: never over what is there, never half of it left behind, and errors that name the place."""
+
+import errno
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from groundstation.errors import GroundStationError
+from groundstation.recording.origin import RecordingError
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+class OutputError(GroundStationError):
+    """The output cannot be written."""
+
+
+def require_absent(path: Path) -> None:
+    """Raise RecordingError when there is something at a path that is to be written."""
+    if path.exists() or path.is_symlink():
+        raise RecordingError(f"{path}: exists already; name another place with --output")
+
+
+@contextmanager
+def errors_named(path: Path) -> Iterator[None]:
+    """Turn errors of the disk into an OutputError that names the place, and the remedy when it is full."""
+    try:
+        yield
+    except OSError as error:
+        remedy = ": make room, or name another place with --output" if error.errno in _NO_ROOM else ""
+        raise OutputError(f"{path}: {error.strerror or error}{remedy}") from error
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[None]:
+    """Make a folder to be filled; what was written is removed again when that fails.
+
+    Raises RecordingError when there is something already, OutputError when the disk refuses.
+    """
+    require_absent(path)
+    with errors_named(path):
+        path.mkdir(parents=True)
+        try:
+            yield
+        except BaseException:
+            shutil.rmtree(path, ignore_errors=True)
+            raise
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Yield the path to write to; it becomes `path` when all went well, and is removed when not.
+
+    Raises RecordingError when there is something already, OutputError when the disk refuses.
+    """
+    require_absent(path)
+    partial = path.with_name(f".{path.name}.partial")
+    with errors_named(path):
+        try:
+            yield partial
+            require_absent(path)
+            partial.rename(path)
+        finally:
+            partial.unlink(missing_ok=True)

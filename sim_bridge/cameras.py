@@ -22,6 +22,7 @@ from sim_bridge.render.spec import (
     BoardSpec,
     BodyShape,
     CameraScenario,
+    FloorKind,
     Mount,
     Outage,
     OutageKind,
@@ -112,7 +113,8 @@ def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
         for fault in scenario.faults
         if fault.kind in CAMERA_FAULTS and fault.entity == name
     )
-    return CameraScenario(**scenario.cameras.model_dump(), outages=outages)
+    figures = scenario.cameras.model_dump(exclude={"floor"})
+    return CameraScenario(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages)
 
 
 def _render(spec: RenderSpec, modes: Connection | None) -> None:

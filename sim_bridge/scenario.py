@@ -124,7 +124,9 @@ class CameraScenario(_Section):
     """Every emulated camera: its stream and the errors of its picture.
 
     video_jitter_ms: half width of the uniform spread about the delay; corner_noise_px: displacement of a corner's
-    image, one sigma per axis; pixel_noise: one sigma in grey levels; blur_px: sigma of the lens and motion blur.
+    image, one sigma per axis; pixel_noise: one sigma in grey levels; blur_px: sigma of the defocus; exposure_ms: of
+    which motion blur comes; rolling_shutter_ms: from the first row to the last; light: share of a full exposure;
+    shot_noise: photon noise at white, one sigma in grey levels; floor: what lies under the scene.
     """
 
     fps: Annotated[float, Field(gt=0, le=60)] = 15.0
@@ -134,6 +136,12 @@ class CameraScenario(_Section):
     corner_noise_px: Annotated[float, Field(ge=0, le=5)] = 0.2
     pixel_noise: Annotated[float, Field(ge=0, le=100)] = 2.0
     blur_px: Annotated[float, Field(ge=0, le=10)] = 0.7
+    exposure_ms: Annotated[float, Field(ge=0, le=60)] = 4.0
+    rolling_shutter_ms: Annotated[float, Field(ge=0, le=60)] = 0.0
+    light: Annotated[float, Field(ge=0.02, le=1)] = 1.0
+    shot_noise: Annotated[float, Field(ge=0, le=30)] = 0.0
+    jpeg_quality: Annotated[int, Field(ge=5, le=100)] = 85
+    floor: Literal["carpet", "wood", "concrete", "tiles"] = "carpet"
 
 
 class FaultKind(StrEnum):

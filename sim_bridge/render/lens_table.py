@@ -28,6 +28,8 @@ class LensTable:
         coarse_columns = (np.arange(-1, -(-self.width // _COARSE) + 1) + 0.5) * _COARSE - 0.5
         coarse_rows = (np.arange(-1, -(-self.height // _COARSE) + 1) + 0.5) * _COARSE - 0.5
         self.coarse_x, self.coarse_y = _rays(intrinsics, coarse_columns, coarse_rows)
+        # How far down the picture each coarse row is, 0 at the first row and 1 at the last (n, 1).
+        self.coarse_share = (coarse_rows / (self.height - 1)).astype(np.float32)[:, None]
 
     def window(self, left: int, top: int, right: int, bottom: int) -> tuple[Float32, Float32]:
         """Return x and y for pixels left..right-1, top..bottom-1, widened by PAD pixels on each side."""

@@ -4,11 +4,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_bridge.render.board_painter import BoardPainter, Flaws
-from sim_bridge.render.floor import Floor, carpet
+from groundstation.geometry.pose import Pose
+from sim_bridge.render.board_painter import BoardPainter, Flaws, smear_kernel
+from sim_bridge.render.card import card_of
+from sim_bridge.render.floor import Floor, texture
 from sim_bridge.render.lens_table import LensTable
 from sim_bridge.render.scene import Scene, Sight, compose_scene
-from sim_bridge.render.sensor import SensorNoise
+from sim_bridge.render.sensor import Sensor
 from sim_bridge.render.shapes import draw_body
 from sim_bridge.render.spec import RenderSpec
 
@@ -24,9 +26,9 @@ class Renderer:
         intrinsics, room = spec.intrinsics, (spec.room_size_m[0], spec.room_size_m[1])
         table = LensTable(intrinsics)
         # The carpet is the room's: every camera of one run sees the same floor.
-        self._floor = Floor(carpet(room, spec.seed), room, table)
-        self._painters = {board: BoardPainter(board.code, board.square_mm, intrinsics, table) for board in spec.boards}
-        self._noise = SensorNoise(intrinsics.width_px, intrinsics.height_px, spec.scenario.pixel_noise, self._random)
+        self._floor = Floor(texture(spec.scenario.floor, room, spec.seed), room, table)
+        self._painters = {board: BoardPainter(card_of(board), intrinsics, table) for board in spec.boards}
+        self._sensor = Sensor(intrinsics.width_px, intrinsics.height_px, spec.scenario, self._random)
         fixed = not spec.mount.body
         self._background = self._blurred(self._floor.draw(spec.mount.parent_from_optical)) if fixed else None
 
@@ -37,13 +39,23 @@ class Renderer:
         for sight in scene.sights:
             draw_body(picture, sight.board.shape, sight.optical_from_base, self._spec.intrinsics)
             painter = self._painters[sight.board]
-            painter.draw(picture, sight.optical_from_marker, self._flaws(sight), self._random)
-        return self._noise.add(picture, self._random)
+            painter.draw(picture, sight.optical_from_marker, self._flaws(sight), self._random, sight.rolling)
+        return self._sensor.expose(picture, self._random)
 
     def _draw_floor(self, scene: Scene) -> Picture:
         if self._background is not None:
             return self._background.copy()
-        return self._blurred(self._floor.draw(scene.world_from_optical))
+        floor = self._blurred(self._floor.draw(scene.world_from_optical, scene.rolling))
+        kernel = smear_kernel(self._floor_smear(*scene.smear))
+        return floor if kernel is None else np.asarray(cv2.filter2D(floor, -1, kernel), dtype=np.uint8)
+
+    def _floor_smear(self, begin: Pose, end: Pose) -> tuple[float, float]:
+        """Return by how much the floor in the middle of the picture moves during the exposure [px]."""
+        axis = begin.rotation[:, 2]
+        distance = begin.translation[2] / max(-axis[2], 0.1)
+        moved = self._spec.intrinsics.project(end.inverse().apply(begin.translation + distance * axis))
+        still = self._spec.intrinsics.project(np.array([0.0, 0.0, 1.0]))
+        return (float(moved[0] - still[0]), float(moved[1] - still[1])) if np.isfinite(moved).all() else (0.0, 0.0)
 
     def _blurred(self, picture: Picture) -> Picture:
         sigma = self._spec.scenario.blur_px

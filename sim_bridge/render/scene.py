@@ -28,13 +28,17 @@ def moved(state: Array, seconds: float) -> Pose:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """One board before the camera: poses at mid exposure, and at its begin and end for the smear."""
+    """One board before the camera: poses at mid exposure, and at its begin and end for the smear.
+
+    rolling: optical_from_marker when the first and the last row are exposed; None when all rows are at once.
+    """
 
     board: BoardSpec
     optical_from_base: Pose
     optical_from_marker: Pose
     begin_m: Array
     end_m: Array
+    rolling: tuple[Pose, Pose] | None = None
 
     @property
     def depth_m(self) -> float:
@@ -44,10 +48,12 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A camera pose and the boards before it, farthest first."""
+    """A camera pose and the boards before it, farthest first; `rolling` as in Sight, `smear` as begin and end."""
 
     world_from_optical: Pose
     sights: tuple[Sight, ...]
+    smear: tuple[Pose, Pose]
+    rolling: tuple[Pose, Pose] | None = None
 
 
 def camera_pose(mount: Mount, bodies: tuple[str, ...], states: Array) -> Pose:
@@ -59,19 +65,44 @@ def camera_pose(mount: Mount, bodies: tuple[str, ...], states: Array) -> Pose:
 
 def compose_scene(spec: RenderSpec, states: Array) -> Scene:
     """Return what the camera has before it; a camera never sees its own carrier."""
-    half_s = spec.scenario.exposure_ms / 2000.0
+    half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
     camera = camera_pose(spec.mount, spec.bodies, states)
-    moments = [(_camera_moved(spec, states, seconds), seconds) for seconds in (-half_s, half_s)]
+    optical_from_world = camera.inverse()
+    smear = _camera_moved(spec, states, -half_s), _camera_moved(spec, states, half_s)
+    rolling = (_camera_moved(spec, states, -readout_s), _camera_moved(spec, states, readout_s)) if readout_s else None
     sights = []
     for board in spec.boards:
         if board.body == spec.mount.body:
             continue
-        state = states[spec.bodies.index(board.body)]
-        optical_from_base = camera.inverse().compose(world_from_base(state))
-        on_body = Pose(np.eye(3), np.array(board.position_m))
-        begin, end = (at.inverse().compose(moved(state, seconds)).apply(on_body.translation) for at, seconds in moments)
-        sights.append(Sight(board, optical_from_base, optical_from_base.compose(on_body), begin, end))
-    return Scene(camera, tuple(sorted(sights, key=lambda sight: -sight.depth_m)))
+        state, offset = states[spec.bodies.index(board.body)], np.array(board.position_m)
+        base = world_from_base(state)
+        optical_from_base = optical_from_world.compose(base)
+        on_body = Pose(np.eye(3), offset)
+        begin, end = (
+            (_point_moved(state, base, offset, seconds) - at.translation) @ at.rotation
+            for at, seconds in zip(smear, (-half_s, half_s), strict=True)
+        )
+        rows = None
+        if rolling is not None:
+            first, last = (
+                at.inverse().compose(moved(state, seconds).compose(on_body))
+                for at, seconds in zip(rolling, (-readout_s, readout_s), strict=True)
+            )
+            rows = first, last
+        sights.append(Sight(board, optical_from_base, optical_from_base.compose(on_body), begin, end, rows))
+    return Scene(camera, tuple(sorted(sights, key=lambda sight: -sight.depth_m)), smear, rolling)
+
+
+def _point_moved(state: Array, base: Pose, point: Array, seconds: float) -> Array:
+    """Return where a point of a body is a moment later [m; world]."""
+    turned = point + seconds * np.array(
+        [
+            state[10] * point[2] - state[11] * point[1],
+            state[11] * point[0] - state[9] * point[2],
+            state[9] * point[1] - state[10] * point[0],
+        ]
+    )
+    return np.asarray(base.rotation @ turned + base.translation + seconds * state[_VELOCITY])
 
 
 def _camera_moved(spec: RenderSpec, states: Array, seconds: float) -> Pose:

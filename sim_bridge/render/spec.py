@@ -5,6 +5,7 @@ from enum import StrEnum
 
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
+from groundstation.geometry.tag import Tag
 
 
 class BodyShape(StrEnum):
@@ -27,13 +28,26 @@ class Mount:
 
 @dataclass(frozen=True, slots=True)
 class BoardSpec:
-    """A marker lying flat on a body: its code, square size, and its place on the body [m; base]."""
+    """A marker lying flat on a body: its code, square size, and its place on the body [m; base].
+
+    tag: it is this tag instead of a checkerboard; code and square size mean nothing then.
+    """
 
     body: str
     code: int
     square_mm: float
     position_m: tuple[float, float, float]
     shape: BodyShape = BodyShape.DRONE
+    tag: Tag | None = None
+
+
+class FloorKind(StrEnum):
+    """What the cameras look down on; `TILES` is a checkerboard of its own and means trouble."""
+
+    CARPET = "carpet"
+    WOOD = "wood"
+    CONCRETE = "concrete"
+    TILES = "tiles"
 
 
 class StreamKind(StrEnum):
@@ -66,7 +80,8 @@ class CameraScenario:
     video_delay_ms +- video_jitter_ms (uniform) from exposure to arrival; frame_loss: share of frames never sent, or,
     where TCP repeats what is lost and nothing may be missing (AR.Drone), sent late;
     corner_noise_px: rms error of each board corner (print, lens model), pixel_noise: grey levels rms; blur_px: sigma
-    of the defocus; exposure_ms: motion blur.
+    of the defocus; exposure_ms: motion blur; rolling_shutter_ms: time from the first row to the last (the stamp is the
+    middle); light: share of a full exposure, shot_noise: rms of photon noise at white [grey levels].
     """
 
     fps: float = 15.0
@@ -78,6 +93,10 @@ class CameraScenario:
     blur_px: float = 0.7
     exposure_ms: float = 4.0
     jpeg_quality: int = 85
+    rolling_shutter_ms: float = 0.0
+    light: float = 1.0
+    shot_noise: float = 0.0
+    floor: FloorKind = FloorKind.CARPET
     outages: tuple[Outage, ...] = ()
 
 

@@ -21,6 +21,7 @@ from groundstation.recording.reader import open_recording
 
 pytestmark = pytest.mark.sitl
 REPOSITORY = Path(__file__).parents[2]
+SENT_S = 6.0
 
 
 @pytest.fixture
@@ -67,18 +68,17 @@ def test_recording_is_readable_after(number: signal.Signals, endpoint: str, tmp_
                 assert time.monotonic() < deadline
                 statuses.wait(0.2)
             sent: list[int] = []
-            _publish_until(bus, time.monotonic() + 4.0, sent)
+            _publish_until(bus, time.monotonic() + SENT_S, sent)
             process.send_signal(number)
             process.wait(timeout=10.0)
     finally:
         process.kill()
         process.wait()
-    lost_s = 0.6 if number is signal.SIGKILL else 0.2  # flushed every 0.4 s, drained every 66 ms
     for stem, topic in (("state", TRUTH), ("raw", RAW_RX)):
         recording = open_recording(tmp_path / f"{stem}.mcap")
         numbers = [raw.sequence for raw in recording.raw_records(lambda t, topic=topic: t is topic)]
         assert numbers == sorted(numbers)
-        assert len(numbers) >= len(sent) * (1 - lost_s / 4.0)
+        assert len(numbers) >= 0.95 * len(sent)
         assert bool(recording.damage) == (number is signal.SIGKILL)
     assert recording.metadata["run"]["epoch"] == "3"
     assert json.loads(recording.attachments["field.json"]) == {"site": "lab"}

@@ -10,7 +10,6 @@ from groundstation.cli.exits import ExitCode
 
 if TYPE_CHECKING:
     from groundstation.replay.source import Source
-    from groundstation.replay.verify import Comparison
 
 _RUNS = Path("runs")
 _RERUN_ONLY = ("options", "estimator", "json_file", "output")
@@ -105,26 +104,21 @@ def _run_again(
     given = [f"--{name.removesuffix('_s')}" for name, value in playing.items() if value]
     if given:
         raise click.UsageError(f"{', '.join(given)} belongs to playing in the console, not to a re-run")
-    field = recorded_field(source.field, options, estimator).model_dump(mode="json")
+    field = recorded_field(source.field).model_dump(mode="json")
+    changed = recorded_field(source.field, options, estimator).model_dump(mode="json")
+    if json_file is not None:
+        _require_writable(json_file)
     numba_cache.activate()
     from groundstation.replay.again import Again
 
     changes = [*([f"estimator of {estimator}"] if estimator else []), *options]
-    again = Again(source, field, changes, output)
-    if json_file is not None:
-        _require_writable(json_file)
+    again = Again(source, field, changed, changes, output)
     result = again.run()
     for line in again.lines(result):
         click.echo(line)
     if json_file is not None:
         json_file.write_bytes(again.as_json(result))
-    if changes:
-        return ExitCode.OK
-    return _exit_code(result)
-
-
-def _exit_code(result: "Comparison") -> int:
-    return ExitCode.OK if result.identical else ExitCode.FAILED
+    return ExitCode.OK if changes or result.identical else ExitCode.FAILED
 
 
 def _require_writable(path: Path) -> None:

@@ -8,9 +8,7 @@ from typing import Any
 
 import msgspec
 
-from groundstation.recording.part_names import part_path
 from groundstation.recording.reader import RecordingError
-from groundstation.recording.selection import STATE
 from groundstation.replay import counterfactual, versions
 from groundstation.replay.rewrite import live_again, require_new
 from groundstation.replay.source import Source
@@ -21,48 +19,61 @@ _SHOWN = 5
 
 
 class Again:
-    """Re-runs a source with a resolved field; `changes`: what is not as it was recorded, in words (none: verify)."""
+    """Re-runs a source. With changes it is run twice, without and with them, so that only they make a difference.
 
-    def __init__(self, source: Source, field: dict[str, Any], changes: Sequence[str], output: Path | None) -> None:
+    field: the resolved field as recorded; changed: the one to run with; changes: in words, none: only verify.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        field: dict[str, Any],
+        changed: dict[str, Any],
+        changes: Sequence[str],
+        output: Path | None,
+    ) -> None:
         self._source = source
-        self._field = field
+        self._field, self._changed = field, changed
         self._changes = tuple(changes)
         self._output = output
-        self._digest = hashlib.sha256()
+        self._digest, self._plain_digest = hashlib.sha256(), hashlib.sha256()
         self._rows: list[counterfactual.Row] = []
         self._parted = counterfactual.Changes()
+        self._others: Comparison | None = None
         if output is not None:
             require_new(output)
 
     def run(self) -> Comparison:
-        """Live all ticks again; raises RecordingError when the recording holds nothing to do it with."""
-        repetition = Repetition(self._source, self._field, self._digest.update)
-        if self._output is None and not self._changes:
-            for _ in repetition.ticks():
+        """Live all ticks again as recorded, then with the changes; returns how the first went.
+
+        Raises RecordingError when the recording holds nothing to do it with.
+        """
+        plain = Repetition(self._source, self._field, self._plain_digest.update)
+        if not self._changes:
+            self._live(plain, self._output)
+            self._digest = self._plain_digest
+            return plain.comparison
+        with tempfile.TemporaryDirectory(prefix="skein-replay-") as scratch:
+            before, after = Path(scratch) / "before", self._output or Path(scratch) / "after"
+            self._live(plain, before)
+            changed = Repetition(self._source, self._changed, self._digest.update)
+            live_again(self._source, changed, after, msgspec.json.encode(self._changed), ", ".join(self._changes))
+            self._others = changed.comparison
+            first, second = gather(before), gather(after)
+        self._rows = counterfactual.rows_of(first, second)
+        self._parted = counterfactual.changes_of(first, second)
+        return plain.comparison
+
+    def _live(self, plain: Repetition, folder: Path | None) -> None:
+        if folder is None:
+            for _ in plain.ticks():
                 pass
         else:
-            with tempfile.TemporaryDirectory(prefix="skein-replay-") as scratch:
-                self._write(repetition, Path(scratch))
-        self._require_something(repetition)
-        return repetition.comparison
-
-    def _write(self, repetition: Repetition, scratch: Path) -> None:
-        target = self._output or scratch / "now"
-        field = msgspec.json.encode(self._field)
-        live_again(self._source, repetition, target, field, ", ".join(self._changes))
-        recorded = scratch / "recorded"
-        recorded.mkdir()
-        for number, path in enumerate(self._source.state, 1):
-            part_path(recorded, STATE, number).symlink_to(path.absolute())
-        before, after = gather(recorded), gather(target)
-        self._rows = counterfactual.rows_of(before, after)
-        self._parted = counterfactual.changes_of(before, after)
-
-    def _require_something(self, repetition: Repetition) -> None:
+            live_again(self._source, plain, folder, msgspec.json.encode(self._field), "")
         name = self._source.name
-        if not repetition.comparison.ticks:
+        if not plain.comparison.ticks:
             raise RecordingError(f"{name}: no journal of the tracker is in it, so nothing says what it did when")
-        if not repetition.tape.inputs:
+        if not plain.tape.inputs:
             raise RecordingError(f"{name}: no odometry, observation or vehicle status is in it: nothing to re-run with")
 
     @property
@@ -77,9 +88,11 @@ class Again:
             f"re-run in {result.cpu_s:.1f} s of CPU ({result.speed:.0f} x)"
         )
         yield from self._reservations(result)
-        if self._changes:
+        if self._others is not None:
+            if not result.identical:
+                yield "today's tracker is not the recorded one even with its settings; compared are two re-runs of it"
             yield f"with {', '.join(self._changes)} (output {self.digest}):"
-            yield from self._counterfactual(result)
+            yield from self._counterfactual(result, self._others)
         else:
             yield from self._verdict(result)
         if self._output is not None:
@@ -107,20 +120,21 @@ class Again:
         yield f"DIFFERS in {result.differing} of {total} messages; the first:"
         yield from (f"  {finding}" for finding in result.findings[:_SHOWN])
 
-    def _counterfactual(self, result: Comparison) -> Iterator[str]:
-        if not result.differing:
+    def _counterfactual(self, plain: Comparison, changed: Comparison) -> Iterator[str]:
+        if self._digest.digest() == self._plain_digest.digest():
             yield "  nothing changed: the tracker says the same, to the bit"
             return
         width = max(len(row.name) for row in self._rows)
-        yield f"  {'':{width}}  {'recorded':>10}  {'now':>10}"
+        yield f"  {'':{width}}  {'before':>10}  {'with it':>10}"
         for row in self._rows:
-            yield f"  {row.name:{width}}  {_number(row.recorded):>10}  {_number(row.now):>10}{_arrow(row)}"
-        yield f"first difference: {result.findings[0]}"
+            yield f"  {row.name:{width}}  {_number(row.before):>10}  {_number(row.after):>10}{_arrow(row)}"
+        if plain.identical and changed.findings:
+            yield f"first difference: {changed.findings[0]}"
         for name, where in self._parted.farthest.items():
             yield f"{name}: estimates at most {where['m']:.3f} m apart, at {where['at_s']:.1f} s"
         yield f"another topology chosen for {self._parted.topology_other_s:.1f} s"
-        for begin, end, recorded, now in self._parted.topologies[:_SHOWN]:
-            yield f"  {begin:.1f} to {end:.1f} s: {recorded} recorded, {now} now"
+        for begin, end, before, after in self._parted.topologies[:_SHOWN]:
+            yield f"  {begin:.1f} to {end:.1f} s: {before} before, {after} with it"
 
     def as_json(self, result: Comparison) -> bytes:
         """Return all of it for programs."""
@@ -133,7 +147,8 @@ class Again:
             "comparison": {name: getattr(result, name) for name in _COUNTS},
             "first_differences": [str(finding) for finding in result.findings],
         }
-        if self._rows:
+        if self._others is not None:
+            content["changed_anything"] = self._digest.digest() != self._plain_digest.digest()
             content |= counterfactual.as_json(self._rows, self._parted)
         return msgspec.json.format(msgspec.json.encode(content), indent=2)
 
@@ -151,6 +166,6 @@ def _number(value: float | None) -> str:
 
 
 def _arrow(row: counterfactual.Row) -> str:
-    if not row.changed:
+    if row.before == row.after:
         return ""
-    return f"  {row.now - row.recorded:+.4g}" if row.now is not None and row.recorded is not None else "  *"
+    return f"  {row.after - row.before:+.4g}" if row.before is not None and row.after is not None else "  *"

@@ -15,28 +15,23 @@ from groundstation.report.tracks import RunData
 
 _STALE_S = 0.5
 _LISTED = 20
-_RATE = ("target_rmse_m", "target_lost_s", "topology_switches", "tracked_s")
+_OVERALL = {"tracked_s": "tracked [s]", "target_lost_s": "target lost [s]", "topology_switches": "topology switches"}
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One figure of both; None where there is nothing to measure."""
+    """One figure before and after a change; None where there is nothing to measure."""
 
     name: str
-    recorded: float | None
-    now: float | None
-
-    @property
-    def changed(self) -> bool:
-        """Whether the two differ at all."""
-        return self.recorded != self.now
+    before: float | None
+    after: float | None
 
 
 @dataclass(slots=True)
 class Changes:
     """Where two runs part: the greatest distance between the estimates of each entity, and other topologies.
 
-    topologies: (from [s], to [s], recorded, now) of each stretch on which the chosen topologies differ.
+    topologies: (from [s], to [s], before, after) of each stretch on which the chosen topologies differ.
     """
 
     farthest: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -44,15 +39,15 @@ class Changes:
     topology_other_s: float = 0.0
 
 
-def rows_of(recorded: RunData, now: RunData) -> list[Row]:
+def rows_of(before: RunData, after: RunData) -> list[Row]:
     """Return all figures of two runs beside each other."""
-    before, after = _figures(figures_of(recorded)), _figures(figures_of(now))
-    names = [*before, *(name for name in after if name not in before)]
-    return [Row(name, before.get(name), after.get(name)) for name in names]
+    first, second = _figures(figures_of(before)), _figures(figures_of(after))
+    names = [*first, *(name for name in second if name not in first)]
+    return [Row(name, first.get(name), second.get(name)) for name in names]
 
 
 def _figures(figures: Figures) -> dict[str, float | None]:
-    rows: dict[str, float | None] = {name: getattr(figures, name) for name in _RATE}
+    rows: dict[str, float | None] = {words: getattr(figures, name) for name, words in _OVERALL.items()}
     accuracies = {**({"target": figures.target} if figures.target else {}), **figures.robots}
     for name, accuracy in accuracies.items():
         rows[f"{name} rmse [m]"] = accuracy.rmse_m
@@ -64,26 +59,26 @@ def _figures(figures: Figures) -> dict[str, float | None]:
     return rows
 
 
-def changes_of(recorded: RunData, now: RunData) -> Changes:
+def changes_of(before: RunData, after: RunData) -> Changes:
     """Return where the two part."""
     changes = Changes()
-    for name in sorted(set(recorded.estimates) & set(now.estimates)):
-        before, after = recorded.estimates[name], now.estimates[name]
-        grid = time_grid(float(before.time_s[0]), float(before.time_s[-1]))
-        first, second = before.latest_at(grid, _STALE_S), after.latest_at(grid, _STALE_S)
+    for name in sorted(set(before.estimates) & set(after.estimates)):
+        one, other = before.estimates[name], after.estimates[name]
+        grid = time_grid(float(one.time_s[0]), float(one.time_s[-1]))
+        first, second = one.latest_at(grid, _STALE_S), other.latest_at(grid, _STALE_S)
         known = (first >= 0) & (second >= 0)
         if not known.any():
             continue
-        apart = np.linalg.norm(before.mean[first[known], :2] - after.mean[second[known], :2], axis=1)
+        apart = np.linalg.norm(one.mean[first[known], :2] - other.mean[second[known], :2], axis=1)
         changes.farthest[name] = {"m": float(apart.max()), "at_s": float(grid[known][apart.argmax()])}
-    _compare_topologies(recorded, now, changes)
+    _compare_topologies(before, after, changes)
     return changes
 
 
-def _compare_topologies(recorded: RunData, now: RunData, changes: Changes) -> None:
-    end = max(recorded.end_s, now.end_s)
-    mine = segments(now, 0.0, end)
-    for begin, finish, text in segments(recorded, 0.0, end):
+def _compare_topologies(before: RunData, after: RunData, changes: Changes) -> None:
+    end = max(before.end_s, after.end_s)
+    mine = segments(after, 0.0, end)
+    for begin, finish, text in segments(before, 0.0, end):
         for start, stop, other in mine:
             low, high = max(begin, start), min(finish, stop)
             if other == text or high - low < 1e-6:
@@ -98,5 +93,5 @@ def _compare_topologies(recorded: RunData, now: RunData, changes: Changes) -> No
 
 def as_json(rows: list[Row], changes: Changes) -> dict[str, Any]:
     """Return both as plain values."""
-    figures = {row.name: {"recorded": row.recorded, "now": row.now} for row in rows}
+    figures = {row.name: {"before": row.before, "after": row.after} for row in rows}
     return {"figures": figures, "changes": asdict(changes)}

@@ -11,6 +11,11 @@ DECIDING = ("numpy", "numba", "scipy")
 KERNELS, PROCESSOR = "kernels", "processor"
 
 
+def current() -> dict[str, str]:
+    """Return what a re-run is computed with, as a recorder notes it."""
+    return {name: version(name) for name in DECIDING} | {KERNELS: sources_hash(), PROCESSOR: processor()}
+
+
 def foreign(recorded: Mapping[str, str]) -> list[str]:
     """Return a line for each library, and for the kernels' sources, that are not those of the recording."""
     lines = []

@@ -13,9 +13,11 @@ from multiprocessing.context import SpawnProcess
 import numpy as np
 
 from groundstation.errors import GroundStationError
+from groundstation.geometry.board import Board
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.geometry.tag import Tag
 from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.faults import CAMERA_FAULTS
 from sim_bridge.render.spec import (
@@ -98,12 +100,18 @@ def _intrinsics(lens: Lens) -> CameraIntrinsics:
 
 def _boards(site: Site) -> tuple[BoardSpec, ...]:
     drones = tuple(
-        BoardSpec(name, drone.marker.code, drone.marker.square_mm, drone.marker.position_m)
+        _board(name, drone.marker.printed, drone.marker.position_m, BodyShape.DRONE)
         for name, drone in site.drones.items()
     )
     marker = site.target.marker
     place = (0.0, 0.0, marker.height_m)
-    return (*drones, BoardSpec(site.target.name, marker.code, marker.square_mm, place, BodyShape.TURTLEBOT))
+    return (*drones, _board(site.target.name, marker.printed, place, BodyShape.TURTLEBOT))
+
+
+def _board(body: str, printed: Board | Tag, place: tuple[float, float, float], shape: BodyShape) -> BoardSpec:
+    if isinstance(printed, Tag):
+        return BoardSpec(body, 0, 0.0, place, shape, printed)
+    return BoardSpec(body, printed.code, printed.square_mm, place, shape)
 
 
 def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:

@@ -10,6 +10,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from groundstation.errors import SettingsError
+from groundstation.geometry.board import Board
+from groundstation.geometry.tag import Tag
 from sim_bridge.scenario import describe_problems
 
 
@@ -35,11 +37,27 @@ class Lens(_Part):
     distortion: tuple[float, float, float, float, float]
 
 
-class Marker(_Part):
-    """The checkerboard of a drone."""
+class Print(_Part):
+    """What is printed on a marker: a checkerboard, or (kind aruco) a tag."""
 
-    code: int
-    square_mm: float
+    kind: Literal["checkerboard", "aruco"] = "checkerboard"
+    code: int | None = None
+    square_mm: float = 44.0
+    dictionary: str | None = None
+    id: int | None = None
+    size_mm: float | None = None
+
+    @property
+    def printed(self) -> Board | Tag:
+        """Return the marker's layout."""
+        if self.dictionary is not None and self.id is not None and self.size_mm is not None:
+            return Tag(self.dictionary, self.id, self.size_mm)
+        return Board(-1 if self.code is None else self.code, self.square_mm)
+
+
+class Marker(Print):
+    """The marker of a drone."""
+
     position_m: tuple[float, float, float]
 
 
@@ -87,12 +105,10 @@ class SiteCamera(_Part):
     looking: Literal["down"] = "down"
 
 
-class TargetMarker(_Part):
-    """The checkerboard of the target, flat, `height_m` above the floor."""
+class TargetMarker(Print):
+    """The marker of the target, flat, `height_m` above the floor."""
 
-    code: int
     height_m: float
-    square_mm: float
 
 
 class SiteTarget(_Part):

@@ -96,7 +96,7 @@ def enlargement(spacing: float) -> float:
 def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
     """Return the board in the window, whose squares are about `spacing` pixels wide, or None."""
     part = picture[window.top : window.bottom, window.left : window.right]
-    enlarged, ratio = _resized(part, enlargement(spacing))
+    enlarged, ratio = resized(part, enlargement(spacing))
     found, raw = cv2.findChessboardCorners(enlarged, (marker.CORNERS_X, marker.CORNERS_Y), flags=_FLAGS)
     if not found or raw is None:
         return None
@@ -115,7 +115,7 @@ def refined(picture: Picture, corners: Array, columns: int = marker.CORNERS_X) -
     if window is None:
         return corners
     part = picture[window.top : window.bottom, window.left : window.right]
-    enlarged, ratio = _resized(part, float(np.clip(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0, _MOST_ENLARGEMENT)))
+    enlarged, ratio = resized(part, float(np.clip(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0, _MOST_ENLARGEMENT)))
     half = int(np.clip(round(0.55 * reach / ratio[0]), 1, _MOST_HALF_WINDOW_PX))
     start = ((corners - (window.left, window.top) + 0.5) / ratio - 0.5).astype(np.float32).reshape(-1, 1, 2)
     found = cv2.cornerSubPix(enlarged, start, (half, half), (-1, -1), _REFINE)
@@ -124,7 +124,7 @@ def refined(picture: Picture, corners: Array, columns: int = marker.CORNERS_X) -
     return np.where(slipped[:, None], corners, fine)
 
 
-def _resized(part: Picture, scale: float) -> tuple[Picture, Array]:
+def resized(part: Picture, scale: float) -> tuple[Picture, Array]:
     """Return a picture scaled by about `scale`, and the size of its pixels in pixels of the original (2)."""
     if abs(scale - 1.0) <= 0.1:
         return part, np.ones(2)

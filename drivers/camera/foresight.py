@@ -30,7 +30,8 @@ _LEAST_DEPTH_M = 0.15
 # Seen flatter than this (85 degrees from face on), a board is turned away for certain.
 _LEAST_FACING = 0.087
 _WIDEST_SHARE = 0.2
-_RADIUS_SQUARES = 1.81
+# From the centre of a checkerboard to its outer corners.
+_RADIUS_SQUARES = 1.803
 _MARGIN_SQUARES = 1.6
 
 
@@ -82,7 +83,7 @@ class Foresight:
             entity = entities.get(marker.entity)
             place = _marker_place(entity, marker, seconds) if entity is not None else None
             if place is not None:
-                known, prediction = _seen(camera, *place, marker.square_mm / 1000.0, self._intrinsics)
+                known, prediction = _seen(camera, *place, marker.reach_m, self._intrinsics)
                 if known:
                     found[marker.entity] = prediction
         return found
@@ -139,7 +140,7 @@ def _marker_place(entity: EntityEstimate, marker: MarkerSettings, seconds: float
 
 
 def _seen(
-    camera: _Camera, centre: Array, covariance: Array, square_m: float, intrinsics: CameraIntrinsics
+    camera: _Camera, centre: Array, covariance: Array, reach_m: float, intrinsics: CameraIntrinsics
 ) -> tuple[bool, Prediction | None]:
     """Return whether anything can be said, and where the marker is seen (None: certainly nowhere)."""
     rotation = camera.pose.rotation
@@ -159,9 +160,8 @@ def _seen(
         return False, None
     if not np.isfinite(centre_px).all():
         return True, None
-    # The marker lies level; how it is turned does not change the largest and least length of a square.
-    level = np.linalg.svd(jacobian @ rotation.T[:, :2], compute_uv=False) * square_m
-    radius = _RADIUS_SQUARES * float(level[0])
+    # The marker lies level; how it is turned does not change its largest and least extent.
+    level = np.linalg.svd(jacobian @ rotation.T[:, :2], compute_uv=False) * reach_m
     if not intrinsics.contains(centre_px, -_SIGMAS * std_px):
         return True, None
-    return True, Prediction(centre_px, radius, float(level[1]), std_px)
+    return True, Prediction(centre_px, float(level[0]), float(level[1]) / _RADIUS_SQUARES, std_px)

@@ -13,8 +13,8 @@ from drivers.camera.foresight import Prediction
 from drivers.camera.search import find_in, search
 from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Notice, Sighting
+from drivers.camera.tags import TagFinder
 from drivers.camera.tracks import Track
-from groundstation.geometry.board import Board
 from groundstation.geometry.lens import CameraIntrinsics
 
 Array = NDArray[np.float64]
@@ -51,8 +51,10 @@ class Pipeline:
     ) -> None:
         self._intrinsics = intrinsics
         self._settings = settings
-        self._expected = {marker.code: marker for marker in expected}
-        self._points = {marker.code: Board(marker.code, marker.square_mm).corners() for marker in expected}
+        self._expected = {marker.code: marker for marker in expected if marker.code is not None}
+        self._points = {marker.entity: marker.printed.corners() for marker in self._expected.values()}
+        self._markers = {marker.entity: marker for marker in expected}
+        self._tags = TagFinder(intrinsics, expected, settings)
         self._search_rate_hz = search_rate_hz
         self._search_phase_ns = round(search_phase_s * _NS)
         self._next_search_ns: int | None = None
@@ -65,7 +67,8 @@ class Pipeline:
     @property
     def tracked(self) -> tuple[str, ...]:
         """Return the entities in view."""
-        return tuple(entity for track in self._tracks if (entity := self._entity_of(track)) is not None)
+        boards = (entity for track in self._tracks if (entity := self._entity_of(track)) is not None)
+        return (*boards, *self._tags.tracked)
 
     def take_notices(self) -> list[Notice]:
         """Return and forget what an operator should hear; the same thing is never said twice."""
@@ -85,10 +88,12 @@ class Pipeline:
         """
         finds = self._follow(picture, stamp_ns, predictions)
         self._look_where_expected(picture, stamp_ns, predictions, finds)
-        if self._is_search_due(stamp_ns):
-            finds += self._search(picture, stamp_ns)
+        searching = self._is_search_due(stamp_ns)
+        if searching:
+            finds += self._search(picture, stamp_ns) if self._expected else []
+        sightings = self._tags.look(picture, stamp_ns, gravity_of, predictions, searching)
+        if searching:
             self._schedule_search(stamp_ns, predictions)
-        sightings = []
         for track, find in finds:
             self._identify(picture, track, find, stamp_ns)
             sighting = self._measure(track, stamp_ns, gravity_of, drop_of)
@@ -124,8 +129,9 @@ class Pipeline:
     ) -> None:
         """Look for markers that are not in view but should be, where the belief has them; adds to `finds`."""
         followed = {self._entity_of(track) for track, _ in finds}
+        boards = {marker.entity for marker in self._expected.values()}
         for entity, prediction in predictions.items():
-            if prediction is None or entity in followed or _is_there(prediction, finds):
+            if prediction is None or entity not in boards or entity in followed or _is_there(prediction, finds):
                 self._blind[entity] = 0
                 continue
             self._blind[entity] += 1
@@ -169,7 +175,7 @@ class Pipeline:
     def _is_search_due(self, stamp_ns: int) -> bool:
         if self._next_search_ns is None:
             self._next_search_ns = stamp_ns + self._search_phase_ns
-        return bool(self._expected) and stamp_ns >= self._next_search_ns
+        return bool(self._markers) and stamp_ns >= self._next_search_ns
 
     def _schedule_search(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
         """Search at the full rate while nothing is in view, at half of it while something is missing, else seldom.
@@ -177,7 +183,7 @@ class Pipeline:
         What the belief has outside of the picture is not missing.
         """
         seen = set(self.tracked)
-        missing = {m.entity for m in self._expected.values() if predictions.get(m.entity, m) is not None} - seen
+        missing = {entity for entity in self._markers if predictions.get(entity, ...) is not None} - seen
         rate_hz = self._search_rate_hz if not seen else self._search_rate_hz / 2
         if not missing:
             rate_hz = self._settings.tracked_search_rate_hz
@@ -215,7 +221,7 @@ class Pipeline:
         if expected is None:
             self.counts["unknown"] += 1
             return None
-        points, settings = self._points[expected.code], self._settings
+        points, settings = self._points[expected.entity], self._settings
         poses = pose.planar_poses(track.corners, points, self._intrinsics)
         if not poses:
             self.counts["no_pose"] += 1
@@ -246,7 +252,7 @@ class Pipeline:
                 resolved += group
                 continue
             self.counts["double"] += len(group)
-            self._faults.doubled(next(m for m in self._expected.values() if m.entity == entity))
+            self._faults.doubled(self._markers[entity])
             prediction = predictions.get(entity)
             if prediction is None or len(group) > 2:
                 continue

@@ -5,11 +5,13 @@ from enum import StrEnum
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from groundstation.geometry.board import VALID_CODES
+from groundstation.geometry.board import VALID_CODES, Board
 from groundstation.geometry.calibration import intrinsics_from_mapping
 from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.tag import Tag
 
 _Positive = Annotated[float, Field(gt=0)]
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
@@ -98,24 +100,60 @@ class MarkerKind(StrEnum):
     TARGET = "target"
 
 
+class TagSettings(_Section):
+    """A tag of an ArUco or AprilTag dictionary; size_mm: the side of its black square."""
+
+    dictionary: str
+    id: int
+    size_mm: Annotated[float, Field(gt=1, le=2000)]
+
+    @model_validator(mode="after")
+    def _known(self) -> "TagSettings":
+        Tag(self.dictionary, self.id, self.size_mm)
+        return self
+
+
 class MarkerSettings(_Section):
-    """A marker that may come into view: whose it is, its code and size, its place on its carrier [m; base]."""
+    """A marker that may come into view: whose it is, its place on its carrier [m; base], and what is printed on it.
+
+    That is a checkerboard (code, square_mm), or a tag.
+    """
 
     entity: _Name
-    code: Annotated[int, Field(ge=min(VALID_CODES), le=max(VALID_CODES))]
-    square_mm: Annotated[float, Field(gt=1, le=1000)]
+    code: Annotated[int, Field(ge=min(VALID_CODES), le=max(VALID_CODES))] | None = None
+    square_mm: Annotated[float, Field(gt=1, le=1000)] | None = None
+    tag: TagSettings | None = None
     position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     kind: MarkerKind = MarkerKind.ROBOT
+
+    @model_validator(mode="after")
+    def _complete(self) -> "MarkerSettings":
+        if (self.code is None or self.square_mm is None) == (self.tag is None):
+            raise ValueError(f"marker of {self.entity}: needs either code and square_mm, or tag")
+        return self
+
+    @property
+    def printed(self) -> Board | Tag:
+        """Return its layout."""
+        if self.tag is not None:
+            return Tag(self.tag.dictionary, self.tag.id, self.tag.size_mm)
+        assert self.code is not None and self.square_mm is not None
+        return Board(self.code, self.square_mm)
 
     @property
     def label(self) -> str:
         """Return what an operator calls it."""
-        return f"marker {self.code}"
+        return f"marker {self.code}" if self.tag is None else f"tag {self.tag.dictionary} {self.tag.id}"
 
     @property
     def size_mm(self) -> float:
-        """Return the length that a ruler is put to: the side of a square."""
-        return self.square_mm
+        """Return the length that a ruler is put to: the side of a square, or of a tag."""
+        return self.tag.size_mm if self.tag is not None else self.square_mm or 0.0
+
+    @property
+    def reach_m(self) -> float:
+        """Return how far its corners are from its centre [m]."""
+        return float(np.linalg.norm(self.printed.corners(), axis=1).max())
 
 
 class MountSettings(_Section):
@@ -189,8 +227,8 @@ class CameraDriverSettings(_Section):
 
     @model_validator(mode="after")
     def _check(self) -> "CameraDriverSettings":
-        codes = [marker.code for marker in self.markers]
-        if len(set(codes)) != len(codes):
+        labels = [marker.label for marker in self.markers]
+        if len(set(labels)) != len(labels):
             raise ValueError("markers: two markers share a code")
         if self.mount.in_world and self.mount.looking is None:
             raise ValueError("mount.looking: a camera fixed in the world needs it (down)")

@@ -12,6 +12,9 @@ BORDER_SQUARES = 3.5
 DETECTION_PX = 10.0
 """A square must be this large to be found with certainty; bounds the range of world-fixed cameras."""
 
+TAG_SQUARES = 3.8
+"""A tag is found as far as a checkerboard with squares of this part of its side (measured: 168 mm like 44 mm)."""
+
 ATTITUDE_REPEATS = 2.0
 """Attitude errors last for seconds: they are counted with this multiple, as if they were white."""
 
@@ -21,14 +24,21 @@ def sensors_from_field(resolved: Mapping[str, Any]) -> SensorSuite:
     drones = {name: drone for name, drone in resolved["drones"].items() if drone.get("enabled", True)}
     target = resolved["target"]
     heights = {name: float(drone["marker"]["position_m"][2]) for name, drone in drones.items()}
-    square = min((drone["marker"]["square_mm"] for drone in drones.values()), default=44.0) / 1000
-    smallest = min(square, target["marker"]["square_mm"] / 1000)
+    square = min((_square_m(drone["marker"]) for drone in drones.values()), default=0.044)
+    smallest = min(square, _square_m(target["marker"]))
     reach = resolved["planner"]["planned_range_m"]
     return SensorSuite(
         world={name: _world(camera, square) for name, camera in resolved["cameras"].items()},
         onboard={name: _onboard(drone, smallest, reach) for name, drone in drones.items()},
         marker_height_m=heights | {target["name"]: float(target["marker"]["height_m"])},
     )
+
+
+def _square_m(marker: Mapping[str, Any]) -> float:
+    """Return the square of the checkerboard that is seen as far as a marker is."""
+    if marker.get("kind") == "aruco":
+        return float(marker["size_mm"]) / TAG_SQUARES / 1000
+    return float(marker["square_mm"]) / 1000
 
 
 def _frustum(calibration: Mapping[str, Any], range_m: float, square_m: float) -> Frustum:

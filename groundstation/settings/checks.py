@@ -9,6 +9,7 @@ from drivers.camera.settings import SourceKind, parse_source
 from groundstation.settings.behaviour import Estimator, Planner, Safety
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
+from groundstation.settings.marker import Marker
 from groundstation.settings.room import Calibration, Room, WorldCamera
 from groundstation.settings.target import Target
 
@@ -99,15 +100,21 @@ def _unique(values: Iterable[tuple[KeyPath, object, str]], what: str) -> Iterato
             holders[value] = holder
 
 
+def _key_of(marker: Marker) -> str:
+    return "code" if marker.kind == "checkerboard" else "id"
+
+
 def _distinct(parts: Parts) -> Iterator[Finding]:
     codes: list[tuple[KeyPath, object, str]] = [
-        (("drones", name, "marker", "code"), drone.marker.code, name) for name, drone in parts.drones.items()
+        (("drones", name, "marker", _key_of(drone.marker)), drone.marker.identity, name)
+        for name, drone in parts.drones.items()
     ]
     sources: list[tuple[KeyPath, object, str]] = [
         (("cameras", name, "source"), camera.source, name) for name, camera in parts.cameras.items()
     ]
     if parts.target is not None:
-        codes.append((("target", "marker", "code"), parts.target.marker.code, parts.target.name))
+        marker = parts.target.marker
+        codes.append((("target", "marker", _key_of(marker)), marker.identity, parts.target.name))
     sources += [(("drones", name, "camera", "source"), d.camera.source, name) for name, d in parts.drones.items()]
     yield from _unique(codes, "marker code")
     yield from _unique(sources, "camera source")

@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from groundstation.settings.marker import Marker
 from groundstation.settings.room import Calibration
-from groundstation.settings.values import Address, MarkerCode, Section, Source, SquareSize, Vector2, Vector3, VideoDelay
+from groundstation.settings.values import Address, Section, Source, Vector2, Vector3, VideoDelay
 
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
 Delay = Annotated[float, Field(ge=0, le=1000)]
@@ -33,17 +34,10 @@ class Limits(Section):
         return math.radians(self.max_tilt_deg)
 
 
-class RobotMarker(Section):
-    """Checkerboard flat on top of a drone: its identity and where its centre is [base]."""
+class RobotMarker(Marker):
+    """The marker flat on top of a drone, and where its centre is [base]."""
 
-    code: MarkerCode
-    square_mm: SquareSize = 44.0
     position_m: Vector3 = (0.0, 0.0, 0.08)
-
-    @property
-    def square_m(self) -> float:
-        """Return the side of one square [m]."""
-        return self.square_mm / 1000
 
 
 class OnboardCamera(Section):

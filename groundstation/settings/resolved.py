@@ -36,7 +36,11 @@ def summary_of(field: Field) -> str:
         lines.append(f"  observes {' and '.join(camera.observes)}")
     lines += [line for name, drone in field.drones.items() for line in _drone_lines(name, drone)]
     marker = field.target.marker
-    lines += [f"target {field.target.name}: marker {marker.code} at {marker.height_m:g} m", "", *_safety_lines(field)]
+    lines += [
+        f"target {field.target.name}: marker {marker.identity} at {marker.height_m:g} m",
+        "",
+        *_safety_lines(field),
+    ]
     return "\n".join(lines)
 
 
@@ -47,7 +51,7 @@ def _span(interval: tuple[float, float]) -> str:
 def _drone_lines(name: str, drone: Drone) -> list[str]:
     limits = drone.limits
     return [
-        f"drone {name}: {drone.kind} at {drone.address}, pad {_pair(drone.pad_m)} m, marker {drone.marker.code}",
+        f"drone {name}: {drone.kind} at {drone.address}, pad {_pair(drone.pad_m)} m, marker {drone.marker.identity}",
         f"  camera {drone.camera.source}, {drone.camera.tilt_down_deg:g} deg down",
         f"  at most {limits.max_speed_m_s:g} m/s, climb {limits.max_climb_m_s:g} m/s,"
         f" turn {limits.max_yaw_rate_deg_s:g} deg/s; lands below {limits.battery_min:.0%} battery"

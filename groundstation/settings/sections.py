@@ -209,15 +209,10 @@ def _camera(field: Field, source: str, lens: Calibration, delay_ms: float, phase
 
 
 def _markers(field: Field) -> list[dict[str, Any]]:
-    robots = [{"entity": name, "kind": "robot", **drone.marker.model_dump()} for name, drone in field.drones.items()]
-    target = field.target.marker
-    return [
-        *robots,
-        {
-            "entity": field.target.name,
-            "kind": "target",
-            "code": target.code,
-            "square_mm": target.square_mm,
-            "position_m": target.position_m,
-        },
+    robots = [
+        {"entity": name, "kind": "robot", "position_m": drone.marker.position_m, **drone.marker.printed}
+        for name, drone in field.drones.items()
     ]
+    marker = field.target.marker
+    target = {"entity": field.target.name, "kind": "target", "position_m": marker.position_m, **marker.printed}
+    return [*robots, target]

@@ -10,6 +10,7 @@ from groundstation.bus.messages import Header, RelativeObservation
 from groundstation.geometry.board import Board
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
+from groundstation.geometry.tag import Tag
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteDrone
 from sim_bridge.world.world import World
@@ -31,18 +32,22 @@ class Carried:
     """A board on a body: where its centre is [base]."""
 
     body: str
-    board: Board
+    board: Board | Tag
     position: Array
+
+
+def _square_m(printed: Board | Tag) -> float:
+    """Return the square of the checkerboard that is seen as far as a marker is (a tag of 168 mm: 44 mm)."""
+    return printed.square_m if isinstance(printed, Board) else printed.size_mm / 3800.0
 
 
 def boards_of(site: Site) -> tuple[Carried, ...]:
     """Return all boards of a site: drones' and target's."""
     drones = [
-        Carried(name, Board(drone.marker.code, drone.marker.square_mm), np.array(drone.marker.position_m))
-        for name, drone in site.drones.items()
+        Carried(name, drone.marker.printed, np.array(drone.marker.position_m)) for name, drone in site.drones.items()
     ]
     marker = site.target.marker
-    return (*drones, Carried(site.target.name, Board(marker.code, marker.square_mm), np.array([0, 0, marker.height_m])))
+    return (*drones, Carried(site.target.name, marker.printed, np.array([0, 0, marker.height_m])))
 
 
 class Eye:
@@ -118,7 +123,7 @@ class Eye:
         if not bool(np.all((outline > _BORDER_PX) & (outline < size))):  # NaN is outside too
             return None
         tracked = now_s - self._last_seen[carried.body] < _FORGET_S
-        pixels = self._lens.fx_px * carried.board.square_m / float(np.linalg.norm(centre))
+        pixels = self._lens.fx_px * _square_m(carried.board) / float(np.linalg.norm(centre))
         if pixels < (_TRACKED_PX if tracked else _SEARCH_PX):
             return None
         if not tracked and self._rng.random() > 3.0 * _SEARCH_SHARE:

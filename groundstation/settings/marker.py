@@ -1,0 +1,62 @@
+"""What a robot or target is known by: a checkerboard with its code, or a tag of an ArUco or AprilTag dictionary."""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from groundstation.geometry.tag import DICTIONARIES, tag_fault
+from groundstation.settings.values import MarkerCode, Section, SquareSize
+
+TagId = Annotated[int, Field(ge=0)]
+TagSize = Annotated[float, Field(ge=10, le=1000)]
+
+
+class Marker(Section):
+    """A flat marker: `code` and `square_mm` of a checkerboard, or `dictionary`, `id` and `size_mm` of a tag."""
+
+    kind: Literal["checkerboard", "aruco"] = "checkerboard"
+    code: MarkerCode | None = None
+    square_mm: SquareSize = 44.0
+    dictionary: str | None = None
+    id: TagId | None = None
+    size_mm: TagSize | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        faults = self._checkerboard_faults() if self.kind == "checkerboard" else self._tag_faults()
+        if faults:
+            details = [InitErrorDetails(type=fault, loc=(key,), input=getattr(self, key)) for key, fault in faults]
+            raise ValidationError.from_exception_data("Marker", details)
+        return self
+
+    def _checkerboard_faults(self) -> list[tuple[str, Any]]:
+        foreign = [key for key in ("dictionary", "id", "size_mm") if getattr(self, key) is not None]
+        faults: list[tuple[str, Any]] = [(key, _fault("belongs to kind: aruco")) for key in foreign]
+        return faults or ([("code", "missing")] if self.code is None else [])
+
+    def _tag_faults(self) -> list[tuple[str, Any]]:
+        if self.code is not None:
+            return [("code", _fault("belongs to kind: checkerboard; a tag has an id"))]
+        missing = [key for key in ("dictionary", "id", "size_mm") if getattr(self, key) is None]
+        if missing or self.dictionary is None or self.id is None:
+            return [(key, "missing") for key in missing]
+        fault = tag_fault(self.dictionary, self.id)
+        place = "dictionary" if self.dictionary not in DICTIONARIES else "id"
+        return [(place, _fault(fault.removeprefix(f"{place} ").split(" (got")[0]))] if fault else []
+
+    @property
+    def identity(self) -> str:
+        """Return what no two markers of a field may share."""
+        return str(self.code) if self.kind == "checkerboard" else f"{self.dictionary} {self.id}"
+
+    @property
+    def printed(self) -> dict[str, Any]:
+        """Return what the camera drivers are told of the print: a code with its square size, or a tag."""
+        if self.kind == "checkerboard":
+            return {"code": self.code, "square_mm": self.square_mm}
+        return {"tag": {"dictionary": self.dictionary, "id": self.id, "size_mm": self.size_mm}}
+
+
+def _fault(text: str) -> PydanticCustomError:
+    return PydanticCustomError("marker", "{text}", {"text": text})

@@ -1,0 +1,118 @@
+"""The second kind of marker, from the field file through rendering to pose: tags, their signs, honesty and identity."""
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.camera import pose
+from drivers.camera.convert import stabilized_from_optical
+from drivers.camera.pipeline import Pipeline
+from drivers.camera.settings import DetectorSettings, MarkerSettings, MountSettings, TagSettings
+from groundstation.errors import SettingsError
+from groundstation.geometry.angles import wrap
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.geometry.tag import Tag
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+from groundstation.settings.sections import driver_sections
+from sim_bridge.cameras import render_specs
+from sim_bridge.render.renderer import Renderer
+from sim_bridge.render.scene import compose_scene
+from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.scenario import Scenario
+from sim_bridge.site import parse_site
+
+FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
+MOUNT = MountSettings(parent="drone_1", tilt_down_deg=45.0)
+FAMILIES = ("DICT_APRILTAG_36H11", "DICT_4X4_50")
+FRAME_NS = 66_666_667
+
+
+def marker(family, number=7):
+    return MarkerSettings(entity="bot", tag=TagSettings(dictionary=family, id=number, size_mm=168.0))
+
+
+def state(x, y, z, yaw=0.0):
+    return [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0, 0.0]
+
+
+def renderer_of(family, number=7, scenario=CameraScenario(exposure_ms=0.0)):  # noqa: B008  frozen
+    mount = Mount(Pose(base_from_tilted_optical(math.radians(45)), np.zeros(3)), "drone_1")
+    board = BoardSpec("bot", 0, 0.0, (0.0, 0.0, 0.4), BodyShape.TURTLEBOT, Tag(family, number, 168.0))
+    return Renderer(RenderSpec("c", mount, FRONT, (board,), "t", ("drone_1", "bot"), "127.0.0.1", 0, scenario))
+
+
+def gravity(_entity):
+    return pose.Gravity(stabilized_from_optical(MOUNT, 0.0, 0.0), 0.0, 0.0, True)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_tag_by_hand(family):
+    """Camera 45 deg down at 1.6 m; the tag 1.2 m ahead, 0.3 m to the left, 1.2 m below, turned left by 20 deg."""
+    pipeline = Pipeline(FRONT, (marker(family),), DetectorSettings(), search_rate_hz=2.0)
+    picture = renderer_of(family).render(np.array([state(0, 0, 1.6), state(1.2, 0.3, 0.0, math.radians(20))]))
+    (sighting,) = pipeline.process(picture, 0, gravity)
+    best = sighting.choice.best
+    assert sighting.entity == "bot"
+    assert best.position_m == pytest.approx([-0.3, 0.0, 1.6971], abs=0.03)
+    assert math.degrees(best.yaw_rad) == pytest.approx(20.0, abs=2.0)
+    assert pipeline.tracked == ("bot",)
+
+
+def test_tags_are_followed_without_searching_and_measured_honestly():
+    random, errors, seen = np.random.default_rng(1), [], 0
+    renderer = renderer_of(FAMILIES[0])
+    pipeline = Pipeline(FRONT, (marker(FAMILIES[0]),), DetectorSettings(), search_rate_hz=2.0)
+    for k in range(60):
+        bot = state(1.5 + 0.4 * math.sin(k / 11), 0.3 * math.sin(k / 7), 0.0, 0.05 * k)
+        states = np.array([state(0, 0, 2.0), bot])
+        truth = compose_scene(renderer._spec, states).sights[0].optical_from_marker.translation
+        sightings = pipeline.process(renderer.render(states), k * FRAME_NS, gravity)
+        seen += len(sightings)
+        for sighting in sightings:
+            best = sighting.choice.best
+            error = np.append(best.position_m - truth, wrap(best.yaw_rad - bot[8]))
+            errors.append(error @ np.linalg.solve(best.covariance, error) / 4)
+        random.random()
+    assert seen >= 55
+    assert pipeline.counts["searches"] <= 5
+    assert 0.02 < np.mean(errors) < 1.5
+
+
+def test_another_id_is_not_reported():
+    pipeline = Pipeline(FRONT, (marker(FAMILIES[0], 8),), DetectorSettings(), search_rate_hz=2.0)
+    picture = renderer_of(FAMILIES[0]).render(np.array([state(0, 0, 1.6), state(1.2, 0.0, 0.0)]))
+    for k in range(20):
+        assert pipeline.process(picture, k * FRAME_NS, gravity) == []
+
+
+TAGGED = [
+    "drones.drone_2.marker={kind: aruco, dictionary: DICT_APRILTAG_36H11, id: 7, size_mm: 168}",
+]
+
+
+def test_the_field_file_chooses_the_kind_of_each_marker():
+    field = load_field(find_field("lab"), TAGGED)
+    ceiling = next(part for part in driver_sections(field) if part.name == "ceiling")
+    assert '"tag":{"dictionary":"DICT_APRILTAG_36H11","id":7,"size_mm":168.0}' in ceiling.section
+    resolved = field.model_dump(mode="json")
+    specs = render_specs(parse_site(resolved), Scenario(), {"ceiling": ("127.0.0.1", 1)}, "t", 1)
+    assert {board.body: board.tag for board in specs[0].boards} == {
+        "drone_1": None,
+        "drone_2": Tag("DICT_APRILTAG_36H11", 7, 168.0),
+        "turtlebot": None,
+    }
+    ordinary = sensors_from_field(load_field(find_field("lab")).model_dump(mode="json"))
+    reach = sensors_from_field(resolved).world["ceiling"].view.range_m
+    assert reach == pytest.approx(ordinary.world["ceiling"].view.range_m, rel=0.02)
+
+
+def test_one_tag_belongs_to_one_robot():
+    both = [*TAGGED, TAGGED[0].replace("drone_2", "drone_1")]
+    with pytest.raises(SettingsError) as caught:
+        load_field(find_field("lab"), both)
+    assert "DICT_APRILTAG_36H11 7 is already that of drone_1" in caught.value.problems[0]

@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from groundstation.bus import messages as m
 from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.topics import Topic
-from groundstation.engineering_views.scene import LINK_COLOUR, Body, Scene
+from groundstation.engineering_views.scene import LINK_COLOUR, TARGET_COLOUR, Body, Scene
 from groundstation.geometry.angles import quaternion_from_euler
 
 # Faster than this nobody looks, and each log call costs tens of microseconds.
@@ -33,6 +33,7 @@ class RerunScene:
         self._start_ns = start_ns
         self._next_ns: dict[str, int] = {}
         self._camera_paths: dict[str, str] = {}
+        self._topology = ""
         self._takers: dict[type[m.Message], Callable[[Any], None]] = {
             m.Estimate: self._estimate,
             m.Plan: self._plan,
@@ -82,19 +83,19 @@ class RerunScene:
     def _log_static(self) -> None:
         field = self._scene.field
         self._log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        room = field.get("room")
-        if room:
-            x, y, z = room["size_m"]
-            self._log(
-                "world/room", rr.Boxes3D(sizes=[[x, y, z]], centers=[[0, 0, z / 2]], colors=[[90] * 3]), static=True
-            )
-            low, high = (np.array([room["fence"][axis][end] for axis in ("x_m", "y_m", "z_m")]) for end in (0, 1))
-            fence = rr.Boxes3D(
-                mins=[low], sizes=[high - low], colors=[[213, 94, 0]], labels=["fence"], show_labels=False
-            )
-            self._log("world/fence", fence, static=True)
+        if field.get("room"):
+            self._log_room(field["room"])
         for camera in self._scene.cameras:
             self._log_camera(camera)
+
+    def _log_room(self, room: dict[str, Any]) -> None:
+        x, y, z = room["size_m"]
+        wire = rr.components.FillMode.MajorWireframe
+        walls = rr.Boxes3D(sizes=[[x, y, z]], centers=[[0, 0, z / 2]], colors=[[90] * 3], fill_mode=wire)
+        low, high = (np.array([room["fence"][axis][end] for axis in ("x_m", "y_m", "z_m")]) for end in (0, 1))
+        fence = rr.Boxes3D(mins=[low], sizes=[high - low], colors=[TARGET_COLOUR], fill_mode=wire)
+        self._log("world/room", walls, static=True)
+        self._log("world/fence", fence, static=True)
 
     def _log_camera(self, camera: Any) -> None:
         field, name = self._scene.field, camera.child
@@ -140,7 +141,9 @@ class RerunScene:
         self._log("plots/cost/chosen", rr.Scalars(message.cost))
         for other in message.alternatives:
             self._log(["plots", "cost", other.topology], rr.Scalars(other.cost))
-        self._log("plan/topology", rr.TextLog(f"{message.topology} ({message.mode})", level="INFO"))
+        if message.topology != self._topology:
+            self._topology = message.topology
+            self._log("log/topology", rr.TextLog(f"{message.topology} ({message.mode})", level="INFO"))
 
     def _setpoint(self, message: m.VelocitySetpoint) -> None:
         arrow = self._scene.arrow(message)
@@ -164,7 +167,7 @@ class RerunScene:
 
     def _truth(self, message: m.TruthState) -> None:
         name = message.header.entity
-        dot = rr.Points3D([message.position_m], radii=[0.05], colors=[[150] * 3], labels=[f"{name} in truth"])
+        dot = rr.Points3D([message.position_m], radii=[0.05], colors=[[150] * 3])
         self._log(f"world/truth/{name}", dot)
 
     def _event(self, message: m.Event) -> None:

@@ -2,9 +2,11 @@
 
 import re
 import struct
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import accumulate
 from pathlib import Path
 from typing import IO
 
@@ -60,7 +62,14 @@ class FileIndex:
         with path.open("rb", buffering=_BUFFER_BYTES) as stream:
             self._scan(stream, path.stat().st_size)
             self._complete(stream)
-        self.chunks = [chunk for chunk in self.chunks if chunk.counts]
+        self.chunks = sorted((chunk for chunk in self.chunks if chunk.counts), key=lambda chunk: chunk.start_ns)
+        self._starts_ns = [chunk.start_ns for chunk in self.chunks]
+        # Chunks overlap a little in time: how far all up to here reach.
+        self._reach_ns = list(accumulate((chunk.end_ns for chunk in self.chunks), max))
+        self._places: dict[int, list[int]] = {}
+        for number, chunk in enumerate(self.chunks):
+            for id_ in chunk.counts:
+                self._places.setdefault(id_, []).append(number)
 
     def _scan(self, stream: IO[bytes], size: int) -> None:
         at = len(MCAP0_MAGIC)
@@ -117,6 +126,34 @@ class FileIndex:
         channels = {id_: key for id_, key in self.channels.items() if key is None or wanted(key.topic)}
         hidden: Channels = {id_: None for id_ in self.channels if id_ not in channels}
         return list(chunk_records(self.data(chunk), channels | hidden, wanted, self.damage))
+
+    def latest(self, time_ns: int, wanted: Callable[[Topic], bool]) -> dict[Key, RawRecord]:
+        """Return for each key of a wanted topic its last message with log time < time."""
+        found: dict[Key, RawRecord] = {}
+        seen: dict[int, dict[Key, RawRecord]] = {}
+        begun = bisect_left(self._starts_ns, time_ns)
+        for id_, key in self.channels.items():
+            if key is None or not wanted(key.topic):
+                continue
+            places = self._places.get(id_, [])
+            for number in reversed(places[: bisect_left(places, begun)]):
+                best = found.get(key)
+                if best is not None and self._reach_ns[number] <= best.log_time_ns:
+                    break
+                if number not in seen:
+                    seen[number] = self._last_of(self.chunks[number], time_ns, wanted)
+                record = seen[number].get(key)
+                if record is not None and (best is None or best.log_time_ns < record.log_time_ns):
+                    found[key] = record
+        return found
+
+    def _last_of(self, chunk: Chunk, time_ns: int, wanted: Callable[[Topic], bool]) -> dict[Key, RawRecord]:
+        last: dict[Key, RawRecord] = {}
+        for record in self.read(chunk, wanted):
+            before = last.get(record.key)
+            if record.log_time_ns < time_ns and (before is None or before.log_time_ns <= record.log_time_ns):
+                last[record.key] = record
+        return last
 
     def holds(self, chunk: Chunk, wanted: Callable[[Topic], bool]) -> bool:
         """Return whether a chunk has messages of wanted topics."""

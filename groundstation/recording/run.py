@@ -93,24 +93,10 @@ class RecordedRun:
     def latest_before(self, time_ns: int, wanted: Wanted = _every) -> dict[Key, RawRecord]:
         """Return for each wanted key its last message with log time < time: what was known at that moment."""
         found: dict[Key, RawRecord] = {}
-        missing = {
-            key for index in self.indexes for key in index.channels.values() if key is not None and wanted(key.topic)
-        }
-        # Chunks overlap a little in time: a key is settled when no earlier chunk reaches its message's time.
-        for place in sorted(self._places, key=lambda place: place.chunk.end_ns, reverse=True):
-            if place.chunk.start_ns >= time_ns:
-                continue
-            open_keys = {key for key in missing if key not in found or found[key].log_time_ns < place.chunk.end_ns}
-            if not open_keys:
-                break
-            keys = {key for id_ in place.chunk.counts if (key := place.index.channels.get(id_)) in open_keys}
-            if not keys:
-                continue
-            for record in place.index.read(place.chunk, lambda topic: wanted(topic)):
-                if record.log_time_ns < time_ns and record.key in keys:
-                    before = found.get(record.key)
-                    if before is None or before.log_time_ns <= record.log_time_ns:
-                        found[record.key] = record
+        for index in self.indexes:
+            for key, record in index.latest(time_ns, wanted).items():
+                if key not in found or found[key].log_time_ns <= record.log_time_ns:
+                    found[key] = record
         return found
 
 

@@ -9,6 +9,7 @@ from functools import partial
 from pydantic import ValidationError
 
 from drivers.ardrone import convert, velocity_loop
+from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.identity import Model, model_from_navdata
 from drivers.ardrone.inquiry import TcpInquirer
 from drivers.ardrone.link import ArDroneLink
@@ -28,9 +29,11 @@ from drivers.base import Health, HostProcess
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import FlightState, Severity, Vector3
+from groundstation.bus.messages import FlightState, Severity
 from groundstation.errors import SettingsError
 
+# WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
+RATE_HZ = 40.0
 _FRESH_NS = 300_000_000
 _RATE_PERIOD_NS = 200_000_000
 _FAULTS = StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW
@@ -44,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Telemetry:
-    """The newest word of the drone; heard_ns 0: never; velocity, of moved_ns, as reported [base_stabilized]."""
+    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last told its motion."""
 
     heard_ns: int = 0
     moved_ns: int = 0
@@ -52,7 +55,6 @@ class Telemetry:
     control_state: int | None = None
     flight_state: FlightState = FlightState.UNKNOWN
     battery: float | None = None
-    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     model: Model = Model.UNKNOWN
 
 
@@ -76,6 +78,7 @@ class ArDrone:
         self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
         self._loop = VelocityLoop(settings.limits)
+        self._motion = MotionMean()
         self._applied_ns = 0
         self._video_refused = False
         self._refused: Counter[str] = Counter()
@@ -108,12 +111,12 @@ class ArDrone:
                 moved_ns=now_ns,
                 control_state=demo.control_state,
                 battery=min(demo.battery_percent, 100) / 100,
-                velocity_m_s=motion.velocity_m_s,
                 model=self.telemetry.model if self.telemetry.model is not Model.UNKNOWN else model_from_navdata(packet),
             )
         flight_state = convert.flight_state_from_navdata(telemetry.state, telemetry.control_state)
         self.telemetry = replace(telemetry, flight_state=flight_state)
         if motion is not None:
+            self._motion.add(motion)
             self._publisher.publish(now_ns, motion)
 
     # -- sender loop --------------------------------------------------------------------------------------------------
@@ -167,12 +170,16 @@ class ArDrone:
     def _attitude(self, now_ns: int, decision: Decision, heard: Telemetry) -> velocity_loop.Attitude:
         dt_s = (now_ns - self._applied_ns) * 1e-9
         self._applied_ns = now_ns
-        if decision.action is not Action.FLY or now_ns - heard.moved_ns > _FRESH_NS:
+        (vx, vy, vz), force = self._motion.drain()
+        fresh = now_ns - heard.moved_ns <= _FRESH_NS
+        if decision.action is Action.IDLE and fresh and force is not None:
+            self._loop.stand(force, dt_s)
+        if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER
-        vx, vy, vz = heard.velocity_m_s
         scale = self._settings.odometry.velocity_scale
-        return self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, (vx * scale, vy * scale, vz), dt_s)
+        measured = (vx * scale, vy * scale, vz)
+        return self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force)
 
     def health(self, now_ns: int) -> Health:
         """Return rates, losses and refusals of the link."""
@@ -206,6 +213,6 @@ def run(child: HostProcess) -> int:
             child.event(notice.severity, f"{drone.name}: {notice.text}", notice.remedy, drone.name)
 
     try:
-        return run_hosts(child, [VehicleHost(child, drone, settings.authority)], before=tell)
+        return run_hosts(child, [VehicleHost(child, drone, settings.authority)], RATE_HZ, tell)
     finally:
         drone.close()

@@ -150,9 +150,7 @@ def probe(address: str) -> Report:
     try:
         inquirer.ask_version()
         if not line.listen(_ANSWER_S, lambda: line.packet is not None):
-            raise DriverError(
-                f"no AR.Drone answers at {address} (navdata, UDP {NAVDATA_PORT}) within {_ANSWER_S:g} s"
-            )
+            raise DriverError(f"no AR.Drone answers at {address} (navdata, UDP {NAVDATA_PORT}) within {_ANSWER_S:g} s")
         report = Report(address)
         _look(line, report)
         version = inquirer.version

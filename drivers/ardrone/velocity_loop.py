@@ -1,32 +1,18 @@
 """Tilt, climb and turn fractions that make an AR.Drone fly a velocity. Pure.
 
 The drone takes tilt angles, not velocities: it accelerates by g tan(tilt) and is braked by the air. Tilt answers late
-(10 / 63 / 90 % after 90 / 180 / 270 ms), and so does its speed (20-40 ms), which bounds the gain.
+(10 / 63 / 90 % after 90 / 180 / 270 ms), and so does its speed (20-40 ms). How the axes work: `velocity_axis.py`.
 """
 
 import math
 from dataclasses import dataclass
 
 from drivers.ardrone.settings import ArDroneLimits
+from drivers.ardrone.velocity_axis import Axis, Gains
 from groundstation.bus.messages import Vector3
 
 _GRAVITY_M_S2 = 9.81
-
-
-@dataclass(frozen=True, slots=True)
-class Gains:
-    """proportional [1/s], integral [1/s^2], drag of the vehicle [1/s], reference_s: time constant that the integral
-    part expects of the vehicle, integral_m_s2: bound of the integral part, still: speeds below this are zero [m/s,
-    rad/s], settle_s: after so long at zero the drone holds its place by itself.
-    """
-
-    proportional: float = 2.4
-    integral: float = 1.1
-    drag: float = 0.1
-    reference_s: float = 0.5
-    integral_m_s2: float = 0.8
-    still: float = 0.02
-    settle_s: float = 1.0
+_LONGEST_STEP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,54 +33,81 @@ HOVER = Attitude(hover=True)
 
 
 class VelocityLoop:
-    """PI control with drag feed-forward on both horizontal axes; climb and yaw rate are passed on within limits.
-
-    The integral part acts on the difference to a model of the wanted response, so that a step does not wind it up.
+    """Follows the wanted velocity by a model of its response, on both horizontal axes; drag and wind are met as the
+    accelerometers show them. Climb and yaw rate are passed on within limits.
     """
 
     def __init__(self, limits: ArDroneLimits, gains: Gains | None = None) -> None:
         self._limits = limits
         self._max_acceleration = _GRAVITY_M_S2 * math.tan(limits.max_tilt_rad)
         self._gains = gains or Gains()
+        self._axes = (Axis(self._gains), Axis(self._gains))
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past; for every time the vehicle was not flown by this loop."""
-        self._integral = [0.0, 0.0]
-        self._reference: list[float] | None = None
+        """Forget the motion, not what was learned of the vehicle; for every time it was not flown by this loop."""
+        self._flying = False
         self._still_s = 0.0
 
-    def step(self, wanted_m_s: Vector3, yaw_rate_rad_s: float, measured_m_s: Vector3, dt_s: float) -> Attitude:
-        """Return the attitude for a wanted velocity, given the true (scaled) one [base_stabilized, FLU]."""
+    def stand(self, force_m_s2: tuple[float, float], dt_s: float) -> None:
+        """Learn what the accelerometers (forward, left) of a standing drone show."""
+        for axis, force in zip(self._axes, force_m_s2, strict=True):
+            axis.stand(force, dt_s)
+
+    def step(
+        self,
+        wanted_m_s: Vector3,
+        yaw_rate_rad_s: float,
+        measured_m_s: Vector3,
+        dt_s: float,
+        force_m_s2: tuple[float, float] | None = None,
+    ) -> Attitude:
+        """Return the attitude for a wanted velocity, given the true (scaled) one [base_stabilized, FLU].
+
+        force_m_s2: specific force forward and left [base], None when the drone does not tell.
+        """
         gains = self._gains
-        dt_s = min(max(dt_s, 0.0), 0.1)
+        dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
+        turn_rad_s = _clamp(yaw_rate_rad_s, self._limits.max_yaw_rate_rad_s)
         moving = max(abs(yaw_rate_rad_s), *(abs(v) for v in wanted_m_s)) > gains.still
         self._still_s = 0.0 if moving else self._still_s + dt_s
         if self._still_s >= gains.settle_s:
-            self._integral, self._reference = [0.0, 0.0], None
+            self._flying = False
             return HOVER
-        if self._reference is None:
-            self._reference = list(measured_m_s[:2])
-        wanted = _shortened(wanted_m_s[0], wanted_m_s[1], self._limits.max_speed_m_s)
-        x, y = (self._axis(i, wanted[i], measured_m_s[i], dt_s) for i in (0, 1))
-        x, y = _shortened(x, y, self._max_acceleration)
+        x, y = self._accelerations(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
         return Attitude(
             roll_rad=-math.atan(y / _GRAVITY_M_S2),
             pitch_rad=math.atan(x / _GRAVITY_M_S2),
             climb_m_s=_clamp(wanted_m_s[2], self._limits.max_climb_m_s),
-            yaw_rate_rad_s=_clamp(yaw_rate_rad_s, self._limits.max_yaw_rate_rad_s),
+            yaw_rate_rad_s=turn_rad_s,
         )
 
-    def _axis(self, axis: int, wanted: float, measured: float, dt_s: float) -> float:
-        gains = self._gains
-        assert self._reference is not None
-        self._reference[axis] += (wanted - self._reference[axis]) * min(1.0, dt_s / gains.reference_s)
-        direct = gains.proportional * (wanted - measured) + gains.drag * wanted
-        step = gains.integral * (self._reference[axis] - measured) * dt_s
-        # Anti wind-up: no integration further into saturation.
-        if abs(direct + self._integral[axis]) < self._max_acceleration or step * direct < 0.0:
-            self._integral[axis] = _clamp(self._integral[axis] + step, gains.integral_m_s2)
-        return direct + self._integral[axis]
+    def _accelerations(
+        self,
+        wanted_m_s: Vector3,
+        turn_rad_s: float,
+        measured_m_s: Vector3,
+        dt_s: float,
+        force_m_s2: tuple[float, float] | None,
+    ) -> tuple[float, float]:
+        axes = self._axes
+        if not self._flying:
+            self._flying = True
+            for axis, speed in zip(axes, measured_m_s, strict=False):
+                axis.start(speed)
+        wanted = _shortened(wanted_m_s[0], wanted_m_s[1], self._limits.max_speed_m_s)
+        # Seen from a frame that turns left a steady velocity turns right, and holding one takes a pull to the left.
+        turning = (turn_rad_s * axes[1].speed_m_s, -turn_rad_s * axes[0].speed_m_s)
+        centripetal = (-turn_rad_s * axes[1].reference_m_s, turn_rad_s * axes[0].reference_m_s)
+        forces = (None, None) if force_m_s2 is None else force_m_s2
+        asked = [0.0, 0.0]
+        for i, axis in enumerate(axes):
+            outside = axis.observe(measured_m_s[i], forces[i], turning[i], dt_s)
+            asked[i] = axis.wish(wanted[i], outside, dt_s) + centripetal[i]
+        x, y = _shortened(asked[0], asked[1], self._max_acceleration)
+        axes[0].ask(x)
+        axes[1].ask(y)
+        return x, y
 
 
 def _shortened(x: float, y: float, longest: float) -> tuple[float, float]:

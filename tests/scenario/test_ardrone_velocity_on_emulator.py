@@ -5,7 +5,9 @@ from functools import partial
 
 import pytest
 
+from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata
+from drivers.ardrone.driver import RATE_HZ
 from drivers.ardrone.orders import orders_from_decision
 from drivers.ardrone.session import Session
 from drivers.ardrone.settings import ArDroneDriverSettings, OdometryCalibration
@@ -25,7 +27,7 @@ from sim_bridge.world.quadrotor import Quadrotor
 
 TICK_S = 0.005
 TICK_NS = 5_000_000
-SENDER_TICKS = 20 / 3  # 30 Hz
+SENDER_TICKS = 200 / RATE_HZ
 
 
 class NoTcp:
@@ -57,7 +59,7 @@ class Flight:
         self.loop = VelocityLoop(self.settings.limits)
         self.ticks, self.next_send, self.sequence = 0, 0.0, 1
         self.packet = navdata.Navdata(0, 0)
-        self.velocity = (0.0, 0.0, 0.0)
+        self.motion = MotionMean()
         self.flight_state = FlightState.UNKNOWN
 
     def tick(self, action, wanted=(0.0, 0.0, 0.0), yaw_rate=0.0):
@@ -82,17 +84,19 @@ class Flight:
         self.packet = navdata.decode(bytes(datagram))
         motion, demo = motion_from_navdata(self.packet), self.packet.read(DEMO)
         if motion is not None and demo is not None:
-            self.velocity = motion.velocity_m_s
+            self.motion.add(motion)
             self.flight_state = flight_state_from_navdata(self.packet.state, demo.control_state)
 
     def say(self, action, wanted, yaw_rate):
-        attitude = HOVER
+        attitude, dt_s = HOVER, SENDER_TICKS * TICK_S
+        (vx, vy, vz), force = self.motion.drain()
         if action is Action.FLY:
             k = self.settings.odometry.velocity_scale
-            vx, vy, vz = self.velocity
-            attitude = self.loop.step(wanted, yaw_rate, (k * vx, k * vy, vz), SENDER_TICKS * TICK_S)
+            attitude = self.loop.step(wanted, yaw_rate, (k * vx, k * vy, vz), dt_s, force)
         else:
             self.loop.reset()
+        if action is Action.IDLE and force is not None:
+            self.loop.stand(force, dt_s)
         commands = orders_from_decision(action, attitude, self.packet.state, self.flight_state, self.scale)
         commands += self.session.step(self.ticks * TICK_NS, self.packet.state, 0)
         self.control.obey_datagram(at.encode_datagram(commands, self.sequence), self.ticks * TICK_NS)
@@ -122,11 +126,11 @@ def mean(values):
 QUIET = {"air_unrest_m_s2": 1e-9, "velocity_noise_m_s": 1e-9, "attitude_noise_deg": 1e-9}
 
 
-def step_response(flight, axis):
-    """Return (seconds to 90 %, peak, speed held in the end) of a step to 0.5 m/s, smoothed over 50 ms."""
+def step_response(flight, axis, seconds=6.0):
+    """Return (seconds to 90 %, peak of 2.5 s, speed held in the end) of a step to 0.5 m/s, smoothed over 50 ms."""
     wanted = [0.0, 0.0, 0.0]
     wanted[axis] = 0.5
-    speeds = [row[axis] for row in flight.record(6.0, tuple(wanted))]
+    speeds = [row[axis] for row in flight.record(seconds, tuple(wanted))]
     smooth = [mean(speeds[max(0, i - 10) : i + 1]) for i in range(len(speeds))]
     reached = next((i for i, v in enumerate(smooth) if v >= 0.45), len(smooth)) * TICK_S
     return reached, max(smooth[:500]), mean(speeds[-600:])
@@ -142,16 +146,24 @@ def test_the_loop_itself_reaches_half_a_metre_per_second(axis, seed):
     assert held == pytest.approx(0.5 / (1.18 * flight.onboard.velocity_gain), abs=0.02)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_noise_and_wind_add_their_own_swing_and_no_more(seed):
-    """With the noise of the default scenario the bar of the quiet loop does not hold on every seed.
+def test_the_bar_holds_with_noise_and_wind():
+    reached, peak, held = step_response(Flight(5).take_off(), 0)
+    assert reached <= 1.2 and peak <= 1.15 * 0.5
+    assert held == pytest.approx(0.5, abs=0.08)
 
-    The held speed wanders by 0.03-0.06 m/s rms then, and single steps exceed 15 % or need more than 1.2 s: this only
-    bounds how far.
-    """
-    reached, peak, held = step_response(Flight(seed).take_off(), 0)
-    assert reached <= 2.5 and peak <= 1.15 * 0.5 + 0.06
-    assert held == pytest.approx(0.5, abs=0.1)
+
+@pytest.mark.slow
+def test_all_of_sixty_noisy_steps_hold_the_bar(capsys):
+    """The default scenario: 90 % of 0.5 m/s within 1.2 s, at most 15 % over, on both axes of 30 seeds."""
+    steps = [(seed, axis, *step_response(Flight(seed).take_off(), axis, 2.6)) for seed in range(30) for axis in (0, 1)]
+    reached = sorted(step[2] for step in steps)
+    over = sorted(100 * (step[3] / 0.5 - 1) for step in steps)
+    with capsys.disabled():
+        for name, values in (("90 % after [s]", reached), ("overshoot [%]", over)):
+            least, median, most_of_them, most = (values[i] for i in (0, 30, 57, -1))
+            print(f"\n{name:15s} least {least:5.2f}, median {median:5.2f}, 95 % {most_of_them:5.2f}, most {most:5.2f}")
+    failed = [step[:4] for step in steps if step[2] > 1.2 or step[3] > 1.15 * 0.5]
+    assert failed == []
 
 
 def test_signs_of_climb_and_turn():

@@ -1,0 +1,123 @@
+"""One horizontal axis of the velocity loop: wanted response, observer of the speed, and what tilt is under way. Pure.
+
+The odometry's speed is noisy over half a second, too slow and off by a constant factor; what the accelerometers say of
+drag and wind, and what the tilts that were asked for must have done, is sharp at once but drifts. The observer follows
+the second and is drawn to the first with a time constant of a second or so.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+_SUBSTEPS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Figures of loop and vehicle.
+
+    proportional [1/s]. reference_rad_s, reference_damping: of the wanted response, second order. observer_rad_s, and
+    blind_observer_rad_s without accelerometers: bandwidth of the observer, its damping. tilt_rad_s, tilt_damping,
+    dead_ticks: how tilt answers, after so many calls. odometry_delay_s: age of the measured speed. drag [1/s],
+    drag_per_m [1/m]: of the air. accelerometer_gain: measured / true. bias_m_s2: bound of what the observer adds.
+    still: speeds below this are zero [m/s, rad/s]. settle_s: after so long at zero the drone holds its place by itself.
+    standing_s: time constant with which a standing drone learns what its accelerometers show at rest.
+    """
+
+    proportional: float = 1.6
+    reference_rad_s: float = 4.2
+    reference_damping: float = 0.69
+    observer_rad_s: float = 0.8
+    blind_observer_rad_s: float = 3.5
+    observer_damping: float = 0.8
+    tilt_rad_s: float = 12.5
+    tilt_damping: float = 0.63
+    dead_ticks: int = 4
+    odometry_delay_s: float = 0.04
+    drag: float = 0.15
+    drag_per_m: float = 0.13
+    accelerometer_gain: float = 0.92
+    bias_m_s2: float = 0.8
+    still: float = 0.02
+    settle_s: float = 1.0
+    standing_s: float = 2.0
+
+
+class Axis:
+    """State of one axis; `bias_m_s2`, what level flight really accelerates by, outlives `start`."""
+
+    def __init__(self, gains: Gains) -> None:
+        self._gains = gains
+        self.bias_m_s2 = 0.0
+        self.start(0.0)
+
+    def start(self, speed_m_s: float) -> None:
+        """Begin from hovering at a measured speed."""
+        # Half of what is measured then is noise: the drone holds its place.
+        self.speed_m_s = self.reference_m_s = 0.5 * speed_m_s
+        self._reference_rate = self._tilt = self._tilt_rate = 0.0
+        self._under_way = deque([0.0] * self._gains.dead_ticks)
+
+    def stand(self, force_m_s2: float, dt_s: float) -> None:
+        """Learn from a drone that stands: after the flat trim, this is what its accelerometers show when level."""
+        share = min(1.0, dt_s / self._gains.standing_s)
+        rest = -_clamp(force_m_s2 / self._gains.accelerometer_gain, self._gains.bias_m_s2)
+        self.bias_m_s2 += (rest - self.bias_m_s2) * share
+
+    def observe(self, measured_m_s: float, force_m_s2: float | None, turn_m_s2: float, dt_s: float) -> float:
+        """Take a measurement; returns how air and bias accelerate the vehicle [m/s^2].
+
+        force_m_s2: specific force, None unless measured. turn_m_s2: change of the speed by turning of its frame.
+        """
+        gains = self._gains
+        blind = force_m_s2 is None
+        air = -self.drag(self.speed_m_s) if force_m_s2 is None else force_m_s2 / gains.accelerometer_gain
+        outside = air + self.bias_m_s2
+        acceleration = self._answer(dt_s) + outside + turn_m_s2
+        self.speed_m_s += acceleration * dt_s
+        error = measured_m_s - (self.speed_m_s - gains.odometry_delay_s * acceleration)
+        bandwidth = gains.blind_observer_rad_s if blind else gains.observer_rad_s
+        self.speed_m_s += min(1.0, 2 * gains.observer_damping * bandwidth * dt_s) * error
+        self.bias_m_s2 = _clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
+        return outside
+
+    def _answer(self, dt_s: float) -> float:
+        """Advance the model of the tilt by what was asked a dead time ago; returns its mean acceleration."""
+        gains, asked, mean = self._gains, self._under_way.popleft(), 0.0
+        step_s = dt_s / _SUBSTEPS
+        for _ in range(_SUBSTEPS):
+            pull = (
+                gains.tilt_rad_s**2 * (asked - self._tilt) - 2 * gains.tilt_damping * gains.tilt_rad_s * self._tilt_rate
+            )
+            self._tilt_rate += pull * step_s
+            self._tilt += self._tilt_rate * step_s
+            mean += self._tilt / _SUBSTEPS
+        return mean
+
+    def wish(self, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
+        """Return the acceleration to ask of the tilt [m/s^2], before it is limited."""
+        gains, step_s = self._gains, dt_s / _SUBSTEPS
+        for _ in range(_SUBSTEPS):
+            pull = gains.reference_rad_s**2 * (wanted_m_s - self.reference_m_s)
+            self._reference_rate += (
+                pull - 2 * gains.reference_damping * gains.reference_rad_s * self._reference_rate
+            ) * step_s
+            self.reference_m_s += self._reference_rate * step_s
+        # Until what is asked now shows, what was asked before brings so much speed, and so does what is outside.
+        lag_s = 2 * gains.tilt_damping / gains.tilt_rad_s
+        coming = sum(self._under_way) * dt_s + self._tilt * lag_s + self._tilt_rate / gains.tilt_rad_s**2
+        coming += outside_m_s2 * (len(self._under_way) * dt_s + lag_s)
+        error = self.reference_m_s - self.speed_m_s - coming
+        return self._reference_rate + gains.proportional * error - outside_m_s2
+
+    def ask(self, acceleration_m_s2: float) -> None:
+        """Note what was asked of the vehicle in the end."""
+        self._under_way.append(acceleration_m_s2)
+
+    def drag(self, speed_m_s: float) -> float:
+        """Return how the air brakes at a speed [m/s^2]."""
+        return speed_m_s * (self._gains.drag + self._gains.drag_per_m * math.fabs(speed_m_s))
+
+
+def _clamp(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)

@@ -37,7 +37,7 @@ class Gains:
     drag: float = 0.15
     drag_per_m: float = 0.13
     accelerometer_gain: float = 0.92
-    bias_m_s2: float = 0.8
+    bias_m_s2: float = 1.5
     still: float = 0.02
     settle_s: float = 1.0
     standing_s: float = 2.0

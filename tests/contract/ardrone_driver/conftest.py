@@ -113,7 +113,7 @@ class ScriptedDrone:
         self.sequence = 0
         self.state = BOOTSTRAP
         self.major = 2
-        self.psi = 0.0
+        self.psi = self.force_mg = 0.0
         self.select = False
         self.lines: list[tuple[str, int, str]] = []
         self.config: dict[str, str] = {}
@@ -141,7 +141,7 @@ class ScriptedDrone:
         demo = struct.pack(
             "<HHIIfffifffI", 0, 148, self.major << 16, 80, theta, 500.0, self.psi, altitude, 300.0, 200.0, 0, 0
         )
-        phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, 100.0, 0.0, -1000.0, 1.0, 2.0, 3.0, 0, 0, 0)
+        phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, self.force_mg, 0.0, -1000.0, 1.0, 2.0, 3.0, 0, 0, 0)
         return checked(body + demo.ljust(148, b"\0") + phys)
 
     def turn(self) -> None:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from drivers.camera import convert, jpeg
 from drivers.camera.pipeline import Pipeline
-from drivers.camera.settings import CameraDriverSettings
+from drivers.camera.settings import CameraDriverSettings, without_password
 from drivers.camera.sources.frames import FrameSource, Grey, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
@@ -179,7 +179,7 @@ class CameraDriver:
         """Tell lifecycle and operator what the stream does now."""
         name = self._settings.name
         if self._watch.state is StreamState.FLOWING:
-            self._child.ready(f"pictures from {self._settings.source}")
+            self._child.ready(f"pictures from {without_password(self._settings.source)}")
             self._child.event(Severity.INFO, f"camera {name}: pictures arrive", entity=name)
             return
         detail = self._trouble()
@@ -195,7 +195,7 @@ class CameraDriver:
     def _remedy(self) -> str:
         if self._watch.state is StreamState.REFUSED:
             return "set the camera to the calibrated size, or calibrate it at this one"
-        return f"check the camera and its address {self._settings.source}"
+        return f"check the camera and its address {without_password(self._settings.source)}"
 
     def _publish_status(self, now_ns: int) -> None:
         elapsed_s = (now_ns - self._status_ns) / clock.NS_PER_S
@@ -209,6 +209,7 @@ class CameraDriver:
             skipped=self._skipped,
             detections=self._detections,
             detail="" if flowing or self._watch.state is StreamState.WAITING else self._trouble(),
+            rejected=dict(+(self.counts + self._source.rejected)),
         )
         self._child.bus.publish(CAMERA_STATUS, status)
         self._status_ns, self._processed_then = now_ns, self._processed

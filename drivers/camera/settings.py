@@ -64,6 +64,13 @@ def parse_source(text: str) -> SourceAddress:
     return SourceAddress(kinds[scheme], parts.hostname, port, path)
 
 
+def without_password(source: str) -> str:
+    """Return a source's address for messages, without the user and password that it may carry."""
+    scheme, mark, rest = source.partition("://")
+    place, slash, path = rest.partition("/")
+    return f"{scheme}{mark}{place.rpartition('@')[2]}{slash}{path}"
+
+
 def _checked_source(text: str) -> str:
     parse_source(text)
     return text

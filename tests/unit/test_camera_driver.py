@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections import deque
+from collections import Counter, deque
 
 import cv2
 import numpy as np
@@ -53,7 +53,7 @@ def settings(**changes):
 class FakeSource:
     def __init__(self):
         self.packets, self.received, self.connected, self.detail = deque(), 0, True, ""
-        self.units = []
+        self.units, self.rejected = [], Counter()
 
     def push(self, data, arrival_ns=None):
         self.received += 1
@@ -259,6 +259,9 @@ def test_a_camera_that_never_answers_is_named(rig):
 
 def test_status_tells_connection_age_and_skipped_frames(rig, jpeg):
     rig.source.received = 4
+    rig.source.rejected["multipart"] = 2
+    rig.source.push(b"no picture")
+    rig.camera.turn()
     rig.source.push(jpeg)
     rig.camera.turn()
     spend(rig, 0.55)
@@ -266,6 +269,7 @@ def test_status_tells_connection_age_and_skipped_frames(rig, jpeg):
     assert not status.connected
     assert (status.frames, status.skipped, status.detections) == (1, 4, 1)
     assert status.age_ms > 500
+    assert status.rejected == {"multipart": 2, "jpeg": 1}
 
 
 def test_a_detector_that_fails_does_not_end_the_process(rig, jpeg, monkeypatch):

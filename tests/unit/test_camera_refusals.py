@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from drivers.camera import jpeg
+from drivers.camera.settings import SourceAddress, SourceKind, parse_source, without_password
 from drivers.camera.stream_watch import StreamState, StreamWatch
 
 
@@ -53,3 +54,25 @@ def test_any_bytes_have_a_size_or_none():
         data[random.integers(2, len(data) - 2, 6)] = random.integers(0, 256, 6)
         size = jpeg.size_of(data.tobytes())
         assert size is None or (0 < size[0] < 65536 and 0 < size[1] < 65536)
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("http://10.0.0.5/a?b=1", SourceAddress(SourceKind.HTTP, "10.0.0.5", 80, "/a?b=1")),
+        ("ardrone://192.168.1.1", SourceAddress(SourceKind.ARDRONE, "192.168.1.1", 5555, "/")),
+        ("ardrone://192.168.1.1:5600", SourceAddress(SourceKind.ARDRONE, "192.168.1.1", 5600, "/")),
+        ("rtsp://me:pass@cam/live", SourceAddress(SourceKind.RTSP, "cam", 554, "/live")),
+        ("/dev/video2", SourceAddress(SourceKind.DEVICE, path="/dev/video2")),
+        ("file:///a b/c.mp4", SourceAddress(SourceKind.FILE, path="/a b/c.mp4")),
+        ("/a/pictures", SourceAddress(SourceKind.FILE, path="/a/pictures")),
+    ],
+)
+def test_sources_are_taken_apart(text, address):
+    assert parse_source(text) == address
+
+
+def test_messages_name_a_source_without_its_password():
+    assert without_password("rtsp://me:pass@cam:554/live@2") == "rtsp://cam:554/live@2"
+    assert without_password("ardrone://192.168.1.1") == "ardrone://192.168.1.1"
+    assert without_password("/dev/video0") == "/dev/video0"

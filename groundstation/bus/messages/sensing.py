@@ -72,7 +72,7 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
 
 
 class CameraStatus(Message, frozen=True, kw_only=True):
-    """Health of one camera process (2 Hz)."""
+    """Health of one camera process (2 Hz); rejected: what was refused since its start, by reason."""
 
     connected: bool
     fps: float
@@ -81,6 +81,7 @@ class CameraStatus(Message, frozen=True, kw_only=True):
     skipped: int
     detections: int
     detail: str = ""
+    rejected: dict[str, int] = msgspec.field(default_factory=dict)
 
 
 class ClockOffset(Message, frozen=True, kw_only=True):

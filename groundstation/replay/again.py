@@ -140,7 +140,7 @@ class Again:
         """Return all of it for programs."""
         content: dict[str, Any] = {
             "recording": self._source.name,
-            "changes": self._changes,
+            "with": self._changes,
             "identical": result.identical,
             "output_sha256": self._digest.hexdigest(),
             "foreign": versions.foreign(self._source.versions),

@@ -1,0 +1,21 @@
+"""Recordings to replay, flown once for all tests."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+
+
+@pytest.fixture(scope="session")
+def flown(tmp_path_factory: pytest.TempPathFactory, lab_field: dict[str, Any]) -> Path:
+    """A run folder: take-off and three seconds of tracking by two drones."""
+    from flown_study import FlownStudy
+
+    from sim_bridge.study.runner import StudyOptions
+
+    folder = tmp_path_factory.mktemp("flown")
+    FlownStudy(lab_field, folder, StudyOptions(seed=3, duration_s=3.0)).fly()
+    return folder

@@ -1,0 +1,28 @@
+"""Writes the recording in tests/fixtures/replay: `python tests/replay/make_fixture.py`.
+
+To be renewed only when the message version changes on purpose: it stands for the recordings that users have.
+"""
+
+from pathlib import Path
+
+from groundstation.process import numba_cache
+
+ROOT = Path(__file__).parents[2]
+FIXTURE = ROOT / "tests" / "fixtures" / "replay"
+
+
+def main() -> None:
+    """Fly it."""
+    numba_cache.activate(numba_cache.EVERYTHING)  # before anything imports numba
+    from flown_study import FlownStudy
+
+    from groundstation.settings.load import load_field
+    from sim_bridge.study.runner import StudyOptions
+
+    FIXTURE.mkdir(parents=True, exist_ok=True)
+    field = load_field(ROOT / "config" / "lab.yaml").model_dump(mode="json")
+    FlownStudy(field, FIXTURE, StudyOptions(seed=5, duration_s=1.5), small=True).fly()
+
+
+if __name__ == "__main__":
+    main()

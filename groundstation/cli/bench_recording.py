@@ -150,7 +150,7 @@ def _peer_read(path: Path) -> dict[str, Any]:
         facts = reader().get_summary().statistics
         at_ns = (facts.message_start_time + facts.message_end_time) // 2
         # Only the next message: what was known before it, which our seek includes, is left to the reader's user.
-        seek = median(_cpu(lambda: next(reader().iter_messages(start_time=at_ns))) for _ in range(3))
+        seek = median(_cpu(lambda: next(reader().iter_messages(starting_at=at_ns))) for _ in range(3))
     return {"peer_open_s": round(opened, 4), "peer_seek_s": round(seek, 4)}
 
 

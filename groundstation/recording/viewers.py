@@ -5,6 +5,7 @@ WIRE (foxglove/schemas, proto): names and numbers of the fields below. Pictures 
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import starmap
 
 from groundstation.bus.clock import NS_PER_S
 from groundstation.recording.protobuf import Field, Kind, Type, blob, descriptor_set, double, fields, integer
@@ -24,28 +25,14 @@ def _doubles(name: str, names: str) -> Type:
     return Type("foxglove", name, tuple(Field(one, number + 1, Kind.DOUBLE) for number, one in enumerate(names)))
 
 
-_IMAGE = Type(
-    "foxglove",
-    "CompressedImage",
-    (
-        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
-        Field("data", 2, Kind.BYTES),
-        Field("format", 3, Kind.STRING),
-        Field("frame_id", 4, Kind.STRING),
-        Field("skein_header", _HEADER_FIELD, Kind.STRING),
-    ),
-)
-_VIDEO = Type(
-    "foxglove",
-    "CompressedVideo",
-    (
-        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
-        Field("frame_id", 2, Kind.STRING),
-        Field("data", 3, Kind.BYTES),
-        Field("format", 4, Kind.STRING),
-        Field("skein_header", _HEADER_FIELD, Kind.STRING),
-    ),
-)
+def _picture(name: str, data: int, kind: int, frame: int) -> Type:
+    parts = (("data", data, Kind.BYTES), ("format", kind, Kind.STRING), ("frame_id", frame, Kind.STRING))
+    ours = Field("skein_header", _HEADER_FIELD, Kind.STRING)
+    return Type("foxglove", name, (Field("timestamp", 1, Kind.MESSAGE, _STAMP), *starmap(Field, parts), ours))
+
+
+_IMAGE = _picture("CompressedImage", data=2, kind=3, frame=4)
+_VIDEO = _picture("CompressedVideo", data=3, kind=4, frame=2)
 _LEVELS = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL")
 _LOG = Type(
     "foxglove",

@@ -5,7 +5,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEMO_ARGS ?=
 
-.PHONY: demo test test-slow check format clean
+INTEROP := .interop
+
+.PHONY: demo test test-slow check format interop clean
 
 demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)
@@ -26,6 +28,22 @@ format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# Clients of others for the interoperability tests, each in an environment of its own.
+interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed
+
+$(INTEROP)/node/.installed: tests/interop/package.json
+	@command -v npm >/dev/null || { echo "npm is missing: the tests with npm ar-drone are skipped without it"; exit 1; }
+	@mkdir -p $(INTEROP)/node && cp $< $(INTEROP)/node/package.json
+	cd $(INTEROP)/node && npm install --no-package-lock --ignore-scripts --no-audit --no-fund --loglevel=error
+	@touch $@
+
+$(INTEROP)/%/.installed: tests/interop/%.txt
+	@test -x $(INTEROP)/$*/bin/python || $(PYTHON) -m venv $(INTEROP)/$*
+	$(INTEROP)/$*/bin/pip install --quiet --disable-pip-version-check --no-deps --requirement $<
+	@mkdir -p $(INTEROP)/bin && for program in $(INTEROP)/$*/lib/python3*/site-packages/imageio_ffmpeg/binaries/ffmpeg-*; do \
+		test ! -x "$$program" || ln -sf "$$(pwd)/$$program" $(INTEROP)/bin/ffmpeg; done
+	@touch $@
+
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "Skein needs Python 3.11 or newer; this is %d.%d. Use: make PYTHON=python3.11 $(MAKECMDGOALS)" % v[:2])'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -33,4 +51,4 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .numba_cache
+	rm -rf $(VENV) $(INTEROP) .mypy_cache .ruff_cache .pytest_cache .numba_cache

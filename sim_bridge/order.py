@@ -51,6 +51,10 @@ def read_order(path: Path) -> Order:
     site = parse_site(envelope.field)
     scenario = parse_scenario(json.dumps(envelope.scenario))
     check_faults(scenario.faults, site.drones, envelope.streams)
+    strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
+    if strangers:
+        names = ", ".join(site.drones)
+        raise SettingsError([f"scenario: drones.firmware_by_drone: {name!r} is none of {names}" for name in strangers])
     missing = sorted(set(site.drones) - set(envelope.addresses))
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])

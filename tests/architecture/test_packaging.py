@@ -142,22 +142,24 @@ def test_the_continuous_integration_run_is_sound(tmp_path: Path) -> None:
     script.write_bytes((ROOT / ".ci" / "run").read_bytes())
     script.chmod(0o755)
     makefile = tmp_path / "Makefile"
-    makefile.write_text(".venv/.installed check test test-slow demo:\n\t@echo did $@ $(DEMO_ARGS)\n", encoding="utf-8")
+    makefile.write_text(
+        ".venv/.installed interop check test test-slow demo:\n\t@echo did $@ $(DEMO_ARGS)\n", encoding="utf-8"
+    )
     good = subprocess.run([str(script)], capture_output=True, text=True, timeout=60, check=False)
     assert good.returncode == 0, good.stdout + good.stderr
     done = [line for line in good.stdout.splitlines() if line.startswith("did ")]
-    assert [line.split()[1] for line in done] == [".venv/.installed", "check", "test", "test-slow", "demo"]
+    assert [line.split()[1] for line in done] == [".venv/.installed", "interop", "check", "test", "test-slow", "demo"]
     assert done[-1].startswith("did demo --headless --duration")
-    makefile.write_text("check:\n\t@false\n.venv/.installed test test-slow demo:\n", encoding="utf-8")
+    makefile.write_text("check:\n\t@false\n.venv/.installed interop test test-slow demo:\n", encoding="utf-8")
     bad = subprocess.run([str(script)], capture_output=True, text=True, timeout=60, check=False)
     assert bad.returncode == 1
     assert bad.stdout.splitlines()[-1] == "== failed: check"
 
 
 def test_the_continuous_integration_run_is_bounded() -> None:
-    """All limits together stay below an hour."""
+    """All limits together stay below 80 minutes."""
     script = ROOT / ".ci" / "run"
     assert script.stat().st_mode & 0o111
     limits = [int(limit) for limit in re.findall(r"^step \S+ (\d+) ", script.read_text(encoding="utf-8"), re.M)]
-    assert len(limits) == 5
-    assert sum(limits) + 30 * len(limits) <= 3600
+    assert len(limits) == 6
+    assert sum(limits) + 30 * len(limits) <= 4800

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
+_INTEROP = Path(__file__).parents[2] / ".interop"
 _SPEC = importlib.util.spec_from_file_location(
     "mavlink_hangar", Path(__file__).parents[1] / "contract" / "mavlink_links" / "conftest.py"
 )
@@ -91,11 +92,12 @@ def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
 
 
 def mavproxy():
-    """The MAVProxy of `$GROUNDSTATION_MAVPROXY` (an environment of its own: it pulls another OpenCV), or a skip."""
-    python = os.environ.get("GROUNDSTATION_MAVPROXY", "")
-    if not python or not Path(python).exists():
-        pytest.skip("GROUNDSTATION_MAVPROXY does not name the mavproxy.py of an environment with MAVProxy 1.8.75")
-    return python
+    """Return the MAVProxy of `$GROUNDSTATION_MAVPROXY` or `make interop`, an environment of its own; or a skip."""
+    program = os.environ.get("GROUNDSTATION_MAVPROXY") or str(_INTEROP / "mavproxy" / "bin" / "mavproxy.py")
+    if not Path(program).exists():
+        reason = f"{program} is missing: run `make interop`"
+        pytest.fail(reason) if os.environ.get("CI") else pytest.skip(reason)
+    return program
 
 
 def test_mavproxy_flies_our_ardupilot(hangar, tmp_path):

@@ -1,0 +1,59 @@
+"""Public AR.Drone clients fly our emulator: they take off, really move, get their settings acknowledged, and land."""
+
+from typing import Any
+
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
+
+
+def flew(states: list[dict[str, Any]], address: str) -> None:
+    """Assert by the truth that a drone rose, moved ahead on its own track and landed again."""
+    track = [state[address] for state in states]
+    begin, end = track[0]["position"], track[-1]["position"]
+    assert max(row["position"][2] for row in track) > 0.6
+    assert 0.8 < end[0] - begin[0] < 6.0, "forward is along x"
+    assert abs(end[1] - begin[1]) < 0.8
+    assert {"TAKING_OFF", "HOVERING", "FLYING", "LANDING"} <= {row["phase"] for row in track}
+    assert track[-1]["phase"] == "LANDED" and end[2] < 0.1
+
+
+def assert_node_was_served(seen: dict[str, Any]) -> None:
+    assert seen["acks"] == [["navdata_demo", True], ["altitude_max", True], ["euler_angle_max", True]]
+    order = [event for event in seen["events"] if event != "landed"]
+    assert order == ["takeoff", "hovering", "flying", "hovering", "landing"] and seen["events"][-1] == "landed"
+    assert seen["errors"] == 0
+    assert 0.6 < seen["altitude"] < 1.2
+    assert 80 < seen["last"]["battery"] <= 100 and seen["last"]["state"] == "CTRL_LANDED"
+
+
+def test_three_drones_fly_at_once_by_two_programs(hangar: Any, programs: Any) -> None:
+    drones = hangar(3)
+    first, second, third = drones.addresses
+    running = [programs.node("node_flight.js", address, "demo", 2.0) for address in (first, second)]
+    other = programs.pyardrone("pyardrone_flight.py", third, 2.0)
+    for process in running:
+        seen = programs.result(process)
+        assert_node_was_served(seen)
+        assert seen["options"]["demo"] > 100 and seen["options"]["visionDetect"] == seen["options"]["demo"]
+    seen = programs.result(other)
+    assert seen["took_off"] and seen["hovers"] and seen["landed"]
+    assert seen["vx"] > 500 and 500 < seen["altitude"] < 1200
+    assert {"demo", "magneto", "zimmu_3000", "cks"} <= set(seen["options"]), "every option has its size"
+    assert seen["sent"] > 1000, "a loop without a pause"
+    states = drones.stop()
+    for address in drones.addresses:
+        flew(states, address)
+
+
+@pytest.mark.parametrize(
+    ("options", "gps"), [(("--omit-option", "27"), False), (("--firmware", "ar2-2.4.8"), True)], ids=["2.3", "2.4.8"]
+)
+def test_node_reads_full_navdata(hangar: Any, programs: Any, options: tuple[str, ...], gps: bool) -> None:
+    drones = hangar(1, *options)
+    seen = programs.result(programs.node("node_flight.js", drones.addresses[0], "full", 1.5))
+    assert_node_was_served(seen)
+    assert seen["packets"] > 1000, "200 packets a second"
+    assert seen["options"]["magneto"] > 1000 and seen["options"]["rawMeasures"] > 1000
+    assert ("gps" in seen["options"]) is gps
+    flew(drones.stop(), drones.addresses[0])

@@ -28,14 +28,14 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """When a part is full: size [bytes] and age [ns]; 0 is never."""
+    """When a part is full: size [bytes] and age [ns]; 0 is never. No part is younger than a second."""
 
     size_bytes: int = 0
     age_ns: int = 0
 
     def due(self, size_bytes: int, age_ns: int) -> bool:
         """Return whether a part of that size and age is to be followed by the next."""
-        return 0 < self.size_bytes <= size_bytes or 0 < self.age_ns <= age_ns
+        return age_ns >= NS_PER_S and (0 < self.size_bytes <= size_bytes or 0 < self.age_ns <= age_ns)
 
 
 NO_ROTATION = Rotation()

@@ -45,6 +45,7 @@ class Watchdog:
         self._airborne_since_ns = 0
         self._brake_until_ns = 0
         self._clearing = False
+        self._paused_ns: int | None = None
         self._answers: dict[str, Ack] = {}
         self._pending: Command | None = None
 
@@ -152,6 +153,7 @@ class Watchdog:
         if mode is not self.mode:
             self._mode_since_ns = now_ns
         self.mode, self.reason = mode, reason
+        self._paused_ns = None
         self._brake_until_ns = now_ns + int(self.limits.brake_s * NS_PER_S) if brake else 0
         if mode not in ALOFT and self._pending is not None and self._pending.verb not in (Verb.LAND, Verb.CUT_MOTORS):
             self._pending = None  # cannot become effective any more
@@ -220,21 +222,24 @@ class Watchdog:
             (low and low_s >= limits.battery_hold_s, "battery below its limit"),
             (self._take_off_overdue(now_ns), "take-off took too long"),
             (self._tracker_silent(now_ns), "no setpoint from the tracker"),
+            (self._pause_overdue(now_ns), "the tracker paused, and nobody ordered RESUME"),
         )
         for applies, reason in landings:
             if applies:
                 self._enter(now_ns, Mode.LANDING, reason)
                 return
+        heard_ns, paused = self.gate.last_heard_ns, self._tracker_paused(now_ns)
         suspensions = (
             (gap_s > limits.gap_s, f"this driver stood still for {gap_s:.1f} s"),
             (not up.supervisor_alive, "the supervisor is dead"),
             (frozen_s >= limits.resume_within_s, "the supervisor does not answer"),
             (lost_s >= limits.resume_within_s, "no telemetry from the vehicle"),
-            (self._tracker_paused(now_ns), "no setpoint from the tracker"),
+            (paused, "no setpoint from the tracker"),
         )
         for applies, reason in suspensions:
             if applies and self.mode is Mode.TRACK:
                 self._enter(now_ns, Mode.HOVER, f"{reason}; RESUME is needed")
+                self._paused_ns = heard_ns if paused else None
 
     def _lasted(self, what: str, condition: bool, now_ns: int) -> float:
         # Seconds for which a condition has held without a break.
@@ -254,6 +259,10 @@ class Watchdog:
         if heard_ns is None:
             return now_ns >= unseen_until_ns
         return now_ns - heard_ns >= self.limits.land_after_s * NS_PER_S
+
+    def _pause_overdue(self, now_ns: int) -> bool:
+        # Setpoints that come back after a pause do not stop the land timer: only an order does.
+        return self._paused_ns is not None and now_ns - self._paused_ns >= self.limits.land_after_s * NS_PER_S
 
     def _tracker_paused(self, now_ns: int) -> bool:
         heard_ns = self.gate.last_heard_ns

@@ -3,6 +3,7 @@
 # The fastest a drone climbs, and the step that noise and the ultrasound's own jumps explain.
 _RATE_M_S = 2.0
 _STEP_M = 0.15
+_LONGEST_S = 0.1
 # Readings that agree for so long are the truth: a table below, or a bad start.
 _INSIST_NS = 400_000_000
 # Nothing is known any more after a pause.
@@ -38,5 +39,6 @@ class HeightWatch:
 
 
 def _reachable(before: tuple[int, float], stamp_ns: int, height_m: float) -> bool:
-    elapsed_s = (stamp_ns - before[0]) * 1e-9
+    # What it may have done during longer silence is left to `_INSIST_NS`: an echo may last as long.
+    elapsed_s = min((stamp_ns - before[0]) * 1e-9, _LONGEST_S)
     return abs(height_m - before[1]) <= _STEP_M + _RATE_M_S * elapsed_s

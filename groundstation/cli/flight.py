@@ -49,6 +49,7 @@ class Flight:
         self._terminal = terminal
         self._began_ns = time.monotonic_ns()
         self._prompting = False
+        self._grounded = False
 
     def run(self) -> Outcome:
         """Start, fly, land, stop. Raises GroundStationError when the start failed; everything is stopped then too."""
@@ -93,6 +94,7 @@ class Flight:
             now_ns = self._turn(operator)
             if self._prompting:
                 self._prompt(operator, now_ns)
+            self._tell_grounded(operator, now_ns)
             if self._supervisor.failure:
                 return self._supervisor.failure
             if self._supervisor.interrupts.stop_requested:
@@ -100,6 +102,17 @@ class Flight:
             ended, failure = self._is_over(operator, now_ns, began_ns)
             if ended:
                 return failure
+
+    def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
+        """Say what a run waits for whose drones landed though nobody ordered it (their watchdogs did)."""
+        flew = operator.phase in (Phase.UP, Phase.TRACKING, Phase.HELD)
+        grounded = flew and operator.landed(now_ns)
+        if grounded and not self._grounded:
+            self._say(
+                "all drones have landed by themselves (why: see the events). Ctrl-C ends the run; to fly again: "
+                "groundstation takeoff, then groundstation track"
+            )
+        self._grounded = grounded
 
     def _is_over(self, operator: Operator, now_ns: int, began_ns: int) -> tuple[bool, str]:
         if self._plan.asks:

@@ -29,9 +29,40 @@ def test_only_a_short_pause_of_the_tracker_is_forgiven(new_bench):
     bench.tracker_speaks = False
     assert bench.run(0.7)[-1] is Action.HOVER
     bench.tracker_speaks = True
-    assert set(bench.run(5)) == {Action.HOVER}, "moved by itself, as after a dead router came back"
+    assert set(bench.run(1)) == {Action.HOVER}, "moved by itself, as after a dead router came back"
     assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
-    assert bench.step().action is Action.FLY
+    assert set(bench.run(5)) == {Action.FLY}
+
+
+@pytest.mark.parametrize("silent_s", [0.7, 2.0, 5.0])
+def test_a_tracker_that_comes_back_unasked_does_not_stop_the_land_timer(new_bench, silent_s):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    began, landed_s = bench.now, None
+    while bench.now - began < 5 * S and landed_s is None:
+        bench.tracker_speaks = bench.now - began > silent_s * S
+        if bench.step().action is Action.LAND:
+            landed_s = (bench.now - began) / S
+    assert landed_s == pytest.approx(3.0, abs=0.04)
+
+
+def test_an_operator_who_holds_after_a_pause_is_obeyed_for_as_long_as_setpoints_come(new_bench):
+    bench = new_bench().fly()
+    bench.tracker_speaks = False
+    bench.run(0.7)
+    bench.tracker_speaks = True
+    assert bench.order(Verb.HOLD).stage is AckStage.ACCEPTED
+    assert set(bench.run(6)) == {Action.HOVER}
+
+
+@pytest.mark.parametrize("verb", [Verb.HOLD, None])
+def test_a_silent_bus_lands_what_hovers_too(new_bench, verb):
+    bench = new_bench().fly()
+    if verb is not None:
+        bench.order(verb)
+    bench.tracker_speaks = bench.lease_alive = False
+    assert Action.LAND not in bench.run(2.9)
+    assert bench.run(0.2)[-1] is Action.LAND
 
 
 def test_an_order_to_track_gives_a_silent_tracker_time_to_speak(new_bench):

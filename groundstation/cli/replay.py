@@ -63,8 +63,12 @@ def replay(recording: tuple[Path, ...], rerun: str | None, **options: Any) -> in
 
 def _newest() -> Path:
     from groundstation.cli.report import newest_run
+    from groundstation.errors import GroundStationError
 
-    return newest_run(_RUNS)
+    try:
+        return newest_run(_RUNS)
+    except GroundStationError as error:
+        raise click.UsageError(str(error)) from error
 
 
 def _play(
@@ -84,8 +88,16 @@ def _play(
 
     playback = Playback(source, speed or 1.0, from_s or 0.0, playing=not paused or headless)
     click.echo(f"replay of {source.name}: {playback.reel.duration_s:.1f} s")
+    for damage in playback.reel.damage:
+        click.echo(f"damaged, and shown as far as it is sound: {damage}")
+
+    def announce(url: str) -> None:
+        if port and f":{port}/" not in url:
+            click.echo(f"port {port} is in use")
+        click.echo(f"{url} (Ctrl-C leaves it)")
+
     with suppress(KeyboardInterrupt):
-        asyncio.run(serve(playback, port, headless, lambda url: click.echo(f"{url} (Ctrl-C leaves it)")))
+        asyncio.run(serve(playback, port, headless, announce))
     return ExitCode.OK
 
 

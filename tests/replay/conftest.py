@@ -11,11 +11,11 @@ sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test 
 
 @pytest.fixture(scope="session")
 def flown(tmp_path_factory: pytest.TempPathFactory, lab_field: dict[str, Any]) -> Path:
-    """A run folder: take-off and three seconds of tracking by two drones."""
+    """A run folder: take-off and a second of tracking by two drones."""
     from flown_study import FlownStudy
 
     from sim_bridge.study.runner import StudyOptions
 
     folder = tmp_path_factory.mktemp("flown")
-    FlownStudy(lab_field, folder, StudyOptions(seed=3, duration_s=3.0)).fly()
+    FlownStudy(lab_field, folder, StudyOptions(seed=3, duration_s=1.5)).fly()
     return folder

@@ -16,11 +16,13 @@ from groundstation.recording.timeline import Timeline
 Change = Callable[[RawRecord], bytes | None]
 
 
-def rewritten(source: Path, folder: Path, change: Change) -> Path:
+def rewritten(source: Path, folder: Path, change: Change, field: bytes = b"") -> Path:
     """Copy a recording message by message, as `change` will have its content; None leaves it out."""
     folder.mkdir()
     opened = open_recording(source / "state.mcap")
     attachments = {name: ("", data) for name, data in opened.attachments.items()}
+    if field:
+        attachments["field.json"] = ("", field)
     capture = Capture(Timeline(opened.metadata["run"]["clock"], UNIX_OFFSET_NS))
     file = McapFile(folder / "state.mcap", Preamble(opened.metadata, attachments, 0))
     for record in opened.raw_records():

@@ -34,6 +34,7 @@ class Hangar:
         pid = os.getpid()
         net = f"127.{60 + pid % 60}.{pid // 60 % 250}"
         self.addresses = [f"{net}.{next(_addresses)}" for _ in range(count)]
+        options = tuple(o for o in options if o != "--video") + (() if "--video" in options else ("--no-video",))
         command = [sys.executable, "-m", "sim_bridge.hangar", *self.addresses, "--truth", "--seconds", "170", *options]
         self._output = tempfile.TemporaryFile("w+")  # noqa: SIM115  # a pipe would be full before anybody reads
         pipe = subprocess.PIPE

@@ -57,3 +57,19 @@ def test_node_reads_full_navdata(hangar: Any, programs: Any, options: tuple[str,
     assert seen["options"]["magneto"] > 1000 and seen["options"]["rawMeasures"] > 1000
     assert ("gps" in seen["options"]) is gps
     flew(drones.stop(), drones.addresses[0])
+
+
+def test_node_parses_our_video(hangar: Any, programs: Any) -> None:
+    drones = hangar(1, "--video")
+    seen = programs.result(programs.node("node_video.js", drones.addresses[0], 0))
+    assert seen["frames"] >= 20 and seen["keys"] >= 1
+    assert seen["sizes"] == [640, 360]
+
+
+def test_node_turns_our_video_into_pictures(hangar: Any, programs: Any) -> None:
+    drones = hangar(1, "--video")
+    seen = programs.result(programs.node("node_video.js", drones.addresses[0], 5))
+    assert len(seen["pngs"]) >= 5
+    for width, height, size in seen["pngs"]:
+        assert (width, height) == (640, 360)
+        assert size > 5_000, "not an empty picture"

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 Grey = NDArray[np.uint8]
 _JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
-JPEG_START, JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
 
 class Picture(Protocol):

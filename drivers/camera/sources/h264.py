@@ -5,17 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import av
-import cv2
 import numpy as np
 from av.codec.context import Flags
 
-from drivers.camera.sources.frames import Grey, Picture, Unit
+from drivers.camera.sources.frames import Grey, Matrix, Picture, Unit
 
 # Larger than any camera that we know; ffmpeg refuses a stream that claims more before it takes the memory.
 _MOST_PIXELS = 4096 * 2304
 # Formats whose first plane is the brightness.
 _PLANAR = ("gray", "yuv4", "yuvj4", "nv12", "nv21")
-_JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class VideoPicture:
 
     def jpeg(self) -> bytes:
         """Return it in colour, compressed for eyes."""
-        return cv2.imencode(".jpg", self.frame.to_ndarray(format="bgr24"), _JPEG_QUALITY)[1].tobytes()
+        return Matrix(np.asarray(self.frame.to_ndarray(format="bgr24"), dtype=np.uint8)).jpeg()
 
 
 class H264Decoder:

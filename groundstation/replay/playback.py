@@ -42,16 +42,16 @@ class Playback:
         """Return what pages show of it."""
         return {
             "at_ms": round(self.now_ns() / 1e6, 3),
-            "playing": self.playing and not self.ended,
+            "playing": self.playing,
             "speed": self.speed,
             "ended": self.ended,
         }
 
     def play(self, playing: bool) -> None:
         """Go on, or stop; at the end, from the start again."""
-        self.playing = playing
         if playing and self.ended:
             self._go(self.reel.start_ns)
+        self.playing = playing
 
     def set_speed(self, factor: float) -> None:
         """Go so many times as fast as it was."""
@@ -87,3 +87,4 @@ class Playback:
         while self.at_ns < goal_ns:
             after_ns, self.at_ns = self.at_ns, min(goal_ns, self.at_ns + _STRETCH_NS)
             yield after_ns, self.at_ns
+        self.playing = not self.ended

@@ -62,9 +62,13 @@ class FakeFlight(threading.Thread):
             due += 0.02
             time.sleep(max(0.0, due - time.monotonic()))
 
-    def stop(self) -> None:
+    def finish(self) -> None:
+        """Say nothing more; who listens stays connected."""
         self._over.set()
         self.join(5)
+
+    def stop(self) -> None:
+        self.finish()
         self._session.close()
         self._router.close()
 

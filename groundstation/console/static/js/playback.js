@@ -6,6 +6,7 @@ import { store } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20];
 const SEEK_EVERY_MS = 100, JUMP_MS = 5000;
+const PRESS = new Set([" ", "Enter"]), MOVE = new Set(["ArrowLeft", "ArrowRight", "Home", "End"]);
 let dragging = false, sentAt = 0, later = 0;
 
 const replay = () => store.scene.replay;
@@ -95,8 +96,9 @@ function toMark(direction) {
 
 // Returns whether the key was one of ours. Where a control has its own use for a key, it keeps it.
 export function playbackKey(event) {
-  const own = event.target instanceof Element && event.target.closest("input, select, button, summary, a, textarea");
-  if (own && [" ", "Enter", "ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End"].includes(event.key)) return false;
+  const within = (kinds) => event.target instanceof Element && event.target.closest(kinds);
+  if (within("button, summary, a") && PRESS.has(event.key)) return false;
+  if (within("input, select") && (PRESS.has(event.key) || MOVE.has(event.key))) return false;
   const { start_ms: start, end_ms: end } = replay();
   switch (event.key) {
     case " ": if (!event.repeat) toggle(); return true;

@@ -1,0 +1,58 @@
+"""The flight that nobody flies, recorded while a live page looks on: what the page saw last, and the recording."""
+
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from fake_flight import FakeFlight
+from serve_fake import field_json
+
+from groundstation.bus import messages as m
+from groundstation.process.child import ChildSpec
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run folder, and the state of a live page when the last message had come."""
+
+    folder: Path
+    live: dict[str, Any]
+
+
+def start_recorder(endpoint: str, folder: Path) -> "subprocess.Popen[bytes]":
+    section = {"field": field_json(8765), "run_dir": str(folder), "epoch": 1}
+    spec = ChildSpec("recorder", "recorder", endpoint, "lab", section=msgspec.json.encode(section).decode())
+    process = subprocess.Popen(
+        [sys.executable, "-m", "groundstation.process.entry", "recorder", "groundstation.runtime.recorder:run"],
+        stdin=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert process.stdin is not None
+    process.stdin.write(msgspec.json.encode(spec))
+    process.stdin.close()
+    return process
+
+
+def record(flight: FakeFlight, page: Any, folder: Path, seconds: float) -> Recorded:
+    """Record a flight to its end; the page looks on live."""
+    recorder = start_recorder(flight.endpoint, folder)
+    try:
+        deadline = time.monotonic() + 20
+        while not (folder / "state.mcap").exists():
+            assert time.monotonic() < deadline, "the recorder does not start"
+            time.sleep(0.05)
+        page.page.wait_for_timeout(500)
+        flight.event(m.Severity.WARNING, "a gust", "drone_1", "wait")
+        page.there("hold").click()
+        page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")
+        page.page.wait_for_timeout(round(1000 * seconds))
+        flight.finish()
+        page.page.wait_for_timeout(1000)
+        return Recorded(folder, page.state())
+    finally:
+        recorder.terminate()
+        recorder.wait(10)

@@ -12,8 +12,8 @@ STANDING_HEIGHT_M = 0.06  # of the base above the floor, on its feet
 # Fitted to those pulses together with the autopilot's command delay of 50 ms.
 _TILT_RATE = 12.5
 _TILT_DAMPING = 0.627
-_DRAG_LINEAR = 0.15
-_DRAG_QUADRATIC = 0.13
+_DRAG_LINEAR = 0.08
+_DRAG_QUADRATIC = 0.17
 # First-order rate 10 /s (tum_ardrone's identified model, reliability.md 5).
 _YAW_RATE = 10.0
 

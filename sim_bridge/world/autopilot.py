@@ -8,8 +8,10 @@ from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import DelayLine, Draw, GaussMarkov
 from sim_bridge.world.stunts import FLIP_KICK_M_S2, FLIP_KICK_S, FLIP_TURN_S, FLIPS, Animation, motion_at
 
-# Profile of a recorded take-off: motors idle, lift-off at 3.1 s, 0.62 m at 3.77 s, peak 0.82 m, settled at 0.76 m.
-LIFT_OFF_S = 3.1
+# Profile of a recorded take-off: the motors' ramp carries the drone from 2.9 s on; 0.27 m at 3.35 s, 0.62 m at 3.77 s,
+# peak 0.82 m, settled at 0.76 m.
+LIFT_OFF_S = 2.9
+_LIFT_OFF_M_S2 = 2.1
 HOVERING_S = 4.8
 TAKE_OFF_HEIGHT_M = 0.76
 _TAKE_OFF_RATE, _TAKE_OFF_DAMPING = 3.66, 0.627
@@ -186,7 +188,7 @@ class Autopilot:
             self._held_height_m = TAKE_OFF_HEIGHT_M
         body = self._airframe
         rise = _TAKE_OFF_RATE**2 * (TAKE_OFF_HEIGHT_M - body.z) - 2 * _TAKE_OFF_DAMPING * _TAKE_OFF_RATE * body.vz
-        body.step(self._tick_s, self._hover_tilt(), rise, 0.0, push)
+        body.step(self._tick_s, self._hover_tilt(), min(rise, _LIFT_OFF_M_S2), 0.0, push)
 
     def _step_landing(self, push: tuple[float, float, float]) -> None:
         body = self._airframe

@@ -13,7 +13,8 @@ from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
 
-LIFT_OFF_SEEN_M = 0.2  # the ultrasound reads nothing below
+LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below
+_MAGNETOMETER_SEEN_M = 0.22  # switched in a moment before
 GROUND_ECHO_M = 0.243  # what it still says on the floor
 _HEIGHT_TICKS = 3  # a new height about every 15 ms
 # Echoes of a neighbour's ultrasound: how often they come, and how far from the height one may be to be believed.
@@ -71,7 +72,7 @@ class Onboard:
         self.battery = 1.0
         self._tick_s, self._ticks = tick_s, 0
         self._yaw_offset = -start.yaw
-        self._jumped = False
+        self._lifted = self._jumped = False
         # Half of the variance is slow: noise that is white at 200 Hz would average out within a camera frame.
         self._white = scenario.velocity_noise_m_s * math.sqrt(0.5)
         self._slow = tuple(GaussMarkov(self._white, _VELOCITY_CORRELATION_S, tick_s, draw) for _ in range(2))
@@ -115,6 +116,7 @@ class Onboard:
 
     def _measure_height(self, body: Airframe, crosstalk: bool) -> None:
         height, climb = self._vertical.push((body.z, body.vz))
+        self._lifted = self._lifted or height > _MAGNETOMETER_SEEN_M
         if self._ticks % _HEIGHT_TICKS:
             return
         error = self._height_error.step() + _HEIGHT_WHITE_M * self._draw()
@@ -137,8 +139,8 @@ class Onboard:
         self.height = believed
 
     def _measure_yaw(self, body: Airframe) -> None:
-        if not self._jumped and body.z > LIFT_OFF_SEEN_M:
-            self._jumped = True  # the magnetometer is switched in
+        if self._lifted and not self._jumped:
+            self._jumped = True
             self._yaw_offset += self.yaw_jump_rad if self._magnetometer else 0.0
         self._yaw_offset += _YAW_DRIFT_RAD_S * self._tick_s
         self.yaw = math.remainder(body.yaw + self._yaw_offset + self._wander.step(), math.tau)

@@ -167,11 +167,8 @@ def probe(address: str) -> Report:
 def _look(line: _Line, report: Report) -> None:
     """Watch without a word; a standing drone that nobody uses is then asked for both kinds of navdata."""
     first = line.stream(_LOOK_S)
-    if first.mode != "bootstrap":
+    if first.mode != "bootstrap" or line.is_set(StateBit.FLY):
         report.streams.append(first)
-        return
-    if line.is_set(StateBit.FLY):
-        report.hints.append("it flies, and nobody has asked it for navdata: land it, then probe again")
         return
     line.speaking = True
     for value in ("TRUE", FULL_NAVDATA.value):
@@ -224,7 +221,7 @@ def _hints(report: Report, values: dict[str, str]) -> list[str]:
     low = report.battery is not None and report.battery < _LOW_BATTERY
     facts = (
         (low and not state & StateBit.VBAT_LOW, "the battery is low: charge it before the next flight"),
-        (bool(state & StateBit.FLY), "in flight: no command was sent, so its configuration was not asked for"),
+        (bool(state & StateBit.FLY), "in flight no command is sent, not even to ask: land it, then probe again"),
         (not state & StateBit.FLY and not report.config, "its control port (TCP 5559) gives no configuration"),
         (report.identity.model is Model.AR1, "its video (UVLC and P264 over UDP 5555) is out of scope here"),
         (any(s.link_quality is not None and s.link_quality < _LOSS for s in report.streams), "the radio loses packets"),

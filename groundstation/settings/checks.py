@@ -149,6 +149,8 @@ def _own_video(parts: Parts) -> Iterator[Finding]:
         if parse_source(camera.source).kind is SourceKind.ARDRONE:
             yield ("cameras", name, "source"), "must not be an AR.Drone's video: drones carry their cameras"
     for name, drone in parts.drones.items():
+        if drone.video is not None and drone.kind != "ardrone":
+            yield ("drones", name, "video"), f"has no meaning for {drone.kind}"
         source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
         if source.kind is not SourceKind.ARDRONE:
             continue

@@ -1,8 +1,10 @@
 """The wire format of one navdata option: a struct format over a named tuple."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import IntEnum
+from functools import partial
+from operator import itemgetter
 from typing import Any, Generic, TypeVar
 
 from drivers.ardrone.wire.errors import WireError
@@ -29,14 +31,17 @@ class Layout(Generic[Value]):
         newer: bool = False,
         exact: bool = False,
     ) -> None:
-        self.tag, self.start = tag, start
+        self.tag, self.number, self.start = tag, int(tag), start
         self._optional, self._exact = newer or exact or start > _HEAD, exact
-        self._make: Any = value_type._make  # type: ignore[attr-defined]
+        # The counts fit by construction: what `_make` does without its check.
+        self._make: Callable[[tuple[Any, ...]], Value] = partial(tuple.__new__, value_type)
         self._struct = struct.Struct("<" + fields.replace(" ", ""))
         counts = [1 if token.endswith("s") else int(token[:-1] or 1) for token in fields.split()]
         ends = [sum(counts[: i + 1]) for i in range(len(counts))]
-        self._slices = [(end - count, end, count) for end, count in zip(ends, counts, strict=True)]
         self._flat = len(counts) == ends[-1]
+        # One item would come bare: the end of the tuple, an empty slice, keeps it company.
+        places = [slice(e - n, e) if n > 1 else e - n for e, n in zip(ends, counts, strict=True)]
+        self._group: Callable[[tuple[Any, ...]], tuple[Any, ...]] = itemgetter(*places, slice(0, 0))
         self._skip = start - _HEAD
         self.size = start + self._struct.size
 
@@ -57,9 +62,7 @@ class Layout(Generic[Value]):
             raise WireError(
                 "option_size", f"{self.tag.name} has {len(payload) + _HEAD} bytes, {self.size} needed"
             ) from None
-        if self._flat:
-            return self._make(flat)  # type: ignore[no-any-return]
-        return self._make([flat[a:b] if n > 1 else flat[a] for a, b, n in self._slices])  # type: ignore[no-any-return]
+        return self._make(flat if self._flat else self._group(flat)[:-1])
 
     def encode(self, value: Value, size: int = 0) -> bytes:
         """Return the payload, zero-filled to an option of `size` bytes (its head included) and before `start`.

@@ -41,10 +41,16 @@ class Navdata:
 
         Raises WireError (option_size) when it is there but shorter than the layout.
         """
-        for tag, payload in self.options:
-            if tag == layout.tag:
-                return layout.decode(payload) if layout.is_in(payload) else None
-        return None
+        options, number = self.options, layout.number
+        # A full packet holds all options from 0 on: nothing to search for.
+        if number < len(options) and options[number][0] == number:
+            payload = options[number][1]
+        else:
+            found = next((payload for tag, payload in options if tag == number), None)
+            if found is None:
+                return None
+            payload = found
+        return layout.decode(payload) if layout.is_in(payload) else None
 
 
 def decode(datagram: bytes, strict: bool = True) -> Navdata:

@@ -31,7 +31,7 @@ class Vehicle(Protocol):
         """Return what the vehicle last said, and whether that is fresh."""
 
     def apply(self, now_ns: int, decision: Decision) -> None:
-        """Tell the vehicle what to do; called 30 times a second, also while it is silent."""
+        """Tell the vehicle what to do; called at the sender's rate, also while it is silent."""
 
     def health(self, now_ns: int) -> Health:
         """Return the state of the link for the status message."""

@@ -21,7 +21,6 @@ class RateWatch:
     """Tells when the rate falls far below the best of this connection, and when it is back."""
 
     def __init__(self) -> None:
-        self.collapses = 0
         self._best_hz = 0.0
         self._slow_since_ns: int | None = None
         self._told = False
@@ -41,7 +40,6 @@ class RateWatch:
         if self._told or now_ns - self._slow_since_ns < _LONG_ENOUGH_NS:
             return None
         self._told = True
-        self.collapses += 1
         return Notice(Severity.WARNING, f"navdata fell from {self._best_hz:.0f} to {rate_hz:.0f} Hz", _REMEDY)
 
     def _recover(self, now_ns: int, rate_hz: float) -> Notice | None:

@@ -15,7 +15,7 @@ from groundstation.estimation.dispatch import call_locate
 from groundstation.estimation.kernel import kernel
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.update import correct, linearise, read, write_outcome
+from groundstation.estimation.update import correct, linearise, note_motion, read, write_outcome
 
 
 @kernel("int64(int64[:,::1], float64[:,::1], float64[::1], int64)")
@@ -174,6 +174,7 @@ def observe(
     z, R, y, nis = np.zeros((2, 4)), np.zeros((2, modes, 4, 4)), np.zeros((2, modes, 4)), np.zeros((2, modes))
     work = np.zeros((2, modes, 4, 4, s.MAX_BLOCK))
     unused_s, use = at - pairs[number, subject], 0
+    note_motion(means[0], aux, entities[0], event)
     out[s.OUT_JOINED] = out[s.OUT_OTHER_CHOSEN] = 0.0
     rows = read(entities[0], parameters[0], own, sensor, unused_s, event, s.EVENT_Z, z[0], R[0, 0])
     out[s.OUT_VERDICT] = -rows if rows < 0 else refusal(entities[0], aux, event, rows)

@@ -75,6 +75,7 @@ class FixedLagFilter:
         at = float(motion.stamp_ns - self._origin_ns)
         if at >= row[s.NEWEST_AT]:
             row[s.NEWEST_YAW], row[s.NEWEST_RESET], row[s.NEWEST_AT] = motion.yaw_rad, motion.reset, at
+            row[s.NEWEST_ROLL], row[s.NEWEST_PITCH] = motion.roll_rad, motion.pitch_rad
         if motion.height_m is not None:
             row = self._touch(motion.stamp_ns - height_delay, index)
             row[s.HEIGHT_SUM] += motion.height_m

@@ -70,7 +70,15 @@ class Intake:
     def _odometry(self, message: Odometry, stamp_ns: int, now_ns: int) -> Verdict:
         if not _plausible(*message.velocity_m_s, message.yaw_rad, message.height_m or 0.0):
             return Verdict.IMPLAUSIBLE
-        motion = Motion(stamp_ns, message.velocity_m_s, message.yaw_rad, message.height_m, message.reset)
+        motion = Motion(
+            stamp_ns,
+            message.velocity_m_s,
+            message.yaw_rad,
+            message.height_m,
+            message.reset,
+            roll_rad=message.roll_rad,
+            pitch_rad=message.pitch_rad,
+        )
         return self._filter.add_motion(message.header.entity, motion, now_ns)
 
     def _observation(self, key: str, message: RelativeObservation, stamp_ns: int, now_ns: int) -> Verdict:

@@ -41,7 +41,7 @@ class Reading:
 class Motion:
     """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground.
 
-    yaw_rate_rad_s: for vehicles that are commanded, or measure, a turn rate and no heading.
+    yaw_rate_rad_s: for vehicles that are commanded, or measure, a turn rate and no heading. roll, pitch: how it leans.
     """
 
     stamp_ns: int
@@ -50,6 +50,8 @@ class Motion:
     height_m: float | None = None
     reset: int = 0
     yaw_rate_rad_s: float = 0.0
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

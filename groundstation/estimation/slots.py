@@ -36,10 +36,10 @@ FIRST_OWN = 3
 PARAMETER_COLUMNS = 32
 
 # Sensor table: addresses of the model's kernels apart (int64); here which rows of a measurement are angles, how long an
-# error of one pair repeats, then the model's own.
+# error of one pair repeats, the variance of the time of measurement [s^2], then the model's own.
 SENSOR_MEASURE, SENSOR_PREPARE, SENSOR_LOCATE = range(3)
 SENSOR_KERNELS = 3
-SENSOR_ANGLES, SENSOR_REPEAT_S, FIRST_SENSOR_OWN = 0, 4, 5
+SENSOR_ANGLES, SENSOR_REPEAT_S, SENSOR_TIME_VARIANCE, FIRST_SENSOR_OWN = 0, 4, 5, 6
 SENSOR_COLUMNS = 20
 
 # Per entity beside mean and covariance, part of every checkpoint.
@@ -58,8 +58,15 @@ SENSOR_COLUMNS = 20
     STREAK_START,
     CORRECTED_AT,
     JOINED_AT,
-) = range(14)
-AUXILIARY_COLUMNS = 14
+    SLOW_VX,
+    SLOW_VY,
+    HELD_ROLL,
+    HELD_PITCH,
+    RATE_X,
+    RATE_Y,
+    RATE_Z,
+) = range(21)
+AUXILIARY_COLUMNS = 21
 
 # Odometry condensed into one step of one robot: sums, counts, and the newest yaw.
 (
@@ -73,8 +80,10 @@ AUXILIARY_COLUMNS = 14
     NEWEST_AT,
     HEIGHT_SUM,
     HEIGHT_COUNT,
-) = range(10)
-ODOMETRY_COLUMNS = 10
+    NEWEST_ROLL,
+    NEWEST_PITCH,
+) = range(12)
+ODOMETRY_COLUMNS = 12
 
 # One event at its time of measurement: an observation, or a change of who may be in the state.
 (
@@ -91,7 +100,9 @@ ODOMETRY_COLUMNS = 10
 EVENT_Z = 9  # measurement (4) and covariance (16)
 EVENT_SIZE = 29  # rows of the measurement: 1 to 4
 EVENT_OTHER = 30  # the alternative hypothesis, laid out as at EVENT_Z
-EVENT_COLUMNS = 50
+# Written when the event is reached: how the subject leans, and how fast the first four entries of both blocks change.
+EVENT_SUBJECT_ROLL, EVENT_SUBJECT_PITCH, EVENT_OBSERVER_RATE, EVENT_SUBJECT_RATE = 50, 51, 52, 56
+EVENT_COLUMNS = 60
 # ADMITTED: may join, and does at once if it has a prior; DISMISSED: leaves; PLACED: is put where the event says.
 EVENT_OBSERVATION, EVENT_ADMITTED, EVENT_DISMISSED, EVENT_PLACED = range(4)
 

@@ -44,6 +44,43 @@ def read(
     return int(rows)
 
 
+@kernel("void(float64[::1], float64[::1], int64[::1], float64[::1], int64)")
+def note_rates(mean: Array, aux: Array, entity: IntArray, event: Array, offset: int) -> None:
+    """Write into the event how fast the first four entries of one entity's block change."""
+    for i in range(4):
+        event[offset + i] = 0.0
+    if entity[s.ENTITY_KIND] == s.KIND_ROBOT:
+        event[offset], event[offset + 1], event[offset + 2] = aux[s.RATE_X], aux[s.RATE_Y], aux[s.RATE_Z]
+        event[offset + s.YAW] = aux[s.YAW_RATE]
+    elif entity[s.ENTITY_KIND] == s.KIND_TARGET:
+        event[offset] = mean[entity[s.ENTITY_START] + s.VX]
+        event[offset + 1] = mean[entity[s.ENTITY_START] + s.VY]
+
+
+@kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[::1])")
+def note_motion(mean: Array, aux: Array, entities: IntArray, event: Array) -> None:
+    """Complete an event by what is known when it is reached: how its subject leans, how fast both move."""
+    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
+    event[s.EVENT_SUBJECT_ROLL], event[s.EVENT_SUBJECT_PITCH] = aux[subject, s.HELD_ROLL], aux[subject, s.HELD_PITCH]
+    note_rates(mean, aux[observer], entities[observer], event, s.EVENT_OBSERVER_RATE)
+    note_rates(mean, aux[subject], entities[subject], event, s.EVENT_SUBJECT_RATE)
+
+
+@kernel("void(float64[::1], float64[::1], int64, float64[:,::1], float64[:,::1], float64[:,::1])")
+def add_timing_noise(sensor: Array, event: Array, rows: int, H_observer: Array, H_subject: Array, R: Array) -> None:
+    """Add to R what an uncertain time of measurement does while observer and subject move: var(t) h' h'^T."""
+    if sensor[s.SENSOR_TIME_VARIANCE] == 0.0:
+        return
+    rate = np.zeros(rows)
+    for i in range(rows):
+        for j in range(4):
+            rate[i] += H_observer[i, j] * event[s.EVENT_OBSERVER_RATE + j]
+            rate[i] += H_subject[i, j] * event[s.EVENT_SUBJECT_RATE + j]
+    for i in range(rows):
+        for j in range(rows):
+            R[i, j] += sensor[s.SENSOR_TIME_VARIANCE] * rate[i] * rate[j]
+
+
 @kernel(
     "float64(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64[::1], float64[::1], float64[::1],"
     " int64, float64[::1], float64[:,::1], float64[:,:,::1], float64[::1])"
@@ -65,6 +102,7 @@ def linearise(
         y[i] = z[i] - h[i]
         if sensor[s.SENSOR_ANGLES + i] != 0.0:
             y[i] = wrap(y[i])
+    add_timing_noise(sensor, event, rows, work[0], work[1], R)
     W = np.empty((rows, P.shape[0]))
     HPH = np.empty((rows, rows))
     project(P, start_o, size_o, work[0], start, size, work[1], rows, W)

@@ -26,7 +26,7 @@ from groundstation.estimation.motion import predict
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.estimation.tables import empty_state, tables_from_parameters
 from groundstation.estimation.update import linearise
-from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler, rotation_z
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
 
 YAWS = (0.3, math.pi - 1e-9, -math.pi + 1e-9, 3.1, -2.0)
 ROBOT = OdometryRobot(marker_position_m=(0.05, -0.03, 0.08), slow_states=SLOW_STATES, velocity_bias_std_m_s=0.1)
@@ -69,6 +69,7 @@ def random_state(seed: int, yaw: float) -> tuple[np.ndarray, np.ndarray]:
     mean[TABLES.part(NAMES.index("mount")).start + 2] = 4.0
     aux[:, s.ACTIVE] = 1.0
     aux[:, s.HELD_VX], aux[:, s.HELD_VY], aux[:, s.YAW_RATE] = 0.5, -0.2, 0.8
+    aux[:, s.SLOW_VX], aux[:, s.SLOW_VY] = 0.4, -0.1
     return mean, aux
 
 
@@ -138,6 +139,7 @@ def observed(mean: np.ndarray, sensor: str, subject: str, rows: int, roll: float
     observer = NAMES.index(SENSORS[sensor].carrier)
     event[[s.EVENT_OBSERVER, s.EVENT_SUBJECT, s.EVENT_SENSOR]] = observer, NAMES.index(subject), number
     event[[s.EVENT_ROLL, s.EVENT_PITCH]] = roll, pitch
+    event[[s.EVENT_SUBJECT_ROLL, s.EVENT_SUBJECT_PITCH]] = 0.06, -0.11
     work, y = np.zeros((4, 4, s.MAX_BLOCK)), np.zeros(4)
     linearise(
         mean, np.eye(mean.size), TABLES.entities[0], TABLES.parameters[0], TABLES.kernels[number],
@@ -192,7 +194,7 @@ def test_a_camera_follows_the_geometry_of_the_frames() -> None:
     mean[observer][:4] = (0.1, -0.2, 2.1, 0.7)
     mean[subject] = (1.2, 0.4, 1.1, 2.0)
     h, _, _ = observed(mean, "full", "bare", 4)
-    marker = np.array([1.2, 0.4, 1.1]) + rotation_z(2.0) @ (0.05, -0.03, 0.08)
+    marker = np.array([1.2, 0.4, 1.1]) + rotation_from_euler(0.06, -0.11, 2.0) @ (0.05, -0.03, 0.08)
     base = rotation_from_euler(0.05, -0.08, 0.7)
     expected = TILTED.T @ (base.T @ (marker - (0.1, -0.2, 2.1)) - (0.09, 0.01, -0.02))
     np.testing.assert_allclose(h[:3], expected, atol=1e-12)

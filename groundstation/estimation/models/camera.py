@@ -62,7 +62,7 @@ def measure_relative_pose(
     observer, subject = entities[int(event[s.EVENT_OBSERVER])], entities[int(event[s.EVENT_SUBJECT])]
     work, cs, D = np.empty((5, 3)), np.empty(6), np.empty((3, 6))
     point, slope, d, b, by_point = work[0], work[1], work[2], work[3], work[4]
-    marker_point(mean, subject, parameters[int(event[s.EVENT_SUBJECT])], point, slope)
+    marker_point(mean, subject, parameters[int(event[s.EVENT_SUBJECT])], event, point, slope)
     observer_angles(mean, observer, event, cs)
     for i in range(3):
         d[i] = point[i] - mean[observer[s.ENTITY_START] + i]
@@ -129,7 +129,7 @@ def locate_relative_pose(
     fy, fz = cr * b[1] - sr * b[2], sr * b[1] + cr * b[2]
     ex, ez = cp * b[0] + sp * fz, -sp * b[0] + cp * fz
     yaw = wrap(mean[start + s.YAW] + z[3])
-    marker_offset(entities[subject], parameters[subject], yaw, offset)
+    marker_offset(entities[subject], parameters[subject], event, yaw, offset)
     pose[0] = mean[start] + cs[0] * ex - cs[1] * fy - offset[0]
     pose[1] = mean[start + 1] + cs[1] * ex + cs[0] * fy - offset[1]
     pose[2] = mean[start + 2] + ez - offset[2]
@@ -142,7 +142,8 @@ class MountedCamera:
     """A camera on a carrier (a robot or a fixed mount): extrinsics, and how well they are known on the carrier.
 
     rotation (3, 3), translation (3): carrier_from_camera [m]. A mounting error is the same in every picture, so it
-    enters R `repeats` times over: it must not average out.
+    enters R `repeats` times over: it must not average out. stamp_std_s: of the time of exposure about the calibrated
+    delay; while observer or subject moves it displaces what is seen.
     """
 
     kernels: ClassVar[tuple[int, int, int]] = (
@@ -159,6 +160,7 @@ class MountedCamera:
     position_std_m: float = 0.0
     observes_targets: bool = True
     repeats: float = 10.0
+    stamp_std_s: float = 0.0
     repeats_s: float = 0.0
 
     def row(self) -> Array:
@@ -167,5 +169,6 @@ class MountedCamera:
         row[ROTATION : ROTATION + 9] = np.asarray(self.rotation, dtype=np.float64).ravel()
         row[TRANSLATION : TRANSLATION + 3] = self.translation
         row[ATTITUDE_VARIANCE] = self.repeats * self.attitude_std_rad**2
+        row[s.SENSOR_TIME_VARIANCE] = self.stamp_std_s**2
         row[POSITION_VARIANCE] = self.repeats * self.position_std_m**2
         return row

@@ -30,7 +30,7 @@ def measure_range_bearing(
     observer, subject = entities[int(event[s.EVENT_OBSERVER])], entities[int(event[s.EVENT_SUBJECT])]
     work = np.zeros((3, 3))
     point, slope, by_point = work[0], work[1], work[2]
-    marker_point(mean, subject, parameters[int(event[s.EVENT_SUBJECT])], point, slope)
+    marker_point(mean, subject, parameters[int(event[s.EVENT_SUBJECT])], event, point, slope)
     start = observer[s.ENTITY_START]
     dx, dy = point[0] - mean[start], point[1] - mean[start + 1]
     distance = max(math.hypot(dx, dy), _NEAREST_M)
@@ -76,7 +76,7 @@ def locate_range_bearing(
     start = entities[int(event[s.EVENT_OBSERVER]), s.ENTITY_START]
     direction = mean[start + s.YAW] + z[int(sensor[BEARING_ROW])]
     offset = np.empty(3)
-    marker_offset(entities[subject], parameters[subject], 0.0, offset)
+    marker_offset(entities[subject], parameters[subject], event, 0.0, offset)
     pose[0] = mean[start] + z[int(sensor[RANGE_ROW])] * math.cos(direction) - offset[0]
     pose[1] = mean[start + 1] + z[int(sensor[RANGE_ROW])] * math.sin(direction) - offset[1]
     pose[2] = mean[start + s.Z]

@@ -142,6 +142,8 @@ class ArDroneEmulator:
         if control.custom_dump_wanted:
             ports.control.custom_dump(control.configuration)
         control.dump_wanted = control.custom_dump_wanted = False
+        if not control.session.answering_config:
+            control.session.clear_ack()  # WIRE: the bit stands for the time of the transfer
 
     def _send_status(self, listener: Listener) -> None:
         word = state_word(self._drone, self.control, self._now_ns, listener.bootstrap)

@@ -158,12 +158,12 @@ class FlightControl:
 
     def _obey_config(self, key: str, value: str, now_ns: int) -> None:
         # WIRE: a CONFIG sent while the last one is not acknowledged is lost (node-ar-drone #76).
-        if self.session.ack:
+        if self.session.ack and self.session.answering_config:
             return
         key = key.lower()
         taken = self.configuration.write(key, value, self._ids)
         self._apply_limits()
-        self.session.raise_ack()
+        self.session.raise_ack(answering_config=True)
         self.status_wanted = True
         if key == "general:navdata_demo":
             self.audience.configured(now_ns)
@@ -185,13 +185,12 @@ class FlightControl:
 
     def _obey_ctrl(self, mode: int) -> None:
         if mode == at.CTRL_ACK:
+            self.status_wanted = self.status_wanted or self.session.ack
             self.session.clear_ack()
-        elif mode == at.CTRL_CONFIG_GET:
-            self.session.raise_ack()
-            self.dump_wanted = True
-        elif mode == at.CTRL_CUSTOM_CONFIG_GET:
-            self.session.raise_ack()
-            self.custom_dump_wanted = True
+        elif mode in (at.CTRL_CONFIG_GET, at.CTRL_CUSTOM_CONFIG_GET):
+            self.session.raise_ack(answering_config=False)
+            self.dump_wanted = self.dump_wanted or mode == at.CTRL_CONFIG_GET
+            self.custom_dump_wanted = self.custom_dump_wanted or mode == at.CTRL_CUSTOM_CONFIG_GET
 
     def _apply_limits(self) -> None:
         values = self.configuration

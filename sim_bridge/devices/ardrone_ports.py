@@ -112,4 +112,7 @@ def open_udp(name: str, address: str, port: int) -> socket.socket:
     except OSError as error:
         udp.close()
         raise taken(name, address, port, "UDP", error) from error
+    # Set after binding: nobody else gets this address, but old clients, which want the same port on all addresses of
+    # the host, get theirs if they ask for sharing, too.
+    udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     return udp

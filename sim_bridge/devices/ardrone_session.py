@@ -26,6 +26,7 @@ class Session:
         self.mean_gap_ms = 0
         self._last_at_ns: int | None = None
         self._fresh = True
+        self.answering_config = False
         self._ack_packets = 0
         self._ack_cleared = False
 
@@ -60,9 +61,9 @@ class Session:
             self.at_sequence = 0
             self._fresh = True
 
-    def raise_ack(self) -> None:
-        """Set the command bit."""
-        self.ack = True
+    def raise_ack(self, answering_config: bool) -> None:
+        """Set the command bit, for a CONFIG or for a dump."""
+        self.ack, self.answering_config = True, answering_config
         self._ack_packets = 0
         self._ack_cleared = False
 

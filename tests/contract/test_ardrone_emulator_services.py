@@ -61,9 +61,8 @@ def test_the_control_port_dumps_the_configuration(bench: Any) -> None:
     bench.say("CTRL,4,0")
     dump = heard(bench, tcp)
     assert bench.state & COMMAND, "set for the time of the transfer"
-    bench.say("CTRL,5,0")
     bench.tick(3)
-    assert not bench.state & COMMAND
+    assert not bench.state & COMMAND, "and no longer"
     assert dump.startswith(b"general:num_version_config = 1\ngeneral:num_version_mb = 33\n")
     assert dump.endswith(b"\n\0") and dump.count(b"\0") == 1
     values = dict(line.split(" = ", 1) for line in dump[:-1].decode().splitlines())
@@ -163,6 +162,30 @@ def test_version_file_by_a_common_ftp_client(bench: Any) -> None:
             break
     assert not problems, problems
     assert lines == ["6", "2.3.3", "version.txt"]
+
+
+def test_a_setting_right_behind_a_dump_is_taken(bench: Any) -> None:
+    bench.connect()
+    tcp = connect(bench, 5559)
+    bench.say("CTRL,5,0")
+    bench.say("CTRL,4,0")
+    heard(bench, tcp)
+    bench.say('CONFIG,"control:altitude_max","1800"')
+    bench.tick(3)
+    assert bench.autopilot.limits.height_m == 1.8
+    assert bench.state & COMMAND
+    tcp.close()
+
+
+def test_old_clients_that_want_the_drones_own_port_get_it(bench: Any) -> None:
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    udp.bind(("", 5554))
+    udp.setblocking(False)
+    udp.sendto(b"\x01\x00\x00\x00", (bench.address, 5554))
+    bench.tick(2)
+    assert [len(packet) for packet in bench.receive(udp)] == [24]
+    udp.close()
 
 
 def test_pairing_is_answered(bench: Any) -> None:

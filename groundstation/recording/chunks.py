@@ -10,6 +10,7 @@ from typing import IO
 
 import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
 from mcap.writer import MCAP0_MAGIC
@@ -26,9 +27,15 @@ _MESSAGE = struct.Struct("<HIQQ")
 _MAX_RECORD_BYTES = 1 << 30
 _MAX_CHUNK_BYTES = 1 << 28
 # What a damaged body of a record makes its parser raise.
-UNREADABLE = (ValueError, EOFError, struct.error, zstandard.ZstdError)
+UNREADABLE = (ValueError, EOFError, struct.error, zstandard.ZstdError, McapError)
 
 Channels = dict[int, Key | None]
+Wanted = Callable[[Topic], bool]
+
+
+def every_topic(_topic: Topic) -> bool:
+    """Want everything."""
+    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +101,7 @@ def message_of(data: bytes, begin: int, end: int) -> tuple[int, int, int, int, b
     return (*_MESSAGE.unpack_from(data, begin), data[begin + _MESSAGE.size : end])
 
 
-def chunk_records(
-    data: bytes, channels: Channels, wanted: Callable[[Topic], bool], damage: list[str]
-) -> Iterator[RawRecord]:
+def chunk_records(data: bytes, channels: Channels, wanted: Wanted, damage: list[str]) -> Iterator[RawRecord]:
     """Yield the messages of a chunk whose channel leads to a key; `channels` learns what the chunk declares."""
     for opcode, begin, end in inner_records(data):
         if opcode == Opcode.MESSAGE:
@@ -129,7 +134,7 @@ def declarations(data: bytes) -> tuple[dict[int, Channel], dict[int, Schema]]:
     return channels, schemas
 
 
-def _learn_channel(body: bytes, channels: Channels, wanted: Callable[[Topic], bool], damage: list[str]) -> None:
+def _learn_channel(body: bytes, channels: Channels, wanted: Wanted, damage: list[str]) -> None:
     channel = Channel.read(ReadDataStream(BytesIO(body)))
     if channel.id in channels:
         return

@@ -1,5 +1,6 @@
 """Valid files from recordings: all that is sound of a cut one, or a stretch of a run."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -132,7 +133,8 @@ def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) 
 
 def preamble_copy(opened: Recording, note: Mapping[str, Mapping[str, str]]) -> Preamble:
     """Return the preamble of a recording for a copy of it, with a note on what the copy is."""
-    created = int(opened.metadata.get("run", {}).get("created_unix_ns", "0"))
+    written = opened.metadata.get("run", {}).get("created_unix_ns", "")
+    created = int(written) if re.fullmatch("[0-9]{1,19}", written) else 0  # metadata has no checksum
     typed = {name: (opened.media_types[name], data) for name, data in opened.attachments.items()}
     return Preamble({**opened.metadata, **note}, typed, created)
 

@@ -4,7 +4,6 @@ import re
 import struct
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import accumulate
 from pathlib import Path
@@ -15,15 +14,16 @@ from mcap.records import Channel, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from groundstation.bus.keys import Key
-from groundstation.bus.topics import Topic
 from groundstation.recording.chunks import (
     RECORD,
     Channels,
     RawRecord,
+    Wanted,
     chunk_data,
     chunk_records,
     count_messages,
     declarations,
+    every_topic,
 )
 
 # WIRE (MCAP specification, records Chunk and Message Index): the fixed fields at their head.
@@ -43,10 +43,6 @@ class Chunk:
     start_ns: int
     end_ns: int
     counts: dict[int, int] = field(default_factory=dict)
-
-
-def _every(_topic: Topic) -> bool:
-    return True
 
 
 class FileIndex:
@@ -99,7 +95,7 @@ class FileIndex:
                 channels, schemas = declarations(data)
                 self.declared |= channels
                 self.schemas |= schemas
-                for _ in chunk_records(data, self.channels, _every, self.damage):
+                for _ in chunk_records(data, self.channels, every_topic, self.damage):
                     pass
                 if not counted:
                     chunk.counts = dict(count_messages(data))
@@ -118,16 +114,24 @@ class FileIndex:
         noted: list[str] = []
         with self.path.open("rb") as stream:
             data = self._data(stream, chunk, noted)
-        self.damage += [place for text in noted if (place := f"{text} at byte {chunk.offset}") not in self.damage]
+        for text in noted:
+            self._note(f"{text} at byte {chunk.offset}")
         return data
 
-    def read(self, chunk: Chunk, wanted: Callable[[Topic], bool] = _every) -> list[RawRecord]:
+    def read(self, chunk: Chunk, wanted: Wanted = every_topic) -> list[RawRecord]:
         """Return the messages of the wanted topics in one chunk, in file order; damage is noted and costs the chunk."""
         channels = {id_: key for id_, key in self.channels.items() if key is None or wanted(key.topic)}
         hidden: Channels = {id_: None for id_ in self.channels if id_ not in channels}
-        return list(chunk_records(self.data(chunk), channels | hidden, wanted, self.damage))
+        records = list(chunk_records(self.data(chunk), channels | hidden, wanted, self.damage))
+        if any(not chunk.start_ns <= record.log_time_ns <= chunk.end_ns for record in records):
+            self._note(f"wrong times, what follows may be out of order, at byte {chunk.offset}")
+        return records
 
-    def latest(self, time_ns: int, wanted: Callable[[Topic], bool]) -> dict[Key, RawRecord]:
+    def _note(self, damage: str) -> None:
+        if damage not in self.damage:
+            self.damage.append(damage)
+
+    def latest(self, time_ns: int, wanted: Wanted) -> dict[Key, RawRecord]:
         """Return for each key of a wanted topic its last message with log time < time."""
         found: dict[Key, RawRecord] = {}
         seen: dict[int, dict[Key, RawRecord]] = {}
@@ -147,7 +151,7 @@ class FileIndex:
                     found[key] = record
         return found
 
-    def _last_of(self, chunk: Chunk, time_ns: int, wanted: Callable[[Topic], bool]) -> dict[Key, RawRecord]:
+    def _last_of(self, chunk: Chunk, time_ns: int, wanted: Wanted) -> dict[Key, RawRecord]:
         last: dict[Key, RawRecord] = {}
         for record in self.read(chunk, wanted):
             before = last.get(record.key)
@@ -155,7 +159,7 @@ class FileIndex:
                 last[record.key] = record
         return last
 
-    def holds(self, chunk: Chunk, wanted: Callable[[Topic], bool]) -> bool:
+    def holds(self, chunk: Chunk, wanted: Wanted) -> bool:
         """Return whether a chunk has messages of wanted topics."""
         return any((key := self.channels.get(id_)) is not None and wanted(key.topic) for id_ in chunk.counts)
 

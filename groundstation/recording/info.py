@@ -23,6 +23,7 @@ from groundstation.recording.schemas import description_of
 _HOLE_S = 1.0
 _HOLE_PERIODS = 5.0
 _MAX_HOLES = 20
+_LATEST_NS = (1 << 63) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +90,7 @@ def info_of(run: RecordedRun) -> RecordingInfo:
     counts = [_gather(index, channels) for index in run.indexes]
     listed = [_channel(name, held, run) for name, held in sorted(channels.items())]
     return RecordingInfo(
-        parts=tuple(
-            PartInfo(str(index.path), index.path.stat().st_size, count, tuple(index.damage))
-            for index, count in zip(run.indexes, counts, strict=True)
-        ),
+        parts=(*_unread(run), *map(_part, run.indexes, counts)),
         start_unix_ns=run.start_ns,
         duration_s=run.duration_s,
         channels=tuple(info for info, _ in listed),
@@ -102,6 +100,14 @@ def info_of(run: RecordedRun) -> RecordingInfo:
         metadata=run.metadata,
         attachments={name: len(data) for name, data in run.attachments.items()},
     )
+
+
+def _unread(run: RecordedRun) -> list[PartInfo]:
+    return [PartInfo(str(path), path.stat().st_size, 0, (text,)) for path, text in run.unread.items()]
+
+
+def _part(index: FileIndex, messages: int) -> PartInfo:
+    return PartInfo(str(index.path), index.path.stat().st_size, messages, tuple(index.damage))
 
 
 def _gather(index: FileIndex, channels: dict[str, _Times]) -> int:
@@ -118,7 +124,7 @@ def _gather(index: FileIndex, channels: dict[str, _Times]) -> int:
             if opcode == Opcode.MESSAGE:
                 number, _, logged, _, _ = message_of(data, begin, end)
                 if number in by_id:
-                    by_id[number].append(logged)
+                    by_id[number].append(min(logged, _LATEST_NS))
                     total += 1
     return total
 

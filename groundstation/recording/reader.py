@@ -1,5 +1,6 @@
 """Reads recordings, whole or cut anywhere: what was flushed before a crash is there, the rest is named as damage."""
 
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -58,10 +59,11 @@ class Recording:
     attachments: dict[str, bytes] = field(default_factory=dict)
     media_types: dict[str, str] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
+    preamble_damage: list[str] = field(default_factory=list)
 
     def raw_records(self, wanted: Callable[[Topic], bool] = lambda _topic: True) -> Iterator[RawRecord]:
         """Yield the messages of the wanted topics in file order; foreign channels are passed over."""
-        self.damage.clear()
+        self.damage[:] = self.preamble_damage
         channels: dict[int, Key | None] = {}
         with self.path.open("rb") as stream:
             for opcode, body in frames(stream, self.damage):
@@ -131,17 +133,21 @@ def _read_preamble(stream: IO[bytes], recording: Recording) -> None:
         if opcode == Opcode.CHUNK:
             return
         try:
-            _take(opcode, ReadDataStream(BytesIO(body)), recording)
+            _take(opcode, body, recording)
         except UNREADABLE as error:
-            raise RecordingError(f"{recording.path}: damaged at its beginning: {error}") from error
+            recording.preamble_damage.append(f"unreadable {Opcode(opcode).name.lower()} at its head: {error!r}")
 
 
-def _take(opcode: int, source: ReadDataStream, recording: Recording) -> None:
+def _take(opcode: int, body: bytes, recording: Recording) -> None:
+    source = ReadDataStream(BytesIO(body))
     match opcode:
         case Opcode.HEADER:
             header = FileHeader.read(source)
             require_ours(str(recording.path), header.profile, header.library)
         case Opcode.ATTACHMENT:
+            checksum = int.from_bytes(body[-4:], "little")
+            if checksum and zlib.crc32(body[:-4]) != checksum:
+                raise ValueError("wrong checksum")
             attachment = Attachment.read(source)
             recording.attachments[attachment.name] = attachment.data
             recording.media_types[attachment.name] = attachment.media_type

@@ -1,23 +1,16 @@
 """A whole run: all parts of all its files as one time line, from which any moment can be read at once."""
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.keys import Key
-from groundstation.bus.topics import Topic
-from groundstation.recording.chunks import RawRecord
+from groundstation.recording.chunks import RawRecord, Wanted, every_topic
 from groundstation.recording.index import Chunk, FileIndex
 from groundstation.recording.reader import RecordingError, open_recording, parts
 from groundstation.recording.selection import RAW, STATE
-
-Wanted = Callable[[Topic], bool]
-
-
-def _every(_topic: Topic) -> bool:
-    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +22,29 @@ class _Place:
 class RecordedRun:
     """The files of a run by time [UNIX ns]; cut files are taken as far as they are sound.
 
-    metadata and attachments are those of the first part that has any.
+    metadata and attachments are those of the first part that has any. `unread` says why a part among others is no
+    recording at all (begun and killed before its first byte); where none is readable, RecordingError is raised.
     """
 
     def __init__(self, paths: list[Path]) -> None:
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.indexes: list[FileIndex] = []
+        self.unread: dict[Path, str] = {}
+        refused: list[RecordingError] = []
         for path in paths:
-            opened = open_recording(path)
+            try:
+                opened = open_recording(path)
+            except RecordingError as error:
+                self.unread[path] = str(error).removeprefix(f"{path}: ")
+                refused.append(error)
+                continue
             self.metadata = self.metadata or opened.metadata
             self.attachments = self.attachments or opened.attachments
             self.indexes.append(FileIndex(path))
+            self.indexes[-1].damage[:0] = opened.preamble_damage
+        if not self.indexes:
+            raise refused[0]
         self._places = sorted(
             (_Place(index, chunk) for index in self.indexes for chunk in index.chunks),
             key=lambda place: place.chunk.start_ns,
@@ -56,7 +60,8 @@ class RecordedRun:
     @property
     def damage(self) -> list[str]:
         """Return what was wrong so far, file by file; reading on may find more."""
-        return [f"{index.path.name}: {text}" for index in self.indexes for text in index.damage]
+        unread = [f"{path.name}: {text}" for path, text in self.unread.items()]
+        return unread + [f"{index.path.name}: {text}" for index in self.indexes for text in index.damage]
 
     @property
     def duration_s(self) -> float:
@@ -71,7 +76,9 @@ class RecordedRun:
                 total[key] = total.get(key, 0) + count
         return total
 
-    def records_from(self, time_ns: int, wanted: Wanted = _every, until_ns: int | None = None) -> Iterator[RawRecord]:
+    def records_from(
+        self, time_ns: int, wanted: Wanted = every_topic, until_ns: int | None = None
+    ) -> Iterator[RawRecord]:
         """Yield messages with time <= log time (< until), in order of log time across all files."""
         waiting: list[tuple[int, int, RawRecord]] = []
         number = 0
@@ -90,7 +97,7 @@ class RecordedRun:
         while waiting:
             yield heapq.heappop(waiting)[2]
 
-    def latest_before(self, time_ns: int, wanted: Wanted = _every) -> dict[Key, RawRecord]:
+    def latest_before(self, time_ns: int, wanted: Wanted = every_topic) -> dict[Key, RawRecord]:
         """Return for each wanted key its last message with log time < time: what was known at that moment."""
         found: dict[Key, RawRecord] = {}
         for index in self.indexes:

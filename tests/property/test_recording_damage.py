@@ -48,7 +48,8 @@ def _read_everything(path: Path) -> int:
         return -1
     found = info_of(run)
     read = list(run.records_from(run.start_ns))
-    assert [record.log_time_ns for record in read] == sorted(record.log_time_ns for record in read)
+    times = [record.log_time_ns for record in read]
+    assert times == sorted(times) or any("wrong times" in text for text in run.damage)
     run.latest_before((run.start_ns + run.end_ns) // 2)
     write_tables(run, folder / "csv", CsvFile)
     try:

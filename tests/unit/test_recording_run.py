@@ -160,3 +160,23 @@ def test_one_file_is_a_recording_too(run_dir: Path) -> None:
 def test_a_folder_without_recording_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="is it a run folder"):
         open_run(tmp_path)
+
+
+def test_a_part_that_never_got_its_first_byte_does_not_hide_the_others(run_dir: Path, tmp_path: Path) -> None:
+    for path in run_dir.glob("state*.mcap"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "state-4.mcap").write_bytes(b"")
+    run = open_run(tmp_path)
+    assert sum(run.counts().values()) > 1000
+    assert run.damage == ["state-4.mcap: not an MCAP recording (the file is empty)"]
+
+
+def test_a_damaged_attachment_is_named_and_costs_nothing_else(run_dir: Path, tmp_path: Path) -> None:
+    data = bytearray((run_dir / "state.mcap").read_bytes())
+    data[data.index(b'"schema_version"') + 2] ^= 0xFF
+    (tmp_path / "state.mcap").write_bytes(data)
+    run = open_run(tmp_path)
+    assert "field.json" not in run.attachments and "calibrations.json" in run.attachments
+    (damage,) = run.damage
+    assert "attachment" in damage and "wrong checksum" in damage
+    assert sum(run.counts().values()) == sum(open_run(run_dir / "state.mcap").counts().values())

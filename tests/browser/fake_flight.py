@@ -269,9 +269,9 @@ class FakeFlight(threading.Thread):
     # --- what is obeyed ---
 
     def _obey(self, command: m.Command) -> None:
-        if any(known.id == command.id for known in self.commands):
-            return
-        self.commands.append(command)
+        # As a driver does: what is said again is answered again, since the first answers may have been lost.
+        if all(known.id != command.id for known in self.commands):
+            self.commands.append(command)
         now = time.monotonic()
         starts = "operator" in command.scope
         names = [name for name in command.scope or DRONES if name in DRONES]

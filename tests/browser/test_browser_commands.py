@@ -124,3 +124,15 @@ def test_a_real_target_is_not_steered(stage: Any) -> None:
     page.page.wait_for_timeout(500)
     assert stage.flight.steered == []
     assert page.page.locator("[data-testid=layer-truth]").count() == 0
+
+
+def test_answers_that_were_lost_are_given_again(stage: Any) -> None:
+    page = stage.open()
+    stage.flight.deaf = {"drone_1", "drone_2"}
+    page.there("land-all").click()
+    page.wait(lambda s: verbs(stage) == ["LAND"])
+    page.page.wait_for_timeout(800)
+    assert page.state()["orders"][0]["state"] == "sent"
+    stage.flight.deaf = set()
+    page.wait(lambda s: s["orders"][0]["state"] == "confirmed")
+    assert verbs(stage) == ["LAND"]  # said again, but one command

@@ -101,7 +101,7 @@ def test_frozen_console_is_shown(stage: Any) -> None:
     page = stage.open()
     os.kill(stage.console.pid, signal.SIGSTOP)
     try:
-        page.there("banner-silent").wait_for(timeout=3000)
+        page.there("banner-silent").wait_for(timeout=20_000)  # how soon is for a machine that has nothing else to do
         page.there("land-all").click()
         page.page.wait_for_timeout(300)
         assert "NOT CONFIRMED" in page.there("orders").inner_text()

@@ -47,21 +47,34 @@ class Link(Protocol):
         """Give the port back."""
 
 
+class Transport(Link, Protocol):
+    """A link that can also be used for frames that somebody else takes apart and makes."""
+
+    def receive_raw(self) -> list[tuple[Heard, bytes]]:
+        """Wait up to 0.1 s; return what came, and the bytes of each frame."""
+
+    def send_raw(self, system: int, data: bytes) -> None:
+        """Send whole frames to one vehicle; never blocks."""
+
+
 def ignore_bytes(system: int, stamp_ns: int, data: bytes, received: bool) -> None:
     """Sniff nothing."""
 
 
 def open_link(settings: LinkSettings, sniffer: Sniffer = ignore_bytes) -> Link:
     """Return the link that the settings describe; raises DriverError when it cannot be opened."""
-    if settings.kind == "mavsdk":
-        from drivers.mavlink.mavsdk_link import MavsdkLink
-
-        return MavsdkLink(settings)
+    transport: Transport
     if settings.target.startswith("serial"):
         from drivers.mavlink.serial_link import SerialLink
 
-        return SerialLink(settings, signing_of(settings), sniffer)
-    return UdpLink(settings, signing_of(settings), sniffer)
+        transport = SerialLink(settings, signing_of(settings), sniffer)
+    else:
+        transport = UdpLink(settings, signing_of(settings), sniffer)
+    if settings.kind == "pymavlink":
+        return transport
+    from drivers.mavlink.mavsdk_link import MavsdkLink
+
+    return MavsdkLink(settings, transport)
 
 
 def signing_of(settings: LinkSettings) -> Signing | None:
@@ -107,6 +120,10 @@ class UdpLink:
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s for a datagram; return its frames."""
+        return [heard for heard, _ in self.receive_raw()]
+
+    def receive_raw(self) -> list[tuple[Heard, bytes]]:
+        """Wait up to 0.1 s for a datagram; return its frames, each with its bytes."""
         try:
             data, source = self._socket.recvfrom(MAX_DATAGRAM)
         except TimeoutError:
@@ -117,8 +134,8 @@ class UdpLink:
             return []
         return self._judge(clock.now_ns(), data, source)
 
-    def _judge(self, now_ns: int, data: bytes, source: tuple[str, int]) -> list[Heard]:
-        heard: list[Heard] = []
+    def _judge(self, now_ns: int, data: bytes, source: tuple[str, int]) -> list[tuple[Heard, bytes]]:
+        heard: list[tuple[Heard, bytes]] = []
         if self._peer is not None and source[0] != self._peer[0]:
             self._reject("foreign_address", f"{source[0]}:{source[1]}")
             return heard
@@ -129,7 +146,7 @@ class UdpLink:
                     continue
                 if self._is_at(now_ns, frame.system, source):
                     self._sniffer(frame.system, now_ns, raw, True)
-                    heard.append(Heard(now_ns, frame))
+                    heard.append((Heard(now_ns, frame), raw))
         except WireError as error:
             self._reject(error.reason, str(error))
         return heard
@@ -155,16 +172,24 @@ class UdpLink:
 
     def send(self, system: int, message: Message) -> None:
         """Send one message in one datagram."""
-        known = self._addresses.get(system)
-        address = known[0] if known is not None else self._peer
-        if address is None:
+        if self._address_of(system) is None:
             return
         with self._lock:
-            data = self._encoder.encode(message)
-            try:
-                self._socket.sendto(data, address)
-            except OSError as error:
-                self._reject("send_failed", str(error))
+            self.send_raw(system, self._encoder.encode(message))
+
+    def _address_of(self, system: int) -> tuple[str, int] | None:
+        known = self._addresses.get(system)
+        return known[0] if known is not None else self._peer
+
+    def send_raw(self, system: int, data: bytes) -> None:
+        """Send whole frames in one datagram to where the vehicle was last heard."""
+        address = self._address_of(system)
+        if address is None:
+            return
+        try:
+            self._socket.sendto(data, address)
+        except OSError as error:
+            self._reject("send_failed", str(error))
         self._sniffer(system, clock.now_ns(), data, False)
 
     def close(self) -> None:

@@ -1,4 +1,8 @@
-"""The same seam over MAVSDK 4 (a native library): it finds vehicles and carries messages; what is said stays ours.
+"""The same seam with MAVSDK 4 (a native library) between the port and us: it knows the vehicles and carries messages.
+
+The port itself stays ours (`raw://`): what a vehicle sent and was sent is recorded to the byte, refusals have the same
+names as on the other links, and each vehicle has a Mavsdk object of its own. With one object for all, messages that
+name no target (poses, clock answers) would go to every vehicle on the port.
 
 Messages go through `mavlink_direct`, whose JSON is made from tuples with all fields: a missing one would be sent as 0.
 Its offboard plugin, which repeats the last set-point by itself, is not used; nor is its clock synchronisation, because
@@ -9,8 +13,9 @@ import json
 import logging
 import math
 import queue
-import socket
-from collections import Counter
+import threading
+import time
+from collections import Counter, deque
 from typing import Any
 
 from mavsdk import Configuration, ConnectionResult, Mavsdk
@@ -19,16 +24,17 @@ from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkDirect
 from mavsdk.plugins.mavlink_direct.mavlink_direct import MavlinkMessage
 
-from drivers.mavlink.link import Heard
+from drivers.mavlink.link import Heard, Transport
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import CLASSES, Frame, Message, name_of
 from drivers.mavlink.wire.telemetry import Heartbeat
-from groundstation.bus import clock
 from groundstation.errors import DriverError
 
 _POLL_S = 0.1
 _WAITING = 4096
+_MOST_SYSTEMS = 64
+_MEET_TRIES, _MEET_S = 40, 0.005
 _log = logging.getLogger(__name__)
 
 
@@ -59,53 +65,117 @@ def json_from_message(message: Message) -> str:
         raise WireError("unencodable", f"{name_of(message)}: {error}") from error
 
 
-class MavsdkLink:
-    """One Mavsdk object on one connection, with any number of systems."""
+class _System:
+    """One vehicle and its Mavsdk object."""
 
-    def __init__(self, settings: LinkSettings) -> None:
-        self.rejected: Counter[str] = Counter()
-        self._heard: queue.Queue[Heard] = queue.Queue(_WAITING)
-        self._direct: dict[int, MavlinkDirect] = {}
-        self._sequence: Counter[int] = Counter()
-        self._closed = False
-        _require_free(settings.target)
-        log_subscribe(_to_log)
+    def __init__(self, number: int, settings: LinkSettings, transport: Transport, heard: "queue.Queue[Heard]") -> None:
+        self.number, self._transport, self._heard = number, transport, heard
+        self._passed: deque[Heard] = deque(maxlen=256)
+        self._direct: MavlinkDirect | None = None
         self._mavsdk = Mavsdk(Configuration.create_manual(settings.system_id, settings.component_id, True))
-        result = self._mavsdk.add_any_connection(_url(settings.target))
-        if result != ConnectionResult.SUCCESS:
+        if (result := self._mavsdk.add_any_connection("raw://")) != ConnectionResult.SUCCESS:
             self._mavsdk.destroy()
-            raise DriverError(f"MAVSDK cannot open {settings.target}: {result.name.lower().replace('_', ' ')}")
+            raise DriverError(f"MAVSDK does not take frames: {result.name.lower().replace('_', ' ')}")
+        self._mavsdk.subscribe_raw_bytes_to_be_sent(lambda data: transport.send_raw(number, data))
 
-    def _meet_systems(self) -> None:
-        # Polled from the reader: creating a plugin inside a callback of the library would wait for itself.
-        if len(self._direct) == self._mavsdk.system_count():
-            return
-        for system in self._mavsdk.get_systems():
-            number = system.get_system_id()
-            if number in self._direct:
-                continue
-            self._direct[number] = direct = MavlinkDirect(system)
-            direct.subscribe_message("", self._take)
+    def take(self, heard: Heard, raw: bytes) -> None:
+        """Hand a frame of the vehicle to the library."""
+        if self._direct is None:
+            self._meet(raw)
+        if self._direct is not None:
+            self._passed.append(heard)
+            self._mavsdk.pass_received_raw_bytes(raw)
 
-    def _take(self, message: MavlinkMessage, _: Any) -> None:
+    def _meet(self, raw: bytes) -> None:
+        # The library finds out who is there on a thread of its own, and a plugin made in its callback would wait for
+        # itself; the heartbeat that introduced the vehicle is handed over again once somebody listens.
+        self._mavsdk.pass_received_raw_bytes(raw)
+        for _ in range(_MEET_TRIES):
+            if self._mavsdk.system_count():
+                self._direct = MavlinkDirect(self._mavsdk.get_systems()[0])
+                self._direct.subscribe_message("", self._decode)
+                return
+            time.sleep(_MEET_S)
+
+    def _decode(self, message: MavlinkMessage, _: Any) -> None:
         # On a thread of the library: only decode and enqueue.
-        now_ns, system = clock.now_ns(), int(message.system_id)
         try:
             decoded = message_from_json(message.message_name, message.fields_json)
         except WireError as error:
-            self.rejected[error.reason] += 1
+            self._transport.rejected[error.reason] += 1
             return
-        # The library has dropped what was lost or broken; it does not tell the frames' own numbers.
-        self._sequence[system] += 1
-        frame = Frame(system, int(message.component_id), self._sequence[system] % 256, decoded)
+        passed = self._passed_as(decoded)
+        if passed is None:
+            self._transport.rejected["unexpected"] += 1
+            return
+        frame = Frame(self.number, int(message.component_id), passed.frame.sequence, decoded)
         try:
-            self._heard.put_nowait(Heard(now_ns, frame))
+            self._heard.put_nowait(Heard(passed.stamp_ns, frame))
         except queue.Full:
-            self.rejected["overflow"] += 1
+            self._transport.rejected["overflow"] += 1
+
+    def _passed_as(self, decoded: Message | None) -> Heard | None:
+        # When the frame came and which number it had: the library keeps the order, but not every kind.
+        while self._passed:
+            passed = self._passed.popleft()
+            if type(passed.frame.message) is type(decoded):
+                return passed
+        return None
+
+    def send(self, message: Message) -> None:
+        """Send a message; heartbeats are the library's own business."""
+        if self._direct is None or isinstance(message, Heartbeat):
+            return
+        carrier = MavlinkMessage(name_of(message), 0, 0, self.number, 1, json_from_message(message))
+        try:
+            self._direct.send_message(carrier)
+        except MavsdkError as error:
+            self._transport.rejected["send_failed"] += 1
+            _log.debug("%s: %s", carrier.message_name, error)
+
+    def close(self) -> None:
+        """Leave the library."""
+        if self._direct is not None:
+            self._direct.destroy()
+        self._mavsdk.destroy()
+
+
+class MavsdkLink:
+    """One port, a thread that hands what comes there to the library, and the vehicles behind it."""
+
+    def __init__(self, settings: LinkSettings, transport: Transport) -> None:
+        self.rejected: Counter[str] = transport.rejected
+        self._settings, self._transport = settings, transport
+        self._heard: queue.Queue[Heard] = queue.Queue(_WAITING)
+        self._systems: dict[int, _System] = {}
+        self._closing = threading.Event()
+        log_subscribe(_to_log)
+        self._pump = threading.Thread(target=self._run, name="mavsdk port", daemon=True)
+        self._pump.start()
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            try:
+                for heard, raw in self._transport.receive_raw():
+                    system = self._systems.get(heard.frame.system) or self._met(heard)
+                    if system is not None and not self._closing.is_set():
+                        system.take(heard, raw)
+            except Exception:  # noqa: BLE001 - the port must be read whatever the library says: count, log, go on
+                self.rejected["internal"] += 1
+                _log.exception("a frame could not be handed to MAVSDK")
+
+    def _met(self, heard: Heard) -> _System | None:
+        number = heard.frame.system
+        if not isinstance(heard.frame.message, Heartbeat):
+            return None
+        if len(self._systems) >= _MOST_SYSTEMS:
+            self.rejected["too_many_systems"] += 1
+            return None
+        system = self._systems[number] = _System(number, self._settings, self._transport, self._heard)
+        return system
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return what came."""
-        self._meet_systems()
         try:
             heard = [self._heard.get(timeout=_POLL_S)]
             while not self._heard.empty():
@@ -115,40 +185,22 @@ class MavsdkLink:
         return heard
 
     def send(self, system: int, message: Message) -> None:
-        """Send to a system that was found; heartbeats are the library's own business."""
-        direct = self._direct.get(system)
-        if direct is None or isinstance(message, Heartbeat) or self._closed:
+        """Send to a vehicle; one that was never heard is only greeted, where the link speaks first."""
+        if self._closing.is_set():
             return
-        carrier = MavlinkMessage(name_of(message), 0, 0, system, 1, json_from_message(message))
-        try:
-            direct.send_message(carrier)
-        except MavsdkError as error:
-            self.rejected["send_failed"] += 1
-            _log.debug("%s: %s", carrier.message_name, error)
+        known = self._systems.get(system)
+        if known is not None:
+            known.send(message)
+        elif isinstance(message, Heartbeat):
+            self._transport.send(system, message)
 
     def close(self) -> None:
-        """Leave the connection."""
-        self._closed = True
-        for direct in self._direct.values():
-            direct.destroy()
-        self._mavsdk.destroy()
-
-
-def _require_free(target: str) -> None:
-    # The library shares a port with whoever has it, and then hears nothing.
-    way, address, port = target.split(":")
-    if way != "udpin":
-        return
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        try:
-            udp.bind((address, int(port)))
-        except OSError as error:
-            raise DriverError(f"cannot listen on {target}: is another program using it? ({error})") from error
-
-
-def _url(target: str) -> str:
-    way, address, number = target.split(":")
-    return f"{way}://{address}:{number}"
+        """Leave the library and give the port back."""
+        self._closing.set()
+        self._pump.join(timeout=1.0)
+        for system in self._systems.values():
+            system.close()
+        self._transport.close()
 
 
 def _to_log(level: int, text: str, file: str | None, line: int) -> bool:

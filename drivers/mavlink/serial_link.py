@@ -39,6 +39,10 @@ class SerialLink:
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s for bytes; return the frames that are whole by now."""
+        return [heard for heard, _ in self.receive_raw()]
+
+    def receive_raw(self) -> list[tuple[Heard, bytes]]:
+        """Wait up to 0.1 s for bytes; return the frames that are whole by now, each with its bytes."""
         try:
             ready, _, _ = select.select([self._fd], [], [], _POLL_S)
             data = os.read(self._fd, _CHUNK) if ready else b""
@@ -48,7 +52,7 @@ class SerialLink:
             select.select([], [], [], _POLL_S)
             raise_if_closed(error)
             return []
-        now_ns, heard = clock.now_ns(), []
+        now_ns, heard = clock.now_ns(), list[tuple[Heard, bytes]]()
         for raw in self._cutter.feed(data):
             try:
                 frame = self._decoder.decode(raw)
@@ -57,13 +61,18 @@ class SerialLink:
                 continue
             if (frame.system, frame.component) != self._own:
                 self._sniffer(frame.system, now_ns, raw, True)
-                heard.append(Heard(now_ns, frame))
+                heard.append((Heard(now_ns, frame), raw))
         return heard
 
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
         with self._lock:
             data = self._encoder.encode(message)
+        self.send_raw(system, data)
+
+    def send_raw(self, system: int, data: bytes) -> None:
+        """Write whole frames; a line that is too slow loses them."""
+        with self._lock:
             try:
                 if os.write(self._fd, data) < len(data):
                     self.rejected["send_cut"] += 1

@@ -1,13 +1,15 @@
 """What every link keeps: discovery, telemetry, commands, numbers to the bit, several vehicles, close."""
 
 import itertools
+import socket
 import time
 
 import pytest
 
-from drivers.mavlink.link import open_link
+from drivers.mavlink.link import ignore_bytes, open_link
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire import flight, service, telemetry
+from drivers.mavlink.wire.frames import Decoder, Encoder
 from drivers.mavlink.wire.names import Command
 from groundstation.errors import DriverError
 
@@ -21,8 +23,8 @@ def kind(request):
 def opened(kind):
     links = []
 
-    def make(target):
-        links.append(open_link(LinkSettings(kind=kind, target=target)))
+    def make(target, sniffer=ignore_bytes):
+        links.append(open_link(LinkSettings(kind=kind, target=target), sniffer))
         return links[-1]
 
     yield make
@@ -72,14 +74,12 @@ def test_commands_are_acknowledged_and_rates_are_granted(hangar, opened):
     each = heartbeat(link, 9)
     collect(link, lambda h: of(h, telemetry.Heartbeat, 9), 3.0, each)
     link.send(9, flight.CommandLong(9, 1, Command.SET_MESSAGE_INTERVAL, 0, 32.0, 20_000.0))
-    heard = collect(link, lambda h: of(h, flight.CommandAck))
-    assert of(heard, flight.CommandAck)[0][:2] == (511, 0)
+    collect(link, lambda h: (511, 0) in [ack[:2] for ack in of(h, flight.CommandAck)])
     heard = collect(link, lambda h: len(of(h, telemetry.LocalPositionNed)) > 20)
     stamps = [m.time_boot_ms for m in of(heard, telemetry.LocalPositionNed)]
     assert all(b - a == 20 for a, b in itertools.pairwise(stamps))
     link.send(9, flight.CommandLong(9, 1, 9999, 0))
-    heard = collect(link, lambda h: of(h, flight.CommandAck))
-    assert of(heard, flight.CommandAck)[0][:2] == (9999, 3)
+    collect(link, lambda h: (9999, 3) in [ack[:2] for ack in of(h, flight.CommandAck)])
 
 
 def test_values_arrive_to_the_bit(hangar, opened):
@@ -134,3 +134,81 @@ def test_a_taken_port_is_named(kind, opened, port):
     opened(f"udpin:127.0.0.1:{port}")
     with pytest.raises(DriverError, match=str(port)):
         open_link(LinkSettings(kind=kind, target=f"udpin:127.0.0.1:{port}"))
+
+
+def test_a_pose_reaches_the_vehicle_it_is_of_and_no_other(hangar, opened, port):
+    """ODOMETRY, VISION_POSITION_ESTIMATE and TIMESYNC name no target: on a shared port the address alone decides."""
+    place = ("127.0.0.1", port)
+    link = opened(f"udpin:127.0.0.1:{port}")
+    taken = {}
+    for system in (21, 22):
+        emulator, _, _ = hangar.add("px4", system, calls=place)
+        taken[system], original = [], emulator.services.take
+        emulator.services.take = lambda frame, now, o=original, s=system: (
+            taken[s].append(frame.message) or o(frame, now)
+        )
+    each = heartbeat(link, 21, 22)
+    collect(link, lambda h: of(h, telemetry.Heartbeat, 21) and of(h, telemetry.Heartbeat, 22), 4.0, each)
+    for system in (21, 22):
+        link.send(system, service.Timesync(1_000 + system, 5))
+        link.send(system, flight.VisionPositionEstimate(77, system / 4, *(0.0,) * 5, (0.0,) * 21, 0))
+        link.send(system, service.ParamRequestRead(system, 1, "EKF2_EV_CTRL", -1))
+    collect(link, lambda h: of(h, service.ParamValue, 21) and of(h, service.ParamValue, 22), 4.0)
+    for system, messages in taken.items():
+        assert [m.tc1 for m in messages if isinstance(m, service.Timesync)] == [1_000 + system]
+        assert [m.x for m in messages if isinstance(m, flight.VisionPositionEstimate)] == [system / 4]
+
+
+def test_what_goes_over_the_port_is_told_to_the_byte(hangar, opened):
+    """The recording, and the .tlog made of it, hold the frames themselves on every link."""
+    _, _, (address, port) = hangar.add("px4", 7)
+    told = []
+    link = opened(f"udpout:{address}:{port}", lambda system, at, data, received: told.append((system, data, received)))
+    collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, heartbeat(link, 7))
+    setpoint = flight.SetPositionTargetLocalNed(5, 7, 1, 8, 0x5C7, *(0.0,) * 3, 0.5, -0.25, 0.125, *(0.0,) * 4, -0.5)
+    link.send(7, setpoint)
+    link.send(7, service.ParamRequestRead(7, 1, "COM_OF_LOSS_T", -1))
+    heard = collect(link, lambda h: of(h, service.ParamValue))
+    decoder = Decoder()
+    frames = {
+        way: [decoder.decode(data) for system, data, r in told if r is way and system == 7] for way in (True, False)
+    }
+    assert setpoint in [frame.message for frame in frames[False]]
+    assert all((frame.system, frame.component) == (255, 190) for frame in frames[False])
+    assert of(heard, service.ParamValue)[0] in [frame.message for frame in frames[True]]
+    numbers = {(f.component, f.sequence) for f in frames[True]}
+    assert {(h.frame.component, h.frame.sequence) for h in heard} <= numbers
+
+
+def test_a_vehicle_that_goes_and_comes_again_and_again_is_spoken_to_again(hangar, opened):
+    emulator, _, (address, port) = hangar.add("px4", 7)
+    link = opened(f"udpout:{address}:{port}")
+    each = heartbeat(link, 7)
+    for silence_s in (0.3, 1.0, 3.5):  # the last beyond the time after which MAVSDK gives a vehicle up
+        collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, each)
+        emulator.silent = True
+        time.sleep(silence_s)
+        while link.receive():
+            pass
+        emulator.silent = False
+        collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, each)
+        link.send(7, service.ParamRequestRead(7, 1, "COM_OF_LOSS_T", -1))
+        assert of(collect(link, lambda h: of(h, service.ParamValue), 2.0), service.ParamValue)
+
+
+def test_strangers_duplicates_and_broken_frames_are_refused_by_name(opened, port):
+    link = opened(f"udpin:127.0.0.1:{port}")
+    beat = Encoder(21, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other,
+    ):
+        for udp in (first, other):
+            udp.bind(("127.0.0.1", 0))
+        first.sendto(beat, ("127.0.0.1", port))
+        collect(link, lambda h: of(h, telemetry.Heartbeat, 21))
+        other.sendto(beat, ("127.0.0.1", port))  # the same system id from elsewhere
+        first.sendto(b"rubbish", ("127.0.0.1", port))
+        first.sendto(beat[:-1] + bytes([beat[-1] ^ 1]), ("127.0.0.1", port))
+        collect(link, lambda h: link.rejected["checksum"], 2.0)
+    assert link.rejected == {"duplicate_system": 1, "no_frame": 1, "checksum": 1}

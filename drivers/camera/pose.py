@@ -135,21 +135,29 @@ def _differ(best: RelativePose, other: RelativePose) -> bool:
     return float(gap @ np.linalg.solve(best.covariance + other.covariance, gap)) > 1.0
 
 
-def relative_pose(
-    pose: PlanarPose, points: Array, intrinsics: CameraIntrinsics, gravity: Gravity, floor_px: float
-) -> RelativePose:
-    """Return position, yaw and their covariance s^2 (J^T J)^-1 with s^2 = squared error / (2n - 6) + floor^2."""
+def pose_covariance(pose: PlanarPose, points: Array, intrinsics: CameraIntrinsics, floor_px: float) -> Array:
+    """Return the covariance (6, 6) of (left rotation error [rad; optical], translation [m; optical]).
+
+    s^2 (J^T J)^-1 with s^2 = squared error / (2n - 6) + floor^2.
+    """
     turned = points @ pose.rotation.T
     by_point = intrinsics.project_jacobian(turned + pose.translation)
     # A left rotation error w moves a point by w x p, so d(pixel)/dw = -J [p]x.
     by_turn = np.cross(turned[:, None, :], by_point)
     jacobian = np.concatenate((by_turn, by_point), axis=2).reshape(-1, 6)
     variance = pose.squared_error / (len(jacobian) - 6) + floor_px**2
+    return np.asarray(variance * np.linalg.solve(jacobian.T @ jacobian, np.eye(6)))
+
+
+def relative_pose(
+    pose: PlanarPose, points: Array, intrinsics: CameraIntrinsics, gravity: Gravity, floor_px: float
+) -> RelativePose:
+    """Return position, yaw and their covariance."""
     axis = gravity.stabilized_from_optical @ pose.rotation[:, 0]
     level = max(axis[0] ** 2 + axis[1] ** 2, 1e-6)
     yaw_by_turn = np.array([-axis[2] * axis[0] / level, -axis[2] * axis[1] / level, 1.0])
     mapping = np.zeros((4, 6))
     mapping[:3, 3:] = np.eye(3)
     mapping[3, :3] = yaw_by_turn @ gravity.stabilized_from_optical
-    mapped = variance * mapping @ np.linalg.solve(jacobian.T @ jacobian, mapping.T)
+    mapped = mapping @ pose_covariance(pose, points, intrinsics, floor_px) @ mapping.T
     return RelativePose(pose.translation, math.atan2(axis[1], axis[0]), 0.5 * (mapped + mapped.T))

@@ -7,6 +7,8 @@ import click
 # name -> (module:function, line in the help); a new bench is one row here and one module beside this one.
 BENCHES = {
     "demo": ("groundstation.cli.bench_demo:demo", "Fly many seeds of the demo and judge each."),
+    "vision": ("groundstation.cli.bench_vision:vision", "Measure markers and detector on rendered pictures."),
+    "ardrone": ("groundstation.cli.bench_ardrone:ardrone", "Time the AR.Drone codec against a public client's."),
     "planner": ("groundstation.cli.bench_planner:planner", "Time the planar planner against brute force and peers."),
     "recording": ("groundstation.cli.bench_recording:recording", "CPU of writing, opening and seeking recordings."),
 }

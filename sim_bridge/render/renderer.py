@@ -32,6 +32,11 @@ class Renderer:
         fixed = not spec.mount.body
         self._background = self._blurred(self._floor.draw(spec.mount.parent_from_optical)) if fixed else None
 
+    @property
+    def spec(self) -> RenderSpec:
+        """Return what is drawn."""
+        return self._spec
+
     def render(self, states: NDArray[np.float64]) -> Picture:
         """Return the picture (h, w) of the true states (n, 13) of the spec's bodies."""
         scene = compose_scene(self._spec, states)

@@ -13,7 +13,8 @@ from sim_bridge.scenario import Scenario, parse_scenario
 _EXAMPLES = """examples:
   python -m sim_bridge.study demo --seed 3 --duration 60
   python -m sim_bridge.study demo --seeds 10 --set planner.hysteresis=0.1 --json
-  python -m sim_bridge.study demo --field my_lab.yaml --outliers 0.02"""
+  python -m sim_bridge.study demo --field my_lab.yaml --outliers 0.02
+  python -m sim_bridge.study vision --help"""
 
 
 def resolved_field(path: str, overrides: list[str]) -> dict[str, Any]:
@@ -50,6 +51,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def main() -> int:
     """Run the studies that the arguments ask for; exit code 0, or that of the settings error."""
+    if sys.argv[1:2] == ["vision"]:
+        from sim_bridge.study.vision.command import main as vision
+
+        return vision(sys.argv[2:])
     arguments = _parser().parse_args()
     field = resolved_field(arguments.field, arguments.set)
     scenario = parse_scenario(Path(arguments.scenario).read_bytes()) if arguments.scenario else Scenario()

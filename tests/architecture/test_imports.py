@@ -115,6 +115,8 @@ def driver_may(one: Import) -> bool:
 
 
 def simulator_may(one: Import) -> bool:
+    if within(one.module, "sim_bridge.study.vision") and within(one.target, "drivers.camera"):
+        return True
     if within(one.module, "sim_bridge.study"):
         return within(one.target, *LOW, *CORE, "sim_bridge")
     if within(one.target, "sim_bridge.study"):
@@ -187,8 +189,8 @@ def test_wire_packages_need_the_standard_library_alone() -> None:
         ("zenoh", ("groundstation.bus.zenoh_bus",)),
         ("ruamel", ("groundstation.settings", "groundstation.cli")),
         ("yaml", ()),
-        ("cv2", ("drivers.camera", "sim_bridge.render")),
-        ("av", ("drivers.camera", "drivers.ardrone", "sim_bridge.devices")),
+        ("cv2", ("drivers.camera", "sim_bridge.render", "sim_bridge.study.vision")),
+        ("av", ("drivers.camera", "drivers.ardrone", "sim_bridge.devices", "sim_bridge.study.vision")),
         ("click", ("groundstation.cli",)),
         (
             "matplotlib",

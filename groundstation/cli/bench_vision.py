@@ -1,0 +1,37 @@
+"""`groundstation bench vision`: starts the simulator's study of markers and detector, as a process of its own."""
+
+import os
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation bench vision\n"
+    "  groundstation bench vision --pictures 250 --out runs/vision\n"
+    "  groundstation bench vision --json | jq .targets"
+)
+@click.option(
+    "--pictures", type=click.IntRange(8, 10_000), default=60, show_default=True, help="Per cell of the tables."
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the pictures.")
+@click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for figures and plots (default: in ./runs)."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print all figures as JSON.")
+def vision(pictures: int, seed: int, out: Path | None, as_json: bool) -> int:
+    """Measure the detector on rendered pictures: rates, pose errors, honesty, identities, CPU, beside OpenCV's finder.
+
+    Exit code 0 only if every figure that is asked for is met. Takes some minutes.
+    """
+    folder = out or Path("runs") / f"vision-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    command = [sys.executable, "-m", "sim_bridge.study", "vision", "--pictures", str(pictures), "--seed", str(seed)]
+    command += ["--out", str(folder), *(["--json"] if as_json else [])]
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    code = subprocess.run(command, env=os.environ | threads, check=False).returncode
+    if not as_json:
+        click.echo(f"figures and plots: {folder}", err=True)
+    return code

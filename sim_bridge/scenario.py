@@ -152,6 +152,7 @@ class FaultKind(StrEnum):
     CAMERA_CUT = "camera_cut"
     CAMERA_STALL = "camera_stall"
     BATTERY_DROP = "battery_drop"
+    PROPELLER_BLOCKED = "propeller_blocked"
 
 
 class Fault(_Section):

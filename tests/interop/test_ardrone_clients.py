@@ -59,6 +59,19 @@ def test_node_reads_full_navdata(hangar: Any, programs: Any, options: tuple[str,
     flew(drones.stop(), drones.addresses[0])
 
 
+def test_a_program_that_navigates_by_itself_completes_its_mission(hangar: Any, programs: Any) -> None:
+    drones = hangar(1)
+    seen = programs.result(programs.node("node_mission.js", drones.addresses[0]))
+    assert seen["error"] is None
+    assert {"demo", "visionDetect", "magneto", "wifi"} <= set(seen["options"])
+    track = [state[drones.addresses[0]]["position"] for state in drones.stop()]
+    highest = max(z for _, _, z in track)
+    (x, y, z), (x0, y0, _) = track[-1], track[0]
+    assert 0.8 < highest < 1.5, "it asked for 1 m"
+    assert 0.9 < ((x - x0) ** 2 + (y - y0) ** 2) ** 0.5 < 2.2, "1 m forward and 1 m to the right"
+    assert z < 0.1
+
+
 def test_node_parses_our_video(hangar: Any, programs: Any) -> None:
     drones = hangar(1, "--video")
     seen = programs.result(programs.node("node_video.js", drones.addresses[0], 0))

@@ -93,6 +93,11 @@ def test_without_a_seed_the_scenario_decides(tmp_path: Path) -> None:
             lambda o: o["scenario"].update(faults=[{"kind": "navdata_silent", "entity": "ceiling", "start_s": 1}]),
             "'ceiling' is none of drone_1, drone_2",
         ),
+        (
+            lambda o: o["scenario"].update(drones={"firmware_by_drone": {"drone_9": "ar1-1.7"}}),
+            "firmware_by_drone: 'drone_9' is none of drone_1, drone_2",
+        ),
+        (lambda o: o["scenario"].update(drones={"firmware": "ar3"}), "firmware: known firmwares: ar1-1.5, "),
     ],
 )
 def test_wrong_orders_are_refused_by_name(tmp_path: Path, change: Any, named: str) -> None:
@@ -173,6 +178,7 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
             Fault(kind=FaultKind.AT_DEAF, entity="drone_2", start_s=1),
             Fault(kind=FaultKind.BATTERY_DROP, entity="drone_1", start_s=1.5, value=0.1),
             Fault(kind=FaultKind.CAMERA_CUT, entity="ceiling", start_s=0),
+            Fault(kind=FaultKind.PROPELLER_BLOCKED, entity="drone_2", start_s=2.5, end_s=2.9),
         ],
         world,
         emulators,
@@ -184,6 +190,10 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
     assert not emulators["drone_1"].silent
     schedule.apply(2.0)
     assert emulators["drone_1"].silent
+    schedule.apply(2.6)
+    assert emulators["drone_2"].control.blocked
+    schedule.apply(2.95)
+    assert not emulators["drone_2"].control.blocked
     assert schedule.apply(3.1) == ["fault navdata_silent of drone_1 ends"]
     assert not emulators["drone_1"].silent
     for emulator in emulators.values():

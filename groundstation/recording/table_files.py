@@ -38,14 +38,14 @@ class CsvFile:
         self._writer = csv.writer(self._stream)
         columns = (*COMMON, *table.columns)
         self._lists = [number for number, column in enumerate(columns) if column.cell is Cell.REALS]
-        self._truths = [number for number, column in enumerate(columns) if column.cell is Cell.TRUTH]
+        self._flags = [number for number, column in enumerate(columns) if column.cell is Cell.FLAG]
         self._writer.writerow([column.name for column in columns])
 
     def add(self, row: Row) -> None:
         """Add a row."""
         for number in self._lists:
             row[number] = None if row[number] is None else json.dumps(row[number])
-        for number in self._truths:
+        for number in self._flags:
             row[number] = None if row[number] is None else int(row[number])
         self._writer.writerow(row)
 
@@ -66,7 +66,7 @@ class ParquetFile:
         kinds = {
             Cell.REAL: pa.float64(),
             Cell.WHOLE: pa.int64(),
-            Cell.TRUTH: pa.bool_(),
+            Cell.FLAG: pa.bool_(),
             Cell.TEXT: pa.string(),
             Cell.REALS: pa.list_(pa.float64()),
         }

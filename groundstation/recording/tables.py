@@ -49,7 +49,7 @@ class Cell(Enum):
 
     REAL = "real"
     WHOLE = "whole"
-    TRUTH = "truth"
+    FLAG = "flag"
     TEXT = "text"
     REALS = "reals"
 
@@ -149,7 +149,7 @@ def _columns(name: str, kind: Any, get: Getter) -> Iterator[tuple[Column, Getter
     elif get_origin(kind) is tuple and arguments == (float, Ellipsis):
         yield column(name, Cell.REALS), _chain(get, list)
     else:
-        cell = {float: Cell.REAL, int: Cell.WHOLE, bool: Cell.TRUTH}.get(kind, Cell.TEXT)
+        cell = {float: Cell.REAL, int: Cell.WHOLE, bool: Cell.FLAG}.get(kind, Cell.TEXT)
         is_text = isinstance(kind, type) and issubclass(kind, str)
         yield column(name, cell), get if cell is not Cell.TEXT or is_text else _chain(get, _json)
 
@@ -197,7 +197,7 @@ _ESTIMATE_COLUMNS = (
     *(column(name, Cell.REAL) for name in _MEAN),
     *(column(f"velocity_{axis}_m_s", Cell.REAL) for axis in _XYZ),
     *(column(_covariance_name(row, col), Cell.REAL) for row, col in _UPPER),
-    column("converged", Cell.TRUTH),
+    column("converged", Cell.FLAG),
     column("age_s", Cell.REAL),
     column("epoch", Cell.WHOLE),
 )

@@ -18,7 +18,8 @@ _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT = 0.4, 6.0
 # Equalising the histogram first (CALIB_CB_NORMALIZE_IMAGE) costs time and every tenth board with small squares.
 _FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH
 _REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005)
-_MOST_HALF_WINDOW_PX = 10
+# Half a refinement window at most [px]: in an enlarged picture all of it is square, in others more is not needed.
+_MOST_HALF_ENLARGED_PX, _MOST_HALF_PX = 10, 8
 _LEAST_CONTRAST = 12.0
 _MOST_WRONG_SQUARES = 1
 _GRID = marker.corner_grid()
@@ -118,7 +119,8 @@ def refined(picture: Picture, corners: Array, columns: int = marker.CORNERS_X) -
         return corners
     part = picture[window.top : window.bottom, window.left : window.right]
     enlarged, ratio = resized(part, float(np.clip(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0, _MOST_ENLARGEMENT)))
-    half = int(np.clip(round(0.55 * reach / ratio[0]), 1, _MOST_HALF_WINDOW_PX))
+    most = _MOST_HALF_ENLARGED_PX if ratio[0] < 1.0 else _MOST_HALF_PX
+    half = int(np.clip(round(0.55 * reach / ratio[0]), 1, most))
     start = ((corners - (window.left, window.top) + 0.5) / ratio - 0.5).astype(np.float32).reshape(-1, 1, 2)
     found = cv2.cornerSubPix(enlarged, start, (half, half), (-1, -1), _REFINE)
     fine = (np.asarray(found, np.float64).reshape(-1, 2) + 0.5) * ratio - 0.5 + (window.left, window.top)

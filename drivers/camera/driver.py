@@ -41,6 +41,7 @@ def run(child: Child) -> int:
         driver = CameraDriver(child, settings, source)
         while not child.stop_requested and child.supervisor_alive:
             driver.turn()
+        driver.tell_counts()
     finally:
         source.close()
     return 0
@@ -71,6 +72,11 @@ class CameraDriver:
         self._next_image_ns = 0
         self._status_ns = clock.now_ns()
         self.counts: Counter[str] = Counter()
+
+    def tell_counts(self) -> None:
+        """Log what became of all pictures and boards."""
+        counts = {"pictures": self._processed, "skipped": self._skipped, **self.counts, **self._pipeline.counts}
+        _log.info("%s", ", ".join(f"{name} {count}" for name, count in counts.items()))
 
     def turn(self) -> None:
         """Wait shortly for a picture, handle it, and keep up heartbeat, status and stream watch."""

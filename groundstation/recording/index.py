@@ -46,7 +46,10 @@ class Chunk:
 
 
 class FileIndex:
-    """The chunks and channels of one file, whole or cut anywhere; `damage` says what was wrong with it."""
+    """The chunks and channels of one file, whole or cut anywhere; `damage` says what was wrong with it.
+
+    chunks: in file order, which is the order in which their messages arrived.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -58,12 +61,13 @@ class FileIndex:
         with path.open("rb", buffering=_BUFFER_BYTES) as stream:
             self._scan(stream, path.stat().st_size)
             self._complete(stream)
-        self.chunks = sorted((chunk for chunk in self.chunks if chunk.counts), key=lambda chunk: chunk.start_ns)
-        self._starts_ns = [chunk.start_ns for chunk in self.chunks]
+        self.chunks = [chunk for chunk in self.chunks if chunk.counts]
+        self._by_time = sorted(self.chunks, key=lambda chunk: chunk.start_ns)
+        self._starts_ns = [chunk.start_ns for chunk in self._by_time]
         # Chunks overlap a little in time: how far all up to here reach.
-        self._reach_ns = list(accumulate((chunk.end_ns for chunk in self.chunks), max))
+        self._reach_ns = list(accumulate((chunk.end_ns for chunk in self._by_time), max))
         self._places: dict[int, list[int]] = {}
-        for number, chunk in enumerate(self.chunks):
+        for number, chunk in enumerate(self._by_time):
             for id_ in chunk.counts:
                 self._places.setdefault(id_, []).append(number)
 
@@ -145,7 +149,7 @@ class FileIndex:
                 if best is not None and self._reach_ns[number] <= best.log_time_ns:
                     break
                 if number not in seen:
-                    seen[number] = self._last_of(self.chunks[number], time_ns, wanted)
+                    seen[number] = self._last_of(self._by_time[number], time_ns, wanted)
                 record = seen[number].get(key)
                 if record is not None and (best is None or best.log_time_ns < record.log_time_ns):
                     found[key] = record

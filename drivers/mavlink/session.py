@@ -1,13 +1,15 @@
 """From silence to full telemetry: streams asked for, origin set, parameters checked. Pure.
 
 WIRE (mavlink.md 1): ArduPilot streams nothing but heartbeats unless asked, one interval at a time; the origin is
-ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back.
+ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back. One that is set is neither
+changed nor told: it is asked for as well. PX4 flies indoors without: nothing waits for its answer.
 """
 
 from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import Origin
 from drivers.mavlink.wire import service, telemetry
+from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import Message, id_of
 from drivers.mavlink.wire.names import Command, Flavour
 from drivers.mavlink.wire.parameters import value_from_carried
@@ -17,6 +19,7 @@ _PARAM_PERIOD_NS = 500_000_000
 _HEARTBEAT_NS = 1_000_000_000
 _DISCONNECTED_NS = 2_000_000_000
 _PARAM_BURST = 4
+_ORIGIN_TRIES_PX4 = 5
 
 
 def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
@@ -51,6 +54,7 @@ class Session:
         self._found: dict[str, float] = {}
         self._asked: set[str] = set()
         self._has_origin = False
+        self._origin_tries = 0
         self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
 
     @property
@@ -75,7 +79,8 @@ class Session:
             return f"reading parameter {self.unread[0]}"
         if self.problems:
             return f"parameter {self.problems[0]}: groundstation mavlink setup --apply"
-        return "" if self._has_origin else "waiting for the origin to be taken"
+        ready = self._has_origin or self._flavour is Flavour.PX4
+        return "" if ready else "waiting for the origin to be taken"
 
     def hear_parameter(self, message: service.ParamValue) -> None:
         """Take a parameter's value; raises WireError."""
@@ -96,7 +101,7 @@ class Session:
             messages.append(telemetry.Heartbeat(6, 8, 0, 0, 4))
         if silence_ns > _DISCONNECTED_NS:
             if self._connected:
-                self._connected, self._has_origin = False, False
+                self._connected, self._has_origin, self._origin_tries = False, False, 0
                 self._found.clear()
                 requests.forget()
             return messages
@@ -109,11 +114,11 @@ class Session:
 
     def _service(self, now_ns: int) -> list[Message]:
         messages: list[Message] = []
-        if not self._has_origin and now_ns >= self._next_origin_ns:
+        given_up = self._flavour is Flavour.PX4 and self._origin_tries >= _ORIGIN_TRIES_PX4
+        if not self._has_origin and not given_up and now_ns >= self._next_origin_ns:
             self._next_origin_ns = now_ns + _ORIGIN_PERIOD_NS
-            o = self._origin
-            degrees = (round(o.latitude_deg * 1e7), round(o.longitude_deg * 1e7))
-            messages.append(service.SetGpsGlobalOrigin(self._system, *degrees, round(o.altitude_m * 1000)))
+            self._origin_tries += 1
+            messages += self._origin_requests()
         unread = self.unread
         if unread and (now_ns >= self._next_param_ns or self._asked.isdisjoint(unread)):
             self._next_param_ns = now_ns + _PARAM_PERIOD_NS
@@ -121,6 +126,16 @@ class Session:
             messages += [service.ParamRequestRead(self._system, 1, name, -1) for name in unread[:_PARAM_BURST]]
             self._asked = set(unread[:_PARAM_BURST])
         return messages
+
+    def _origin_requests(self) -> list[Message]:
+        o = self._origin
+        place = (round(o.latitude_deg * 1e7), round(o.longitude_deg * 1e7), round(o.altitude_m * 1000))
+        asked = float(id_of(telemetry.GpsGlobalOrigin))
+        # Not through the requests: "denied" here means "none yet", which is no news for the operator.
+        return [
+            service.SetGpsGlobalOrigin(self._system, *place),
+            CommandLong(self._system, 1, Command.REQUEST_MESSAGE, 0, asked),
+        ]
 
     @staticmethod
     def _key(kind: type[Message]) -> str:

@@ -14,6 +14,7 @@ from drivers.mavlink.publisher import MotionPublisher
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import Session, streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
+from drivers.mavlink.texts import BootClock, Texts
 from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
@@ -25,6 +26,10 @@ from groundstation.bus.messages import Estimate, FlightState, Vector3
 
 _FRESH_NS = 300_000_000
 _HEARTBEAT_NS = 4_000_000_000
+# A refusal is told once the vehicle has said why: its acknowledgement overtakes its texts.
+_EXPLAIN_NS = 700_000_000
+# ArduPilot repeats what keeps it from arming every 30 s.
+_COMPLAINTS_NS = 35_000_000_000
 _FAULTS = Sensor.GYRO | Sensor.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
 
@@ -56,7 +61,7 @@ class MavlinkVehicle:
         self.system = vehicle.system_id
         self.telemetry = Telemetry()
         self.flavour = _FLAVOURS[vehicle.flavour]
-        self.texts: deque[tuple[int, str]] = deque(maxlen=32)
+        self.texts: deque[tuple[int, telemetry.Statustext]] = deque(maxlen=64)
         self.log = DatagramLog(bus, vehicle.name, settings.raw_datagrams)
         self._settings, self._link = settings, link
         self._publisher = MotionPublisher(vehicle, bus)
@@ -72,6 +77,9 @@ class MavlinkVehicle:
         self._next_vision_ns = 0
         self._traffic = Traffic()
         self._refused: Counter[str] = Counter()
+        self._said, self._boot_clock = Texts(), BootClock()
+        self._jumps: deque[int] = deque(maxlen=8)
+        self._refusals: deque[tuple[int, str]] = deque(maxlen=16)
 
     # -- reader thread ------------------------------------------------------------------------------------------------
 
@@ -110,6 +118,9 @@ class MavlinkVehicle:
         self.telemetry = known
 
     def _moved(self, now_ns: int, message: telemetry.LocalPositionNed, known: Telemetry) -> Telemetry:
+        if (jump_ms := self._boot_clock.hear(now_ns, message.time_boot_ms)) != 0:
+            self._refused["clock_jump"] += 1
+            self._jumps.append(jump_ms)
         if known.attitude is None:
             return known
         velocity = convert.velocity_from_local(message, known.attitude)
@@ -132,7 +143,7 @@ class MavlinkVehicle:
             case telemetry.EkfStatusReport():
                 return replace(known, ekf=message.flags)
             case telemetry.Statustext():
-                self.texts.append((message.severity, message.text))
+                self.texts.append((now_ns, message))
             case flight.CommandAck():
                 self._acks.append(message)
             case service.ParamValue() | telemetry.GpsGlobalOrigin():
@@ -182,8 +193,8 @@ class MavlinkVehicle:
         return "" if known.healthy & Sensor.PREARM_CHECK else self._arming_reason()
 
     def _arming_reason(self) -> str:
-        said = [text for _, text in self.orders.said if "arm" in text.lower()]
-        return f"it does not want to arm{': ' + said[-1] if said else ''}"
+        said = self._said.reasons(clock.now_ns() - _COMPLAINTS_NS, "arm")
+        return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"
 
     def apply(self, now_ns: int, decision: Decision) -> None:
         """Tell the vehicle what the decision means to it, feed its estimator, and ask what is still unknown."""
@@ -213,12 +224,24 @@ class MavlinkVehicle:
                     self._session.hear_origin()
             except WireError as error:
                 self._refused[error.reason] += 1
+        self._take_texts(now_ns)
+
+    def _take_texts(self, now_ns: int) -> None:
+        events = self.orders.events
         while self.texts:
-            said = self.texts.popleft()
-            self.orders.said.append(said)
-            self.orders.events.append(said)
+            said = self._said.hear(*self.texts.popleft())
+            if said is not None:
+                self.orders.said.append(said)
+                events.append(said)
+        while self._jumps:
+            jump_s = self._jumps.popleft() / 1000
+            events.append((4, f"its clock jumped by {jump_s:.0f} s: it restarted, or two vehicles share its system id"))
         while self._requests.failures:
-            self.orders.events.append((4, f"{self._requests.failures.popleft()}{self.orders.last_words()}"))
+            self._refusals.append((now_ns, self._requests.failures.popleft()))
+        while self._refusals and now_ns - self._refusals[0][0] >= _EXPLAIN_NS:
+            at_ns, text = self._refusals.popleft()
+            reasons = self._said.reasons(at_ns - _EXPLAIN_NS)
+            events.append((4, f"{text} ({'; '.join(reasons)})" if reasons else text))
 
     def _feed(self, now_ns: int, known: Telemetry) -> list[tuple[object, ...]]:
         if now_ns < self._next_vision_ns or known.attitude is None:

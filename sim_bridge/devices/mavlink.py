@@ -26,6 +26,7 @@ _FORGET_NS = 10_000_000_000
 _CLIENTS = 8
 _TIMESYNC_TICKS = 20
 _LIST_PER_TICK = 2
+_TEXT_SIZE = 50
 
 
 class MavlinkEmulator:
@@ -53,7 +54,7 @@ class MavlinkEmulator:
         self._clients: dict[Address, int] = {}
         self._ground_ns: int | None = None
         self._lists: dict[Address, int] = {}
-        self._ticks = 0
+        self._ticks = self._long_texts = 0
         self.socket = _open(name, address)
 
     @property
@@ -119,9 +120,18 @@ class MavlinkEmulator:
         if self.firmware.flavour is Flavour.PX4 and self._ticks % _TIMESYNC_TICKS == 0:
             self._send_to_all(s.Timesync(0, now_ns))
         while self.firmware.texts:
-            severity, text = self.firmware.texts.popleft()
-            self._send_to_all(t.Statustext(severity, text[:50]))
+            self._say(*self.firmware.texts.popleft())
         self._send_lists()
+
+    def _say(self, severity: int, text: str) -> None:
+        # WIRE (STATUSTEXT): 50 characters; longer ones go in pieces with an id, of which the last is not full.
+        if len(text) <= _TEXT_SIZE:
+            self._send_to_all(t.Statustext(severity, text))
+            return
+        self._long_texts = self._long_texts % 65535 + 1
+        for piece in range(len(text) // _TEXT_SIZE + 1):
+            part = text[piece * _TEXT_SIZE : (piece + 1) * _TEXT_SIZE]
+            self._send_to_all(t.Statustext(severity, part, self._long_texts, piece))
 
     def _send_lists(self) -> None:
         names = self.firmware.parameters.names

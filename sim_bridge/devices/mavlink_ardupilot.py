@@ -95,9 +95,9 @@ class ArduCopter(Firmware):
 
     @property
     def landed(self) -> Landed:
-        """Return what the landing detector says."""
+        """Return what the landing detector says; WIRE (mavlink.md 1): 3 until the height is reached."""
         climbing = self._climb_to_m is not None and self.armed and self.now_s - self._take_off_s >= _SPOOL_S
-        return Landed.TAKE_OFF if climbing and self.copter.airframe.z < 0.2 else super().landed
+        return Landed.TAKE_OFF if climbing else super().landed
 
     def steering_of(self, mode: int) -> Steering:
         """Return what the motors do in a mode, in the air."""

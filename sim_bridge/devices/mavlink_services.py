@@ -187,7 +187,9 @@ class Services:
         # WIRE (mavlink.md 1.1): ignored until the estimator runs.
         if self._speaker.boot_us < 2_000_000:
             return []
-        if self._firmware.origin is None and self._firmware.flavour is Flavour.ARDUPILOT:
+        if self._firmware.flavour is Flavour.ARDUPILOT:
+            if self._firmware.origin is not None:
+                return []  # WIRE (source): an origin that is set stays, and nothing is said
             self._firmware.say(6, "EKF3 IMU0 origin set")
         self._firmware.origin = (message.latitude, message.longitude, message.altitude)
         return [t.GpsGlobalOrigin(*self._firmware.origin, self._speaker.boot_us)]

@@ -5,7 +5,9 @@ Bytes go through both codecs; 20 s of flight take about a second.
 
 import itertools
 import math
+import sys
 from collections import deque
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,6 +38,9 @@ from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.scenario import CopterScenario
 from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter
 from sim_bridge.world.world import TICK_NS, TICK_S
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # what lies there and is no test belongs to these tests
+from mavlink_process import FakeProcess
 
 S = 1_000_000_000
 GROUND = ("127.0.0.1", 14999)
@@ -88,33 +93,6 @@ class DirectLink:
         pass
 
 
-class Process:
-    """What `Child` offers, without a process."""
-
-    def __init__(self, bus):
-        self.name, self.bus, self.section = bus.source, bus, "{}"
-        self.stop_requested, self.supervisor_alive, self.supervisor_fresh = False, True, True
-        self.events = []
-
-    def beat(self):
-        pass
-
-    def ready(self, detail=""):
-        pass
-
-    def degrade(self, detail):
-        pass
-
-    def tick_status(self, ticks=0, overruns=0, overflowed=0):
-        pass
-
-    def sleep_until(self, deadline_ns):
-        return True
-
-    def event(self, severity, text, remedy="", entity=None):
-        self.events.append((severity, text))
-
-
 class Rig:
     """A vehicle of a flavour at (0.5, -0.3), heading 0.4 rad, with everything around it."""
 
@@ -131,7 +109,7 @@ class Rig:
         self.link = DirectLink(self.emulator)
         exchange = MemoryExchange()
         self.other = MemoryBus(exchange, "lab", "tracker")
-        self.process = Process(MemoryBus(exchange, "lab", "mavlink_v"))
+        self.process = FakeProcess(MemoryBus(exchange, "lab", "mavlink_v"))
         vehicle = {
             "name": "v",
             "system_id": 11,
@@ -260,6 +238,14 @@ class Rig:
 
     def velocity(self):
         return (*self.body.velocity_stabilized(), self.body.vz)
+
+    def mean_velocity(self, seconds):
+        """Fly on and return the mean: air and sensors push it about, by a tenth of a metre per second for a second."""
+        flown = []
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+            flown.append(self.velocity())
+        return tuple(np.mean(flown, axis=0))
 
 
 class Hand:

@@ -5,7 +5,11 @@ import math
 
 import pytest
 
+from drivers.host import VehicleHost
+from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
+from drivers.mavlink.wire.service import SetGpsGlobalOrigin, Timesync
+from drivers.mavlink.wire.telemetry import GpsGlobalOrigin, LocalPositionNed
 from groundstation.bus.messages import Verb
 from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, VEHICLE_STATUS
 
@@ -19,8 +23,8 @@ def test_it_takes_off_hovers_flies_and_lands(rig):
     rig.track_on()
     assert 0.65 < rig.body.z < 1.1
     rig.wanted = ((0.4, 0.0, 0.0), 0.0)
-    rig.run(4.0)
-    forward, left, up = rig.velocity()
+    rig.run(1.5)
+    forward, left, up = rig.mean_velocity(4.0)
     # PX4 stays 15 % under what it is told: nothing may wind up over that.
     assert 0.27 < forward < 0.45 and abs(left) < 0.1 and abs(up) < 0.1
     rig.wanted = ((0.0, 0.3, 0.0), 0.5)
@@ -125,8 +129,8 @@ def test_belief_that_breaks_down_lands_it_within_two_seconds(rig):
 def test_killed_driver_is_survived_by_the_vehicles_own_time_out(rig):
     rig.track_on()
     rig.wanted = ((0.5, 0.0, 0.0), 0.0)
-    rig.run(3.0)
-    assert rig.velocity()[0] > 0.35
+    rig.run(1.5)
+    assert rig.mean_velocity(1.5)[0] > 0.35
     rig.driving = False
     rig.run(3.5)
     assert math.hypot(*rig.velocity()[:2]) < 0.25
@@ -137,9 +141,6 @@ def test_restarted_driver_lands_what_flies(rig, rig_of, flavour):
     rig.track_on()
     rig.run(0.5)
     before = rig.host
-    from drivers.host import VehicleHost
-    from drivers.mavlink.vehicle import MavlinkVehicle
-
     rig.vehicle = MavlinkVehicle(rig.settings, rig.settings.vehicles[0], rig.link, rig.process.bus)
     rig.host = VehicleHost(rig.process, rig.vehicle, before.watchdog.limits)
     rig.link.sent.clear()
@@ -190,3 +191,48 @@ def test_pilots_mode_change_is_not_fought(rig):
     rig.order(Verb.RESUME)
     rig.run(1.0)
     assert rig.emulator.firmware.mode == rig.emulator.firmware.guided
+
+
+def test_a_driver_that_comes_later_finds_the_origin_that_is_set(rig):
+    """ArduPilot neither changes nor repeats an origin that it has."""
+    rig.connect()
+    rig.vehicle = MavlinkVehicle(rig.settings, rig.settings.vehicles[0], rig.link, rig.process.bus)
+    rig.host = VehicleHost(rig.process, rig.vehicle, rig.host.watchdog.limits)
+    rig.connect()
+
+
+def test_px4_that_says_nothing_of_its_origin_still_flies(rig_of):
+    rig = rig_of("px4")
+    del rig.emulator.speaker.builders[GpsGlobalOrigin]
+    rig.emulator.services._set_origin = lambda message: []
+    rig.track_on()
+    sent = [m for _, m in rig.sent(SetGpsGlobalOrigin)]
+    rig.run(8.0)
+    assert len(sent) <= 5 and len(rig.sent(SetGpsGlobalOrigin)) <= 5
+
+
+@pytest.mark.parametrize("jump_s", [3600, -4])
+def test_a_vehicles_clock_that_jumps_is_named_and_moves_nothing(rig, jump_s):
+    rig.track_on()
+    rig.wanted = ((0.3, 0.0, 0.0), 0.0)
+    rig.run(2.0)
+    rig.messages(ODOMETRY)
+    tell = rig.emulator.speaker.local_position
+    rig.emulator.speaker.builders[LocalPositionNed] = lambda: (
+        (m := tell()) and m._replace(time_boot_ms=m.time_boot_ms + jump_s * 1000)
+    )
+    assert 0.1 < rig.mean_velocity(2.0)[0] < 0.4 and rig.mode == "TRACK"
+    stamps = [o.header.stamp_ns for o in rig.messages(ODOMETRY)]
+    assert len(stamps) > 90 and all(0 < b - a < 50_000_000 for a, b in itertools.pairwise(stamps))
+    assert rig.vehicle.health(rig.hand.now).rejected["clock_jump"] == 1
+    assert any(f"its clock jumped by {jump_s} s" in text for text in rig.texts)
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED")
+
+
+def test_clock_requests_with_any_time_are_answered_with_ours(rig):
+    rig.connect()
+    for asked in (0, -1, 2**62, 5):
+        rig.link.sent.clear()
+        rig.vehicle._take(rig.hand.now, Timesync(0, asked))
+        assert rig.sent(Timesync)[-1][1] == Timesync(rig.hand.now, asked)

@@ -1,58 +1,39 @@
 """The driver as a process runs it, on real sockets: a fleet on one port, strangers, duplicates, a vehicle that goes."""
 
+import itertools
+import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of
 from drivers.mavlink.settings import MavlinkDriverSettings
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.topics import IMU, ODOMETRY, VEHICLE_STATUS
+from groundstation.bus.messages import Command, Lease, Verb
+from groundstation.bus.topics import COMMAND, IMU, LEASE, ODOMETRY, VEHICLE_STATUS
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # what lies there and is no test belongs to these tests
+from mavlink_process import FakeProcess
 
-class Process:
-    """What `Child` offers, without a process."""
-
-    def __init__(self):
-        exchange = MemoryExchange()
-        self.other = MemoryBus(exchange, "lab", "other")
-        self.bus = MemoryBus(exchange, "lab", "mavlink")
-        self.name, self.section = "mavlink", "{}"
-        self.stop_requested, self.supervisor_alive, self.supervisor_fresh = False, True, True
-        self.events = []
-
-    def beat(self):
-        pass
-
-    def ready(self, detail=""):
-        pass
-
-    def degrade(self, detail):
-        pass
-
-    def tick_status(self, ticks=0, overruns=0, overflowed=0):
-        pass
-
-    def sleep_until(self, deadline_ns):
-        return True
-
-    def event(self, severity, text, remedy="", entity=None):
-        self.events.append(text)
+_ids = itertools.count()
 
 
 class Flying:
     """A fleet with hosts, turned by this thread."""
 
     def __init__(self, target, vehicles, kind="pymavlink"):
-        self.process = Process()
+        exchange = MemoryExchange()
+        self.other = MemoryBus(exchange, "lab", "other")
+        self.process = FakeProcess(MemoryBus(exchange, "lab", "mavlink"))
         self.settings = MavlinkDriverSettings.model_validate(
             {
                 "link": {"target": target, "kind": kind},
                 "vehicles": [{"name": f"v{s}", "system_id": s, "flavour": f} for s, f in vehicles.items()],
             }
         )
-        self.heard = {t: self.process.other.subscribe([t], capacity=100_000) for t in (ODOMETRY, IMU, VEHICLE_STATUS)}
+        self.heard = {t: self.other.subscribe([t], capacity=100_000) for t in (ODOMETRY, IMU, VEHICLE_STATUS)}
         self.fleet = Fleet(self.process, self.settings)
         self.hosts = hosts_of(self.process, self.fleet, self.settings)
 
@@ -69,11 +50,25 @@ class Flying:
     def messages(self, topic):
         return [r.message for r in self.heard[topic].drain()]
 
+    def order(self, verb):
+        now, header = time.monotonic_ns(), self.other.header("team")
+        self.other.publish(LEASE, Lease(header=header, holder="op", expires_ns=now + 10**10))
+        command = Command(header=header, id=f"c{next(_ids)}", verb=verb, scope=(), issuer="op", expires_ns=now + 10**10)
+        self.other.publish(COMMAND, command)
+
     def close(self):
         self.fleet.close()
 
 
-@pytest.mark.parametrize("kind", ["pymavlink", "mavsdk"])
+@pytest.fixture(params=["pymavlink", "mavsdk"])
+def kind(request):
+    return request.param
+
+
+def ready(flying):
+    return all(h.watchdog.mode == "LANDED" and not h.watchdog.vehicle.not_ready for h in flying.hosts)
+
+
 def test_both_flavours_on_one_port_come_to_be_ready(hangar, port, kind):
     place = ("127.0.0.1", port)
     flying = Flying(f"udpin:127.0.0.1:{port}", {21: "px4", 22: "ardupilot"}, kind)
@@ -81,24 +76,23 @@ def test_both_flavours_on_one_port_come_to_be_ready(hangar, port, kind):
     hangar.add("ardupilot", 22, calls=place)
     hangar.add("px4", 23, calls=place)
     try:
-        ready = lambda: all(h.watchdog.mode == "LANDED" and not h.watchdog.vehicle.not_ready for h in flying.hosts)  # noqa: E731
-        assert flying.turn(10.0, ready), [h.watchdog.vehicle.not_ready for h in flying.hosts]
+        assert flying.turn(10.0, lambda: ready(flying)), [h.watchdog.vehicle.not_ready for h in flying.hosts]
         flying.messages(ODOMETRY), flying.messages(IMU)
         flying.turn(1.0)
         odometry, imu = flying.messages(ODOMETRY), flying.messages(IMU)
         assert {m.header.entity for m in odometry} == {"v21", "v22"}
         assert len(odometry) > 60 and len(imu) > 120
         assert flying.fleet.link.rejected["unknown_system"] > 0
-        assert [t for t in flying.process.events if "system 23" in t] == [
+        assert [t for t in flying.process.texts if "system 23" in t] == [
             "system 23 answers, which is not in the field file"
         ]
     finally:
         flying.close()
 
 
-def test_wrong_flavour_is_refused(hangar):
+def test_wrong_flavour_is_refused(hangar, kind):
     _, _, (address, port) = hangar.add("px4", 9)
-    flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"})
+    flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)
     try:
         assert flying.turn(3.0, lambda: flying.fleet.vehicles[9].health(0).rejected.get("wrong_flavour", 0) > 0)
         assert flying.hosts[0].watchdog.mode == "CONNECTING"
@@ -106,16 +100,16 @@ def test_wrong_flavour_is_refused(hangar):
         flying.close()
 
 
-def test_a_vehicle_that_vanishes_is_lost_and_found_again(hangar):
+def test_a_vehicle_that_vanishes_is_lost_and_found_again(hangar, kind):
     emulator, _, (address, port) = hangar.add("px4", 9)
-    flying = Flying(f"udpout:{address}:{port}", {9: "px4"})
+    flying = Flying(f"udpout:{address}:{port}", {9: "px4"}, kind)
     host = flying.hosts[0]
     try:
         assert flying.turn(8.0, lambda: host.watchdog.mode == "LANDED")
         emulator.silent = True
         assert flying.turn(2.0, lambda: not host.watchdog.vehicle.fresh)
         flying.turn(1.2)
-        assert any("does not answer" in text for text in flying.process.events)
+        assert any("does not answer" in text for text in flying.process.texts)
         emulator.silent = False
         assert flying.turn(3.0, lambda: host.watchdog.vehicle.fresh)
     finally:
@@ -129,3 +123,65 @@ def test_close_ends_the_reader(hangar):
     flying.turn(0.2)
     flying.close()
     assert threading.active_count() == before
+
+
+REASONS = (
+    "Arm: Throttle too high",
+    "Arm: Battery 1 below minimum arming voltage and also this text is longer than a frame",
+)
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_refused_arming_lists_all_reasons(hangar, kind, flavour):
+    """They arrive after the acknowledgement, one of them in two pieces, and on every link."""
+    emulator, _, (address, port) = hangar.add(flavour, 9)
+    flying = Flying(f"udpout:{address}:{port}", {9: flavour}, kind)
+    try:
+        assert flying.turn(10.0, lambda: ready(flying)), flying.hosts[0].watchdog.vehicle.not_ready
+        firmware = emulator.firmware
+
+        def refuse(force=False):
+            firmware.texts.extend((2, text) for text in REASONS)
+            return firmware.arming_refusal, REASONS[0]
+
+        firmware.arm = refuse
+        flying.order(Verb.TAKEOFF)
+        refused = lambda: [t for t in flying.process.texts if "arming: " in t]  # noqa: E731
+        assert flying.turn(8.0, refused), flying.process.texts
+        result = "denied" if flavour == "px4" else "failed"
+        assert refused()[0] == f"v9: arming: {result} ({'; '.join(REASONS)})"
+        assert not firmware.armed and flying.hosts[0].watchdog.mode in ("TAKING_OFF", "LANDED")
+    finally:
+        flying.close()
+
+
+def test_a_command_that_is_never_answered_is_said_to_be(hangar, kind):
+    emulator, _, (address, port) = hangar.add("ardupilot", 9)
+    flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)
+    try:
+        assert flying.turn(10.0, lambda: ready(flying)), flying.hosts[0].watchdog.vehicle.not_ready
+        original = emulator.services._command
+        emulator.services._command = lambda frame, command, p: [] if command == 176 else original(frame, command, p)
+        flying.order(Verb.TAKEOFF)
+        assert flying.turn(6.0, lambda: any("guided mode: no answer" in t for t in flying.process.texts))
+        assert not emulator.firmware.armed
+    finally:
+        flying.close()
+
+
+def test_parameters_and_health_forbid_a_take_off_on_every_link(hangar, kind):
+    emulator, copter, (address, port) = hangar.add("ardupilot", 9)
+    emulator.firmware.parameters.values["GUID_TIMEOUT"] = 3.0
+    flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)
+    reason = lambda: flying.hosts[0].watchdog.vehicle.not_ready  # noqa: E731
+    try:
+        assert flying.turn(10.0, lambda: "GUID_TIMEOUT is 3, needs 0.5" in reason()), reason()
+        emulator.firmware.parameters.values["GUID_TIMEOUT"] = 0.5
+        emulator.silent = True  # it is restarted: everything is read anew
+        flying.turn(2.5)
+        emulator.silent = False
+        assert flying.turn(10.0, lambda: ready(flying)), reason()
+        copter.battery = 0.05
+        assert flying.turn(3.0, lambda: "does not want to arm" in reason()), reason()
+    finally:
+        flying.close()

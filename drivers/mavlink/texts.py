@@ -1,0 +1,60 @@
+"""What a vehicle says to its operator, put together from its pieces; and why its clock cannot be believed. Pure."""
+
+from collections import deque
+
+from drivers.mavlink.wire.telemetry import Statustext
+
+_PIECE = 50
+_TOGETHER_NS = 1_000_000_000
+_WARNING = 4
+_JUMP_MS = 1000
+_PIECES = 8
+Said = tuple[int, str]  # severity 0 emergency .. 7 debug, text
+
+
+class Texts:
+    """Joins the pieces of long texts and remembers the last ones with their times.
+
+    WIRE (STATUSTEXT, MAVLink 2): pieces of one text share an id other than 0; all but the last are full.
+    """
+
+    def __init__(self) -> None:
+        self._pieces: dict[int, list[str]] = {}
+        self._heard: deque[tuple[int, Said]] = deque(maxlen=32)
+
+    def hear(self, now_ns: int, message: Statustext) -> Said | None:
+        """Take a piece; return the text that it completes, if it does. A piece that was lost is missed out."""
+        text = message.text
+        if message.id:
+            pieces = self._pieces.setdefault(message.id, [])
+            pieces.append(text)
+            if len(text) >= _PIECE and len(pieces) < _PIECES:
+                if len(self._pieces) > _PIECES:
+                    del self._pieces[next(iter(self._pieces))]
+                return None
+            text = "".join(self._pieces.pop(message.id))
+        self._heard.append((now_ns, (message.severity, text)))
+        return message.severity, text
+
+    def reasons(self, since_ns: int, word: str = "") -> list[str]:
+        """Return the distinct warnings that it gave since a time, oldest first; word: only those that hold it."""
+        said = [text for at, (severity, text) in self._heard if at >= since_ns and severity <= _WARNING]
+        return list(dict.fromkeys(text for text in said if word in text.lower()))
+
+
+class BootClock:
+    """Compares the time since power-on that a vehicle tells with our own.
+
+    Its stamps are used for nothing else: what is measured is stamped when it arrives.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[int, int] | None = None
+
+    def hear(self, now_ns: int, boot_ms: int) -> int:
+        """Take a stamp; return by how much it jumped [ms], or 0; a gap in the link is none."""
+        before, self._last = self._last, (now_ns, boot_ms)
+        if before is None:
+            return 0
+        jump = boot_ms - before[1] - (now_ns - before[0]) // 1_000_000
+        return jump if abs(jump) > _JUMP_MS else 0

@@ -72,6 +72,7 @@ class Playback:
     def _go(self, at_ns: int) -> None:
         self.at_ns = max(self.reel.start_ns, min(self.reel.end_ns, at_ns))
         self._sought = True
+        self.playing = self.playing and not self.ended
 
     def take_sought(self) -> bool:
         """Return and forget whether it has jumped since the last call."""

@@ -21,6 +21,7 @@ from groundstation.bus.topics import (
     SIM_STATUS,
     TRUTH,
     VEHICLE_STATUS,
+    Topic,
 )
 from groundstation.console.scene import scene_from_field
 from groundstation.console.section import port_of
@@ -122,17 +123,23 @@ class Show:
         now_ns = self.playback.now_ns()
         server.begin_anew()
         self._trace(max(reel.start_ns - 1, at_ns - _LOOK_BACK_NS), at_ns)
-        self._ingest(reel.newest(at_ns, among(_LATCHED)), now_ns)
+        self._ingest(self._newest(at_ns, _LATCHED), now_ns)
         for came_ns, record in reel.milestones:
             if came_ns > at_ns:
                 break
             self._ingest([record], self.playback.boot_ns(came_ns))
         recently = reel.between(at_ns - _SEEN_NS, at_ns, among((OBSERVATION,)))
         self._ingest([record for _, record in recently], now_ns)
-        for record in reel.newest(at_ns, among((IMAGE,))):
+        for record in self._newest(at_ns, (IMAGE,)):
             self._deliver(record)
         server.sessions.desk.step(now_ns)
         server.show_anew(now_ns)
+
+    def _newest(self, at_ns: int, topics: tuple[Topic, ...]) -> list[RawRecord]:
+        """Return what had come last of each key: what was measured shortly before may not have been there yet."""
+        found = {str(record.key): record for record in self._reel.newest(at_ns - _SEEN_NS, among(topics))}
+        found |= {str(record.key): record for _, record in self._reel.between(at_ns - _SEEN_NS, at_ns, among(topics))}
+        return list(found.values())
 
     def _trace(self, after_ns: int, at_ns: int) -> None:
         """Let trails, curves and NIS go through the past as they did, with the newest of each key at each step."""

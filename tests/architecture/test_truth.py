@@ -14,6 +14,7 @@ MAY_NAME_IT = (
     "groundstation/experiments",
     "groundstation/engineering_views",
     "groundstation/recording/synthetic.py",
+    "groundstation/replay/show.py",
 )
 
 

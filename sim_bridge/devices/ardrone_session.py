@@ -4,7 +4,7 @@ from enum import Enum, auto
 
 COM_WATCHDOG_NS = 50_000_000
 COM_LOST_NS = 2_000_000_000
-LAND_AFTER_LOST_NS = 1_000_000_000
+LAND_AFTER_LOST_NS = 500_000_000
 # WIRE: an ack that comes and goes within one packet is missed by real clients: hold bit 6 for two.
 ACK_PACKETS = 2
 

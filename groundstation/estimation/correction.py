@@ -1,6 +1,6 @@
 """One correction of the joint belief by a measurement of up to four rows that touches two blocks of the state.
 
-Joseph form: P = (I - K H) P (I - K H)^T + K R K^T, symmetric by construction and positive definite for any gain.
+Joseph's form: (I - K H) P (I - K H)^T + K R K^T, symmetric by construction and positive definite for any gain.
 """
 
 import math
@@ -96,52 +96,51 @@ def inflate(HPH: Array, R: Array, rows: int, factor: float) -> None:
             R[i, j] = factor * R[i, j] + (factor - 1.0) * 0.5 * (HPH[i, j] + HPH[j, i])
 
 
-@kernel(
-    "void(float64[::1], float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64,"
-    " float64[:,::1], float64[:,::1], float64[:,::1], float64[::1])"
-)
-def apply(
-    mean: Array,
-    P: Array,
-    start_a: int,
-    size_a: int,
-    H_a: Array,
-    start_b: int,
-    size_b: int,
-    H_b: Array,
-    rows: int,
-    W: Array,
-    factor: Array,
-    R: Array,
-    y: Array,
-) -> None:
-    """Correct mean and P in place, given W = H P and the Cholesky factor of S."""
+@kernel("void(float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+def subtract_two(P: Array, K_0: Array, C_0: Array, K_1: Array, C_1: Array) -> None:
+    """Subtract K^T C + C^T K from P for two rows each, in one pass and symmetric to the bit."""
+    for a in range(P.shape[0]):
+        row, k_0, c_0, k_1, c_1 = P[a], K_0[a], C_0[a], K_1[a], C_1[a]
+        for j in range(P.shape[0]):
+            row[j] -= (k_0 * C_0[j] + c_0 * K_0[j]) + (k_1 * C_1[j] + c_1 * K_1[j])
+
+
+@kernel("void(float64[:,::1], float64[:,::1], float64[:,::1])")
+def subtract_four(P: Array, K: Array, C: Array) -> None:
+    """Subtract K^T C + C^T K from P for four rows each, in one pass and symmetric to the bit."""
+    K_0, K_1, K_2, K_3 = K[0], K[1], K[2], K[3]
+    C_0, C_1, C_2, C_3 = C[0], C[1], C[2], C[3]
+    for a in range(P.shape[0]):
+        row, k_0, c_0, k_1, c_1 = P[a], K_0[a], C_0[a], K_1[a], C_1[a]
+        k_2, c_2, k_3, c_3 = K_2[a], C_2[a], K_3[a], C_3[a]
+        for j in range(P.shape[0]):
+            row[j] -= ((k_0 * C_0[j] + c_0 * K_0[j]) + (k_1 * C_1[j] + c_1 * K_1[j])) + (
+                (k_2 * C_2[j] + c_2 * K_2[j]) + (k_3 * C_3[j] + c_3 * K_3[j])
+            )
+
+
+@kernel("void(float64[::1], float64[:,::1], int64, float64[:,::1], float64[:,::1], float64[:,::1], float64[::1])")
+def apply(mean: Array, P: Array, rows: int, W: Array, S: Array, factor: Array, y: Array) -> None:
+    """Correct mean and P in place, given W = H P (4, n), S and its Cholesky factor.
+
+    Joseph's form, multiplied out: (I - K H) P (I - K H)^T + K R K^T = P - K C - (K C)^T with C = W - S K^T / 2, which
+    is symmetric and does not need K to be the best gain.
+    """
     n = P.shape[0]
-    K = np.empty((rows, n))
-    B = np.empty((rows, n))
+    K, C = np.zeros((4, n)), np.zeros((4, n))
     solve_rows(factor, rows, W, K)
     for i in range(rows):
         for j in range(n):
             mean[j] += K[i, j] * y[i]
-    for a in range(n):
-        for i in range(rows):
-            f = K[i, a]
-            if f != 0.0:
-                for j in range(n):
-                    P[a, j] -= f * W[i, j]
-    project_columns(P, start_a, size_a, H_a, start_b, size_b, H_b, rows, B)
-    for i in range(rows):
+            C[i, j] = W[i, j]
         for k in range(rows):
-            f = R[i, k]
+            f = 0.5 * S[i, k]
             for j in range(n):
-                B[i, j] -= f * K[k, j]
-    for a in range(n):
-        for i in range(rows):
-            f = B[i, a]
-            for j in range(a, n):
-                P[a, j] -= f * K[i, j]
-        for j in range(a):
-            P[a, j] = P[j, a]
+                C[i, j] -= f * K[k, j]
+    if rows > 2:
+        subtract_four(P, K, C)
+    else:
+        subtract_two(P, K[0], C[0], K[1], C[1])
 
 
 @kernel("boolean(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1])")

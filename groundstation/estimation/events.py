@@ -47,19 +47,31 @@ def has_diverged(aux: Array, settings: Array, at: float, nis_over_gate: float) -
 
 @kernel(
     "float64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
-    " float64[::1], float64[::1], int64, float64[::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,::1],"
-    " float64[::1])"
+    " float64[::1], float64[::1], int64, float64[::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1],"
+    " float64[:,::1], float64[::1])"
 )
 def confront(
     means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
-    sensor: Array, event: Array, rows: int, z: Array, R: Array, work: Array, y: Array, nis: Array,
+    sensor: Array, event: Array, rows: int, z: Array, R: Array, work: Array, W: Array, y: Array, nis: Array,
 ) -> float:  # fmt: skip
     """Linearise in all modes; writes the NIS of each (-1: S not PD) and returns the log evidence of the hypothesis."""
     modes = means.shape[0]
     scores, best = np.empty(modes), -math.inf
     for m in range(modes):
         nis[m] = linearise(
-            means[m], covariances[m], entities[m], parameters[m], kernels, sensor, event, rows, z, R[m], work[m], y[m]
+            means[m],
+            covariances[m],
+            entities[m],
+            parameters[m],
+            kernels,
+            sensor,
+            event,
+            rows,
+            z,
+            R[m],
+            work[m],
+            W[m],
+            y[m],
         )
         scores[m] = -math.inf
         if nis[m] >= 0.0:
@@ -135,16 +147,17 @@ def least(nis: Array) -> float:
 @kernel(
     "int64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
     " float64[::1], float64, float64[::1], int64, float64[:,::1], float64[:,:,:,::1], float64[:,:,:,:,::1],"
-    " float64[:,:,::1], float64[:,::1])"
+    " float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])"
 )
 def choose(
     means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
-    sensor: Array, unused_s: float, event: Array, rows: int, z: Array, R: Array, work: Array, y: Array, nis: Array,
+    sensor: Array, unused_s: float, event: Array, rows: int, z: Array, R: Array, work: Array, W: Array, y: Array,
+    nis: Array,
 ) -> int:  # fmt: skip
     """Confront the belief with the pose as measured and, if there is one, its alternative; 1 if that is likelier."""
     evidence = confront(
-        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[0], R[0], work[0], y[0],
-        nis[0],
+        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[0], R[0], work[0], W[0],
+        y[0], nis[0],
     )  # fmt: skip
     if event[s.EVENT_HAS_OTHER] == 0.0 or evidence == -math.inf:
         return 0
@@ -153,8 +166,8 @@ def choose(
     for m in range(1, means.shape[0]):
         copy_matrix(R[1, 0], R[1, m])
     other = confront(
-        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[1], R[1], work[1], y[1],
-        nis[1],
+        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[1], R[1], work[1], W[1],
+        y[1], nis[1],
     )  # fmt: skip
     return 1 if other > evidence else 0
 
@@ -172,7 +185,7 @@ def observe(
     sensor, own, at = sensors[number], kernels[number], event[s.EVENT_AT]
     # First axis: the pose as measured, and its alternative.
     z, R, y, nis = np.zeros((2, 4)), np.zeros((2, modes, 4, 4)), np.zeros((2, modes, 4)), np.zeros((2, modes))
-    work = np.zeros((2, modes, 4, 4, s.MAX_BLOCK))
+    work, W = np.zeros((2, modes, 4, 4, s.MAX_BLOCK)), np.empty((2, modes, 4, means.shape[1]))
     unused_s, use = at - pairs[number, subject], 0
     note_motion(means[0], aux, entities[0], event)
     out[s.OUT_JOINED] = out[s.OUT_OTHER_CHOSEN] = 0.0
@@ -185,7 +198,7 @@ def observe(
     gate, joined, excess = settings[s.SETTING_GATE + rows], aux[subject, s.ACTIVE] == 0.0, 1.0
     if not joined:
         use = choose(
-            means, covariances, weights, entities, parameters, own, sensor, unused_s, event, rows, z, R, work, y, nis
+            means, covariances, weights, entities, parameters, own, sensor, unused_s, event, rows, z, R, work, W, y, nis
         )
         out[s.OUT_OTHER_CHOSEN] = use
         mode = likeliest(weights, nis[use])
@@ -204,13 +217,13 @@ def observe(
             return
         confront(
             means, covariances, weights, entities, parameters, own, sensor, event, rows, z[use], R[use], work[use],
-            y[use], nis[use],
+            W[use], y[use], nis[use],
         )  # fmt: skip
         excess = 1.0
         out[s.OUT_JOINED] = 1.0
     excess = max(excess, 1.0)
     for m in range(modes):
-        correct(means[m], covariances[m], entities[m], event, rows, R[use, m], work[use, m], y[use, m], excess)
+        correct(means[m], covariances[m], entities[m], rows, R[use, m], work[use, m], W[use, m], y[use, m], excess)
     weigh(weights, nis[use], work[use], rows, excess)
     aux[subject, s.CORRECTED_AT] = at
     pairs[number, subject] = at

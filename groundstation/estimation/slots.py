@@ -18,10 +18,11 @@ Nothing here belongs to one model: what only one model reads has its columns in 
     AT_PITCH_ERROR,
     AT_YAW_OFFSET,
     AT_RANGE_BIAS,
+    AT_RANGE_SCALE,
     AT_BEARING_BIAS,
-) = range(13)
-ENTITY_COLUMNS = 13
-SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "bearing_bias")
+) = range(14)
+ENTITY_COLUMNS = 14
+SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
 FIRST_SHARED = AT_Z
 KIND_ROBOT, KIND_TARGET, KIND_CAMERA, KIND_LANDMARK = range(4)
 
@@ -58,6 +59,8 @@ SENSOR_COLUMNS = 20
     STREAK_START,
     CORRECTED_AT,
     JOINED_AT,
+    LAST_VX,
+    LAST_RATE,
     SLOW_VX,
     SLOW_VY,
     HELD_ROLL,
@@ -65,8 +68,8 @@ SENSOR_COLUMNS = 20
     RATE_X,
     RATE_Y,
     RATE_Z,
-) = range(21)
-AUXILIARY_COLUMNS = 21
+) = range(23)
+AUXILIARY_COLUMNS = 23
 
 # Odometry condensed into one step of one robot: sums, counts, and the newest yaw.
 (

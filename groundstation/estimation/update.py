@@ -83,13 +83,13 @@ def add_timing_noise(sensor: Array, event: Array, rows: int, H_observer: Array, 
 
 @kernel(
     "float64(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64[::1], float64[::1], float64[::1],"
-    " int64, float64[::1], float64[:,::1], float64[:,:,::1], float64[::1])"
+    " int64, float64[::1], float64[:,::1], float64[:,:,::1], float64[:,::1], float64[::1])"
 )
 def linearise(
     mean: Array, P: Array, entities: IntArray, parameters: Array, kernels: IntArray, sensor: Array, event: Array,
-    rows: int, z: Array, R: Array, work: Array, y: Array,
+    rows: int, z: Array, R: Array, work: Array, W: Array, y: Array,
 ) -> float:  # fmt: skip
-    """Write y = z - h(x) and, into work, H of both blocks, H P H^T and the factor of S; returns the NIS or -1."""
+    """Write y = z - h(x), W = H P and, into work, H of both blocks, H P H^T and the factor of S; the NIS, or -1."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
     start, size = entities[subject, s.ENTITY_START], entities[subject, s.ENTITY_SIZE]
     start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
@@ -103,10 +103,9 @@ def linearise(
         if sensor[s.SENSOR_ANGLES + i] != 0.0:
             y[i] = wrap(y[i])
     add_timing_noise(sensor, event, rows, work[0], work[1], R)
-    W = np.empty((rows, P.shape[0]))
     HPH = np.empty((rows, rows))
     project(P, start_o, size_o, work[0], start, size, work[1], rows, W)
-    project_columns(W, start_o, size_o, work[0], start, size, work[1], rows, HPH)
+    project_columns(W[:rows], start_o, size_o, work[0], start, size, work[1], rows, HPH)
     for i in range(rows):
         for j in range(rows):
             work[2, i, j] = HPH[i, j]
@@ -115,22 +114,21 @@ def linearise(
 
 
 @kernel(
-    "void(float64[::1], float64[:,::1], int64[:,::1], float64[::1], int64, float64[:,::1], float64[:,:,::1],"
+    "void(float64[::1], float64[:,::1], int64[:,::1], int64, float64[:,::1], float64[:,:,::1], float64[:,::1],"
     " float64[::1], float64)"
 )
 def correct(
-    mean: Array, P: Array, entities: IntArray, event: Array, rows: int, R: Array, work: Array, y: Array, factor: float
+    mean: Array, P: Array, entities: IntArray, rows: int, R: Array, work: Array, W: Array, y: Array, factor: float
 ) -> None:
     """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    start, size = entities[subject, s.ENTITY_START], entities[subject, s.ENTITY_SIZE]
-    start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
     if factor > 1.0:
         inflate(work[2], R, rows, factor)
         surprise(work[2], R, y, rows, work[3])
-    W = np.empty((rows, P.shape[0]))
-    project(P, start_o, size_o, work[0], start, size, work[1], rows, W)
-    apply(mean, P, start_o, size_o, work[0], start, size, work[1], rows, W, work[3], R, y)
+    S = np.empty((4, 4))
+    for i in range(rows):
+        for j in range(rows):
+            S[i, j] = 0.5 * (work[2, i, j] + work[2, j, i]) + R[i, j]
+    apply(mean, P, rows, W, S, work[3], y)
     for e in range(entities.shape[0]):
         if entities[e, s.AT_YAW] >= 0:
             yaw = entities[e, s.ENTITY_START] + entities[e, s.AT_YAW]

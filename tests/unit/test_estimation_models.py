@@ -45,6 +45,7 @@ TILTED = base_from_tilted_optical(math.radians(45))
 SENSORS = {
     **{name: MountedCamera(name, TILTED, (0.09, 0.01, -0.02)) for name in ("full", "bare", "mount")},
     "both": RangeBearingSensor("ground"),
+    "depth": RangeBearingSensor("ground", is_depth=True),
     "range": RangeBearingSensor("ground", "range"),
     "bearing": RangeBearingSensor("full", "bearing"),
     "heading": HeadingSensor("full"),
@@ -140,10 +141,10 @@ def observed(mean: np.ndarray, sensor: str, subject: str, rows: int, roll: float
     event[[s.EVENT_OBSERVER, s.EVENT_SUBJECT, s.EVENT_SENSOR]] = observer, NAMES.index(subject), number
     event[[s.EVENT_ROLL, s.EVENT_PITCH]] = roll, pitch
     event[[s.EVENT_SUBJECT_ROLL, s.EVENT_SUBJECT_PITCH]] = 0.06, -0.11
-    work, y = np.zeros((4, 4, s.MAX_BLOCK)), np.zeros(4)
+    work, W, y = np.zeros((4, 4, s.MAX_BLOCK)), np.zeros((4, mean.size)), np.zeros(4)
     linearise(
         mean, np.eye(mean.size), TABLES.entities[0], TABLES.parameters[0], TABLES.kernels[number],
-        TABLES.sensors[number], event, rows, np.zeros(4), np.eye(4), work, y,
+        TABLES.sensors[number], event, rows, np.zeros(4), np.eye(4), work, W, y,
     )  # fmt: skip
     H = np.zeros((rows, mean.size))
     for block, index in ((work[0], observer), (work[1], NAMES.index(subject))):
@@ -165,6 +166,8 @@ PAIRS = [
     ("both", "post", 2),
     ("both", "full", 2),
     ("both", "turning", 2),
+    ("depth", "post", 2),
+    ("depth", "turning", 2),
     ("range", "bare", 1),
     ("bearing", "straight", 1),
     ("heading", "full", 1),
@@ -203,9 +206,9 @@ def test_a_camera_follows_the_geometry_of_the_frames() -> None:
 
 def test_range_and_bearing_follow_plane_geometry() -> None:
     mean, _ = random_state(0, 0.0)
-    mean[TABLES.part(NAMES.index("ground"))] = (0.5, -0.7, 0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.03, -0.01)
+    mean[TABLES.part(NAMES.index("ground"))] = (0.5, -0.7, 0.0, math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.03, 0.02, -0.01)
     h, _, _ = observed(mean, "both", "post", 2)
-    np.testing.assert_allclose(h, (1.03, -math.pi / 2 - 0.01), atol=1e-12)
+    np.testing.assert_allclose(h, (1.05, -math.pi / 2 - 0.01), atol=1e-12)
 
 
 def test_a_point_below_the_ceiling_camera_is_in_front_of_it() -> None:
@@ -226,7 +229,7 @@ def locate(address, mean, entities, parameters, sensor, event, z, pose):
 @pytest.mark.parametrize(("sensor", "subject", "rows"), [p for p in PAIRS if p[1] != "post"])
 def test_an_observation_without_noise_gives_back_the_place(sensor: str, subject: str, rows: int, yaw: float) -> None:
     mean, _ = random_state(5, yaw)
-    mean[TABLES.part(NAMES.index("ground")).start + 7 :][:2] = 0.0  # biases: what is located is located without them
+    mean[TABLES.part(NAMES.index("ground")).start + 8 :][:3] = 0.0  # biases: what is located is located without them
     z = np.zeros(4)
     z[:rows], _, event = observed(mean, sensor, subject, rows)
     number, pose = list(SENSORS).index(sensor), np.zeros(4)
@@ -245,7 +248,7 @@ def test_an_observation_without_noise_gives_back_the_place(sensor: str, subject:
         for value, offset in zip(pose, at, strict=True):
             if offset is not None:
                 assert math.remainder(value - block[offset], math.tau) == pytest.approx(0.0, abs=1e-9)
-    elif rows == 2 and subject == "turning":
+    elif sensor == "both" and subject == "turning":
         np.testing.assert_allclose(pose[:2], mean[TABLES.part(NAMES.index(subject))][:2], atol=1e-9)
 
 

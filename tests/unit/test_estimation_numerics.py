@@ -10,14 +10,14 @@ from groundstation.estimation.models.height import correct_height
 def correct(P, R, H, y):
     """One dense correction through the compiled kernels: all states as block a."""
     rows, n = H.shape
-    mean, W, HPH = np.zeros(n), np.empty((rows, n)), np.empty((rows, rows))
+    mean, W, HPH = np.zeros(n), np.zeros((4, n)), np.empty((rows, rows))
     nothing, factor = np.zeros((rows, n)), np.zeros((rows, rows))
     H = np.ascontiguousarray(H)
     project(P, 0, n, H, 0, 0, nothing, rows, W)
-    project_columns(W, 0, n, H, 0, 0, nothing, rows, HPH)
+    project_columns(W[:rows], 0, n, H, 0, 0, nothing, rows, HPH)
     bound_precision(HPH, R, rows)
     nis = surprise(HPH, R, y, rows, factor)
-    apply(mean, P, 0, n, H, 0, 0, nothing, rows, W, factor, R, y)
+    apply(mean, P, rows, W, 0.5 * (HPH + HPH.T) + R, factor, y)
     return mean, nis
 
 

@@ -1,8 +1,8 @@
 """A ground robot of which only the commanded speeds are known: it follows them late and never quite as told.
 
-f: forward = (1 + forward_scale) v, rate = (1 + turn_scale) w + turn_offset; the robot keeps the arc during a step. It
-answers a command `response_s` late (its odometry delay is minus that). What its range and bearing sensor is off by
-are states too.
+f: forward = (1 + forward_scale) v - turn_drag |w|, rate = (1 + turn_scale) w + turn_offset, on an arc during a step. It
+answers a command `response_s` late (its odometry delay is minus that) and approaches it within `lag_s`. What its range
+and bearing sensor is off by are states too.
 """
 
 import math
@@ -37,8 +37,14 @@ from groundstation.estimation.motion import depend, fade, mirror
     BEARING_STD,
     BEARING_TAU,
     HOLD_S,
-) = range(s.FIRST_OWN, s.FIRST_OWN + 15)
-FORWARD_SCALE, TURN_SCALE, TURN_OFFSET, RANGE_BIAS, BEARING_BIAS = range(4, 9)
+    LAG_S,
+    DRAG_MEAN,
+    DRAG_STD,
+    RANGE_SCALE_STD,
+    SWAY_NOISE,
+) = range(s.FIRST_OWN, s.FIRST_OWN + 20)
+FORWARD_SCALE, TURN_DRAG, TURN_SCALE, TURN_OFFSET, RANGE_BIAS, RANGE_SCALE, BEARING_BIAS = range(4, 11)
+STANDS = 1e-3  # commands below are none [m/s, rad/s]
 
 
 @kernel("void(float64[:,::1], int64, float64[::1], float64[::1], float64, float64, float64, float64)")
@@ -54,7 +60,7 @@ def add_drive_noise(
     P[start + 1, start + 1] += n * n * along + c * c * across
     P[start, start + 1] += c * n * (along - across)
     P[start + 1, start] += c * n * (along - across)
-    P[start + s.YAW, start + s.YAW] += (p[RATE_DENSITY] + p[TURN_NOISE] * abs(rate)) * dt
+    P[start + s.YAW, start + s.YAW] += (p[RATE_DENSITY] + p[TURN_NOISE] * abs(rate) + p[SWAY_NOISE] * abs(forward)) * dt
 
 
 @kernel(PREDICT)
@@ -64,8 +70,11 @@ def predict_commanded_robot(
     """Drive an arc at the commanded speeds, scaled; scales and offsets fade back to what the type is known for."""
     start, size, p = entities[e, s.ENTITY_START], entities[e, s.ENTITY_SIZE], parameters[e]
     v, w = aux[e, s.HELD_VX], aux[e, s.YAW_RATE]
-    rate = (1.0 + mean[start + TURN_SCALE]) * w + mean[start + TURN_OFFSET]
-    forward = (1.0 + mean[start + FORWARD_SCALE]) * v
+    # A robot that is told to stand stands.
+    moving = 1.0 if abs(v) > STANDS or abs(w) > STANDS else 0.0
+    rate = (1.0 + mean[start + TURN_SCALE]) * w + moving * mean[start + TURN_OFFSET]
+    drag = (p[DRAG_MEAN] + mean[start + TURN_DRAG]) * abs(w)
+    forward = (1.0 + mean[start + FORWARD_SCALE]) * v - drag
     heading = mean[start + s.YAW] + 0.5 * rate * dt
     c, n = math.cos(heading) * dt, math.sin(heading) * dt
     mean[start] += c * forward
@@ -75,16 +84,20 @@ def predict_commanded_robot(
     depend(P, start, size, s.Y, s.YAW, c * forward)
     depend(P, start, size, s.X, FORWARD_SCALE, c * v)
     depend(P, start, size, s.Y, FORWARD_SCALE, n * v)
+    depend(P, start, size, s.X, TURN_DRAG, -c * abs(w))
+    depend(P, start, size, s.Y, TURN_DRAG, -n * abs(w))
     depend(P, start, size, s.X, TURN_SCALE, -0.5 * dt * w * n * forward)
     depend(P, start, size, s.Y, TURN_SCALE, 0.5 * dt * w * c * forward)
-    depend(P, start, size, s.X, TURN_OFFSET, -0.5 * dt * n * forward)
-    depend(P, start, size, s.Y, TURN_OFFSET, 0.5 * dt * c * forward)
+    depend(P, start, size, s.X, TURN_OFFSET, -0.5 * dt * n * forward * moving)
+    depend(P, start, size, s.Y, TURN_OFFSET, 0.5 * dt * c * forward * moving)
     depend(P, start, size, s.YAW, TURN_SCALE, dt * w)
-    depend(P, start, size, s.YAW, TURN_OFFSET, dt)
+    depend(P, start, size, s.YAW, TURN_OFFSET, dt * moving)
     fade(mean, P, start, size, FORWARD_SCALE, p[SCALE_STD], dt / p[SCALE_TAU])
+    fade(mean, P, start, size, TURN_DRAG, p[DRAG_STD], dt / p[SCALE_TAU])
     fade(mean, P, start, size, TURN_SCALE, p[TURN_SCALE_STD], dt / p[SCALE_TAU])
     fade(mean, P, start, size, TURN_OFFSET, p[OFFSET_STD], dt / p[OFFSET_TAU])
     fade(mean, P, start, size, RANGE_BIAS, p[RANGE_STD], dt / p[RANGE_TAU])
+    fade(mean, P, start, size, RANGE_SCALE, p[RANGE_SCALE_STD], dt / p[RANGE_TAU])
     fade(mean, P, start, size, BEARING_BIAS, p[BEARING_STD], dt / p[BEARING_TAU])
     add_drive_noise(P, start, p, aux[e], heading, forward, rate, dt)
     mirror(P, start, size, size)
@@ -95,8 +108,16 @@ def begin_commanded_robot(
     mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, odometry: Array, e: int, step: float,
     gate: float,
 ) -> None:  # fmt: skip
-    """Hold the speeds that were commanded for this step."""
+    """Let the robot's speeds approach those that were commanded for this step."""
+    forward, rate = aux[e, s.HELD_VX], aux[e, s.YAW_RATE]
     hold_velocity(odometry[e], aux[e], parameters[e, HOLD_S], step)
+    if odometry[e, s.VELOCITY_COUNT] > 0.0:
+        aux[e, s.LAST_VX], aux[e, s.LAST_RATE] = aux[e, s.HELD_VX], aux[e, s.YAW_RATE]
+    elif aux[e, s.ODOMETRY_AGE] > parameters[e, HOLD_S]:
+        aux[e, s.LAST_VX] = aux[e, s.LAST_RATE] = 0.0
+    share = 1.0 - math.exp(-step / parameters[e, LAG_S])
+    aux[e, s.HELD_VX] = forward + share * (aux[e, s.LAST_VX] - forward)
+    aux[e, s.YAW_RATE] = rate + share * (aux[e, s.LAST_RATE] - rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +133,11 @@ class CommandedRobot:
     labels: ClassVar[tuple[str, ...]] = (
         *ROBOT_CORE,
         "forward_scale",
+        "turn_drag",
         "turn_scale",
         "turn_offset",
         "range_bias",
+        "range_scale",
         "bearing_bias",
     )
     kernels: ClassVar[tuple[int, int]] = (address_of(predict_commanded_robot), address_of(begin_commanded_robot))
@@ -122,18 +145,23 @@ class CommandedRobot:
     admitted: ClassVar[bool] = True
 
     marker_position_m: Vector3 = (0.0, 0.0, 0.0)
-    response_s: float = 0.17
+    response_s: float = 0.1
+    lag_s: float = 0.12
     speed_noise_m: float = 0.002
     slip_noise_m: float = 0.0005
     speed_density: float = 0.0
-    turn_noise_rad: float = 0.005
-    rate_density: float = 1e-4
+    turn_noise_rad: float = 0.02
+    sway_noise: float = 0.002
+    rate_density: float = 1e-7
     scale_std: float = 0.1
     turn_scale_std: float = 0.1
     scale_correlation_s: float = 300.0
+    turn_drag_m: float = 0.05
+    turn_drag_std_m: float = 0.05
     offset_std_rad_s: float = 0.01
     offset_correlation_s: float = 60.0
     range_bias_std_m: float = 0.05
+    range_scale_std: float = 0.03
     range_bias_correlation_s: float = 300.0
     bearing_bias_std_rad: float = 0.015
     bearing_bias_correlation_s: float = 300.0
@@ -165,21 +193,26 @@ class CommandedRobot:
             self.turn_scale_std,
         )
         row[OFFSET_STD], row[OFFSET_TAU] = self.offset_std_rad_s, self.offset_correlation_s
+        row[SWAY_NOISE] = self.sway_noise
+        row[RANGE_SCALE_STD] = self.range_scale_std
         row[RANGE_STD], row[RANGE_TAU] = self.range_bias_std_m, self.range_bias_correlation_s
         row[BEARING_STD], row[BEARING_TAU] = self.bearing_bias_std_rad, self.bearing_bias_correlation_s
-        row[HOLD_S] = self.hold_s
+        row[HOLD_S], row[LAG_S] = self.hold_s, self.lag_s
+        row[DRAG_MEAN], row[DRAG_STD] = self.turn_drag_m, self.turn_drag_std_m
         return row
 
     def prior(self) -> Array:
         """Return mean and variances (2, size) of what joins."""
         deviations = (
             self.scale_std,
+            self.turn_drag_std_m,
             self.turn_scale_std,
             self.offset_std_rad_s,
             self.range_bias_std_m,
+            self.range_scale_std,
             self.bearing_bias_std_rad,
         )
-        return np.array([[0.0] * 9, [0.0] * 4 + [d * d for d in deviations]])
+        return np.array([[0.0] * 11, [0.0] * 4 + [d * d for d in deviations]])
 
     def velocity_m_s(self, block: Array, aux: Array) -> Vector3:
         """Return the velocity [world] from the block's mean and the held command."""

@@ -75,28 +75,21 @@ def attribute_jump(
 
 @kernel("void(float64[::1], float64[:,::1], int64, int64, int64, float64, float64, float64)")
 def correct_height(mean: Array, P: Array, z: int, error: int, floor: int, height: float, R: float, gate: float) -> None:
-    """Correct by one height, softly gated; indices into the state, -1 for entries that the block lacks."""
+    """Correct by one height, softly gated; indices into the state, -1 for entries that the block lacks.
+
+    Joseph's form, as in correction.apply.
+    """
     n = P.shape[0]
     W, K = np.empty(n), np.empty(n)
     S = attribute_jump(mean, P, z, error, floor, height, R, gate, W) + R
     y = height - height_of(mean, z, error, floor)
     if y * y > gate * S:
-        R += y * y / gate - S
         S = y * y / gate
     for j in range(n):
         K[j] = W[j] / S
         mean[j] += K[j] * y
+        W[j] -= 0.5 * S * K[j]
     for i in range(n):
+        row, k, c = P[i], K[i], W[i]
         for j in range(n):
-            P[i, j] -= K[i] * W[j]
-    for i in range(n):
-        W[i] = P[i, z] - R * K[i]
-        if error >= 0:
-            W[i] += P[i, error]
-        if floor >= 0:
-            W[i] -= P[i, floor]
-    for i in range(n):
-        for j in range(i, n):
-            P[i, j] -= W[i] * K[j]
-        for j in range(i):
-            P[i, j] = P[j, i]
+            row[j] -= k * W[j] + c * K[j]

@@ -1,7 +1,8 @@
 """Range, bearing, or both, from an entity to another or to a landmark, in the plane.
 
-range = |marker - (x, y)| + range_bias, bearing = atan2(marker - (x, y)) - yaw + bearing_bias; biases are states of the
-observer where it has them.
+range = (1 + range_scale) d + range_bias with d = |marker - (x, y)|, or, for a camera that tells distance by the size of
+a marker's picture, d = its depth, the way along the axis; bearing = atan2(marker - (x, y)) - yaw + bearing_bias. Scale
+and biases are states of the observer where it has them.
 """
 
 import math
@@ -17,8 +18,9 @@ from groundstation.estimation.kernel import address_of, kernel
 from groundstation.estimation.linear import wrap
 from groundstation.estimation.models.subject import chain_subject, marker_offset, marker_point
 
-RANGE_ROW, BEARING_ROW = s.FIRST_SENSOR_OWN, s.FIRST_SENSOR_OWN + 1  # -1: not measured
+RANGE_ROW, BEARING_ROW, IS_DEPTH = range(s.FIRST_SENSOR_OWN, s.FIRST_SENSOR_OWN + 3)  # rows: -1 if not measured
 _NEAREST_M = 0.01  # a bearing to what is nearer says nothing
+_LEAST_COS = 0.1  # further aside nothing has a depth
 
 
 @kernel(MEASURE)
@@ -36,8 +38,18 @@ def measure_range_bearing(
     distance = max(math.hypot(dx, dy), _NEAREST_M)
     row = int(sensor[RANGE_ROW])
     if row >= 0:
-        h[row] = distance
+        way, scale = distance, 1.0
         by_point[0], by_point[1] = dx / distance, dy / distance
+        if sensor[IS_DEPTH] != 0.0:
+            by_point[0], by_point[1] = math.cos(mean[start + s.YAW]), math.sin(mean[start + s.YAW])
+            way = by_point[0] * dx + by_point[1] * dy
+        if observer[s.AT_RANGE_SCALE] >= 0:
+            scale += mean[start + observer[s.AT_RANGE_SCALE]]
+            H_observer[row, observer[s.AT_RANGE_SCALE]] = way
+        if sensor[IS_DEPTH] != 0.0:
+            H_observer[row, s.YAW] = scale * (by_point[0] * dy - by_point[1] * dx)
+        h[row] = scale * way
+        by_point[0], by_point[1] = scale * by_point[0], scale * by_point[1]
         H_observer[row, s.X], H_observer[row, s.Y] = -by_point[0], -by_point[1]
         chain_subject(subject, slope, by_point, H_subject, row)
         if observer[s.AT_RANGE_BIAS] >= 0:
@@ -77,8 +89,11 @@ def locate_range_bearing(
     direction = mean[start + s.YAW] + z[int(sensor[BEARING_ROW])]
     offset = np.empty(3)
     marker_offset(entities[subject], parameters[subject], event, 0.0, offset)
-    pose[0] = mean[start] + z[int(sensor[RANGE_ROW])] * math.cos(direction) - offset[0]
-    pose[1] = mean[start + 1] + z[int(sensor[RANGE_ROW])] * math.sin(direction) - offset[1]
+    way = z[int(sensor[RANGE_ROW])]
+    if sensor[IS_DEPTH] != 0.0:
+        way /= max(math.cos(z[int(sensor[BEARING_ROW])]), _LEAST_COS)
+    pose[0] = mean[start] + way * math.cos(direction) - offset[0]
+    pose[1] = mean[start + 1] + way * math.sin(direction) - offset[1]
     pose[2] = mean[start + s.Z]
     pose[3] = 0.0
     return 1
@@ -88,7 +103,8 @@ def locate_range_bearing(
 class RangeBearingSensor:
     """A sensor on a robot that measures range, bearing, or both, in the plane.
 
-    Real ranges repeat their error for the same pair at the same place: `repeats_s` is for how long.
+    is_depth: the range is told by the size of a picture, which gives the way along the axis. Real ranges repeat their
+    error for the same pair at the same place: `repeats_s` is for how long.
     """
 
     kernels: ClassVar[tuple[int, int, int]] = (
@@ -99,6 +115,7 @@ class RangeBearingSensor:
 
     carrier: str
     measures: Literal["range", "bearing", "range-bearing"] = "range-bearing"
+    is_depth: bool = False
     repeats_s: float = 0.0
     observes_targets: bool = True
 
@@ -112,4 +129,5 @@ class RangeBearingSensor:
         row = np.zeros(s.SENSOR_COLUMNS)
         row[RANGE_ROW] = -1.0 if self.measures == "bearing" else 0.0
         row[BEARING_ROW] = {"range": -1.0, "bearing": 0.0, "range-bearing": 1.0}[self.measures]
+        row[IS_DEPTH] = float(self.is_depth)
         return row

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
+from groundstation.cli.experiment_mrclam import mrclam
 from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ def experiment() -> None:
 
     Each writes results.csv (one row per run), summary.json, timing.json and pictures into its folder.
     """
+
+
+experiment.add_command(mrclam)
 
 
 @experiment.command()

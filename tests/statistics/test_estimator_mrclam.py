@@ -1,0 +1,58 @@
+"""The joint filter on real data: UTIAS MRCLAM set 7, causal, one set of figures; the bars are those of real use."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from groundstation.experiments.mrclam.dataset import Dataset, read_dataset
+from groundstation.experiments.mrclam.run import Result, run_scenario
+from groundstation.experiments.mrclam.scenarios import SCENARIOS
+
+DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "mrclam7"
+BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.fixture(scope="module")
+def dataset() -> Dataset:
+    if not DATA.is_dir():
+        pytest.skip(f"no data at {DATA}; set GROUNDSTATION_DATA")
+    return read_dataset(DATA)
+
+
+def both(dataset: Dataset, name: str) -> tuple[Result, Result]:
+    return run_scenario(dataset, BY_NAME[name], False), run_scenario(dataset, BY_NAME[name], True)
+
+
+def test_all_landmarks(dataset: Dataset) -> None:
+    alone, together = both(dataset, "all landmarks")
+    assert together.rmse_m <= 0.105
+    assert together.rmse_deg <= 5.0
+    assert together.rmse_m <= 0.7 * alone.rmse_m
+    assert together.anees <= 2.0
+    assert not alone.lost
+    assert not together.lost
+
+
+def test_only_robot_1_sees_landmarks(dataset: Dataset) -> None:
+    alone, together = both(dataset, "robot 1 only")
+    assert together.rmse_m <= 0.20
+    assert alone.rmse_m >= 8.0 * together.rmse_m
+    assert together.anees <= 2.0
+    assert not together.lost
+
+
+def test_a_camera_over_half_the_room(dataset: Dataset) -> None:
+    together = run_scenario(dataset, BY_NAME["half-room camera"], True)
+    assert together.rmse_m <= 0.10
+    assert together.anees <= 2.0
+    assert not together.lost
+
+
+@pytest.mark.parametrize("name", ["camera with dark spells", "half-room camera with dark spells"])
+def test_dark_spells_lose_nobody(dataset: Dataset, name: str) -> None:
+    together = run_scenario(dataset, BY_NAME[name], True)
+    assert together.anees <= 4.0
+    assert not together.lost

@@ -30,8 +30,28 @@ class Room(Section):
     fence: Fence
 
 
+LensStd = Annotated[float, Field(ge=0)]
+
+
+class CalibrationStd(Section):
+    """One sigma of each figure of a calibration, as its least squares have it."""
+
+    fx_px: LensStd
+    fy_px: LensStd
+    cx_px: LensStd
+    cy_px: LensStd
+    k1: LensStd
+    k2: LensStd
+    p1: LensStd
+    p2: LensStd
+    k3: LensStd
+
+
 class Calibration(Section):
-    """Pinhole with radial and tangential distortion (OpenCV's plumb bob), as measured on one camera."""
+    """Pinhole with radial and tangential distortion (OpenCV's plumb bob), as measured on one camera.
+
+    views: pictures that it was measured with.
+    """
 
     schema_version: Literal[1] = 1
     model: Literal["plumb_bob"]
@@ -44,6 +64,8 @@ class Calibration(Section):
     distortion: tuple[float, float, float, float, float]
     residual_px: Annotated[float, Field(gt=0, le=5)] = 0.2
     date: datetime.date | None = None
+    views: Annotated[int, Field(gt=0)] | None = None
+    std: CalibrationStd | None = None
 
     @property
     def horizontal_view_rad(self) -> float:

@@ -196,7 +196,7 @@ def _onboard_camera(field: Field, name: str, drone: Drone, phase_s: float) -> Ca
 
 
 def _camera(field: Field, source: str, lens: Calibration, delay_ms: float, phase_s: float) -> dict[str, Any]:
-    calibration = lens.model_dump(mode="json", exclude_none=True)
+    calibration = lens.model_dump(mode="json", exclude_none=True, exclude={"views", "std"})
     return {
         "source": source,
         "calibration": calibration,

@@ -31,13 +31,16 @@ class FileReader:
     def interrupt(self) -> None:
         """Do nothing: a file never keeps its reader waiting."""
 
-    def read(self, drain: Drain) -> None:
-        """Hand over pictures, each when it is due; raises EndOfStreamError after the last."""
+    def pictures(self) -> Iterator[tuple[float, str, Picture]]:
+        """Yield every picture as fast as it is asked for: when it is due [s], its name, and the picture itself."""
         if not self._path.exists():
             raise DriverError("there is no such file or folder")
-        pictures = self._folder() if self._path.is_dir() else self._video()
+        yield from self._folder() if self._path.is_dir() else self._video()
+
+    def read(self, drain: Drain) -> None:
+        """Hand over pictures, each when it is due; raises EndOfStreamError after the last."""
         start_ns, count = clock.now_ns(), 0
-        for due_s, picture in pictures:
+        for due_s, _, picture in self.pictures():
             due_ns = start_ns + round(due_s * clock.NS_PER_S)
             if drain.wait(max(0.0, (due_ns - clock.now_ns()) / clock.NS_PER_S)):
                 return
@@ -48,7 +51,7 @@ class FileReader:
             raise DriverError("there is no picture in it")
         raise EndOfStreamError(f"ended after {count} pictures")
 
-    def _folder(self) -> Iterator[tuple[float, Picture]]:
+    def _folder(self) -> Iterator[tuple[float, str, Picture]]:
         paths = sorted(path for path in self._path.iterdir() if path.suffix.lower() in _SUFFIXES)
         shown = 0
         for path in paths:
@@ -59,10 +62,10 @@ class FileReader:
             if pixels is None:
                 self.rejected["unreadable"] += 1
                 continue
-            yield shown / _FOLDER_FPS, Matrix(np.asarray(pixels, dtype=np.uint8))
+            yield shown / _FOLDER_FPS, path.name, Matrix(np.asarray(pixels, dtype=np.uint8))
             shown += 1
 
-    def _video(self) -> Iterator[tuple[float, Picture]]:
+    def _video(self) -> Iterator[tuple[float, str, Picture]]:
         try:
             with av.open(str(self._path)) as container:
                 stream = next(iter(container.streams.video), None)
@@ -73,6 +76,6 @@ class FileReader:
                 for index, frame in enumerate(container.decode(stream)):
                     shown_s = frame.time if frame.time is not None else index / float(stream.average_rate or 25)
                     first_s = shown_s if first_s is None else first_s
-                    yield shown_s - first_s, VideoPicture(frame)
+                    yield shown_s - first_s, f"{shown_s - first_s:.2f} s", VideoPicture(frame)
         except (av.FFmpegError, ValueError) as error:
             raise DriverError(getattr(error, "strerror", None) or str(error)) from None

@@ -1,0 +1,94 @@
+"""Pictures of any source, one after the other, for tools that look at them on the spot."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from drivers.camera.settings import SourceKind, parse_source, without_password
+from drivers.camera.sources.files import FileReader
+from drivers.camera.sources.frames import FrameSource, Grey, Packet
+from drivers.camera.sources.opening import open_source
+from groundstation.bus import clock
+from groundstation.errors import DriverError
+
+_POLL_S = 0.2
+PATIENCE_S = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One picture: its name (of a file, else its number), brightness (h, w), when it came, and its age then [ms]."""
+
+    name: str
+    grey: Grey
+    at_s: float
+    age_ms: float = 0.0
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Return width and height [px]."""
+        return int(self.grey.shape[1]), int(self.grey.shape[0])
+
+
+def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[Shot]:
+    """Yield pictures: of a file or folder every one, as fast as they are asked for; of a camera always the newest.
+
+    size: what a camera of this machine is asked for. A camera never ends; raises DriverError when none comes
+    for 6 s, or when a file holds none.
+    """
+    try:
+        address = parse_source(source)
+    except ValueError as error:
+        raise DriverError(f"camera source {source}: {error}") from None
+    if address.kind is SourceKind.FILE:
+        yield from _stored(address.path)
+        return
+    opened = open_source(source, size)
+    try:
+        yield from _live(opened, without_password(source), PATIENCE_S)
+    finally:
+        opened.close()
+
+
+def _stored(path: str) -> Iterator[Shot]:
+    reader = FileReader(path)
+    count = 0
+    try:
+        for due_s, name, picture in reader.pictures():
+            count += 1
+            yield Shot(name, picture.grey(), due_s)
+    except DriverError as error:
+        raise DriverError(f"{path}: {error}") from None
+    if not count:
+        raise DriverError(f"{path}: there is no picture in it")
+
+
+def _live(source: FrameSource, name: str, patience_s: float) -> Iterator[Shot]:
+    began_ns = last_ns = clock.now_ns()
+    broken = 0
+    while True:
+        packet = source.take_newest(_POLL_S)
+        grey = _grey(packet) if packet is not None else None
+        now_ns = clock.now_ns()
+        if packet is not None and grey is not None:
+            last_ns, broken = now_ns, 0
+            age_ms = (now_ns - packet.arrival_ns) / clock.NS_PER_MS
+            yield Shot(f"{packet.number:05d}", grey, (packet.arrival_ns - began_ns) / clock.NS_PER_S, age_ms)
+            last_ns = clock.now_ns()
+            continue
+        broken += packet is not None
+        if (now_ns - last_ns) / clock.NS_PER_S > patience_s:
+            why = f"{broken} came that cannot be decoded" if broken else source.detail or "connected, but nothing comes"
+            raise DriverError(f"{name}: no picture for {patience_s:g} s ({why})")
+
+
+def _grey(packet: Packet) -> Grey | None:
+    if packet.picture is not None:
+        return packet.picture.grey()
+    try:
+        grey = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if packet.data else None
+    except cv2.error:  # one that claims to be huge
+        return None
+    return None if grey is None else np.asarray(grey, dtype=np.uint8)

@@ -1,0 +1,89 @@
+"""From views of a board to a lens: least squares, views that fit nothing dropped, and how well each figure is known."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.calibration.judge import View
+from drivers.camera.calibration.pattern import Pattern
+from groundstation.errors import DriverError
+from groundstation.geometry.lens import CameraIntrinsics
+
+Array = NDArray[np.float64]
+
+LEAST_VIEWS = 6
+_ROUNDS = 4
+_OUTLIER_RATIO, _OUTLIER_PX = 2.5, 0.3
+_NAMES = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
+
+
+@dataclass(frozen=True, slots=True)
+class LensFit:
+    """A lens, one sigma of each of its nine figures, rms [px] by view, and what became of the others.
+
+    dropped: views that fit no lens, with their rms; all_views_px: rms of a fit to all views, those included.
+    """
+
+    lens: CameraIntrinsics
+    std: dict[str, float]
+    by_view_px: dict[str, float]
+    dropped: dict[str, float]
+    all_views_px: float
+
+
+def fit_lens(
+    views: Sequence[View], pattern: Pattern, size: tuple[int, int], keep_all: bool = False, square_pixels: bool = False
+) -> LensFit:
+    """Return the lens of pictures of (width, height).
+
+    keep_all: drop no view. Raises DriverError when the views are too few, or no lens comes of them.
+    """
+    dropped: dict[str, float] = {}
+    kept, all_views_px = list(views), 0.0
+    for turn in range(_ROUNDS):
+        if len(kept) < LEAST_VIEWS:
+            raise DriverError(f"{len(kept)} usable views are too few, {LEAST_VIEWS} is the least: show the board more")
+        rms, matrix, distortion, std, errors = _fitted(kept, pattern, size, square_pixels)
+        all_views_px = all_views_px or rms
+        bad = [] if keep_all or turn == _ROUNDS - 1 else _outliers(errors)
+        if not bad:
+            break
+        dropped |= {kept[index].name: float(errors[index]) for index in bad}
+        kept = [view for index, view in enumerate(kept) if index not in bad]
+    k1, k2, p1, p2, k3 = distortion.tolist()
+    try:
+        lens = CameraIntrinsics(
+            *size, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], (k1, k2, p1, p2, k3), rms
+        )
+    except ValueError as error:
+        raise DriverError(f"no lens comes of these views ({error}): are they really views of one flat board?") from None
+    by_view = {view.name: float(error) for view, error in zip(kept, errors, strict=True)}
+    return LensFit(lens, dict(zip(_NAMES, std.tolist(), strict=True)), by_view, dropped, all_views_px)
+
+
+def _fitted(
+    views: list[View], pattern: Pattern, size: tuple[int, int], square_pixels: bool
+) -> tuple[float, Array, Array, Array, Array]:
+    """Return rms, camera matrix, distortion (5), standard deviations (9) and rms by view."""
+    objects = [pattern.points.astype(np.float32)] * len(views)
+    corners = [view.corners.astype(np.float32).reshape(-1, 1, 2) for view in views]
+    flags = cv2.CALIB_FIX_ASPECT_RATIO if square_pixels else 0
+    try:
+        rms, matrix, distortion, _, _, std, _, errors = cv2.calibrateCameraExtended(
+            objects, corners, size, np.eye(3), np.zeros(5), flags=flags
+        )
+    except cv2.error:
+        raise DriverError("no lens comes of these views: show the board from more directions, tilted") from None
+    figures = np.asarray(std, dtype=np.float64).ravel()[: len(_NAMES)].copy()
+    if square_pixels:  # one focal length was fitted; its deviation is told for the other axis only
+        figures[0] = figures[1]
+    lens = np.asarray(matrix, dtype=np.float64), np.asarray(distortion, dtype=np.float64).ravel()[:5]
+    return float(rms), *lens, figures, np.asarray(errors, dtype=np.float64).ravel()
+
+
+def _outliers(errors: Array) -> list[int]:
+    median = float(np.median(errors))
+    return np.flatnonzero((errors > _OUTLIER_RATIO * median) & (errors > _OUTLIER_PX)).tolist()

@@ -1,0 +1,68 @@
+"""What commands that look through a camera share: its address, its lens, and where they write."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from groundstation.errors import OperatorMistake
+
+if TYPE_CHECKING:
+    from drivers.camera.calibration.feed import Shot
+    from groundstation.geometry.lens import CameraIntrinsics
+
+SOURCES = "http://..., rtsp://..., ardrone://..., /dev/video0, a video file, or a folder of pictures"
+
+
+def source_of(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    """Return a camera source; a file or folder may be given relative. Raises BadParameter for anything else."""
+    from drivers.camera.settings import parse_source
+
+    path = Path(value)
+    if "://" not in value and not value.startswith("/dev/"):
+        if not path.exists():
+            raise click.BadParameter(f"{value!r} is no file or folder here, nor {SOURCES}.")
+        return str(path.resolve())
+    try:
+        parse_source(value)
+    except ValueError as error:
+        raise click.BadParameter(f"{value!r} {error}") from None
+    return value
+
+
+def lens_of(path: Path) -> "CameraIntrinsics":
+    """Return the lens of a calibration file; raises SettingsError with what is wrong in it."""
+    from groundstation.geometry.calibration import intrinsics_from_mapping
+    from groundstation.settings.calibration_file import load_calibration
+
+    return intrinsics_from_mapping(load_calibration(path).model_dump())
+
+
+def require_size(shot: "Shot", lens: "CameraIntrinsics", calibration: str) -> None:
+    """Raise OperatorMistake when a picture is not of the size that a calibration is for."""
+    if shot.size != (lens.width_px, lens.height_px):
+        width, height = shot.size
+        raise OperatorMistake(
+            f"its pictures are {width}x{height}, the calibration {calibration} is for {lens.width_px}x"
+            f"{lens.height_px}: set the camera to that size, or calibrate it at this one"
+        )
+
+
+def require_folder(folder: Path) -> None:
+    """Make a folder to write into; raises OperatorMistake when nothing can be written there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OperatorMistake(f"{folder}: cannot be made or written ({error.strerror})") from None
+    if not os.access(folder, os.W_OK):
+        raise OperatorMistake(f"{folder}: cannot be written")
+
+
+@contextmanager
+def until_interrupted() -> Iterator[None]:
+    """Let Ctrl-C end the looking, not the command."""
+    with suppress(KeyboardInterrupt):
+        yield

@@ -97,3 +97,30 @@ def test_arguments_are_read_by_type():
         at.AtCommand("REF", (1,)).text(0)
     with pytest.raises(WireError):
         at.AtCommand("REF").integer(0)
+
+
+@pytest.mark.parametrize(
+    ("line", "count"),
+    [
+        ("ZAP=5,1", 1),
+        ("CAD=5,2,1", 2),
+        ("VISP=5,1,2,3", 3),
+        ("VISO=5,1", 1),
+        ("CAP=5,1,2", 2),
+        ("GAIN=5," + ",".join("7" * 13), 13),
+        ("POL=5,1,2,3,4,5", 5),
+        ("PWM=5,100,-100,3,4", 4),
+        ("AFLIGHT=5,1", 1),
+        ("VICON=5," + ",".join("7" * 22), 22),
+        ("MTRIM=5,0,1036831949,-1102263091", 3),
+        ("PCMD_MAG=5,7,0,0,0,0,1056964608,1036831949", 7),
+        ("ANIM=5,19,15", 2),
+        ("LED=5,20,1073741824,3", 3),
+    ],
+)
+def test_every_command_of_the_sheet_is_known_with_its_arguments(line, count):
+    (command,) = at.decode_datagram(f"AT*{line}\r".encode(), strict=True)
+    assert (command.sequence, len(command.arguments)) == (5, count)
+    assert at.encode(command, 5) == f"AT*{line}\r".encode()
+    if command.name not in ("VISP", "VISO", "CAP"):
+        assert at.decode_datagram(f"AT*{line},1\r".encode()) == [], "one argument too many"

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +15,7 @@ from groundstation.geometry.rotations import base_from_tilted_optical, rotation_
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
 from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.study.vision.coding import through_h264, through_jpeg
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -30,12 +30,13 @@ _MOST_TRIES = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A picture quality: scenario, speed of the board across the picture [px during the exposure], coding."""
+    """A picture quality: scenario, smear of the board [px], quality of JPEG or quantiser of H.264."""
 
     name: str
     scenario: CameraScenario
     smear_px: float = 0.0
     jpeg: int | None = None
+    h264: int | None = None
 
 
 def _conditions() -> tuple[Condition, ...]:
@@ -51,6 +52,8 @@ def _conditions() -> tuple[Condition, ...]:
         Condition("noise 8 levels", replace(CLEAN, pixel_noise=8.0)),
         Condition("JPEG 30", CLEAN, jpeg=30),
         Condition("JPEG 10", CLEAN, jpeg=10),
+        Condition("H.264 quantiser 30", CLEAN, h264=30),
+        Condition("H.264 quantiser 38", CLEAN, h264=38),
         Condition("rolling shutter 20 ms", replace(CLEAN, rolling_shutter_ms=20.0)),
     )
 
@@ -143,6 +146,7 @@ def _shot(
         states[1, 3:6] = 0.5 * camera.rotation[:, 0]
     picture = renderer.render(states)
     if condition.jpeg is not None:
-        coded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, condition.jpeg])[1]
-        picture = np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+        picture = through_jpeg(picture, condition.jpeg)
+    if condition.h264 is not None:
+        picture = through_h264(picture, condition.h264)
     return Shot(picture, code, truth, states, FRONT.project(truth.apply(points())))

@@ -18,8 +18,8 @@ from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import DriverError, SettingsError
 
-# A setpoint waits at most one turn: 5 ms.
-RATE_HZ = 200.0
+# A setpoint waits at most one turn: 3.3 ms.
+RATE_HZ = 300.0
 _SAME_TEXT_NS = 10_000_000_000
 _log = logging.getLogger(__name__)
 

@@ -81,6 +81,10 @@ class MavlinkVehicle:
         self._jumps: deque[int] = deque(maxlen=8)
         self._refusals: deque[tuple[int, str]] = deque(maxlen=16)
 
+    def use(self, link: Link) -> None:
+        """Send through another link from now on."""
+        self._link = link
+
     # -- reader thread ------------------------------------------------------------------------------------------------
 
     def hear(self, heard: Heard) -> None:

@@ -10,6 +10,7 @@ BENCHES = {
     "vision": ("groundstation.cli.bench_vision:vision", "Measure markers and detector on rendered pictures."),
     "ardrone": ("groundstation.cli.bench_ardrone:ardrone", "Time the AR.Drone codec against a public client's."),
     "planner": ("groundstation.cli.bench_planner:planner", "Time the planar planner against brute force and peers."),
+    "mavlink": ("groundstation.cli.bench_mavlink:mavlink", "CPU and delays of driving many MAVLink vehicles."),
     "recording": ("groundstation.cli.bench_recording:recording", "CPU of writing, opening and seeking recordings."),
 }
 

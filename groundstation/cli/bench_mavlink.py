@@ -1,0 +1,44 @@
+"""`groundstation bench mavlink`: what driving many vehicles costs, and how late telemetry and set-points are."""
+
+import json
+import os
+from typing import Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+_LIMITS = {"discovery_s": 2.0, "cores": 0.6, "telemetry_to_bus_ms": 3.0, "setpoint_to_wire_ms": 5.0}
+
+
+@click.command(epilog="Example: groundstation bench mavlink --link mavsdk --json")
+@click.option("--vehicles", type=click.IntRange(1, 50), default=10, show_default=True, help="How many.")
+@click.option("--seconds", type=click.FloatRange(1, 600), default=10.0, show_default=True, help="How long.")
+@click.option("--link", type=click.Choice(["pymavlink", "mavsdk"]), default="pymavlink", show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+def mavlink(vehicles: int, seconds: float, link: str, as_json: bool) -> int:
+    """Drive talking vehicles (each 50 Hz odometry, 100 Hz IMU, on one port) in TRACK with set-points at 20 Hz.
+
+    Cores are CPU time of the driver alone. Delays are wall time: a busy machine shows in them, so its load is printed.
+    Exit code 0 when all limits are kept, 1 when one is not.
+    """
+    from drivers.mavlink.bench import measure, peer
+
+    figures: dict[str, Any] = {"vehicles": vehicles, "link": link, **measure(link, vehicles, seconds)}
+    theirs = peer(vehicles, seconds)
+    figures["peer"] = {"name": "pymavlink mavutil, receive only", **theirs}
+    figures["ratio_to_peer"] = round(figures["us_per_frame"] / theirs["us_per_frame"], 2)
+    figures["load_average"] = round(os.getloadavg()[0], 1)
+    figures["limits"] = _LIMITS
+    broken = [name for name, limit in _LIMITS.items() if not _value(figures[name]) <= limit]
+    if as_json:
+        click.echo(json.dumps(figures | {"passed": not broken}, indent=2))
+    else:
+        for name, value in figures.items():
+            click.echo(f"{name.replace('_', ' '):22} {value}")
+        click.echo(f"missed: {', '.join(broken)}" if broken else "all limits are kept")
+    return ExitCode.FAILED if broken else ExitCode.OK
+
+
+def _value(figure: Any) -> float:
+    return float(figure["p99"] if isinstance(figure, dict) else figure)

@@ -16,7 +16,11 @@ from groundstation.errors import GroundStationError
 from groundstation.geometry.board import Board
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
-from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.geometry.rotations import (
+    WORLD_FROM_DOWNWARD_OPTICAL,
+    base_from_tilted_optical,
+    world_from_downward_optical,
+)
 from groundstation.geometry.tag import Tag
 from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.faults import CAMERA_FAULTS
@@ -39,7 +43,6 @@ _START_LIMIT_S = 45.0
 _STOP_LIMIT_S = 1.5
 _ARDRONE_SOURCE = "ardrone://"
 # Picture right is world +x, picture down is world -y, the optical axis points at the floor.
-_WORLD_FROM_DOWN_OPTICAL = np.diag([1.0, -1.0, -1.0])
 
 
 def render_specs(
@@ -85,8 +88,9 @@ def _mount(site: Site, name: str) -> Mount:
     drone = site.drones.get(name)
     if drone is None or drone.camera is None:
         camera = site.cameras.get(name)
-        position = camera.position_m if camera else (0.0, 0.0, 0.0)
-        return Mount(Pose(_WORLD_FROM_DOWN_OPTICAL, np.array(position)))
+        if camera is None:
+            return Mount(Pose(WORLD_FROM_DOWNWARD_OPTICAL, np.zeros(3)))
+        return Mount(Pose(world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m)))
     eye = drone.camera
     rotation = base_from_tilted_optical(math.radians(eye.tilt_down_deg), math.radians(eye.pan_left_deg))
     return Mount(Pose(rotation, np.array(eye.position_m)), name)

@@ -98,11 +98,12 @@ class SiteDrone(_Part):
 
 
 class SiteCamera(_Part):
-    """A camera fixed in the world, looking straight down."""
+    """A camera fixed in the world, looking down but for a turn: roll, pitch, yaw about the world's axes."""
 
     calibration: Lens
     position_m: tuple[float, float, float]
     looking: Literal["down"] = "down"
+    rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class TargetMarker(Print):

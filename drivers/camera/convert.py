@@ -9,18 +9,19 @@ from drivers.camera.pose import RelativePose
 from drivers.camera.settings import MountSettings
 from drivers.camera.sighting import Sighting
 from groundstation.bus.messages import Header, PoseHypothesis, RelativeObservation
-from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
+from groundstation.geometry.rotations import (
+    base_from_tilted_optical,
+    rotation_from_euler,
+    world_from_downward_optical,
+)
 
 Array = NDArray[np.float64]
-
-# Picture x axis along world x, picture y axis along world -y, optical axis down.
-_WORLD_FROM_DOWNWARD_OPTICAL = np.diag([1.0, -1.0, -1.0])
 
 
 def parent_from_optical(mount: MountSettings) -> Array:
     """Return base_from_camera_optical (3, 3) on a robot, world_from_camera_optical in the world."""
     if mount.in_world:
-        return _WORLD_FROM_DOWNWARD_OPTICAL
+        return world_from_downward_optical(mount.rotation_deg)
     return base_from_tilted_optical(math.radians(mount.tilt_down_deg), math.radians(mount.pan_deg))
 
 

@@ -167,7 +167,8 @@ class MountSettings(_Section):
     """Where the camera is: `parent` "world", or the robot that carries it.
 
     On a robot: position [m; base], tilted down and panned left. In the world: position [m; world] and `looking`
-    (down: picture x axis along world +x, picture y axis along world -y).
+    (down: picture x axis along world +x, picture y axis along world -y), turned from there by `rotation_deg` (roll,
+    pitch, yaw about the world's axes).
     """
 
     parent: str = "world"
@@ -175,6 +176,7 @@ class MountSettings(_Section):
     tilt_down_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
     pan_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     looking: Literal["down"] | None = None
+    rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def in_world(self) -> bool:

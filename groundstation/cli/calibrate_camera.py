@@ -85,9 +85,6 @@ class Session:
     """Looking at pictures of one source until they suffice; tells the operator what is still missing."""
 
     def __init__(self, pattern: "Pattern", enough: int, preview: Path | None) -> None:
-        import cv2
-
-        cv2.setNumThreads(1)
         self._pattern, self._enough, self._preview = pattern, enough, preview
         self._judge: Judge | None = None
         self._size = (0, 0)

@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 _EDGE_POINTS = 8
 # `looking: down`: picture right is world x, picture down is world -y.
-_WORLD_FROM_DOWNWARD_OPTICAL: Array = np.diag([1.0, -1.0, -1.0])
 _LENS_FIELDS = ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px")
 
 
@@ -81,7 +80,7 @@ def _drone(name: str, drone: Mapping[str, Any]) -> Json:
 
 
 def _world_camera(name: str, camera: Mapping[str, Any]) -> Json:
-    rays = _rays(_lens(camera["calibration"]), _WORLD_FROM_DOWNWARD_OPTICAL)
+    rays = _rays(_lens(camera["calibration"]), world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0))))
     return {"name": name, "position_m": camera["position_m"], "rays": rays, "observes": camera["observes"]}
 
 

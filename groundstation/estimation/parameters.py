@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from groundstation.estimation.models import (
     ConstantVelocityTarget,
     FixedMount,
@@ -15,10 +13,14 @@ from groundstation.estimation.models import (
     ObservationModel,
     OdometryRobot,
 )
-from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.geometry.rotations import (
+    WORLD_FROM_DOWNWARD_OPTICAL,
+    base_from_tilted_optical,
+    world_from_downward_optical,
+)
 
 # `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
-WORLD_FROM_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
+WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ def _mount(camera: Mapping[str, Any]) -> FixedMount:
 def _world_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
     return MountedCamera(
         carrier=name,
-        rotation=WORLD_FROM_DOWN,
+        rotation=world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0))),
         observes_targets="targets" in camera.get("observes", ("robots",)),
     )
 

@@ -1,6 +1,7 @@
 """Rotation matrices `a_from_b`: v_a = a_from_b @ v_b. Euler angles are intrinsic z-y-x (yaw, pitch, roll)."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,19 @@ def euler_from_rotation(parent_from_body: Array) -> tuple[float, float, float]:
 # camera_optical: z forward, x right, y down; a camera looking along base x has base_from_optical below.
 BASE_FROM_LEVEL_OPTICAL: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 BASE_FROM_LEVEL_OPTICAL.setflags(write=False)
+
+# A camera fixed in the world that looks straight down: picture right is world x, picture down is world -y.
+WORLD_FROM_DOWNWARD_OPTICAL: Array = np.diag([1.0, -1.0, -1.0])
+WORLD_FROM_DOWNWARD_OPTICAL.setflags(write=False)
+
+
+def world_from_downward_optical(rotation_deg: Sequence[float]) -> Array:
+    """Return world_from_camera_optical (3, 3) of a camera that looks down but for a turn (roll, pitch, yaw) [deg].
+
+    The turn is about the world's axes, as `rotation_from_euler` has it.
+    """
+    roll, pitch, yaw = (math.radians(angle) for angle in rotation_deg)
+    return np.asarray(rotation_from_euler(roll, pitch, yaw) @ WORLD_FROM_DOWNWARD_OPTICAL)
 
 
 def base_from_tilted_optical(tilt_down_rad: float, pan_rad: float = 0.0) -> Array:

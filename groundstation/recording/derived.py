@@ -10,7 +10,11 @@ from groundstation.bus.clock import NS_PER_MS
 from groundstation.bus.messages import Severity
 from groundstation.bus.topics import ESTIMATE, EVENT
 from groundstation.geometry.angles import quaternion_from_euler
-from groundstation.geometry.rotations import base_from_tilted_optical, euler_from_rotation
+from groundstation.geometry.rotations import (
+    base_from_tilted_optical,
+    euler_from_rotation,
+    world_from_downward_optical,
+)
 from groundstation.recording.capture import Entry
 from groundstation.recording.schemas import well_known
 from groundstation.recording.viewers import LOG_CHANNEL, TF_CHANNEL, Transform, frame_transforms, log_line
@@ -42,10 +46,11 @@ _event = msgspec.json.Decoder(_Event)
 
 def camera_frames(field: dict[str, Any]) -> tuple[Transform, ...]:
     """Return the optical frame of every camera of a resolved field (decoded JSON), by its name on the bus."""
-    # `looking: down`: picture right is world x, so the optical frame is the world's, half a turn about x.
-    down = quaternion_from_euler(math.pi, 0.0, 0.0)
-    fixed = [Transform(WORLD, name, tuple(one["position_m"]), down) for name, one in field.get("cameras", {}).items()]
-    carried = []
+    fixed, carried = [], []
+    for name, camera in field.get("cameras", {}).items():
+        rotation = world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0)))
+        turn = quaternion_from_euler(*euler_from_rotation(rotation))
+        fixed.append(Transform(WORLD, name, tuple(camera["position_m"]), turn))
     for name, drone in field.get("drones", {}).items():
         camera = drone["camera"]
         tilt, pan = math.radians(camera["tilt_down_deg"]), math.radians(camera.get("pan_left_deg", 0.0))

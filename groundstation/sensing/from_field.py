@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.sensing.models import Frustum, Noise, OnboardCamera, SensorSuite, WorldCamera
 
 BORDER_SQUARES = 3.5
@@ -50,7 +51,8 @@ def _world(camera: Mapping[str, Any], square_m: float) -> WorldCamera:
     calibration = camera["calibration"]
     noise = Noise(math.hypot(0.015, camera["position_std_m"]), math.radians(camera["attitude_std_deg"]), 0.0, 0.035)
     reach = calibration["fx_px"] * square_m / DETECTION_PX
-    return WorldCamera(tuple(camera["position_m"]), _frustum(calibration, reach, square_m), noise)
+    rotation = world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0)))
+    return WorldCamera(tuple(camera["position_m"]), _frustum(calibration, reach, square_m), noise, rotation.T)
 
 
 def _onboard(drone: Mapping[str, Any], square_m: float, range_m: float) -> OnboardCamera:

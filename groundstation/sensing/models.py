@@ -152,14 +152,22 @@ class SensorSuite:
         return eye.view.margin(eye.optical(mean, point)) >= 0
 
     def root_views(self, height_m: float) -> tuple[Rectangle, ...]:
-        """Return where world-fixed cameras that look down count on seeing a marker at this height."""
+        """Return where world-fixed cameras that look down count on seeing a marker at this height.
+
+        A tilt moves the rectangle as a whole, a turn about the vertical counts in quarters.
+        """
         found = []
         for camera in self.world.values():
-            x, y, z = camera.position_m
+            right, _, axis = camera.optical_from_world
+            x, y, z = (
+                camera.position_m - axis * ((camera.position_m[2] - height_m) / axis[2]) * (1.0, 1.0, 0.0)
+            ).tolist()
             across = (z - height_m) * camera.view.half_width_tan
             across -= camera.view.border_m * math.hypot(1.0, camera.view.half_width_tan)
             along = (z - height_m) * camera.view.half_height_tan
             along -= camera.view.border_m * math.hypot(1.0, camera.view.half_height_tan)
-            if across > 0 and along > 0 and camera.optical_from_world[2, 2] < -0.99:
+            if abs(right[1]) > abs(right[0]):
+                across, along = along, across
+            if across > 0 and along > 0 and axis[2] < -0.99:
                 found.append(Rectangle((x - across, x + across), (y - along, y + along)))
         return tuple(found)

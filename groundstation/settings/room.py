@@ -9,6 +9,7 @@ from pydantic import Field
 from groundstation.settings.values import Interval, Section, Source, Vector3, VideoDelay, of_length
 
 Length = Annotated[float, Field(gt=0, le=100)]
+Angle = Annotated[float, Field(ge=-180, le=180)]
 
 
 class Fence(Section):
@@ -30,6 +31,7 @@ class Room(Section):
     fence: Fence
 
 
+Rotation = Annotated[tuple[Angle, Angle, Angle], of_length(3)]
 LensStd = Annotated[float, Field(ge=0)]
 
 
@@ -79,12 +81,16 @@ class Calibration(Section):
 
 
 class WorldCamera(Section):
-    """A camera fixed in the world. `looking: down`: picture right is world x, picture down is world -y."""
+    """A camera fixed in the world. `looking: down`: picture right is world x, picture down is world -y.
+
+    rotation_deg: how it is turned from there, roll, pitch, yaw about the world's axes, as it was measured.
+    """
 
     source: Source
     calibration: Calibration
     position_m: Vector3
     looking: Literal["down"] = "down"
+    rotation_deg: Rotation = (0.0, 0.0, 0.0)
     video_delay_ms: VideoDelay = 120.0
     attitude_std_deg: Annotated[float, Field(gt=0, le=10)] = 0.2
     position_std_m: Annotated[float, Field(gt=0, le=0.5)] = 0.01

@@ -176,7 +176,12 @@ def _mavlink_vehicle(name: str, drone: Drone) -> dict[str, Any]:
 
 
 def _world_camera(field: Field, name: str, camera: WorldCamera, phase_s: float) -> CameraDriverSettings:
-    mount = {"parent": "world", "position_m": camera.position_m, "looking": camera.looking}
+    mount = {
+        "parent": "world",
+        "position_m": camera.position_m,
+        "looking": camera.looking,
+        "rotation_deg": camera.rotation_deg,
+    }
     robots = list(field.drones) if "robots" in camera.observes else []
     targets = [field.target.name] if "targets" in camera.observes else []
     common = _camera(field, camera.source, camera.calibration, camera.video_delay_ms, phase_s)

@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 from groundstation.bus.messages import Header, RelativeObservation
 from groundstation.geometry.board import Board
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
+from groundstation.geometry.rotations import (
+    base_from_tilted_optical,
+    rotation_from_euler,
+    world_from_downward_optical,
+)
 from groundstation.geometry.tag import Tag
 from sim_bridge.scenario import CameraScenario
-from sim_bridge.site import Lens, Site, SiteDrone
+from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
 from sim_bridge.world.world import World
 
 Array = NDArray[np.float64]
 
-_WORLD_FROM_DOWN = np.diag([1.0, -1.0, -1.0])
 _BORDER_PX = 6.0
 # Pixels per square that the detector needs: with a window predicted from the last sighting, and without (vision.md).
 _TRACKED_PX, _SEARCH_PX = 5.5, 8.5
@@ -58,7 +61,7 @@ class Eye:
     """
 
     def __init__(
-        self, name: str, lens: Lens, mount: SiteDrone | tuple[float, float, float], site: Site, cameras: CameraScenario,
+        self, name: str, lens: Lens, mount: SiteDrone | SiteCamera, site: Site, cameras: CameraScenario,
         outliers: float, rng: np.random.Generator, mounting_std: tuple[float, float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
         self.name = name
@@ -72,7 +75,8 @@ class Eye:
         else:
             turn, shift = mounting_std
             error = rotation_from_euler(*(turn * rng.standard_normal(3)))
-            self._rotation, self._position = error @ _WORLD_FROM_DOWN, mount + shift * rng.standard_normal(3)
+            self._rotation = error @ world_from_downward_optical(mount.rotation_deg)
+            self._position = mount.position_m + shift * rng.standard_normal(3)
         self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
         self._robots = frozenset(site.drones)
         self._scenario, self._outliers, self._rng = cameras, outliers, rng

@@ -85,7 +85,7 @@ class Study:
             Eye(
                 name,
                 c.calibration,
-                c.position_m,
+                c,
                 site,
                 cameras,
                 outliers,

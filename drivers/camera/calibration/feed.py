@@ -38,6 +38,7 @@ def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[Shot]:
     size: what a camera of this machine is asked for. A camera never ends; raises DriverError when none comes
     for 6 s, or when a file holds none.
     """
+    cv2.setNumThreads(1)
     try:
         address = parse_source(source)
     except ValueError as error:

@@ -42,6 +42,11 @@ class Health:
         elif innovation.nis is not None and innovation.residual:
             edge.nis.append((innovation.nis, len(innovation.residual)))
 
+    def nis(self) -> float | None:
+        """Return the mean NIS per degree of freedom over all edges; None while there are too few."""
+        figure: float | None = _figures(list(self._edges.values()))["nis"]
+        return figure
+
     def summary(self) -> dict[str, Any]:
         """Return the mean NIS per degree of freedom with its bounds, over all edges and for each."""
         edges = [

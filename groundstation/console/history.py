@@ -28,7 +28,11 @@ class History:
 
     def due(self, now_ns: int) -> bool:
         """Return whether there is something to take."""
-        return now_ns >= min(self._next_trail_ns, self._next_sample_ns)
+        return now_ns >= self._next_trail_ns or self.sample_due(now_ns)
+
+    def sample_due(self, now_ns: int) -> bool:
+        """Return whether a sample of the curves is to be taken."""
+        return now_ns >= self._next_sample_ns
 
     def step(
         self,
@@ -45,7 +49,7 @@ class History:
                 point = (round(entity.mean[0], 3), round(entity.mean[1], 3))
                 self._trails.setdefault(entity.name, deque(maxlen=_TRAIL_POINTS)).append(point)
                 self._passed.append((entity.name, *point))
-        if now_ns < self._next_sample_ns:
+        if not self.sample_due(now_ns):
             return None
         self._next_sample_ns = now_ns + _SAMPLE_NS
         sample = self._sample(now_ns, estimate, plan, nis, truth)

@@ -48,7 +48,7 @@ class ConsoleState:
         truth = {name: seen.message for name, seen in self.truth.items()}
         plan = self.monitor.plan.message if self.monitor.plan else None
         estimate = self.monitor.estimate.message if self.monitor.estimate else None
-        nis = self.health.summary()["nis"]
+        nis = self.health.nis() if self.history.sample_due(now_ns) else None
         self._sample = self.history.step(now_ns, estimate, plan, nis, truth) or self._sample
 
     def put(self, board: Board, now_ns: int) -> None:

@@ -20,8 +20,8 @@ from groundstation.replay.source import Source
 Wanted = Callable[[Topic], bool]
 Arrival = tuple[int, RawRecord]
 _MILESTONES = (EVENT, COMMAND, COMMAND_ACK)
-# Chunks last 0.4 s: so many of small ones hold what a seek looks back over, and few of those with pictures are large.
-_KEPT_SMALL, _KEPT_LARGE = 400, 6
+# So many small chunks hold the two minutes that a seek looks back over; those with pictures are large.
+_KEPT_SMALL, _KEPT_LARGE = 1000, 6
 _LARGE_BYTES = 200_000
 _STEP_REACH_NS = 30_000_000_000
 
@@ -42,6 +42,9 @@ class _File:
         self._index = index
         self.ends = list(accumulate((chunk.end_ns for chunk in index.chunks), max))
         self.begins = [chunk.start_ns for chunk in index.chunks[:1]] + self.ends[:-1]
+        # Estimates come 50 times a second and tell the time well enough; a file of pictures needs its datagrams for it.
+        known = {key.topic for key in index.channels.values() if key is not None}
+        self._timed: Wanted = is_shown if ESTIMATE in known else lambda _topic: True
         self._read: OrderedDict[int, list[Arrival]] = OrderedDict()
 
     def between(self, after_ns: int, until_ns: int, wanted: Wanted) -> Iterator[Arrival]:
@@ -61,7 +64,7 @@ class _File:
         chunk = self._index.chunks[number]
         now_ns = self.begins[number]
         arrivals = []
-        for record in self._index.read(chunk):
+        for record in self._index.read(chunk, self._timed):
             now_ns = max(now_ns, record.log_time_ns)
             if is_shown(record.key.topic):
                 arrivals.append((now_ns, record))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from groundstation.bus import codec
-from groundstation.bus.api import Received, Sample, decode_sample
+from groundstation.bus.api import Received, Sample
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Event, Severity
 from groundstation.bus.topics import (
@@ -168,9 +168,10 @@ class Show:
 
 def _received(record: RawRecord) -> Received | None:
     try:
-        return decode_sample(Sample(str(record.key), record.data))
+        message = codec.decode(record.key, record.data)
     except MessageError:
         return None
+    return Received(record.key, message.header, message, record.data)
 
 
 async def serve(playback: Playback, port: int | None, headless: bool, announce: Callable[[str], None]) -> None:

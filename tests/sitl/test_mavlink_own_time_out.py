@@ -1,0 +1,78 @@
+"""A driver process that is killed or frozen in flight, with nobody to speak for it: the vehicles stop by themselves."""
+
+import importlib.util
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(180)]
+HERE = Path(__file__).parent
+_SPEC = importlib.util.spec_from_file_location(
+    "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
+)
+_hangar = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(_hangar)
+hangar, port = _hangar.hangar, _hangar.port
+
+# PX4: COM_OF_LOSS_T 1.0 s and what it was measured to add, then it lands. ArduPilot: GUID_TIMEOUT 0.5 s, then it
+# brakes; FS_GCS_TIMEOUT 5 s, then it lands. Add the time of braking, and that of one heartbeat.
+STOPPED_S = {"px4": 2.5, "ardupilot": 2.2}
+LANDS_S = {"px4": 3.5, "ardupilot": 7.0}
+
+
+def until(condition, seconds, what):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f"never: {what()}"
+        time.sleep(0.01)
+
+
+def speed(copter):
+    return math.hypot(*copter.airframe.velocity_stabilized())
+
+
+@pytest.mark.parametrize("link", ["pymavlink", "mavsdk"])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=lambda number: number.name)
+def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_path):
+    place = ("127.0.0.1", port)
+    flown = {}
+    for flavour, system in (("px4", 11), ("ardupilot", 12)):
+        # Poses go on: it is the silence of the set-points and of the heartbeat that must act, not that of the cameras.
+        flown[flavour] = hangar.add(flavour, system, calls=place, aided=True)[:2]
+    with (tmp_path / "pilot.txt").open("wb") as sink:
+        command = [sys.executable, str(HERE / "mavlink_pilot.py"), str(port), link]
+        pilot = subprocess.Popen(command, stdout=sink, stderr=sink)
+    try:
+        said = lambda: [(f, e.firmware.mode, round(speed(c), 2), c.airframe.z) for f, (e, c) in flown.items()]  # noqa: E731
+        moving = lambda: all(c.airborne and c.airframe.z > 0.5 and speed(c) > 0.25 for _, c in flown.values())  # noqa: E731
+        until(moving, 60, lambda: (said(), (tmp_path / "pilot.txt").read_text()[-2000:]))
+        os.kill(pilot.pid, number)
+        at_s = {flavour: emulator.firmware.now_s for flavour, (emulator, _) in flown.items()}
+        tracks = {flavour: [] for flavour in flown}
+
+        def landed():
+            for flavour, (emulator, copter) in flown.items():
+                # In the vehicle's own time: what counts are its time-outs, not how fast this machine turns it.
+                body, firmware = copter.airframe, emulator.firmware
+                tracks[flavour].append((firmware.now_s - at_s[flavour], (body.x, body.y), firmware.mode))
+            return not any(e.firmware.armed or c.airborne for e, c in flown.values())
+
+        until(landed, 90, said)
+        for flavour, (emulator, _) in flown.items():
+            begin = STOPPED_S[flavour]
+            places = [place for at, place, _ in tracks[flavour] if begin <= at <= begin + 1.0]
+            assert places, "no sample of that second"
+            drift_m = math.dist(places[0], places[-1])
+            assert drift_m < 0.25, f"{flavour} still flies: {drift_m:.2f} m within a second"
+            lands_s = next(at for at, _, mode in tracks[flavour] if mode == emulator.firmware.landing)
+            assert lands_s < LANDS_S[flavour], f"{flavour} lands after {lands_s:.1f} s only"
+    finally:
+        os.kill(pilot.pid, signal.SIGCONT) if pilot.poll() is None else None
+        pilot.kill()
+        pilot.wait()

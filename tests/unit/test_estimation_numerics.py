@@ -1,9 +1,15 @@
 """The covariance stays symmetric and positive definite, whatever the ratio of prior to measurement."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from groundstation.estimation import correction
 from groundstation.estimation.correction import apply, bound_precision, project, project_columns, surprise
+from groundstation.estimation.kernel import kernel
+from groundstation.estimation.linear import cholesky
 from groundstation.estimation.models.height import correct_height
 
 
@@ -66,3 +72,77 @@ def test_a_soft_gate_bounds_the_pull_of_an_outlier() -> None:
     correct_height(mean, P, 0, 1, -1, 1000.0, 0.1, 9.0)
     assert 0.0 < mean.sum() < 1.0
     np.linalg.cholesky(P)
+
+
+FLIGHT = "int64(float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64, float64[::1])"
+
+
+@kernel(FLIGHT)
+def fly(mean, P, F, H, R, steps, worst):
+    """Predict and correct a small state for many steps; returns the steps after which P was no covariance."""
+    n, rows = P.shape[0], H.shape[0]
+    W, S, factor, y, work = np.zeros((4, n)), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(4), np.zeros((n, n))
+    noise, bad = np.zeros((4, 4)), 0
+    for step in range(steps):
+        for i in range(n):
+            for j in range(n):
+                work[i, j] = 0.0
+                for k in range(n):
+                    work[i, j] += F[i, k] * P[k, j]
+        for i in range(n):
+            for j in range(i + 1):
+                value = 0.0
+                for k in range(n):
+                    value += work[i, k] * F[j, k]
+                P[i, j] = P[j, i] = value
+        P[step % n, step % n] += 1e-9
+        for i in range(rows):
+            for j in range(n):
+                W[i, j] = 0.0
+                for k in range(n):
+                    W[i, j] += H[i, k] * P[k, j]
+        for i in range(rows):
+            for k in range(rows):
+                S[i, k] = 0.0
+                for j in range(n):
+                    S[i, k] += W[i, j] * H[k, j]
+                noise[i, k] = R[i, k]
+        bound_precision(S, noise, rows)
+        surprise(S, noise, y, rows, factor)
+        for i in range(rows):
+            for k in range(rows):
+                S[i, k] = 0.5 * (S[i, k] + S[k, i]) + noise[i, k]
+        apply(mean, P, rows, W, S, factor, y)
+        for i in range(n):
+            for j in range(n):
+                work[i, j] = P[i, j]
+                worst[0] = max(worst[0], abs(P[i, j] - P[j, i]))
+        bad += not cholesky(work, n)
+    return bad
+
+
+def long_flight(prior: float, noise: float, steps: int) -> tuple[int, float]:
+    n = 4
+    F = np.eye(n)
+    F[0, 2] = F[1, 3] = 0.01
+    H = np.array([[1.0, 0.3, 0.0, 0.0], [0.2, -1.0, 0.0, 0.1]])
+    worst = np.zeros(1)
+    bad = fly(np.zeros(n), prior * np.eye(n), F, H, noise * np.eye(2), steps, worst)
+    return int(bad), float(worst[0])
+
+
+@pytest.mark.parametrize("prior", [1e-9, 1.0, 1e6])
+@pytest.mark.parametrize("noise", [1e-9, 1e-4])
+def test_a_million_steps_leave_a_covariance(prior: float, noise: float) -> None:
+    assert long_flight(prior, noise, 1_000_000) == (0, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_ten_million_steps_leave_a_covariance() -> None:
+    assert long_flight(1e6, 1e-6, 10_000_000) == (0, 0.0)
+
+
+def test_nothing_is_inverted() -> None:
+    package = Path(correction.__file__).parent
+    assert not [p.name for p in package.rglob("*.py") if re.search(r"\binv\(|linalg", p.read_text(encoding="utf-8"))]

@@ -33,7 +33,7 @@ def run(child: Child) -> int:
     else:
         child.starting("compiling kernels (once per version, some 30 s)")
         other_half = numba_cache.ParallelCompilation(["groundstation.planning.plan"])
-        importlib.import_module("groundstation.estimation.replay")
+        importlib.import_module("groundstation.estimation.fixed_lag")
         other_half.finish()
     from groundstation.runtime.tracking import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up

@@ -1,6 +1,7 @@
-"""A process with the real driver for two vehicles on one port, and a stand-in for the tracker: `PORT LINK`.
+"""The real driver and a stand-in for the tracker; as a process, `PORT LINK`, for two vehicles on one port.
 
-The stand-in tells the driver where the vehicles say they are, takes off and flies them forward at 0.4 m/s.
+The stand-in tells the driver where the vehicles are (unless told otherwise: where they say they are), takes off and
+flies them forward at 0.4 m/s.
 """
 
 import itertools
@@ -17,21 +18,24 @@ from groundstation.bus.topics import COMMAND, ESTIMATE, LEASE, SETPOINT
 sys.path.insert(0, str(Path(__file__).parents[1] / "contract"))
 from mavlink_process import FakeProcess
 
-PX4, ARDUPILOT = 11, 12
+FLAVOURS = {11: "px4", 12: "ardupilot"}
 _COVARIANCE = tuple(1e-4 if place % 5 == 0 else 0.0 for place in range(16))
 
 
+def where_it_says(vehicle):
+    """Return ((x, y, z) [m], yaw [rad]) in the world, or None."""
+    known = vehicle.telemetry
+    return None if known.position_m is None or known.attitude is None else (known.position_m, known.attitude.yaw_rad)
+
+
 class Pilot:
-    def __init__(self, port: int, kind: str) -> None:
-        exchange, self.orders = MemoryExchange(), 0
-        self.bus, self.process = (
-            MemoryBus(exchange, "lab", "tracker"),
-            FakeProcess(MemoryBus(exchange, "lab", "mavlink")),
-        )
-        vehicles = [
-            {"name": f"v{system}", "system_id": system, "flavour": flavour}
-            for system, flavour in ((PX4, "px4"), (ARDUPILOT, "ardupilot"))
-        ]
+    """turn() is one cycle of the driver and of the tracker's part."""
+
+    def __init__(self, port: int, kind: str, flavours=FLAVOURS, where=where_it_says, **vehicle) -> None:
+        exchange, self.orders, self.where = MemoryExchange(), 0, where
+        self.bus = MemoryBus(exchange, "lab", "tracker")
+        self.process = FakeProcess(MemoryBus(exchange, "lab", "mavlink"))
+        vehicles = [{"name": f"v{s}", "system_id": s, "flavour": f, **vehicle} for s, f in flavours.items()]
         link = {"target": f"udpin:127.0.0.1:{port}", "kind": kind}
         settings = MavlinkDriverSettings.model_validate({"link": link, "vehicles": vehicles})
         self.fleet = Fleet(self.process, settings)
@@ -52,10 +56,10 @@ class Pilot:
     def track(self) -> None:
         entities = []
         for vehicle in self.fleet.vehicles.values():
-            known = vehicle.telemetry
-            if known.position_m is None or known.attitude is None:
+            place = self.where(vehicle)
+            if place is None:
                 continue
-            mean = (*known.position_m, known.attitude.yaw_rad)
+            mean = (*place[0], place[1])
             entities.append(
                 EntityEstimate(
                     name=vehicle.name, kind="robot", mean=mean, covariance=_COVARIANCE,
@@ -69,20 +73,23 @@ class Pilot:
             self.bus.publish(SETPOINT, setpoint)
         self.bus.publish(ESTIMATE, Estimate(header=self.bus.header("team"), entities=tuple(entities), epoch=1))
 
+    def turn(self, turn: int) -> None:
+        now = time.monotonic_ns()
+        self.fleet.turn(now)
+        for host in self.hosts:
+            host.turn(now)
+        if turn % 8 == 0:
+            self.track()
+        time.sleep(1 / RATE_HZ)
+
     def fly(self) -> None:
         for turn in itertools.count():
-            now = time.monotonic_ns()
-            self.fleet.turn(now)
-            for host in self.hosts:
-                host.turn(now)
-            if turn % 8 == 0:
-                self.track()
+            self.turn(turn)
             if turn % 300 == 0:
                 self.order(Verb.TAKEOFF, "LANDED")
                 self.order(Verb.TRACK, "HOVER")
                 print(*self.process.texts, sep="\n", flush=True)
                 self.process.events.clear()
-            time.sleep(1 / RATE_HZ)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,197 @@
+"""Our driver sets up and flies real ArduCopter and PX4 SITL binaries, without GPS; our emulators by the same steps.
+
+How to run it, and what each binary needs: drivers/mavlink/README.md.
+"""
+
+import importlib.util
+import math
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from drivers.mavlink.link import open_link
+from drivers.mavlink.probe import probe
+from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.setup import Setup
+from drivers.mavlink.wire.frames import dialect
+from drivers.mavlink.wire.names import Flavour
+from groundstation.bus.messages import Verb
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+from mavlink_pilot import Pilot  # noqa: E402
+
+pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(300)]
+_SPEC = importlib.util.spec_from_file_location(
+    "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
+)
+_hangar = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(_hangar)
+hangar, port = _hangar.hangar, _hangar.port
+
+SYSTEM = 5
+M_PER_DEGREE = 111_319.5
+PX4_API, PX4_TRUTH = 14540 + SYSTEM - 1, 19410 + SYSTEM - 1
+
+
+class Truth(threading.Thread):
+    """Where the simulation of a binary has its vehicle, from a port of its own: (x, y, z) [m] and yaw [rad], FLU."""
+
+    def __init__(self, port, ask):
+        super().__init__(daemon=True)
+        self.place, self._origin, self._ask = None, None, ask
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", port))
+        self._socket.settimeout(0.2)
+        self._mav = dialect.MAVLink(None, 254, 190)
+        self._mav.robust_parsing = True
+        self.closing = threading.Event()
+        self.start()
+
+    def run(self):
+        due = 0.0
+        while not self.closing.is_set():
+            with suppress(TimeoutError):
+                data, source = self._socket.recvfrom(2048)
+                if self._ask and time.monotonic() > due:
+                    due = time.monotonic() + 1.0
+                    command = (SYSTEM, 1, 511, 0, dialect.MAVLINK_MSG_ID_SIM_STATE, 20_000, 0, 0, 0, 0, 0)
+                    message = dialect.MAVLink_command_long_message(*command)
+                    self._socket.sendto(message.pack(self._mav), source)
+                for message in self._mav.parse_buffer(data) or []:
+                    self._note(message)
+        self._socket.close()
+
+    def _note(self, message):
+        match message.get_type():
+            case "SIM_STATE":
+                exact = getattr(message, "lat_int", 0)
+                degrees = (message.lat_int / 1e7, message.lon_int / 1e7) if exact else (message.lat, message.lon)
+                self._keep(*degrees, message.alt, message.yaw)
+            case "HIL_STATE_QUATERNION":
+                w, x, y, z = message.attitude_quaternion
+                yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+                self._keep(message.lat / 1e7, message.lon / 1e7, message.alt / 1e3, yaw)
+
+    def _keep(self, latitude, longitude, altitude, yaw):
+        self._origin = self._origin or (latitude, longitude, altitude)
+        north = (latitude - self._origin[0]) * M_PER_DEGREE
+        east = (longitude - self._origin[1]) * M_PER_DEGREE * math.cos(math.radians(latitude))
+        self.place = (north, -east, altitude - self._origin[2]), -yaw
+
+
+def start(flavour, folder, port, truth_port, fresh):
+    """Start the SITL binary that a variable names, on loopback, in a folder of its own; a skip where it names none."""
+    variable = "GROUNDSTATION_ARDUCOPTER" if flavour == "ardupilot" else "GROUNDSTATION_PX4"
+    binary = os.environ.get(variable, "")
+    if not binary:
+        pytest.skip(f"{variable} names no SITL binary: none is in a package registry (see drivers/mavlink/README.md)")
+    environment = dict(os.environ)
+    if flavour == "ardupilot":
+        quiet = [item for n in range(2, 9) for item in (f"--serial{n}", "none:")]
+        command = [binary, "--model", "quad", "--home", "47.4,8.5,488,0", "-I", "0", "--sysid", str(SYSTEM)]
+        command += [
+            "--serial0",
+            f"udpclient:127.0.0.1:{port}",
+            "--serial1",
+            f"udpclient:127.0.0.1:{truth_port}",
+            *quiet,
+        ]
+        command += ["-w"] if fresh else []
+    else:
+        environment |= {"PX4_SYS_AUTOSTART": "10040", "PX4_SIM_MODEL": "sihsim_quadx", "PX4_SIMULATOR": "sihsim"}
+        environment |= {"PX4_PARAM_SENS_EN_GPSSIM": "0", "PX4_PARAM_EKF2_EVP_NOISE": "0.05"}
+        command = [binary, "-i", str(SYSTEM - 1), "-d", str(Path(binary).parents[1] / "etc")]
+    sink = subprocess.DEVNULL
+    return subprocess.Popen(command, cwd=folder, env=environment, stdin=sink, stdout=sink, stderr=sink)
+
+
+def end(process):
+    process.terminate()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(10)
+    process.kill()
+    process.wait()
+
+
+def set_up(flavour, port):
+    """Meet the vehicle, write what indoor flight needs and read it back."""
+    link = open_link(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+    try:
+        found = probe(link, 10.0)
+        assert list(found) == [SYSTEM] and found[SYSTEM].flavour == flavour
+        setup = Setup(link, SYSTEM, Flavour[flavour.upper()], 255)
+        setup.connect()
+        refused = [d.text for d in setup.differences() if not setup.apply(d.wanted)]
+        assert refused == [] and [d.text for d in setup.differences()] == []
+    finally:
+        link.close()
+
+
+def fly(port, kind, flavour, truth, patience_s):
+    """Take off, fly forward at 0.4 m/s for 6 s and land, on the true position; returns the distance flown [m]."""
+    pad, yaw = truth()
+    options = {"pad_m": pad[:2], "pad_yaw_rad": yaw}
+    pilot = Pilot(port, kind, {SYSTEM: flavour}, lambda vehicle: truth(), **options)
+    vehicle, watchdog, turns = pilot.fleet.vehicles[SYSTEM], pilot.hosts[0].watchdog, iter(range(10**9))
+
+    def until(condition, seconds, verb=None, mode=""):
+        deadline, due = time.monotonic() + seconds, 0.0
+        while not condition():
+            assert time.monotonic() < deadline, f"{watchdog.mode}: {watchdog.vehicle}; {pilot.process.texts[-8:]}"
+            if verb is not None and time.monotonic() > due:
+                due = time.monotonic() + 2.0
+                pilot.order(verb, mode)
+            pilot.turn(next(turns))
+
+    try:
+        until(lambda: watchdog.mode == "LANDED" and not watchdog.vehicle.not_ready, patience_s)
+        until(lambda: watchdog.mode == "HOVER", 40, Verb.TAKEOFF, "LANDED")
+        until(lambda: truth()[0][2] - pad[2] > 0.5, 15)
+        until(lambda: watchdog.mode == "TRACK", 5, Verb.TRACK, "HOVER")
+        begin, began = truth()[0], time.monotonic()
+        until(lambda: time.monotonic() - began > 6.0, 10)
+        flown = math.dist(begin[:2], truth()[0][:2])
+        until(lambda: watchdog.mode == "LANDED", 40, Verb.LAND, "TRACK")
+        assert not vehicle.telemetry.base_mode & 128 and truth()[0][2] - pad[2] < 0.3
+    finally:
+        pilot.fleet.close()
+    return flown
+
+
+@pytest.mark.parametrize("kind", ["pymavlink", "mavsdk"])
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_real_firmware_is_set_up_and_flown(flavour, kind, port, tmp_path):
+    port, truth_port = (PX4_API, PX4_TRUTH) if flavour == "px4" else (port, _hangar.free_port())
+    process = start(flavour, tmp_path, port, truth_port, fresh=True)
+    truth = None
+    try:
+        set_up(flavour, port)
+        end(process)  # what was set is used from the next start on
+        process = start(flavour, tmp_path, port, truth_port, fresh=False)
+        truth = Truth(truth_port, flavour == "ardupilot")
+        deadline = time.monotonic() + 30
+        while truth.place is None:
+            assert time.monotonic() < deadline, "the simulation does not tell where it is"
+            time.sleep(0.1)
+        assert 1.2 < fly(port, kind, flavour, lambda: truth.place, patience_s=90) < 3.2
+    finally:
+        if truth is not None:
+            truth.closing.set()
+        end(process)
+
+
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_emulated_vehicle_is_set_up_and_flown_by_the_same_steps(hangar, port, flavour):
+    _, copter, _ = hangar.add(flavour, SYSTEM, calls=("127.0.0.1", port), configured=False)
+    set_up(flavour, port)
+    body = copter.airframe
+    flown = fly(port, "pymavlink", flavour, lambda: ((body.x, body.y, body.z), body.yaw), patience_s=30)
+    assert 1.2 < flown < 3.2

@@ -3,6 +3,7 @@
 import click
 
 from groundstation.cli.calibrate_camera import camera
+from groundstation.cli.calibrate_extrinsics import extrinsics
 
 
 @click.group(epilog="Example: groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --name ceiling")
@@ -11,3 +12,4 @@ def calibrate() -> None:
 
 
 calibrate.add_command(camera)
+calibrate.add_command(extrinsics)

@@ -1,0 +1,91 @@
+"""Markers that lie still in front of a camera: found, read and averaged over many pictures."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.markers import read_bar
+from drivers.camera.search import search
+from groundstation.geometry import board as marker
+from groundstation.geometry.lens import CameraIntrinsics
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+_MOST_BOARDS = 16
+_SURE = 1.0
+# More than this between pictures, and the marker or the camera has moved [px].
+_STILL_PX = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A marker in one picture: its code (None: not sure), margin of the reading, corners (12, 2) [px]."""
+
+    code: int | None
+    margin: float
+    corners: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Steady:
+    """A marker's corners (12, 2) [px] over several pictures, and one sigma of their mean."""
+
+    corners: Array
+    std_px: float
+    pictures: int
+    moved: bool
+
+
+def markers_in(picture: Picture, lens: CameraIntrinsics) -> list[Seen]:
+    """Return all markers of ours in a picture, the unreadable ones without a code."""
+    seen = []
+    for find in search(picture, [], _MOST_BOARDS):
+        reading = read_bar(picture, find, lens)
+        sure = reading is not None and reading.is_sure(_SURE)
+        code = reading.code if reading is not None and sure else None
+        seen.append(Seen(code, reading.margin if reading is not None else 0.0, find.corners))
+    return seen
+
+
+class Gathering:
+    """Collects what single pictures show; `doubled` are codes that were seen twice in one picture."""
+
+    def __init__(self, lens: CameraIntrinsics) -> None:
+        self._lens = lens
+        self._corners: defaultdict[int, list[Array]] = defaultdict(list)
+        self.pictures = 0
+        self.unread = 0
+        self.doubled: set[int] = set()
+
+    def take(self, picture: Picture) -> list[Seen]:
+        """Take in a picture; returns what is in it."""
+        seen = markers_in(picture, self._lens)
+        self.pictures += 1
+        codes = [one.code for one in seen if one.code is not None]
+        self.unread += len(seen) - len(codes)
+        self.doubled |= {code for code in codes if codes.count(code) > 1}
+        for one in seen:
+            if one.code is not None:
+                self._corners[one.code].append(one.corners)
+        return seen
+
+    def steady(self) -> Mapping[int, Steady]:
+        """Return the mean of each marker that was seen, by code; the median, so that one bad picture does no harm."""
+        found = {}
+        for code, many in sorted(self._corners.items()):
+            stack = np.array(many)
+            middle = np.median(stack, axis=0)
+            spread = float(np.sqrt(((stack - middle) ** 2).mean()))
+            # A median's variance is pi/2 times a mean's.
+            std = spread * float(np.sqrt(np.pi / 2 / len(many)))
+            found[code] = Steady(middle, std, len(many), spread > _STILL_PX)
+        return found
+
+
+def flat_points(square_mm: float) -> Array:
+    """Return a marker's corners (12, 3) [m; marker frame]."""
+    return marker.Board(0, square_mm).corners()

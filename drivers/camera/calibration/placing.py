@@ -1,0 +1,200 @@
+"""Where a camera is, from markers that lie flat at known places: least squares over all corners at once. Pure.
+
+Unknown are the camera's pose, and each marker's small displacement from where it was said to be: a tape measure is good
+to millimetres, and what all markers say together tells which one was put elsewhere.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from drivers.camera.calibration.marks import Steady, flat_points
+from drivers.camera.pose import planar_poses
+from groundstation.errors import DriverError
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+from groundstation.geometry.rotations import rotation_z
+
+Array = NDArray[np.float64]
+
+_YAW_STD_RAD = math.radians(1.0)
+_FREE_YAW_STD_RAD = math.pi
+_MISPLACED = 4.0
+_LEAST_TO_JUDGE = 4
+_WORST_RMS_PX = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A marker flat on the floor or a table: code, centre [m], and which way its x axis points (None: unknown)."""
+
+    code: int
+    position_m: tuple[float, float, float]
+    yaw_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Placing:
+    """frame_from_optical with the covariance (6, 6) of (left rotation error [rad], position [m]), rms [px].
+
+    offsets_m: how far each marker seems to lie from where it was said to be; misplaced: those that were left out.
+    """
+
+    pose: Pose
+    covariance: Array
+    rms_px: float
+    offsets_m: dict[int, float]
+    misplaced: dict[int, float]
+
+    @property
+    def position_std_m(self) -> Array:
+        """Return one sigma of the position (3) [m]."""
+        return np.sqrt(np.diag(self.covariance)[3:])
+
+    @property
+    def attitude_std_rad(self) -> Array:
+        """Return one sigma of the attitude about the frame's axes (3) [rad]."""
+        return np.sqrt(np.diag(self.covariance)[:3])
+
+
+def place_camera(
+    marks: Sequence[Mark], steady: Mapping[int, Steady], lens: CameraIntrinsics, square_mm: float, mark_std_m: float
+) -> Placing:
+    """Return where the camera is in the frame that the marks are given in.
+
+    mark_std_m: how well they were put there. Raises DriverError when what is seen does not tell, with what is missing.
+    """
+    used = [mark for mark in marks if mark.code in steady]
+    misplaced: dict[int, float] = {}
+    while True:
+        _require_enough(used, marks)
+        placing = _placed(used, steady, lens, square_mm, mark_std_m)
+        worst = max(placing.offsets_m, key=placing.offsets_m.__getitem__)
+        if placing.offsets_m[worst] <= _MISPLACED * mark_std_m or len(used) < _LEAST_TO_JUDGE:
+            break
+        misplaced[worst] = placing.offsets_m[worst]
+        used = [mark for mark in used if mark.code != worst]
+    if placing.rms_px > _WORST_RMS_PX:
+        raise DriverError(
+            f"the corners fit no place of the camera ({placing.rms_px:.1f} px rms): is the calibration this camera's, "
+            f"are the squares {square_mm:g} mm, do the markers lie flat?"
+        )
+    return Placing(placing.pose, placing.covariance, placing.rms_px, placing.offsets_m, misplaced)
+
+
+def _require_enough(used: Sequence[Mark], marks: Sequence[Mark]) -> None:
+    if not used:
+        named = ", ".join(str(mark.code) for mark in marks)
+        raise DriverError(f"none of the markers {named} was seen: are they in the picture, flat, lit and large enough?")
+    if len(used) == 1 and used[0].yaw_rad is None:
+        raise DriverError(
+            f"only marker {used[0].code} was seen, and which way it points was not said: give its heading as fourth "
+            "number, or lay out a second marker"
+        )
+
+
+def _placed(
+    used: Sequence[Mark], steady: Mapping[int, Steady], lens: CameraIntrinsics, square_mm: float, mark_std_m: float
+) -> Placing:
+    problem = _Problem(used, steady, lens, square_mm, mark_std_m)
+    solutions = [least_squares(problem.residuals, start, x_scale="jac", max_nfev=60) for start in problem.starts()]
+    if not solutions:
+        raise DriverError("no pose comes of the corners: is the calibration this camera's?")
+    best = min(solutions, key=lambda solution: float(solution.cost))
+    pixels = best.fun[: problem.pixel_rows]
+    freedom = max(1, len(best.fun) - len(best.x))
+    inflation = max(1.0, 2.0 * float(best.cost) / freedom)
+    information = best.jac.T @ best.jac
+    covariance = inflation * np.linalg.solve(information, np.eye(len(best.x)))[:6, :6]
+    offsets = {m.code: float(np.hypot(*best.x[6 + 3 * i : 8 + 3 * i])) for i, m in enumerate(used)}
+    rms = float(np.sqrt((pixels**2).mean() * 2.0)) * problem.sigma_px
+    return Placing(problem.pose_of(best.x), np.asarray(covariance), rms, offsets, {})
+
+
+class _Problem:
+    """Residuals of all corners in sigmas, then those of the markers' places and headings.
+
+    Variables: rotation vector (left of the start) and position of the camera; by marker a shift along x and y, a turn.
+    """
+
+    def __init__(
+        self,
+        marks: Sequence[Mark],
+        steady: Mapping[int, Steady],
+        lens: CameraIntrinsics,
+        square_mm: float,
+        std_m: float,
+    ) -> None:
+        self._marks, self._lens, self._std_m = marks, lens, std_m
+        self._points = flat_points(square_mm)
+        self._corners = [steady[mark.code].corners for mark in marks]
+        noise = max(steady[mark.code].std_px for mark in marks)
+        # The lens explains its own board to its residual only: what is left of it does not average out.
+        self.sigma_px = math.hypot(noise, max(lens.residual_px, 0.05))
+        self.pixel_rows = 24 * len(marks)
+        self._yaws = [0.0 if mark.yaw_rad is None else mark.yaw_rad for mark in marks]
+
+    def pose_of(self, x: Array) -> Pose:
+        """Return frame_from_optical."""
+        return Pose(rotation_of_vector(x[:3]), x[3:6])
+
+    def residuals(self, x: Array) -> Array:
+        """Return all residuals [sigmas]."""
+        pose = self.pose_of(x).inverse()
+        rows: list[Array] = []
+        priors: list[float] = []
+        for index, (mark, corners) in enumerate(zip(self._marks, self._corners, strict=True)):
+            dx, dy, turn = x[6 + 3 * index : 9 + 3 * index]
+            place = np.add(mark.position_m, (dx, dy, 0.0))
+            points = self._points @ rotation_z(self._yaws[index] + turn).T + place
+            seen = self._lens.project(pose.apply(points))
+            rows.append(np.nan_to_num((seen - corners) / self.sigma_px, nan=1e4).ravel())
+            yaw_std = _FREE_YAW_STD_RAD if mark.yaw_rad is None else _YAW_STD_RAD
+            priors += [dx / self._std_m, dy / self._std_m, turn / yaw_std]
+        return np.concatenate([*rows, np.array(priors)])
+
+    def starts(self) -> list[Array]:
+        """Return first guesses: from the pose of one marker, both solutions, and the places of the others."""
+        poses = [planar_poses(corners, self._points, self._lens) for corners in self._corners]
+        first = next((i for i, mark in enumerate(self._marks) if mark.yaw_rad is not None and poses[i]), 0)
+        if any(not many for many in poses):
+            return []
+        starts = []
+        for solution in poses[first]:
+            marker_from_optical = Pose(solution.rotation, solution.translation).inverse()
+            centres = np.array([marker_from_optical.apply(many[0].translation)[:2] for many in poses])
+            yaw = self._heading(first, centres)
+            place = Pose(rotation_z(yaw), np.array(self._marks[first].position_m))
+            camera = place.compose(marker_from_optical)
+            x = np.zeros(6 + 3 * len(self._marks))
+            x[:3], x[3:6] = vector_of_rotation(camera.rotation), camera.translation
+            for index, mark in enumerate(self._marks):
+                if mark.yaw_rad is None:
+                    turned = camera.rotation @ poses[index][0].rotation
+                    x[8 + 3 * index] = math.atan2(turned[1, 0], turned[0, 0])
+            starts.append(x)
+        return starts
+
+    def _heading(self, first: int, centres: Array) -> float:
+        """Return how the first marker is turned: as was said, else as the places of the others ask for."""
+        said = self._marks[first].yaw_rad
+        if said is not None:
+            return said
+        places = np.array([mark.position_m[:2] for mark in self._marks])
+        a, b = centres - centres.mean(axis=0), places - places.mean(axis=0)
+        return math.atan2(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()), float((a * b).sum()))
+
+
+def rotation_of_vector(vector: Array) -> Array:
+    """Return the rotation (3, 3) about a vector by its length [rad]."""
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+
+
+def vector_of_rotation(rotation: Array) -> Array:
+    """Return the rotation vector (3) [rad] of a rotation matrix."""
+    return np.asarray(Rotation.from_matrix(rotation).as_rotvec())

@@ -1,0 +1,58 @@
+"""Markers laid out at known places to measure cameras with: a small YAML file, or options of a command."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from groundstation.errors import SettingsError
+from groundstation.settings.document import read
+from groundstation.settings.room import Angle
+from groundstation.settings.values import MarkerCode, Section, SquareSize, Vector3
+from groundstation.settings.wording import ordered, problem_of_error
+
+
+class FloorMarker(Section):
+    """Its code, its centre, and which way its bar points (none: any)."""
+
+    code: MarkerCode
+    position_m: Vector3
+    yaw_deg: Angle | None = None
+
+
+class FloorMarkers(Section):
+    """A layout; position_std_m: how well the markers were put in their places."""
+
+    square_mm: SquareSize = 44.0
+    position_std_m: Annotated[float, Field(gt=0, le=0.2)] = 0.005
+    markers: tuple[FloorMarker, ...]
+
+
+def load_floor_markers(path: Path) -> FloorMarkers:
+    """Return a layout; raises SettingsError with all problems, each with its line."""
+    tree = read(path)
+    try:
+        return TypeAdapter(FloorMarkers).validate_json(json.dumps(tree.plain()))
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        raise SettingsError(ordered([problem_of_error(one, tree, FloorMarkers) for one in found])) from None
+
+
+def floor_marker_of(text: str) -> FloorMarker:
+    """Return the marker of `3=0.5,1.0`, `3=0.5,1.0,0` or `3=0.5,1.0,0,90` (code = x, y, z [m], heading [deg]).
+
+    Raises SettingsError that says what is wrong.
+    """
+    code, equals, place = text.partition("=")
+    try:
+        numbers = [float(part) for part in place.split(",")]
+        if not equals or not 2 <= len(numbers) <= 4:
+            raise ValueError
+        position = (numbers[0], numbers[1], numbers[2] if len(numbers) > 2 else 0.0)
+        return FloorMarker(code=int(code), position_m=position, yaw_deg=numbers[3] if len(numbers) > 3 else None)
+    except ValidationError as error:
+        faults = "; ".join(f"{fault['loc'][0]}: {fault['msg']}" for fault in error.errors())
+        raise SettingsError([f"--marker {text}: {faults}"]) from None
+    except ValueError:
+        raise SettingsError([f"--marker {text}: must look like 3=0.5,1.0 or 3=0.5,1.0,0,90"]) from None

@@ -1,0 +1,161 @@
+"""Where a camera is, from markers on the floor: pictures in, lines for the field file out."""
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from drivers.camera.calibration.marks import Steady
+from drivers.camera.calibration.placing import Mark, place_camera
+from groundstation.cli.main import run
+from groundstation.errors import DriverError
+from groundstation.geometry.board import Board, raster
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.pose import Pose
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
+
+LENS = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, residual_px=0.1)
+TURN_DEG = (1.2, -0.8, 15.0)
+CEILING = Pose(world_from_downward_optical(TURN_DEG), np.array([0.2, -0.1, 3.2]))
+PLACES = {1: (0.9, 0.6), 2: (-0.8, 0.5), 3: (-0.7, -0.7), 4: (0.8, -0.6)}
+HEADINGS = {1: 0.3, 2: -1.2, 3: 2.0, 4: 0.0}
+
+
+def corners_of(code, camera=CEILING, lens=LENS, at=None):
+    x, y, z = (*(at or PLACES[code]), 0.0)[:3]
+    points = Board(code, 44.0).corners() @ rotation_z(HEADINGS.get(code, 0.0)).T + (x, y, z)
+    return lens.project(camera.inverse().apply(points))
+
+
+def drawn(camera, lens, marks):
+    """Return a picture of markers {code: (x, y, z, yaw)} on grey ground."""
+    picture = np.full((lens.height_px, lens.width_px), 120, np.uint8)
+    for code, (x, y, z, yaw) in marks.items():
+        texels, texel_from_marker = raster(code, 24.0)
+        frame = Pose(rotation_z(yaw), np.array([x, y, z]))
+        optical = camera.inverse().compose(frame)
+        plane = np.column_stack((optical.rotation[:, :2] * 0.044, optical.translation))
+        h = lens.matrix @ plane @ np.linalg.inv(texel_from_marker)
+        size = (lens.width_px, lens.height_px)
+        mask = cv2.warpPerspective(np.full_like(texels, 255), h, size, flags=cv2.INTER_AREA)
+        card = cv2.warpPerspective(cv2.GaussianBlur(texels, (0, 0), 1.5), h, size, flags=cv2.INTER_LINEAR)
+        picture = np.where(mask > 127, card, picture)
+    return cv2.GaussianBlur(picture, (0, 0), 0.6)
+
+
+def files_for(tmp_path, lens, picture, frames=3):
+    (tmp_path / "in").mkdir()
+    rng = np.random.default_rng(1)
+    for number in range(frames):
+        noisy = picture + rng.normal(0.0, 2.0, picture.shape)
+        cv2.imwrite(str(tmp_path / "in" / f"{number}.png"), np.clip(noisy, 0, 255).astype(np.uint8))
+    calibration = tmp_path / "lens.yaml"
+    names = ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "residual_px")
+    content = {"model": "plumb_bob", "distortion": list(lens.distortion)} | {n: getattr(lens, n) for n in names}
+    calibration.write_text(yaml.safe_dump(content))
+    return str(tmp_path / "in"), str(calibration)
+
+
+def markers(places=PLACES):
+    return [f"--marker={code}={x},{y}" for code, (x, y) in places.items()]
+
+
+@pytest.fixture
+def measured(capsys):
+    """Run `calibrate extrinsics`; returns exit code, what it printed as YAML, and all it said."""
+
+    def call(*arguments):
+        code = run(["calibrate", "extrinsics", *arguments])
+        said = capsys.readouterr()
+        return code, yaml.safe_load(said.out), said.out + said.err
+
+    return call
+
+
+def test_a_turned_ceiling_camera_is_placed_from_pictures(tmp_path, measured):
+    picture = drawn(CEILING, LENS, {code: (*PLACES[code], 0.0, HEADINGS[code]) for code in PLACES})
+    folder, calibration = files_for(tmp_path, LENS, picture)
+    code, lines, said = measured(folder, "--calibration", calibration, *markers())
+    assert code == 0, said
+    std_m, std_deg = lines["position_std_m"], lines["attitude_std_deg"]
+    assert 0.001 <= std_m < 0.02 and 0.01 <= std_deg < 0.5
+    assert np.allclose(lines["position_m"], CEILING.translation, atol=4 * std_m)
+    assert np.allclose(lines["rotation_deg"], TURN_DEG, atol=4 * std_deg)
+    # And these lines are what a field file takes.
+    from groundstation.settings.room import WorldCamera
+
+    lens = yaml.safe_load((tmp_path / "lens.yaml").read_text())
+    entry = {"source": "/dev/video0", "calibration": lens | {"distortion": tuple(lens["distortion"])}, **lines}
+    WorldCamera.model_validate(entry, strict=False)
+
+
+def test_the_deviations_told_are_those_of_the_errors():
+    """Corner noise and misplaced markers as assumed: errors over their sigmas have unit variance."""
+    rng = np.random.default_rng(4)
+    scores = []
+    for _ in range(12):
+        steady = {}
+        for code, (x, y) in PLACES.items():
+            at = (x + rng.normal(0, 0.005), y + rng.normal(0, 0.005), 0.0)
+            steady[code] = Steady(corners_of(code, at=at) + rng.normal(0.0, 0.1, (12, 2)), 0.0, 20, moved=False)
+        marks = [Mark(code, (x, y, 0.0)) for code, (x, y) in PLACES.items()]
+        found = place_camera(marks, steady, LENS, 44.0, 0.005)
+        error = found.pose.translation - CEILING.translation
+        scores.append(error @ np.linalg.solve(found.covariance[3:, 3:], error) / 3)
+    assert 0.5 < np.mean(scores) < 1.7
+
+
+def test_a_marker_that_lies_elsewhere_is_named_and_left_out(tmp_path, measured):
+    picture = drawn(CEILING, LENS, {code: (*PLACES[code], 0.0, HEADINGS[code]) for code in PLACES})
+    folder, calibration = files_for(tmp_path, LENS, picture, 1)
+    wrong = {**PLACES, 3: (-0.7, -0.5)}
+    code, lines, said = measured(folder, "--calibration", calibration, *markers(wrong))
+    assert code == 0 and "marker 3 seems to lie" in said and "left out" in said
+    assert np.allclose(lines["position_m"], CEILING.translation, atol=0.03)
+
+
+def test_an_onboard_camera_is_placed_on_the_bench(tmp_path, measured):
+    lens = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, residual_px=0.1)
+    camera = Pose(base_from_tilted_optical(np.radians(43.0), np.radians(2.0)), np.array([0.09, 0.01, 0.02]))
+    picture = drawn(camera, lens, {6: (0.75, 0.0, -0.6, 0.0)})
+    folder, calibration = files_for(tmp_path, lens, picture)
+    code, lines, said = measured(folder, "--calibration", calibration, "--onboard", "--marker=6=0.75,0,-0.6,0")
+    assert code == 0, said
+    assert lines["tilt_down_deg"] == pytest.approx(43.0, abs=1.0)
+    assert lines["pan_left_deg"] == pytest.approx(2.0, abs=1.0)
+    assert np.allclose(lines["position_m"], camera.translation, atol=0.02)
+
+
+def test_what_does_not_tell_is_refused_with_what_is_missing(tmp_path, measured):
+    picture = drawn(CEILING, LENS, {1: (*PLACES[1], 0.0, 0.3)})
+    folder, calibration = files_for(tmp_path, LENS, picture, 1)
+    code, _, said = measured(folder, "--calibration", calibration, *markers())
+    assert code == 4 and "only marker 1 was seen" in said
+    code, _, said = measured(folder, "--calibration", calibration, "--marker=9=0,0")
+    assert code == 4 and "none of the markers 9 was seen" in said
+    code, _, said = measured(folder, "--calibration", calibration, "--marker=16=0,0", "--marker=2=x")
+    assert code == 2 and "--marker 16=0,0" in said
+    code, _, said = measured(folder, "--calibration", calibration)
+    assert code == 2 and "--markers FILE" in said
+    text = (tmp_path / "lens.yaml").read_text()
+    (tmp_path / "lens.yaml").write_text(text.replace("width_px: 1280", "width_px: 640"))
+    code, _, said = measured(folder, "--calibration", calibration, *markers())
+    assert code == 2 and "1280x720" in said and "640x720" in said
+
+
+def test_a_layout_file_names_its_mistakes(tmp_path, measured):
+    picture = drawn(CEILING, LENS, {code: (*PLACES[code], 0.0, HEADINGS[code]) for code in PLACES})
+    folder, calibration = files_for(tmp_path, LENS, picture, 1)
+    layout = tmp_path / "floor.yaml"
+    entries = [{"code": code, "position_m": [x, y, 0.0]} for code, (x, y) in PLACES.items()]
+    layout.write_text(yaml.safe_dump({"square_mm": 44.0, "markers": entries}))
+    code, lines, _ = measured(folder, "--calibration", calibration, "--markers", str(layout))
+    assert code == 0 and np.allclose(lines["position_m"], CEILING.translation, atol=0.02)
+    layout.write_text("square_mm: 44\nmarkers:\n  - code: 3\n    position: [1, 1, 0]\n")
+    code, _, said = measured(folder, "--calibration", calibration, "--markers", str(layout))
+    assert code == 2 and f"{layout}:4" in said and "position_m" in said
+
+
+def test_nothing_can_be_told_of_no_markers():
+    with pytest.raises(DriverError, match="none of the markers 1"):
+        place_camera([Mark(1, (0.0, 0.0, 0.0))], {}, LENS, 44.0, 0.005)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from drivers.mavlink.link import UdpLink, open_link, signing_of
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire import telemetry
-from drivers.mavlink.wire.frames import Encoder
+from drivers.mavlink.wire.frames import Encoder, Signing
 from groundstation.cli.mavlink import mavlink
 from groundstation.errors import DriverError
 
@@ -110,3 +110,19 @@ def test_duplicates_strangers_and_rubbish_are_refused_by_name():
     out = UdpLink(LinkSettings(target="udpout:127.0.0.2:5"))
     assert out._judge(now, beat, ("127.0.0.7", 5)) == [] and out.rejected == {"foreign_address": 1}
     out.close()
+
+
+def test_a_signed_link_refuses_what_is_unsigned_forged_or_played_again(tmp_path):
+    key = tmp_path / "key"
+    key.write_bytes(bytes(range(32)))
+    ours = signing_of(LinkSettings(target="udpin:127.0.0.1:0", key_file=str(key)))
+    link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"), ours)
+    beat, place, now = telemetry.Heartbeat(2, 3, 1, 4, 3), ("127.0.0.2", 1), time.monotonic_ns()
+    good, stale = (Encoder(11, n, Signing(ours.key, at)).encode(beat) for n, at in ((1, ours.timestamp), (2, 10**9)))
+    assert link._judge(now, Encoder(11, 1).encode(beat), place) == []
+    assert link._judge(now, Encoder(11, 1, Signing(bytes(32), ours.timestamp)).encode(beat), place) == []
+    assert [heard.frame.system for heard, _ in link._judge(now, good, place)] == [11]
+    assert link._judge(now, good, place) == []
+    assert link._judge(now, stale, place) == []  # recorded years ago
+    assert link.rejected == {"unsigned": 1, "signature": 1, "replayed": 2}
+    link.close()

@@ -13,6 +13,7 @@ from groundstation.estimation.models import (
     ObservationModel,
     OdometryRobot,
 )
+from groundstation.estimation.models.odometry_robot import AERIAL
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
     base_from_tilted_optical,
@@ -21,6 +22,35 @@ from groundstation.geometry.rotations import (
 
 # `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
 WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
+# Of the time of exposure about the calibrated delay of a video: +-20 ms, as measured on real streams [s].
+STAMP_STD_S = 0.0115
+# A calibrated velocity scale is good to this, and creeps by this in a second.
+_SCALE_STD, _SCALE_DRIFT = 0.04, 0.002
+_VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
+# Deviations of the velocity's error that lasts, and of what is left within 0.2 s, over that of all of it.
+_LASTING_SHARE, _QUICK_SHARE = 0.6, 0.2
+# A target does the most that it may do for this share of the time.
+_MANOEUVRING_SHARE = 0.07
+
+
+@dataclass(frozen=True, slots=True)
+class _Habits:
+    """How long a kind of vehicle's errors last [s], and the error of its climb rate [m/s; of its highest: share]."""
+
+    velocity_s: float
+    attitude_s: float
+    climb_s: float
+    climb_m_s: float
+    climb_share: float
+    reports_climb: bool
+
+
+# An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. A MAVLink vehicle flies on our
+# position: it has no height of its own to report; its velocity follows our errors as slowly as its filter does.
+_HABITS = {
+    "ardrone": _Habits(0.4, 5.0, 0.7, 0.0, 0.2, False),
+    "mavlink": _Habits(2.5, 10.0, 2.0, 0.02, 0.0, True),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +78,8 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
     target, estimator = resolved["target"], resolved["estimator"]
     entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
     entities[target["name"]] = ConstantVelocityTarget(
-        marker_height_m=target["marker"]["height_m"], acceleration_std_m_s2=target["acceleration_std_m_s2"]
+        marker_height_m=target["marker"]["height_m"],
+        acceleration_std_m_s2=math.sqrt(_MANOEUVRING_SHARE) * target["acceleration_std_m_s2"],
     )
     entities |= {name: _mount(camera) for name, camera in resolved["cameras"].items()}
     cameras: dict[str, ObservationModel] = {
@@ -64,19 +95,25 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
 
 
 def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
-    odometry = drone["odometry"]
+    odometry, habits = drone["odometry"], _HABITS[drone["kind"]]
     return OdometryRobot(
         marker_position_m=tuple(drone["marker"]["position_m"]),
         velocity_scale=odometry["velocity_scale"],
-        velocity_std_m_s=odometry["velocity_std_m_s"],
+        scale_std=_SCALE_STD,
+        scale_drift=_SCALE_DRIFT,
+        velocity_std_m_s=_QUICK_SHARE * odometry["velocity_std_m_s"],
+        velocity_bias_std_m_s=_LASTING_SHARE * odometry["velocity_std_m_s"] / odometry["velocity_scale"],
+        velocity_bias_correlation_s=habits.velocity_s,
         velocity_delay_s=odometry["velocity_delay_ms"] / 1000,
         yaw_std_rad=math.radians(odometry["yaw_rate_std_deg_s"]),
         attitude_std_rad=math.radians(odometry["attitude_std_deg"]),
+        attitude_correlation_s=habits.attitude_s,
         height_std_m=odometry["height_std_m"],
         height_delay_s=odometry["height_delay_ms"] / 1000,
-        climb_std_m_s=0.2 * drone["limits"]["max_climb_m_s"],
-        # A vehicle that flies on our position has no height of its own to report, but a climb rate.
-        reports_climb=drone["kind"] == "mavlink",
+        climb_std_m_s=habits.climb_m_s + habits.climb_share * drone["limits"]["max_climb_m_s"],
+        climb_correlation_s=habits.climb_s,
+        reports_climb=habits.reports_climb,
+        slow_states=AERIAL + _VELOCITY_LABELS,
     )
 
 
@@ -93,6 +130,7 @@ def _world_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
         carrier=name,
         rotation=world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0))),
         observes_targets="targets" in camera.get("observes", ("robots",)),
+        stamp_std_s=STAMP_STD_S,
     )
 
 
@@ -103,4 +141,5 @@ def _onboard_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
             math.radians(camera["tilt_down_deg"]), math.radians(camera.get("pan_left_deg", 0.0))
         ),
         translation=tuple(camera["position_m"]),
+        stamp_std_s=STAMP_STD_S,
     )

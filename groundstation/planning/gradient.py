@@ -10,6 +10,7 @@ from groundstation.planning.covariance import correct_adjoint, predict_adjoint
 from groundstation.planning.rollout import (
     RELATIVE_X,
     RELATIVE_Y,
+    TARGET_WEIGHTS,
     V_X,
     V_Y,
     V_YAW,
@@ -127,9 +128,10 @@ def evaluate(
         A, state, back, work = np.zeros((d, d)), np.zeros((n, 3)), np.empty((n, 2)), np.empty(d)
         for i in range(h - 1, -1, -1):
             discount = options[1] ** (i + 1)
-            for x in range(3 * n, d, 4):
-                A[x, x] += discount
-                A[x + 1, x + 1] += discount
+            for t in range(targets.shape[0]):
+                x, weight = 3 * n + 4 * t, discount * options[TARGET_WEIGHTS + t]
+                A[x, x] += weight
+                A[x + 1, x + 1] += weight
             for r in range(n):
                 A[3 * r, 3 * r] += discount * options[13]
                 A[3 * r + 1, 3 * r + 1] += discount * options[13]

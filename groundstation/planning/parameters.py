@@ -50,6 +50,7 @@ class PlannerParameters:
     not considered. hysteresis: relative gain a new topology must bring; within min_dwell_s of the last switch it must
     bring urgent_gain. fence: drones' box in the floor plan, kept fence_margin_m away from (softly).
     evaluation_budget and tolerance: of one solve. starts: how many starts of each topology are optimised.
+    target_weights: what a target's uncertainty counts in the cost beside the others', 1 where nothing is said.
     """
 
     level_heights_m: tuple[tuple[float, ...], ...]
@@ -65,6 +66,7 @@ class PlannerParameters:
     limits: Mapping[str, MotionLimits] = field(default_factory=dict)
     noise: ProcessNoise = ProcessNoise()
     weights: Weights = Weights()
+    target_weights: Mapping[str, float] = field(default_factory=dict)
     mode: Literal["certified", "paper"] = "certified"
     evaluation_budget: int = 60
     tolerance: float = 2e-3

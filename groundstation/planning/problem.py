@@ -114,9 +114,10 @@ class ProblemBuilder:
         """Return the topology's problem; it must have height slots."""
         indices, names = self._edges(scene, topology)
         markers = np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets])
+        weights = [self._parameters.target_weights.get(name, 1.0) for name in scene.targets]
         arrays = (
             scene.poses, scene.moving, self._heights(scene, topology), scene.prior,
-            indices, self._cameras, markers, self._options,
+            indices, self._cameras, markers, np.concatenate((self._options, weights)),
         )  # fmt: skip
         return Problem(topology, self.scale(scene), arrays, names)
 

@@ -34,6 +34,8 @@ OPTIONS = (
     "effort_weight",
     "robot_weight",
 )
+TARGET_WEIGHTS = len(OPTIONS)
+"""From here on the options hold one weight per target, in state order."""
 
 # Columns of a tape's edge entry: w, v and their derivatives by the relative position and by the observer's yaw.
 W, W_X, W_Y, W_YAW, V, V_X, V_Y, V_YAW, RELATIVE_X, RELATIVE_Y = range(10)
@@ -186,7 +188,7 @@ def roll_out(
         discount *= options[1]
         for t in range(k):
             x = 3 * n + 4 * t
-            uncertainty += discount * (P[x, x] + P[x + 1, x + 1])
+            uncertainty += discount * options[TARGET_WEIGHTS + t] * (P[x, x] + P[x + 1, x + 1])
         for x in range(0, 3 * n, 3):
             extra += discount * options[13] * (P[x, x] + P[x + 1, x + 1])
         penalties[i, :, :] = 0.0

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 CEILING = WorldCamera((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0))
 ONBOARD = OnboardCamera((0.09, 0.0, 0.02), Frustum.of_picture(640, 360, 460, 460, 1.9), pan_left_rad=0.1)
 CAMERAS = np.vstack([row_of_world_camera(CEILING, Softness()), row_of_onboard_camera(ONBOARD, Softness())])
-OPTIONS = np.array([0.3, 0.9, 2e-3, 3e-4, 0.05, 0.1, 1.0, 1.0, -0.8, 0.9, -0.6, 0.7, 1e-3])
+OPTIONS = np.array([0.3, 0.9, 2e-3, 3e-4, 0.05, 0.1, 1.0, 1.0, -0.8, 0.9, -0.6, 0.7, 1e-3, 0.5])
+WEIGHTS = np.array([1.0, 2.5])  # of two targets
 STEPS = 8
 
 
@@ -56,8 +57,8 @@ def case(n: int, layout: str, seed: int, targets: int = 1) -> Case:
         heights[:] = np.linspace(2.0, 1.2, n)
         edges = [(0, -1, 0), *((1, r, r + 1) for r in range(n - 1)), *((1, n - 1, n + t) for t in range(targets))]
     markers = np.concatenate([np.full(n, 0.08), np.full(targets, 0.4)])
-    indices = np.array(edges, dtype=np.int64)
-    return Case(n, (poses, moving, heights, 0.5 * (prior + prior.T), indices, CAMERAS, markers, OPTIONS))
+    indices, options = np.array(edges, dtype=np.int64), np.concatenate((OPTIONS, WEIGHTS[:targets]))
+    return Case(n, (poses, moving, heights, 0.5 * (prior + prior.T), indices, CAMERAS, markers, options))
 
 
 def rotation(yaw: float) -> Array:
@@ -118,7 +119,9 @@ def textbook(case: Case, u: Array) -> float:
             H, w = measurement(case, edge, places, yaws, heights[i])
             information += H.T @ np.diag(w) @ H
         P = np.linalg.inv(information)
-        total += discount ** (i + 1) * sum(P[x, x] + P[x + 1, x + 1] for x in range(3 * n, d, 4))
+        places_of_targets = range(3 * n, d, 4)
+        spread = [w * (P[x, x] + P[x + 1, x + 1]) for w, x in zip(WEIGHTS, places_of_targets, strict=False)]
+        total += discount ** (i + 1) * sum(spread)
     return total
 
 

@@ -70,6 +70,11 @@ class Pipeline:
         boards = (entity for track in self._tracks if (entity := self._entity_of(track)) is not None)
         return (*boards, *self._tags.tracked)
 
+    def windows(self, stamp_ns: int, shape: tuple[int, ...]) -> list[detect.Window]:
+        """Return where the boards in view will be looked for in a picture of that time and shape."""
+        found = (track.window(stamp_ns, shape, None) for track in self._tracks)
+        return [window for window in found if window is not None]
+
     def take_notices(self) -> list[Notice]:
         """Return and forget what an operator should hear; the same thing is never said twice."""
         return self._faults.take()

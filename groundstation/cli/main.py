@@ -51,6 +51,7 @@ VERBS: dict[str, Verb] = {
     "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
     "ardrone": Verb("Settings", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
     "calibrate": Verb("Settings", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."),
+    "camera": Verb("Settings", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."),
     "markers": Verb("Settings", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
     "mavlink": Verb("Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."),
     "version": Verb("Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."),

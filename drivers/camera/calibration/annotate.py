@@ -62,13 +62,18 @@ def lines(on: Canvas, texts: Iterable[str], colour: Colour = NOTE) -> None:
         label(on, text, (6, 16 + 17 * row), colour)
 
 
+def jpeg_of(picture: Canvas) -> bytes:
+    """Return a picture as JPEG."""
+    return cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, 90))[1].tobytes()
+
+
 def save(folder: Path, name: str, picture: Canvas) -> Path:
     """Write a picture as JPEG below a folder; raises DriverError where it cannot be written."""
     path = folder / f"{Path(name).stem.replace(' ', '_')}.jpg"
-    done, data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, 90))
-    if not done:
-        raise DriverError(f"{path}: the picture cannot be encoded")
-    path.write_bytes(data.tobytes())
+    try:
+        path.write_bytes(jpeg_of(picture))
+    except OSError as error:
+        raise DriverError(f"{path}: cannot be written ({error.strerror})") from None
     return path
 
 

@@ -1,0 +1,102 @@
+"""`groundstation camera view`: what a camera sees and what the detector finds in it, without flying."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.sources import lens_of, require_folder, require_size, source_of, until_interrupted
+
+if TYPE_CHECKING:
+    from drivers.camera.calibration.looking import Look
+
+_PORT = 8770
+
+
+@click.group(epilog="Example: groundstation camera view http://192.168.1.50:8080/video.mjpg --stream")
+def camera() -> None:
+    """Look through cameras."""
+
+
+@camera.command(
+    epilog="\b\nExamples:\n  groundstation camera view /dev/video0 --calibration config/cameras/ceiling.yaml --stream\n"
+    "  groundstation camera view ardrone://192.168.1.11 -o seen/ --frames 50\n"
+    "  groundstation camera view pictures/ --calibration config/cameras/ceiling.yaml -o seen/\n\n"
+    "Exit codes: 0 done, 2 wrong usage, or pictures of another size than the calibration, 4 no pictures."
+)
+@click.argument("source", callback=source_of)
+@click.option(
+    "--calibration",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="The camera's calibration; without it markers have no distance.",
+)
+@click.option("--square-mm", type=click.FloatRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
+@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Write annotated pictures here.")
+@click.option("--stream", is_flag=True, help="Serve them as MJPEG on loopback, for a browser.")
+@click.option("--port", type=click.IntRange(0, 65535), default=_PORT, show_default=True, help="Where; 0: any free one.")
+@click.option("--frames", type=click.IntRange(1), help="End after so many pictures.")
+def view(
+    source: str,
+    calibration: Path | None,
+    square_mm: float,
+    output: Path | None,
+    stream: bool,
+    port: int,
+    frames: int | None,
+) -> int:
+    """Find markers in the pictures of SOURCE; say, draw and show what was found. Ctrl-C ends it.
+
+    Drawn are corners (a ring on the first), axes, code, distance, residual, age, and the windows searched.
+    """
+    from drivers.camera.calibration.annotate import jpeg_of, save
+    from drivers.camera.calibration.feed import shots
+    from drivers.camera.calibration.looking import Viewer
+    from drivers.camera.calibration.stream import Stream
+
+    lens = lens_of(calibration) if calibration is not None else None
+    if output is not None:
+        require_folder(output)
+    served = Stream(port) if stream else None
+    if served is not None:
+        click.echo(f"{served.url} (Ctrl-C ends it)")
+    viewer, seen = None, Tally()
+    try:
+        with until_interrupted():
+            for shot in shots(source, None if lens is None else (lens.width_px, lens.height_px)):
+                if lens is not None:
+                    require_size(shot, lens, str(calibration))
+                viewer = viewer or Viewer(shot.size, lens, square_mm)
+                look = viewer.look(shot)
+                seen.add(look)
+                if output is not None:
+                    save(output, shot.name, look.picture)
+                if served is not None:
+                    served.show(jpeg_of(look.picture))
+                if frames is not None and seen.pictures >= frames:
+                    break
+    finally:
+        if served is not None:
+            served.close()
+    click.echo(seen.text)
+    return ExitCode.OK
+
+
+class Tally:
+    """Says each picture in a line, and counts."""
+
+    def __init__(self) -> None:
+        self.pictures, self._found, self._cpu_ms = 0, 0, 0.0
+
+    def add(self, look: "Look") -> None:
+        """Take in a picture."""
+        click.echo(look.text)
+        self.pictures += 1
+        self._found += bool(look.marked)
+        self._cpu_ms += look.cpu_ms
+
+    @property
+    def text(self) -> str:
+        """Return how it went."""
+        mean_ms = self._cpu_ms / max(1, self.pictures)
+        return f"{self.pictures} pictures, markers in {self._found} of them, {mean_ms:.1f} ms of CPU each"

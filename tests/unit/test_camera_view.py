@@ -1,0 +1,99 @@
+"""`groundstation camera view`: lines and pictures of what is found, and a stream for a browser."""
+
+import socket
+import threading
+import urllib.request
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from drivers.camera.calibration.stream import Stream
+from drivers.camera.multipart import MultipartParser
+from groundstation.cli.main import run
+from groundstation.geometry.board import EXTENT, raster
+
+WIDTH, HEIGHT, FOCAL = 640, 360, 460.0
+CALIBRATION = {
+    "model": "plumb_bob", "width_px": WIDTH, "height_px": HEIGHT, "fx_px": FOCAL, "fy_px": FOCAL, "cx_px": 319.5,
+    "cy_px": 179.5, "distortion": [0.0, 0.0, 0.0, 0.0, 0.0],
+}  # fmt: skip
+
+
+def picture(code=3, px_per_square=18):
+    """Return a marker that faces the camera in the middle of the picture."""
+    card, _ = raster(code, px_per_square)
+    grey = np.full((HEIGHT, WIDTH), 110, np.uint8)
+    # The board's centre, not the card's, in the principal point.
+    left = round(WIDTH / 2 + EXTENT[0] * px_per_square)
+    top = (HEIGHT - card.shape[0]) // 2
+    grey[top : top + card.shape[0], left : left + card.shape[1]] = card
+    return cv2.GaussianBlur(grey, (0, 0), 0.6)
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "in").mkdir()
+    for number in range(3):
+        cv2.imwrite(str(tmp_path / "in" / f"p{number}.png"), picture())
+    (tmp_path / "lens.yaml").write_text(yaml.safe_dump(CALIBRATION))
+    return tmp_path
+
+
+def test_pictures_are_annotated_and_told(files, capsys):
+    source, lens, out = (str(files / name) for name in ("in", "lens.yaml", "out"))
+    assert run(["camera", "view", source, "--calibration", lens, "-o", out, "--frames", "2"]) == 0
+    said = capsys.readouterr().out
+    # 460 px x 44 mm / 18 px
+    assert "p0.png: marker 3 at 1.12 m" in said and "markers in 2 of them" in said
+    drawn = cv2.imread(str(files / "out" / "p1.jpg"))
+    assert sorted(path.name for path in (files / "out").iterdir()) == ["p0.jpg", "p1.jpg"]
+    plain = cv2.cvtColor(picture(), cv2.COLOR_GRAY2BGR)
+    assert (np.abs(drawn.astype(int) - plain).max(axis=2) > 80).sum() > 200
+
+
+def test_without_a_calibration_nothing_is_said_of_distances(files, capsys):
+    assert run(["camera", "view", str(files / "in"), "--frames", "1"]) == 0
+    assert "marker 3 somewhere" in capsys.readouterr().out
+
+
+def test_bad_input_is_named(files, capsys):
+    (files / "lens.yaml").write_text(yaml.safe_dump(CALIBRATION | {"width_px": 1280}))
+    assert run(["camera", "view", str(files / "in"), "--calibration", str(files / "lens.yaml")]) == 2
+    assert "640x360, the calibration" in capsys.readouterr().err
+    (files / "lens.yaml").write_text("model: plumb_bob\nfx_pixels: 3\n")
+    assert run(["camera", "view", str(files / "in"), "--calibration", str(files / "lens.yaml")]) == 2
+    assert "lens.yaml:2: fx_pixels: unknown key, did you mean" in capsys.readouterr().err
+    (files / "taken").write_text("")
+    assert run(["camera", "view", str(files / "in"), "-o", str(files / "taken" / "below")]) == 2
+    assert "cannot be made" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        assert run(["camera", "view", str(files / "in"), "--stream", "--port", port]) == 2
+    assert f"port {port} cannot be used" in capsys.readouterr().err
+
+
+def test_a_stream_is_one_that_our_own_reader_understands():
+    stream = Stream(0)
+    jpeg = cv2.imencode(".jpg", picture())[1].tobytes()
+    halt = threading.Event()
+
+    def show():
+        while not halt.wait(0.02):
+            stream.show(jpeg)
+
+    shower = threading.Thread(target=show)
+    shower.start()
+    try:
+        with urllib.request.urlopen(stream.url, timeout=5.0) as answer:
+            reader, parts = MultipartParser(b"skein"), []
+            for _ in range(200):
+                parts += reader.feed(answer.read1(65536))
+                if parts:
+                    break
+    finally:
+        halt.set()
+        shower.join()
+        stream.close()
+    assert parts[0] == jpeg

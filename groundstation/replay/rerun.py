@@ -13,7 +13,7 @@ from groundstation.planning.plan import Planner
 from groundstation.replay.ticks import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
 from groundstation.runtime.tracking import Feed, TrackerSection, Tracking
-from groundstation.tracker import Notice, PlanRequest
+from groundstation.tracker import PlanRequest
 
 Words = list[tuple[Topic, Message]]
 
@@ -105,7 +105,7 @@ class JournalWorker:
 
 
 class Rerun:
-    """One life of the tracker, lived again with a field of choice. `notices` are what it would have told."""
+    """One life of the tracker, lived again with a field of choice."""
 
     def __init__(self, field: Mapping[str, Any], site: str, first: JournalEntry, epoch: int) -> None:
         self._arrivals = JournalArrivals()
@@ -118,11 +118,6 @@ class Rerun:
         self._workers.append(JournalWorker(planner))
         return self._workers[-1]
 
-    @property
-    def notices(self) -> list[Notice]:
-        """Return what the operator would have been told so far."""
-        return self._tracking.notices
-
     def tick(self, tick: Tick) -> Words:
         """Live one tick; returns what was published in it, in order."""
         self._arrivals.ready = tick.inputs
@@ -130,5 +125,6 @@ class Rerun:
         for worker in self._workers:
             worker.entry = tick.entry
         self._tracking.tick(tick.entry.now_ns)
+        self._tracking.notices.clear()
         said, self._bus.said = self._bus.said, []
         return said

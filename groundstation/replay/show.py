@@ -1,5 +1,6 @@
 """A recording in the console's own server and page, through a bus that ends in this process."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -73,7 +74,8 @@ class Show:
         said: set[tuple[str, ...]] = set()
         for at_ns, record in self._reel.milestones:
             message = _received(record)
-            at_ms = round(self.playback.boot_ns(at_ns) / _MS, 1)
+            # Never before the event, or a jump to the mark would not show it.
+            at_ms = math.ceil(self.playback.boot_ns(at_ns) / _MS)
             match message and message.message:
                 case Event() as event:
                     text = (

@@ -10,6 +10,7 @@ import numpy as np
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
+from groundstation.estimation.blame import blame
 from groundstation.estimation.correction import log_determinant
 from groundstation.estimation.dispatch import call_locate
 from groundstation.estimation.kernel import kernel
@@ -29,20 +30,6 @@ def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
     if aux[subject, s.ACTIVE] == 0.0 and entities[subject, s.ENTITY_KIND] == s.KIND_ROBOT and rows < 4:
         return s.YAW_MISSING
     return s.PENDING
-
-
-@kernel("boolean(float64[::1], float64[::1], float64, float64)")
-def has_diverged(aux: Array, settings: Array, at: float, nis_over_gate: float) -> bool:
-    """Count wild innovations in a row of one entity; True when they last long enough to blame the belief."""
-    if nis_over_gate <= settings[s.SETTING_WILD]:
-        if nis_over_gate <= 1.0:
-            aux[s.STREAK] = 0.0
-        return False
-    if aux[s.STREAK] == 0.0:
-        aux[s.STREAK_START] = at
-    aux[s.STREAK] += 1.0
-    lasting = at - aux[s.STREAK_START] >= settings[s.SETTING_STREAK_S]
-    return bool(lasting and aux[s.STREAK] >= settings[s.SETTING_STREAK])
 
 
 @kernel(
@@ -207,10 +194,16 @@ def observe(
             return
         write_outcome(out, nis[use, mode], rows, y[use, mode], work[use, mode])
         excess = least(nis[use]) / gate
-        joined = has_diverged(aux[subject], settings, at, excess)
-        if excess > settings[s.SETTING_WILD] and not joined:
-            out[s.OUT_VERDICT] = s.IMPLAUSIBLE
-            return
+        if excess > settings[s.SETTING_WILD]:
+            out[s.OUT_VERDICT] = blame(
+                means[0], covariances[0], aux, entities[0], parameters[0], own, sensor, settings, event, rows, z[use],
+                R[use, 0],
+            )  # fmt: skip
+            if out[s.OUT_VERDICT] != s.PENDING:
+                return
+            joined = True
+        elif excess <= 1.0:
+            aux[subject, s.STREAK] = 0.0
     if joined:
         if not settle(means, covariances, aux, entities, parameters, priors, own, sensor, event, z[use]):
             out[s.OUT_VERDICT] = s.NOT_LOCATED

@@ -27,8 +27,8 @@ STAMP_STD_S = 0.0115
 # A calibrated velocity scale is good to this, and creeps by this in a second.
 _SCALE_STD, _SCALE_DRIFT = 0.04, 0.002
 _VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
-# Deviations of the velocity's error that lasts, and of what is left within 0.2 s, over that of all of it.
-_LASTING_SHARE, _QUICK_SHARE = 0.6, 0.2
+# Deviations of the velocity's error that lasts, and of what is quicker, over that of all of it.
+_LASTING_SHARE, _QUICK_SHARE = 0.6, 0.1
 # A target does the most that it may do for this share of the time.
 _MANOEUVRING_SHARE = 0.07
 
@@ -49,7 +49,7 @@ class _Habits:
 # position: it has no height of its own to report; its velocity follows our errors as slowly as its filter does.
 _HABITS = {
     "ardrone": _Habits(0.4, 5.0, 0.7, 0.0, 0.2, False),
-    "mavlink": _Habits(2.5, 10.0, 2.0, 0.02, 0.0, True),
+    "mavlink": _Habits(5.0, 10.0, 2.0, 0.02, 0.0, True),
 }
 
 
@@ -69,7 +69,7 @@ class EstimatorParameters:
     gate_probability: float = 0.997
     wild_gates: float = 6.0
     divergence_count: int = 5
-    divergence_s: float = 0.25
+    divergence_s: float = 0.6
 
 
 def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:

@@ -68,8 +68,9 @@ SENSOR_COLUMNS = 20
     RATE_X,
     RATE_Y,
     RATE_Z,
-) = range(23)
-AUXILIARY_COLUMNS = 23
+    WILD_AT,
+) = range(24)
+AUXILIARY_COLUMNS = 24
 
 # Odometry condensed into one step of one robot: sums, counts, and the newest yaw.
 (
@@ -117,7 +118,7 @@ OUT_COLUMNS = 25
 (PENDING, ACCEPTED, INFLATED, IMPLAUSIBLE, OUT_OF_VIEW, SINGULAR, OBSERVER_UNKNOWN, SUBJECT_GROUNDED, YAW_MISSING) = (
     range(9)
 )
-NOT_LOCATED = 9
+NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED = 9, 10, 11
 
 # Filter settings handed to the kernels.
 SETTING_STEP, SETTING_WILD, SETTING_STREAK, SETTING_STREAK_S, SETTING_GATE = range(5)  # gates by rows follow

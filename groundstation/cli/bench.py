@@ -11,6 +11,7 @@ BENCHES = {
     "ardrone": ("groundstation.cli.bench_ardrone:ardrone", "Time the AR.Drone codec against a public client's."),
     "planner": ("groundstation.cli.bench_planner:planner", "Time the planar planner against brute force and peers."),
     "mavlink": ("groundstation.cli.bench_mavlink:mavlink", "CPU and delays of driving many MAVLink vehicles."),
+    "estimator": ("groundstation.cli.bench_estimator:estimator", "Time the joint filter, its path, and peers."),
     "recording": ("groundstation.cli.bench_recording:recording", "CPU of writing, opening and seeking recordings."),
 }
 

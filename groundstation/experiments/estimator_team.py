@@ -1,0 +1,139 @@
+"""The team that `bench estimator` runs on: two levels of robots, a ceiling camera, a target, every edge between levels.
+
+30 robots: the camera sees the upper 15, each of these sees the lower 15, each of those sees the target: 255 edges.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from groundstation.estimation import slots as s
+from groundstation.estimation.belief import Array
+from groundstation.estimation.event_log import observation_columns
+from groundstation.estimation.measurement import Measurement
+from groundstation.estimation.models import (
+    ConstantVelocityTarget,
+    FixedMount,
+    MotionModel,
+    MountedCamera,
+    ObservationModel,
+    OdometryRobot,
+)
+from groundstation.estimation.models.camera import measure_relative_pose
+from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
+from groundstation.estimation.tables import State, Tables, empty_state, tables_from_parameters
+from groundstation.geometry.rotations import base_from_tilted_optical
+
+CEILING, TARGET = "ceiling", "target"
+ODOMETRY_HZ, CAMERA_HZ = 200, 30
+SPEED_M_S, TURN_RAD_S = 0.1, 0.05  # what the robots' odometry says in the runs of the bare kernels
+POSITION_STD_M, YAW_STD_RAD = 0.02, 0.03  # of a sighting
+_PRIOR_STD = 0.05
+_GATE = 1.0 - 1e-9  # the peers have none
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """Parameters and tables, where everything truly is (mean, n), and who sees whom."""
+
+    parameters: EstimatorParameters
+    tables: Tables
+    truth: Array
+    robots: tuple[str, ...]
+    edges: tuple[tuple[str, str], ...]
+
+    def index(self, name: str) -> int:
+        """Return the place of an entity in the tables."""
+        return list(self.parameters.entities).index(name)
+
+
+def minimal_parameters(robots: int) -> EstimatorParameters:
+    """Return a team whose robots are no more than (x, y, z, yaw), as the paper's, with odometry that is in time."""
+    tilted = base_from_tilted_optical(math.radians(45.0))
+    names = robot_names(robots)
+    robot = OdometryRobot(slow_states=(), reports_climb=True, velocity_delay_s=0.0, height_delay_s=0.0)
+    entities: dict[str, MotionModel] = dict.fromkeys(names, robot)
+    entities |= {TARGET: ConstantVelocityTarget(), CEILING: FixedMount((0.0, 0.0, 4.0), 0.003, 0.01)}
+    sensors: dict[str, ObservationModel] = {name: MountedCamera(name, tilted, (0.09, 0.0, 0.0)) for name in names}
+    sensors[CEILING] = MountedCamera(CEILING, WORLD_FROM_DOWN, observes_targets=False)
+    return EstimatorParameters(entities, sensors, gate_probability=_GATE)
+
+
+def product_parameters(robots: int, resolved: Mapping[str, Any]) -> EstimatorParameters:
+    """Return a team of copies of the first drone and the first camera of a resolved field, as they are flown."""
+    drone, camera = next(iter(resolved["drones"].values())), next(iter(resolved["cameras"].values()))
+    target = {**resolved["target"], "name": TARGET}
+    drones = dict.fromkeys(robot_names(robots), drone)
+    return parameters_from_field({**resolved, "drones": drones, "target": target, "cameras": {CEILING: camera}})
+
+
+def robot_names(robots: int) -> tuple[str, ...]:
+    """Return the names of the robots, upper level first."""
+    return tuple(f"robot_{i + 1}" for i in range(robots))
+
+
+def team_of(parameters: EstimatorParameters) -> Team:
+    """Return the team of some parameters, hovering in two rows that look at each other and at the target."""
+    tables = tables_from_parameters(parameters)
+    robots = tuple(name for name in parameters.entities if name not in (TARGET, CEILING))
+    upper, lower = robots[: (len(robots) + 1) // 2], robots[(len(robots) + 1) // 2 :]
+    truth = np.zeros(tables.dim)
+    for i, (name, model) in enumerate(parameters.entities.items()):
+        place = truth[tables.part(i)]
+        place[:] = tables.priors[i, 0, : len(model.labels)]
+        if name == TARGET:
+            place[:2] = 4.0, 0.0
+        elif name != CEILING:
+            row = upper if name in upper else lower
+            across = 0.4 * (row.index(name) - 0.5 * (len(row) - 1))
+            place[:4] = (0.0, across, 2.0, 0.1) if row is upper else (2.0, across, 1.2, -0.1)
+    edges = [(CEILING, name) for name in upper] + [(a, b) for a in upper for b in lower]
+    return Team(parameters, tables, truth, robots, (*edges, *((name, TARGET) for name in lower or upper)))
+
+
+def sighting(team: Team, edge: tuple[str, str], stamp_ns: int, rng: np.random.Generator) -> Measurement:
+    """Return what an observer sees of a subject, with noise; a heading only of robots."""
+    observer, subject = map(team.index, edge)
+    rows = 3 if edge[1] == TARGET else 4
+    event, h, H = np.zeros(s.EVENT_COLUMNS), np.zeros(4), np.zeros((2, 4, s.MAX_BLOCK))
+    event[s.EVENT_OBSERVER], event[s.EVENT_SUBJECT] = observer, subject
+    tables = team.tables
+    sensor = tables.sensors[list(team.parameters.sensors).index(edge[0])]
+    measure_relative_pose(team.truth, tables.entities[0], tables.parameters[0], sensor, event, rows, h, H[0], H[1])
+    deviations = np.array([POSITION_STD_M] * 3 + [YAW_STD_RAD])[:rows]
+    z = h[:rows] + deviations * rng.normal(size=rows)
+    x, y, depth, *yaw = z.tolist()
+    covariance = tuple(np.diag(deviations**2).ravel().tolist())
+    return Measurement(stamp_ns, *edge, (x, y, depth), yaw[0] if yaw else None, covariance)
+
+
+def frame_of(team: Team, rng: np.random.Generator) -> Array:
+    """Return the event rows (edges, EVENT_COLUMNS) of one sighting along every edge, all at time 0."""
+    events = np.zeros((len(team.edges), s.EVENT_COLUMNS))
+    sensors = list(team.parameters.sensors)
+    for row, edge in zip(events, team.edges, strict=True):
+        m = sighting(team, edge, 0, rng)
+        columns = observation_columns(m, 0.0, 0, team.index(edge[0]), team.index(edge[1]), sensors.index(edge[0]))
+        row[: len(columns)] = columns
+    return events
+
+
+def joined_state(team: Team, rng: np.random.Generator) -> State:
+    """Return a state in which all have joined, are correlated with each other, and move as their odometry says."""
+    tables, n = team.tables, team.tables.dim
+    state = empty_state(tables, np.ones(len(team.parameters.entities)))
+    root = rng.normal(size=(n, n)) / math.sqrt(n)
+    deviations = np.full(n, _PRIOR_STD)
+    for i in range(len(team.parameters.entities)):
+        part = tables.part(i)
+        deviations[part.start + 4 : part.stop] = np.sqrt(tables.priors[i, 1, 4 : part.stop - part.start])
+    P = deviations[:, None] * (0.5 * root @ root.T + 0.5 * np.eye(n)) * deviations
+    state.covariances[0] = 0.5 * (P + P.T)
+    state.means[0] = team.truth
+    state.aux[:, s.ACTIVE] = 1.0
+    for name in team.robots:
+        state.aux[team.index(name), [s.HELD_VX, s.HELD_VY, s.YAW_RATE]] = SPEED_M_S, -0.5 * SPEED_M_S, TURN_RAD_S
+    return state

@@ -1,0 +1,44 @@
+"""`groundstation bench console`: what the page's server costs, and how old an estimate is when it is sent and drawn."""
+
+import json
+import shutil
+from typing import Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+_CHROMIUM = "/usr/bin/chromium"
+_LIMITS = {"cpu_percent_of_core": 5.0, "estimate_to_socket_ms": 60.0, "estimate_to_drawn_ms": 60.0}
+
+
+@click.command(epilog="Example: groundstation bench console --seconds 20 --json")
+@click.option("--seconds", type=click.FloatRange(2, 600), default=20.0, show_default=True, help="How long.")
+@click.option("--drones", type=click.IntRange(1, 20), default=4, show_default=True, help="How many talk.")
+@click.option("--no-browser", is_flag=True, help="Leave out what needs Chromium.")
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int:
+    """Feed a console with a team's messages and two cameras' pictures at 5 Hz, and look at it once as a page does.
+
+    The server's cost is CPU time. Delays are medians of wall time: a busy machine shows in them, so its load is
+    printed. Exit code 0 when all limits are kept, 1 when one is not.
+    """
+    from groundstation.console.bench import load_average, measure
+
+    browser = "" if no_browser else shutil.which(_CHROMIUM) or ""
+    figures: dict[str, Any] = {"drones": drones, "seconds": seconds, **measure(seconds, drones, browser)}
+    figures["ratio_to_peer"] = round(figures["cpu_percent_of_core"] / figures["peer"]["cpu_percent_of_core"], 2)
+    figures["load_average"] = load_average()
+    figures["limits"] = _LIMITS
+    broken = [name for name, limit in _LIMITS.items() if name in figures and not _value(figures[name]) <= limit]
+    if as_json:
+        click.echo(json.dumps(figures | {"passed": not broken}, indent=2))
+    else:
+        for name, value in figures.items():
+            click.echo(f"{name.replace('_', ' '):24} {value}")
+        click.echo(f"missed: {', '.join(broken)}" if broken else "all limits are kept")
+    return ExitCode.FAILED if broken else ExitCode.OK
+
+
+def _value(figure: Any) -> float:
+    return float(figure["median"] if isinstance(figure, dict) else figure)

@@ -1,6 +1,7 @@
 """The web application: the files, the token, and the WebSocket's two directions."""
 
 import asyncio
+import contextlib
 import itertools
 from collections import Counter
 from collections.abc import Callable
@@ -14,12 +15,16 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from groundstation.console.board import Board
 from groundstation.console.gate import Gate
 from groundstation.console.pages import StaticFile
-from groundstation.console.protocol import decode
+from groundstation.console.protocol import Hello, decode
 from groundstation.console.session import Sessions
 from groundstation.console.viewer import Viewer
 from groundstation.errors import MessageError
 
 MAX_VIEWERS = 100
+# Places beyond these for pages of the operator, who is asked for only then, and a bound on how many are asked at once.
+_OPERATORS_PLACES = 4
+_ASKED = 20
+_ANSWER_S = 1.0
 _CLOSE_POLICY, _CLOSE_FULL, _CLOSE_SLOW = 1008, 1013, 1013
 _GONE = (WebSocketDisconnect, ConnectionError, RuntimeError)
 
@@ -39,6 +44,7 @@ class ConsoleApp:
         self._pages, self._token, self._board, self._sessions, self._seed = pages, token, board, sessions, seed
         self._clock = clock
         self._numbers = itertools.count(1)
+        self._asked = 0
         self.refused: Counter[str] = Counter()
         routes = [
             WebSocketRoute("/ws", self._socket),
@@ -59,12 +65,16 @@ class ConsoleApp:
 
     async def _socket(self, socket: WebSocket) -> None:
         await socket.accept()
-        if len(self._sessions.viewers) >= MAX_VIEWERS:
+        first = None
+        if len(self._sessions.viewers) >= MAX_VIEWERS and (first := await self._operators_hello(socket)) is None:
             self.refused["full"] += 1
-            await socket.close(_CLOSE_FULL, f"{MAX_VIEWERS} viewers are connected already")
+            with contextlib.suppress(*_GONE):
+                await socket.close(_CLOSE_FULL, f"{MAX_VIEWERS} viewers are connected already")
             return
         viewer = Viewer(next(self._numbers), self._board, socket.send_text, socket.send_bytes, self._clock)
         self._sessions.add(viewer)
+        if first is not None:
+            self._sessions.handle(viewer, first)
         listening = asyncio.create_task(self._listen(socket, viewer))
         sending = asyncio.create_task(viewer.run(self._seed))
         try:
@@ -75,6 +85,19 @@ class ConsoleApp:
                 task.cancel()
             results = await asyncio.gather(listening, sending, return_exceptions=True)
             await self._farewell(socket, viewer, results[0])
+
+    async def _operators_hello(self, socket: WebSocket) -> Hello | None:
+        """Return what a page says first where that shows it to be the operator's, who is let in even if it is full."""
+        if self._asked >= _ASKED or len(self._sessions.viewers) >= MAX_VIEWERS + _OPERATORS_PLACES:
+            return None
+        self._asked += 1
+        try:
+            message = decode(await asyncio.wait_for(socket.receive_text(), _ANSWER_S))
+        except (TimeoutError, KeyError, MessageError, *_GONE):
+            return None
+        finally:
+            self._asked -= 1
+        return message if isinstance(message, Hello) and self._sessions.is_operators(message) else None
 
     async def _listen(self, socket: WebSocket, viewer: Viewer) -> str:
         """Obey the page until it goes; returns why it must go, if it must."""

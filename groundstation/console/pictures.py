@@ -13,8 +13,16 @@ from groundstation.geometry.lens import CameraIntrinsics
 # Half of the board's long side, quiet zone included [m]: the ring that is drawn around a detection.
 _RING_M = 0.16
 _REMEMBERED = 8
-# Pictures come at 5 a second at most; a sender that does not keep to it is held to it here.
-_PERIOD_NS = 190_000_000
+# Pictures come at 5 a second at most; a sender that does not keep to it is held to it here, on the average: what comes
+# is looked at in turns of 50 ms.
+_PERIOD_NS = 200_000_000
+_EARLY_NS = 60_000_000
+# A browser decodes what it is sent: 20 megapixels are 80 MB there.
+_MAX_BYTES = 4_000_000
+_MAX_PIXELS = 20_000_000
+# WIRE: JPEG (ISO/IEC 10918-1, B.1.1.3): start-of-frame markers, all of C0..CF but tables (C4, C8, CC).
+_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_MAX_SEGMENTS = 200
 
 
 class PictureDesk:
@@ -23,36 +31,42 @@ class PictureDesk:
     def __init__(self, lenses: Mapping[str, CameraIntrinsics]) -> None:
         self._lenses = lenses
         self._stamps: dict[str, int] = {}
-        self._taken: dict[str, int] = {}
-        self._seen: dict[str, dict[int, list[dict[str, Any]]]] = {}
+        self._due: dict[str, int] = {}
+        self._seen: dict[str, dict[int, list[RelativeObservation]]] = {}
+        self._marks: dict[str, list[dict[str, Any]]] = {}
         self.frames: dict[str, bytes] = {}
+        self.refused: dict[str, str] = {}
 
     def take_picture(self, camera: str, header: Header, jpeg: bytes, now_ns: int) -> bool:
-        """Keep a picture; returns whether it is to be shown. Its frame for viewers is in `frames`."""
-        if now_ns - self._taken.get(camera, 0) < _PERIOD_NS or not jpeg.startswith(b"\xff\xd8"):
+        """Keep a picture; returns whether it is to be shown. Its frame for viewers is in `frames`.
+
+        Why the newest of a camera is not shown, if it is not, is in `refused`.
+        """
+        due_ns = self._due.get(camera, 0)
+        if now_ns < due_ns - _EARLY_NS:
             return False
-        self._taken[camera], self._stamps[camera] = now_ns, header.stamp_ns
-        self.frames[camera] = frame_of(camera, header.stamp_ns, jpeg)
+        self._due[camera] = max(due_ns, now_ns - _EARLY_NS) + _PERIOD_NS
+        problem = problem_of(jpeg)
+        if problem:
+            self.refused[camera] = problem
+            return False
+        self.refused.pop(camera, None)
+        stamp_ns = self._stamps[camera] = header.stamp_ns
+        self.frames[camera] = frame_of(camera, stamp_ns, jpeg)
+        found = self._seen.get(camera, {}).get(stamp_ns, [])
+        self._marks[camera] = [mark for observation in found for mark in self._marks_of(observation)]
         return True
 
     def take_detection(self, observation: RelativeObservation) -> None:
         """Keep where in the picture a marker was."""
-        lens = self._lenses.get(observation.camera)
-        if lens is None:
+        camera, stamp_ns = observation.camera, observation.header.stamp_ns
+        if camera not in self._lenses:
             return
-        x, y, z = observation.position_m
-        pixel = lens.project(np.array([x, y, z]))
-        if not math.isfinite(pixel[0]):
+        if self._stamps.get(camera) == stamp_ns:
+            self._marks[camera] += self._marks_of(observation)
             return
-        by_stamp = self._seen.setdefault(observation.camera, {})
-        mark = {
-            "subject": observation.subject,
-            "u": round(float(pixel[0]), 1),
-            "v": round(float(pixel[1]), 1),
-            "r": round(lens.fx_px * _RING_M / z, 1),
-            "range_m": round(math.sqrt(x * x + y * y + z * z), 2),
-        }
-        by_stamp.setdefault(observation.header.stamp_ns, []).append(mark)
+        by_stamp = self._seen.setdefault(camera, {})
+        by_stamp.setdefault(stamp_ns, []).append(observation)
         while len(by_stamp) > _REMEMBERED:
             del by_stamp[next(iter(by_stamp))]
 
@@ -63,11 +77,55 @@ class PictureDesk:
                 "stamp_ms": stamp / 1e6,
                 "width": lens.width_px,
                 "height": lens.height_px,
-                "marks": self._seen.get(camera, {}).get(stamp, []),
+                "marks": self._marks[camera],
             }
             for camera, stamp in self._stamps.items()
             if (lens := self._lenses.get(camera)) is not None
         }
+
+    def _marks_of(self, observation: RelativeObservation) -> list[dict[str, Any]]:
+        lens = self._lenses.get(observation.camera)
+        if lens is None:
+            return []
+        x, y, z = observation.position_m
+        pixel = lens.project(np.array([x, y, z]))
+        if not math.isfinite(pixel[0]):
+            return []
+        mark = {
+            "subject": observation.subject,
+            "u": round(float(pixel[0]), 1),
+            "v": round(float(pixel[1]), 1),
+            "r": round(lens.fx_px * _RING_M / z, 1),
+            "range_m": round(math.sqrt(x * x + y * y + z * z), 2),
+        }
+        return [mark]
+
+
+def problem_of(jpeg: bytes) -> str:
+    """Return "" for a JPEG that a browser may be given, else what is wrong with it; looks at its head only."""
+    if len(jpeg) > _MAX_BYTES:
+        return f"picture of {len(jpeg) / 1e6:.0f} MB, at most {_MAX_BYTES / 1e6:.0f} MB are shown"
+    size = jpeg_size(jpeg)
+    if size is None:
+        return "not a JPEG picture"
+    width, height = size
+    if not 0 < width * height <= _MAX_PIXELS:
+        return f"picture of {width} x {height} pixels, at most {_MAX_PIXELS // 10**6} million are shown"
+    return ""
+
+
+def jpeg_size(jpeg: bytes) -> tuple[int, int] | None:
+    """Return width and height that a JPEG's frame header states [px]; None where there is no such header."""
+    if not jpeg.startswith(b"\xff\xd8"):
+        return None
+    at = 2
+    for _ in range(_MAX_SEGMENTS):
+        if at + 9 > len(jpeg) or jpeg[at] != 0xFF:
+            return None
+        if jpeg[at + 1] in _FRAME_MARKERS:
+            return int.from_bytes(jpeg[at + 7 : at + 9], "big"), int.from_bytes(jpeg[at + 5 : at + 7], "big")
+        at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
+    return None
 
 
 def frame_of(camera: str, stamp_ns: int, jpeg: bytes) -> bytes:

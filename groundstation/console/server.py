@@ -196,6 +196,7 @@ class ConsoleServer:
 
     def _put_own(self, now_ns: int) -> None:
         self.board.put("detections", self._pictures.detections())
+        self.board.put("refused_pictures", self._pictures.refused)
         self.board.put("orders", self.sessions.desk.summary())
         self.board.put("session", self.sessions.summary(now_ns))
         if self._player is not None:

@@ -79,6 +79,10 @@ class Sessions:
         if viewer.client and not any(other.client == viewer.client for other in self.viewers.values()):
             self.helm.left(viewer.client, clock.now_ns())
 
+    def is_operators(self, hello: Hello) -> bool:
+        """Whether this is said by a page of the operator."""
+        return self.helm.client == hello.client and self._has_token(hello)
+
     def summary(self, now_ns: int) -> dict[str, Any]:
         """Return who is here and who is in command."""
         return {
@@ -134,12 +138,15 @@ class Sessions:
 
     def _greet(self, viewer: Viewer, hello: Hello) -> None:
         viewer.client = hello.client
-        viewer.trusted = hmac.compare_digest(hello.token.encode(), self._token.encode())
+        viewer.trusted = self._has_token(hello)
         if viewer.trusted:
             self.helm.arrived(viewer.client, viewer.name)
         else:
             self.refused["token"] += 1
         viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, trusted=viewer.trusted))
+
+    def _has_token(self, hello: Hello) -> bool:
+        return hmac.compare_digest(hello.token.encode(), self._token.encode())
 
     def _order(self, viewer: Viewer, order: Order) -> None:
         if order.verb not in STOPS:

@@ -240,12 +240,81 @@ def test_there_is_room_for_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
         pages = [await site.connect() for _ in range(5)]
         await until(lambda: len(site.server.sessions.viewers) == 5)
         async with site.connect() as one_more:
-            assert (await site.closed(one_more))[0] == 1013
+            assert await site.closed(one_more) == (1013, "5 viewers are connected already")
+        # The operator whose page comes back finds a place, and nobody who only says he is.
+        hello = {"type": "hello", "token": await site.token(), "client": "abcd"}
+        await pages[0].send(json.dumps(hello))
+        await pages[0].send(json.dumps({"type": "takeover"}))
+        await until(lambda: site.server.sessions.helm.client == "abcd")
+        for claim in (hello | {"client": "efgh"}, hello | {"token": "guess"}, {"type": "takeover"}):
+            async with site.connect() as pretender:
+                await pretender.send(json.dumps(claim))
+                assert (await site.closed(pretender))[0] == 1013
+        async with site.connect() as again:
+            await again.send(json.dumps(hello))
+            assert json.loads(await again.recv())["type"] in ("welcome", "seed")
+            assert len(site.server.sessions.viewers) == 6
         for page in pages:
             await page.close()
         await until(lambda: not site.server.sessions.viewers)
         async with site.connect() as page:
             assert json.loads(await page.recv())["type"] == "seed"
+
+    run(test)
+
+
+def test_a_hundred_connections_leave_the_operator_his_page() -> None:
+    async def test(site: Site) -> None:
+        token = await site.token()
+        async with site.connect() as page:
+            await page.send(json.dumps({"type": "hello", "token": token, "client": "abcd"}))
+            silent = [await site.connect() for _ in range(app.MAX_VIEWERS - 1)]
+            async with site.connect() as one_more:
+                assert (await site.closed(one_more))[0] == 1013
+            await page.send(json.dumps({"type": "order", "verb": "LAND", "drones": [], "at_ms": 0}))
+            (received,) = await until(site.commands.drain)
+            assert received.message.verb is m.Verb.LAND
+            for other in silent:
+                other.transport.abort()
+        await until(lambda: not site.server.sessions.viewers)
+
+    run(test)
+
+
+FRAME = st.builds(
+    lambda first, mask, size, body: bytes((first, mask | size)) + body,
+    st.integers(0, 255),
+    st.sampled_from((0, 0x80)),
+    st.integers(0, 127),
+    st.binary(max_size=40),
+)
+
+
+@pytest.mark.fuzz
+@settings(max_examples=8, deadline=None)
+@given(st.lists(st.lists(FRAME, min_size=1, max_size=6), min_size=8, max_size=8))
+def test_no_bytes_on_the_wire_disturb_the_others(attempts: list[list[bytes]]) -> None:
+    async def test(site: Site) -> None:
+        origin = f"http://127.0.0.1:{site.port}"
+        shake = (
+            f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{site.port}\r\nOrigin: {origin}\r\nUpgrade: websocket\r\n"
+            "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+        )
+        async with site.connect() as good:
+            for frames in attempts:
+                reader, writer = await asyncio.open_connection("127.0.0.1", site.port)
+                writer.write(shake.encode())
+                assert b"101" in await reader.readline()
+                writer.write(b"".join(frames))
+                writer.write_eof()
+                with contextlib.suppress(ConnectionError):
+                    await asyncio.wait_for(reader.read(), 5)
+                writer.close()
+            await until(lambda: len(site.server.sessions.viewers) == 1)
+            before = site.server.board.turn
+            await until(lambda: site.server.board.turn > before)
+            await good.recv()
+        assert site.commands.drain() == []
 
     run(test)
 

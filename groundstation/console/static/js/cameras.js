@@ -62,8 +62,10 @@ function draw(name, { canvas, bitmap, stamp }) {
   g.drawImage(bitmap, 0, 0, width, height);
   const found = store.s.detections?.[name];
   if (!found || Math.abs(found.stamp_ms - stamp) > 0.01) return;
+  // Marks are in pixels of the calibration, which need not be those of the picture.
+  const zoom = width / found.width;
   for (const mark of found.marks) {
-    const [u, v, r] = [mark.u * scale, mark.v * scale, Math.max(8, mark.r * scale)], colour = colourOf(mark.subject);
+    const [u, v, r] = [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)], colour = colourOf(mark.subject);
     const tint = mark.subject === store.scene.target.name ? "#ffe14d" : colour;
     for (const [style, line] of [["#000", 5], [tint, 2.5]]) {
       g.strokeStyle = style;
@@ -88,8 +90,9 @@ export function showCameras() {
     const status = store.s.cameras?.[name], old = ageS(stamp), stale = old > STALE_S || !store.connected;
     root.classList.toggle("stale", stale && stamp !== null);
     text(age, `${status ? `${status.fps.toFixed(0)} fps` : ""} ${Number.isFinite(old) ? `${(1000 * old).toFixed(0)} ms` : ""}`.trim());
-    veil.hidden = !stale;
-    text(veil, stamp === null ? (status && !status.connected ? `no pictures${status.detail ? `: ${status.detail}` : ""}` : "no picture yet") : `${seconds(old)} old`);
-    veil.dataset.level = stamp === null ? "wait" : "bad";
+    const refused = store.s.refused_pictures?.[name];
+    veil.hidden = !stale && !refused;
+    text(veil, refused ? refused : stamp === null ? (status && !status.connected ? `no pictures${status.detail ? `: ${status.detail}` : ""}` : "no picture yet") : `${seconds(old)} old`);
+    veil.dataset.level = stamp === null && !refused ? "wait" : "bad";
   }
 }

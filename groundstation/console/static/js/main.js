@@ -17,7 +17,7 @@ import { View } from "./view.js";
 
 const SLOW_MS = 200;
 const NAMES = { footprints: "Footprints", graph: "Sensing graph", trails: "Trails", velocities: "Velocities", truth: "Truth" };
-let dirty = true, undrawnStamp = null, lastSlow = 0, builtFor = "";
+let dirty = true, undrawnStamp = null, lastSlow = 0, lastFrame = 0, builtFor = "";
 
 const view = new View(byId("map"), () => { dirty = true; });
 
@@ -73,6 +73,8 @@ function describe() {
 }
 
 function frame(at) {
+  drawn.gapS = (at - lastFrame) / 1000;
+  lastFrame = at;
   if (at - lastSlow > SLOW_MS) {
     lastSlow = at;
     showAll();
@@ -135,7 +137,7 @@ window.__console = {
   get state() {
     return {
       frames: store.frames, seeds: store.seeds, seq: store.seq, run: store.run, connected: store.connected, client: me.client, trusted: me.trusted,
-      draws: drawn.draws, drawMs: drawn.ms, ellipses: structuredClone(drawn.ellipses), latencies: [...drawn.latencies], pictures: { ...pictures },
+      draws: drawn.draws, drawMs: drawn.ms, ellipses: structuredClone(drawn.ellipses), latencies: [...drawn.latencies], marks: structuredClone(drawn.marks), pictures: { ...pictures },
       playback: structuredClone(store.s.playback ?? null), nowMs: now(), sections: structuredClone(store.s), samples: store.samples.length,
       orders: structuredClone(store.s.orders ?? []), estimateAge: estimateAge(), trail: Object.fromEntries(Object.entries(store.trails).map(([name, trail]) => [name, trail.length])),
       scale: view.scale, points: Object.fromEntries(entities().map(({ name, mean }) => [name, view.point(mean[0], mean[1])])), at: Object.fromEntries(entities().map(({ name, mean }) => [name, mean])),

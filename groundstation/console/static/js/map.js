@@ -7,7 +7,9 @@ import { estimateAge, store } from "./store.js";
 
 const STALE_S = 0.5;
 export const layers = { footprints: true, graph: true, trails: true, velocities: true, truth: true };
-export const drawn = { draws: 0, ms: 0, ellipses: {}, latencies: [] };
+// marks: when the first picture of the room stood [ms since the page was asked for], how old what we showed was when a
+// banner said so [s], and how long the browser had not let us draw until then [s].
+export const drawn = { draws: 0, ms: 0, ellipses: {}, latencies: [], gapS: 0, marks: {} };
 
 export function drawMap(view, ghost) {
   if (!store.scene) return;
@@ -27,5 +29,6 @@ export function drawMap(view, ghost) {
   g.globalAlpha = 1;
   if (ghost) drawGhost(g, view, ghost);
   drawn.draws += 1;
+  drawn.marks.firstMs ??= performance.now();
   drawn.ms = performance.now() - began;
 }

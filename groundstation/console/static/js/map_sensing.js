@@ -5,6 +5,8 @@ import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./pen.js";
 import { ageS, droneNames, entities, entity, isSeen, store } from "./store.js";
 
+const FIGURE_PX = 75;
+
 export function drawFootprints(g, view) {
   const alpha = g.globalAlpha, [w, h] = store.scene.room.size_m;
   g.save();
@@ -22,9 +24,8 @@ export function drawFootprints(g, view) {
     g.lineWidth = 1.5;
     g.stroke();
     g.setLineDash([]);
-    const top = points.reduce((best, p) => (p[1] > best[1] ? p : best));
-    const [, y] = view.point(...top);
-    label(g, `${camera.name} at ${height.toFixed(1)} m`, view.point(camera.position_m[0], 0)[0], y - 5, ink().dim, 11, 400);
+    const [x, y] = view.point(Math.min(...points.map((p) => p[0])), Math.min(...points.map((p) => p[1])));
+    label(g, `${camera.name} at ${height.toFixed(1)} m`, x, y + 13, ink().dim, 11, 400, "left");
   }
   for (const drone of store.scene.drones) {
     const body = entity(drone.name);
@@ -65,6 +66,8 @@ export function drawGraph(g, view) {
     drawArrow(g, view.point(a[0], a[1]), view.point(b[0], b[1]), thickness(information), colour, 0.3 * view.scale);
     g.setLineDash([]);
     g.globalAlpha = alpha;
+    // Where the link is shorter than its figure the thickness must do.
+    if (Math.hypot(a[0] - b[0], a[1] - b[1]) * view.scale < FIGURE_PX) continue;
     const [x, y] = view.point((a[0] + b[0]) / 2, (a[1] + b[1]) / 2);
     label(g, `${information >= 10 ? Math.round(information) : information.toFixed(1)} m⁻²${seen ? "" : " unseen"}`, x, y - 5, colour, 11, 500);
   }

@@ -25,6 +25,7 @@ export function showBanners() {
   }
   const host = byId("banners"), kinds = banners.map(([kind]) => kind).join();
   if (host.dataset.kinds !== kinds) {
+    noteSilence(kinds.split(","), (host.dataset.kinds ?? "").split(","), { tracker: age, silent: silentS() });
     host.dataset.kinds = kinds;
     host.replaceChildren(...banners.map(([kind, , , , shell]) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
   }
@@ -34,6 +35,11 @@ export function showBanners() {
     text(node.children[0], `${grave ? "⚠ " : ""}${title}`);
     text(node.children[1], more);
   });
+}
+
+// For tests: how late the page was to say that something is silent.
+function noteSilence(kinds, before, ages) {
+  for (const [kind, afterS] of Object.entries(ages)) if (kinds.includes(kind) && !before.includes(kind)) drawn.marks[kind] = { afterS, gapS: drawn.gapS };
 }
 
 export function showTop() {

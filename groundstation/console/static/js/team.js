@@ -19,6 +19,7 @@ export function buildTeam() {
 }
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
+const BELIEF = ["position", "ellipse", "speed", "by"];
 const WIDE = new Set(["position", "ellipse", "by"]);
 
 function card(name, fields, drone) {
@@ -63,9 +64,17 @@ function showVehicle(name, { root, values, mode, detail }) {
   showBattery(values.battery, status.battery, store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15);
   text(values.rate, `${status.rate_hz.toFixed(0)} Hz`);
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
-  text(values.link, status.link === null ? "?" : `${(100 * status.link).toFixed(0)} %`);
+  showLink(values.link, status.link);
   detail.hidden = !status.detail;
   text(detail, status.detail);
+}
+
+// What share of the packets or of the signal arrives, as the driver says it.
+function showLink(node, share) {
+  const level = share === null || share === undefined ? "unknown" : share < 0.3 ? "empty" : share < 0.6 ? "low" : "full";
+  text(node, level === "unknown" ? "?" : `${(100 * share).toFixed(0)} %${{ full: "", low: " weak", empty: " bad!" }[level]}`);
+  node.className = level === "low" || level === "empty" ? level : "";
+  node.dataset.link = level;
 }
 
 function showBattery(node, value, least) {
@@ -83,6 +92,8 @@ function showBattery(node, value, least) {
 
 function showBelief(name, { root, values, mode, drone }) {
   const body = entity(name), age = body ? estimateAge() + body.age_s : Infinity;
+  const old = estimateAge() > STALE_S;
+  for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s;
     text(mode, !body ? "not found yet" : lost ? "lost" : "tracked");

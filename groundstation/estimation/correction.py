@@ -1,6 +1,8 @@
 """One correction of the joint belief by a measurement of up to four rows that touches two blocks of the state.
 
-Joseph's form: (I - K H) P (I - K H)^T + K R K^T, symmetric by construction and positive definite for any gain.
+P - (L^-1 H P)^T (L^-1 H P) with S = L L^T: Joseph's form less a square of rounding errors (see `apply`). P stays
+symmetric to the bit, and positive definite because R is never below what double precision tells from an exact
+measurement.
 """
 
 import math
@@ -10,7 +12,7 @@ import numpy as np
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import cholesky, solve_rows
+from groundstation.estimation.linear import cholesky
 
 
 @kernel("void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])")
@@ -96,51 +98,53 @@ def inflate(HPH: Array, R: Array, rows: int, factor: float) -> None:
             R[i, j] = factor * R[i, j] + (factor - 1.0) * 0.5 * (HPH[i, j] + HPH[j, i])
 
 
-@kernel("void(float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1])")
-def subtract_two(P: Array, K_0: Array, C_0: Array, K_1: Array, C_1: Array) -> None:
-    """Subtract K^T C + C^T K from P for two rows each, in one pass and symmetric to the bit."""
+@kernel("void(float64[:,::1], float64[:,::1])")
+def subtract_two(P: Array, V: Array) -> None:
+    """Subtract V^T V from P for two rows, in one pass and symmetric to the bit."""
+    V_0, V_1 = V[0], V[1]
     for a in range(P.shape[0]):
-        row, k_0, c_0, k_1, c_1 = P[a], K_0[a], C_0[a], K_1[a], C_1[a]
+        row, v_0, v_1 = P[a], V_0[a], V_1[a]
         for j in range(P.shape[0]):
-            row[j] -= (k_0 * C_0[j] + c_0 * K_0[j]) + (k_1 * C_1[j] + c_1 * K_1[j])
+            row[j] -= v_0 * V_0[j] + v_1 * V_1[j]
 
 
-@kernel("void(float64[:,::1], float64[:,::1], float64[:,::1])")
-def subtract_four(P: Array, K: Array, C: Array) -> None:
-    """Subtract K^T C + C^T K from P for four rows each, in one pass and symmetric to the bit."""
-    K_0, K_1, K_2, K_3 = K[0], K[1], K[2], K[3]
-    C_0, C_1, C_2, C_3 = C[0], C[1], C[2], C[3]
+@kernel("void(float64[:,::1], float64[:,::1])")
+def subtract_four(P: Array, V: Array) -> None:
+    """Subtract V^T V from P for four rows, in one pass and symmetric to the bit."""
+    V_0, V_1, V_2, V_3 = V[0], V[1], V[2], V[3]
     for a in range(P.shape[0]):
-        row, k_0, c_0, k_1, c_1 = P[a], K_0[a], C_0[a], K_1[a], C_1[a]
-        k_2, c_2, k_3, c_3 = K_2[a], C_2[a], K_3[a], C_3[a]
+        row, v_0, v_1, v_2, v_3 = P[a], V_0[a], V_1[a], V_2[a], V_3[a]
         for j in range(P.shape[0]):
-            row[j] -= ((k_0 * C_0[j] + c_0 * K_0[j]) + (k_1 * C_1[j] + c_1 * K_1[j])) + (
-                (k_2 * C_2[j] + c_2 * K_2[j]) + (k_3 * C_3[j] + c_3 * K_3[j])
-            )
+            row[j] -= (v_0 * V_0[j] + v_1 * V_1[j]) + (v_2 * V_2[j] + v_3 * V_3[j])
 
 
-@kernel("void(float64[::1], float64[:,::1], int64, float64[:,::1], float64[:,::1], float64[:,::1], float64[::1])")
-def apply(mean: Array, P: Array, rows: int, W: Array, S: Array, factor: Array, y: Array) -> None:
-    """Correct mean and P in place, given W = H P (4, n), S and its Cholesky factor.
+@kernel("void(float64[::1], float64[:,::1], int64, float64[:,::1], float64[:,::1], float64[::1])")
+def apply(mean: Array, P: Array, rows: int, W: Array, factor: Array, y: Array) -> None:
+    """Correct mean and P in place, given W = H P (4, n) and the Cholesky factor L of S.
 
-    Joseph's form, multiplied out: (I - K H) P (I - K H)^T + K R K^T = P - K C - (K C)^T with C = W - S K^T / 2, which
-    is symmetric and does not need K to be the best gain.
+    Joseph's form (I - K H) P (I - K H)^T + K R K^T, multiplied out with V = L^-1 W and U = L^T K, is
+    P - V^T V + (U - V)^T (U - V). U - V is what rounding did to the gain (1e-16 of V): its square is left out.
     """
     n = P.shape[0]
-    K, C = np.zeros((4, n)), np.zeros((4, n))
-    solve_rows(factor, rows, W, K)
+    V, u = np.zeros((4, n)), np.empty(4)
     for i in range(rows):
+        u[i] = y[i]
         for j in range(n):
-            mean[j] += K[i, j] * y[i]
-            C[i, j] = W[i, j]
-        for k in range(rows):
-            f = 0.5 * S[i, k]
+            V[i, j] = W[i, j]
+        for k in range(i):
+            f = factor[i, k]
+            u[i] -= f * u[k]
             for j in range(n):
-                C[i, j] -= f * K[k, j]
+                V[i, j] -= f * V[k, j]
+        d = 1.0 / factor[i, i]
+        u[i] *= d
+        for j in range(n):
+            V[i, j] *= d
+            mean[j] += V[i, j] * u[i]
     if rows > 2:
-        subtract_four(P, K, C)
+        subtract_four(P, V)
     else:
-        subtract_two(P, K[0], C[0], K[1], C[1])
+        subtract_two(P, V)
 
 
 @kernel("boolean(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1])")

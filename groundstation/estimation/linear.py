@@ -37,27 +37,3 @@ def cholesky(matrix: Array, size: int) -> bool:
                 value -= matrix[row, k] * matrix[column, k]
             matrix[row, column] = value / root
     return True
-
-
-@kernel("void(float64[:,::1], int64, float64[:,::1], float64[:,::1])")
-def solve_rows(factor: Array, size: int, W: Array, K: Array) -> None:
-    """Write S^-1 W into K for W, K (size, n), from the Cholesky factor of S."""
-    n = W.shape[1]
-    for i in range(size):
-        for j in range(n):
-            K[i, j] = W[i, j]
-        for k in range(i):
-            f = factor[i, k]
-            for j in range(n):
-                K[i, j] -= f * K[k, j]
-        d = 1.0 / factor[i, i]
-        for j in range(n):
-            K[i, j] *= d
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            f = factor[k, i]
-            for j in range(n):
-                K[i, j] -= f * K[k, j]
-        d = 1.0 / factor[i, i]
-        for j in range(n):
-            K[i, j] *= d

@@ -124,11 +124,7 @@ def correct(
     if factor > 1.0:
         inflate(work[2], R, rows, factor)
         surprise(work[2], R, y, rows, work[3])
-    S = np.empty((4, 4))
-    for i in range(rows):
-        for j in range(rows):
-            S[i, j] = 0.5 * (work[2, i, j] + work[2, j, i]) + R[i, j]
-    apply(mean, P, rows, W, S, work[3], y)
+    apply(mean, P, rows, W, work[3], y)
     for e in range(entities.shape[0]):
         if entities[e, s.AT_YAW] >= 0:
             yaw = entities[e, s.ENTITY_START] + entities[e, s.AT_YAW]

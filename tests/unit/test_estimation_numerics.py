@@ -23,7 +23,7 @@ def correct(P, R, H, y):
     project_columns(W[:rows], 0, n, H, 0, 0, nothing, rows, HPH)
     bound_precision(HPH, R, rows)
     nis = surprise(HPH, R, y, rows, factor)
-    apply(mean, P, rows, W, 0.5 * (HPH + HPH.T) + R, factor, y)
+    apply(mean, P, rows, W, factor, y)
     return mean, nis
 
 
@@ -109,10 +109,7 @@ def fly(mean, P, F, H, R, steps, worst):
                 noise[i, k] = R[i, k]
         bound_precision(S, noise, rows)
         surprise(S, noise, y, rows, factor)
-        for i in range(rows):
-            for k in range(rows):
-                S[i, k] = 0.5 * (S[i, k] + S[k, i]) + noise[i, k]
-        apply(mean, P, rows, W, S, factor, y)
+        apply(mean, P, rows, W, factor, y)
         for i in range(n):
             for j in range(n):
                 work[i, j] = P[i, j]

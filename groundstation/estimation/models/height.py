@@ -4,6 +4,8 @@ Over an object the height falls by the object's height while the vehicle does no
 belief cannot explain is the floor's: the floor entry forgets what it knew and takes the jump; the vehicle stays.
 """
 
+import math
+
 import numpy as np
 
 from groundstation.estimation.belief import Array
@@ -77,19 +79,19 @@ def attribute_jump(
 def correct_height(mean: Array, P: Array, z: int, error: int, floor: int, height: float, R: float, gate: float) -> None:
     """Correct by one height, softly gated; indices into the state, -1 for entries that the block lacks.
 
-    Joseph's form, as in correction.apply.
+    As in correction.apply: P - W^T W / S.
     """
     n = P.shape[0]
-    W, K = np.empty(n), np.empty(n)
+    W = np.empty(n)
     S = attribute_jump(mean, P, z, error, floor, height, R, gate, W) + R
     y = height - height_of(mean, z, error, floor)
     if y * y > gate * S:
         S = y * y / gate
+    root = math.sqrt(S)
     for j in range(n):
-        K[j] = W[j] / S
-        mean[j] += K[j] * y
-        W[j] -= 0.5 * S * K[j]
+        W[j] /= root
+        mean[j] += W[j] * (y / root)
     for i in range(n):
-        row, k, c = P[i], K[i], W[i]
+        row, v = P[i], W[i]
         for j in range(n):
-            row[j] -= k * W[j] + c * K[j]
+            row[j] -= v * W[j]

@@ -2,8 +2,9 @@
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from groundstation.bus.messages import Innovation, Verdict
 
@@ -20,11 +21,26 @@ def chi_square_bounds(degrees: int) -> tuple[float, float]:
     return max(0.0, low), high
 
 
+class _Sums(NamedTuple):
+    """Over a window: how many NIS values, their sum, their degrees of freedom; how many verdicts, how many accepted."""
+
+    values: int = 0
+    nis: float = 0.0
+    degrees: int = 0
+    verdicts: int = 0
+    accepted: int = 0
+
+
 @dataclass(slots=True)
 class _Edge:
     nis: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_WINDOW))
     verdicts: deque[Verdict] = field(default_factory=lambda: deque(maxlen=_WINDOW))
     last: str = ""
+
+    def sums(self) -> _Sums:
+        accepted = sum(map(_COUNTED.__contains__, self.verdicts))
+        nis, degrees = map(sum, zip(*self.nis, strict=True)) if self.nis else (0.0, 0)
+        return _Sums(len(self.nis), nis, int(degrees), len(self.verdicts), accepted)
 
 
 class Health:
@@ -44,30 +60,31 @@ class Health:
 
     def nis(self) -> float | None:
         """Return the mean NIS per degree of freedom over all edges; None while there are too few."""
-        figure: float | None = _figures(list(self._edges.values()))["nis"]
+        figure: float | None = _figures(_total(edge.sums() for edge in self._edges.values()))["nis"]
         return figure
 
     def summary(self) -> dict[str, Any]:
         """Return the mean NIS per degree of freedom with its bounds, over all edges and for each."""
+        sums = {names: edge.sums() for names, edge in sorted(self._edges.items())}
         edges = [
-            {"observer": observer, "subject": subject, "refused": edge.last, **_figures([edge])}
-            for (observer, subject), edge in sorted(self._edges.items())
+            {"observer": observer, "subject": subject, "refused": self._edges[observer, subject].last, **_figures(own)}
+            for (observer, subject), own in sums.items()
         ]
-        return {**_figures(list(self._edges.values())), "edges": edges}
+        return {**_figures(_total(sums.values())), "edges": edges}
 
 
-def _figures(edges: list[_Edge]) -> dict[str, Any]:
-    values = [value for edge in edges for value in edge.nis]
-    verdicts = [verdict for edge in edges for verdict in edge.verdicts]
-    degrees = sum(size for _, size in values)
-    accepted = sum(verdict in _COUNTED for verdict in verdicts) / len(verdicts) if verdicts else None
-    if len(values) < _FEWEST:
+def _total(sums: Iterable[_Sums]) -> _Sums:
+    return _Sums(*map(sum, zip(_Sums(), *sums, strict=True)))
+
+
+def _figures(sums: _Sums) -> dict[str, Any]:
+    accepted = sums.accepted / sums.verdicts if sums.verdicts else None
+    if sums.values < _FEWEST:
         return {"nis": None, "low": None, "high": None, "accepted": accepted}
-    low, high = chi_square_bounds(degrees)
-    mean = sum(nis for nis, _ in values) / degrees
+    low, high = chi_square_bounds(sums.degrees)
     return {
-        "nis": round(mean, 3),
-        "low": round(low / degrees, 3),
-        "high": round(high / degrees, 3),
+        "nis": round(sums.nis / sums.degrees, 3),
+        "low": round(low / sums.degrees, 3),
+        "high": round(high / sums.degrees, 3),
         "accepted": None if accepted is None else round(accepted, 3),
     }

@@ -22,7 +22,8 @@ from groundstation.estimation.replay import replay
 from groundstation.estimation.tables import empty_state, tables_from_parameters
 
 NS_PER_S = 1_000_000_000
-_FUTURE_NS = 100_000_000  # a measurement further ahead of now than this is an error of a clock
+_FORGOTTEN_NS = 60 * NS_PER_S  # after a pause as long (a suspended host) nothing that was believed is worth predicting
+FUTURE_NS = 100_000_000  # a measurement further ahead of now than this is an error of a clock
 _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `add_*` advances by itself
 
 
@@ -42,6 +43,8 @@ class FixedLagFilter:
         self._sensors = tuple(parameters.sensors.values())
         self._sensor_index = {name: i for i, name in enumerate(parameters.sensors)}
         self._tables = tables_from_parameters(parameters)
+        self._now_ns: int
+        self._last: int
         self._step_ns = round(parameters.step_s * NS_PER_S)
         self._lag_ns = round(parameters.max_lateness_s * NS_PER_S)
         self._delays = {
@@ -51,7 +54,7 @@ class FixedLagFilter:
         }
         delays = [delay for pair in self._delays.values() for delay in pair]
         # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
-        self._ahead = (_FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
+        self._ahead = (FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
         self._behind = (self._lag_ns + max(0, *delays, 0)) // self._step_ns + 3
         self._build_state([float(model.admitted) for model in self._models])
 
@@ -137,6 +140,9 @@ class FixedLagFilter:
         """Bring the belief to `now_ns`, through everything that has arrived; time never runs backwards."""
         self._start(now_ns)
         now_ns = max(now_ns, self._now_ns)
+        if now_ns - self._now_ns > _FORGOTTEN_NS:
+            self._now_ns = now_ns
+            self.restart()
         while self._step_of(now_ns) - self._last > self._ahead - 1:  # the rings hold only so much at once
             self._replay_to(self._origin_ns + (self._last + self._ahead - 1) * self._step_ns)
         self._replay_to(now_ns)
@@ -230,7 +236,7 @@ class FixedLagFilter:
         now_ns = max(now_ns, self._now_ns)
         if stamp_ns < now_ns - self._lag_ns:
             return Verdict.LATE
-        return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + _FUTURE_NS else Verdict.ACCEPTED
+        return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + FUTURE_NS else Verdict.ACCEPTED
 
     def _step_of(self, stamp_ns: int) -> int:
         return (stamp_ns - self._origin_ns) // self._step_ns

@@ -8,12 +8,14 @@ from groundstation.bus.messages import (
     FlightState,
     Message,
     Odometry,
+    PoseHypothesis,
     RelativeObservation,
     VehicleStatus,
     Verdict,
 )
-from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.measurement import Measurement, Motion
+from groundstation.estimation.repetition import FreezeWatch
 
 _AIRBORNE = {
     FlightState.FLYING: True,
@@ -23,7 +25,11 @@ _AIRBORNE = {
 }
 # No vehicle here moves so fast or so far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
 _ABSURD = 1e3
-_REMEMBERED = 512  # message identities per key against which duplicates are looked for
+# Message identities per key against which duplicates are looked for: all that are not late yet, but no more than these.
+_REMEMBERED, _REMEMBERED_AT_MOST = 512, 8192
+# A sensor that still measures does not repeat itself so often for so long [s].
+_FROZEN_ODOMETRY, _FROZEN_SIGHT = (10, 0.5), (4, 0.3)
+_SYMMETRY = 1e-6  # of covariances, beside the deviations of their rows
 
 REASONS = {
     Verdict.LATE: "older than the rewind reaches",
@@ -32,6 +38,8 @@ REASONS = {
     Verdict.DUPLICATE: "already had this message",
     Verdict.NOT_PERMITTED: "this camera must not observe targets",
     Verdict.IMPLAUSIBLE: "not finite, absurdly large, or from the future",
+    Verdict.SINGULAR: "covariance is of the wrong shape, not symmetric, or not positive",
+    Verdict.FROZEN: "repeats itself to the last bit: its sensor or stream hangs",
 }
 
 
@@ -42,8 +50,11 @@ class Intake:
         self._filter = joint
         self._cameras = cameras
         self._clock = clock
+        self._lag_ns = round(joint.parameters.max_lateness_s * 1e9)
         self._offsets: dict[str, int] = {}
-        self._seen: dict[str, dict[tuple[int, int], None]] = {}
+        self._seen: dict[str, dict[tuple[int, int], int]] = {}
+        self._newest_status: dict[str, int] = {}
+        self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
         """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are none of ours."""
@@ -56,20 +67,35 @@ class Intake:
         stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
             return Verdict.UNSYNCED
-        if self._is_duplicate(key, message):
+        if self._is_duplicate(key, message, stamp_ns, now_ns):
             return Verdict.DUPLICATE
         if isinstance(message, Odometry):
             return self._odometry(message, stamp_ns, now_ns)
         if isinstance(message, RelativeObservation):
             return self._observation(key, message, stamp_ns, now_ns)
-        airborne = _AIRBORNE.get(message.flight_state)
+        return self._status(message, stamp_ns, now_ns)
+
+    def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
+        entity, airborne = message.header.entity, _AIRBORNE.get(message.flight_state)
         if airborne is None:
             return Verdict.ACCEPTED
-        return self._filter.set_airborne(message.header.entity, airborne, stamp_ns, now_ns)
+        if stamp_ns > now_ns + FUTURE_NS:
+            return Verdict.IMPLAUSIBLE
+        # The newest word counts however late it comes; an older one must not undo it.
+        if stamp_ns < self._newest_status.get(entity, stamp_ns) and stamp_ns < now_ns - self._lag_ns:
+            return Verdict.LATE
+        verdict = self._filter.set_airborne(entity, airborne, stamp_ns, now_ns)
+        if verdict is Verdict.ACCEPTED:
+            self._newest_status[entity] = max(stamp_ns, self._newest_status.get(entity, stamp_ns))
+        return verdict
 
     def _odometry(self, message: Odometry, stamp_ns: int, now_ns: int) -> Verdict:
-        if not _plausible(*message.velocity_m_s, message.yaw_rad, message.height_m or 0.0):
+        attitude = (message.yaw_rad, message.roll_rad, message.pitch_rad)
+        if len(message.velocity_m_s) != 3 or not _plausible(*message.velocity_m_s, *attitude, message.height_m or 0.0):
             return Verdict.IMPLAUSIBLE
+        values = (message.velocity_m_s, *attitude, message.height_m)
+        if self._odometry_watch.is_frozen(message.header.entity, values, stamp_ns):
+            return Verdict.FROZEN
         motion = Motion(
             stamp_ns,
             message.velocity_m_s,
@@ -82,10 +108,17 @@ class Intake:
         return self._filter.add_motion(message.header.entity, motion, now_ns)
 
     def _observation(self, key: str, message: RelativeObservation, stamp_ns: int, now_ns: int) -> Verdict:
-        if not (_plausible(*message.position_m, message.yaw_rad or 0.0) and _finite(*message.covariance)):
-            return Verdict.IMPLAUSIBLE
         if message.header.entity != message.observer:
             return Verdict.UNKNOWN_ENTITY
+        for pose in (message, message.alternative):
+            fault = _fault_of(pose) if pose is not None else None
+            if fault is not None:
+                return fault
+        if not _plausible(message.roll_rad, message.pitch_rad):
+            return Verdict.IMPLAUSIBLE
+        values = (message.position_m, message.yaw_rad)
+        if self._sight_watch.is_frozen((message.observer, message.camera, message.subject), values, stamp_ns):
+            return Verdict.FROZEN
         measurement = Measurement(
             stamp_ns,
             message.camera if message.camera in self._cameras else message.observer,
@@ -106,19 +139,44 @@ class Intake:
         offset = self._offsets.get(message.header.clock)
         return None if offset is None else message.header.stamp_ns + offset
 
-    def _is_duplicate(self, key: str, message: Message) -> bool:
+    def _is_duplicate(self, key: str, message: Message, stamp_ns: int, now_ns: int) -> bool:
         identity = (message.header.seq, message.header.stamp_ns)
         seen = self._seen.setdefault(key, {})
         if identity in seen:
             return True
-        seen[identity] = None
-        if len(seen) > _REMEMBERED:
-            del seen[next(iter(seen))]
+        seen[identity] = stamp_ns
+        # Beyond the rewind a message is late by itself; what could still count is remembered at any rate.
+        while len(seen) > _REMEMBERED:
+            oldest = next(iter(seen))
+            if seen[oldest] >= now_ns - self._lag_ns and len(seen) <= _REMEMBERED_AT_MOST:
+                break
+            del seen[oldest]
         return False
 
 
-def _finite(*values: float) -> bool:
-    return all(map(math.isfinite, values))
+def _fault_of(pose: RelativeObservation | PoseHypothesis) -> Verdict | None:
+    """Return why a measured pose cannot be used whatever the belief, or None."""
+    if len(pose.position_m) != 3 or not _plausible(*pose.position_m, pose.yaw_rad or 0.0):
+        return Verdict.IMPLAUSIBLE
+    if not all(map(math.isfinite, pose.covariance)):
+        return Verdict.IMPLAUSIBLE
+    rows = 3 if pose.yaw_rad is None else 4
+    return None if _is_covariance(pose.covariance, rows) else Verdict.SINGULAR
+
+
+def _is_covariance(values: tuple[float, ...], rows: int) -> bool:
+    """Return whether row-major values are square, of positive variances and symmetric (the filter does the rest)."""
+    if len(values) != rows * rows:
+        return False
+    variances = values[:: rows + 1]
+    if min(variances) <= 0.0:
+        return False
+    return all(
+        abs(values[i * rows + j] - values[j * rows + i])
+        <= _SYMMETRY * math.sqrt(variances[i]) * math.sqrt(variances[j])
+        for i in range(rows)
+        for j in range(i)
+    )
 
 
 def _plausible(*values: float) -> bool:

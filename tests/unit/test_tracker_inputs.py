@@ -55,7 +55,9 @@ class Flight:
             assert self.ingest(VehicleStatus(header=self.header(name), flight_state=state, mode="TRACK")) is None
 
     def odometry(self, name: str, **changes: Any) -> Odometry:
-        values = {"velocity_m_s": (0.0, 0.0, 0.0), "yaw_rad": 0.0, "roll_rad": 0.0, "pitch_rad": 0.0, "height_m": 1.3}
+        trembling = 1e-9 * self.seq  # what never changes is taken for a frozen sensor
+        values = {"velocity_m_s": (0.0, 0.0, 0.0), "yaw_rad": 0.0, "roll_rad": trembling, "pitch_rad": 0.0}
+        values["height_m"] = 1.3
         return Odometry(header=self.header(name), velocity_covariance=(0.01,) * 9, **(values | changes))
 
     def ceiling(self, name: str, age_ms: int = 50, **changes: Any) -> RelativeObservation:
@@ -70,6 +72,7 @@ class Flight:
     def sighting(
         self, observer: str, subject: str, position: tuple[float, ...], yaw: float | None, age_ms: int, **changes: Any
     ) -> RelativeObservation:
+        position = (position[0] + 1e-9 * self.seq, *position[1:])
         values = {"position_m": position, "yaw_rad": yaw, "covariance": COVARIANCE, "camera": f"{observer}_camera"}
         header = changes.pop("header", None) or self.header(observer, age_ms)
         return RelativeObservation(header=header, observer=observer, subject=subject, **(values | changes))
@@ -190,9 +193,10 @@ def test_bad_inputs_are_verdicts_and_leave_the_belief_untouched(tracking: Flight
 
 def test_unusable_observations_get_a_verdict_from_the_filter(tracking: Flight) -> None:
     t = tracking
-    negative = tuple(np.diag([1e-4, -1e-4, 4e-4, 1e-3]).ravel().tolist())
+    indefinite = np.diag([1e-4, 1e-4, 4e-4, 1e-3])
+    indefinite[0, 1] = indefinite[1, 0] = 2e-4
     for message in (
-        t.ceiling("drone_1", covariance=negative),
+        t.ceiling("drone_1", covariance=tuple(indefinite.ravel().tolist())),
         t.sighting("ceiling", "drone_1", (0.0, 0.0, -2.0), 0.0, 50),
         t.sighting("ceiling", "drone_1", (9.0, 9.0, 2.0), 0.0, 50),
     ):

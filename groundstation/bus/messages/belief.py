@@ -52,6 +52,7 @@ class Verdict(StrEnum):
     IMPLAUSIBLE = "IMPLAUSIBLE"
     DUPLICATE = "DUPLICATE"
     NOT_PERMITTED = "NOT_PERMITTED"
+    FROZEN = "FROZEN"
 
 
 class Innovation(Message, frozen=True, kw_only=True):

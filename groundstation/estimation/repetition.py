@@ -1,0 +1,29 @@
+"""Sensors that freeze: the same numbers to the last bit, for longer than any sensor that still measures."""
+
+from dataclasses import dataclass
+
+Values = tuple[object, ...]
+
+
+@dataclass(slots=True)
+class _Spell:
+    values: Values
+    since_ns: int
+    count: int = 1
+
+
+class FreezeWatch:
+    """Tells for each source whether it has repeated itself at least `count` times over at least `span_s`."""
+
+    def __init__(self, count: int, span_s: float) -> None:
+        self._count, self._span_ns = count, round(span_s * 1e9)
+        self._spells: dict[object, _Spell] = {}
+
+    def is_frozen(self, source: object, values: Values, stamp_ns: int) -> bool:
+        """Take what a source says at a time of measurement; sources are few, and one spell is kept of each."""
+        spell = self._spells.get(source)
+        if spell is None or spell.values != values:
+            self._spells[source] = _Spell(values, stamp_ns)
+            return False
+        spell.count += 1
+        return spell.count > self._count and stamp_ns - spell.since_ns >= self._span_ns

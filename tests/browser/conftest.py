@@ -42,10 +42,9 @@ def browser() -> Iterator[Any]:
 class Stage:
     """A flight with its console, and pages in front of it."""
 
-    def __init__(self, browser: Any) -> None:
-        self.browser = browser
+    def __init__(self, browser: Any, flight: FakeFlight, field: str = "lab") -> None:
+        self.browser, self.flight, self.field = browser, flight, field
         self.port = any_port()
-        self.flight = FakeFlight()
         self.flight.start()
         self.console = self.start_console()
         self._contexts: list[Any] = []
@@ -56,7 +55,7 @@ class Stage:
         return f"http://127.0.0.1:{self.port}/"
 
     def start_console(self, truth: bool = True) -> "subprocess.Popen[bytes]":
-        self.console = start_console(self.flight.endpoint, self.port, truth)
+        self.console = start_console(self.flight.endpoint, self.port, truth, field=self.field)
         return self.console
 
     def open(self, **options: Any) -> Seen:
@@ -75,7 +74,16 @@ class Stage:
 
 @pytest.fixture
 def stage(browser: Any) -> Iterator[Stage]:
-    made = Stage(browser)
+    made = Stage(browser, FakeFlight())
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def mixed_stage(browser: Any) -> Iterator[Stage]:
+    """Three drones of three kinds and two ceiling cameras."""
+    drones, cameras = ("drone_1", "drone_2", "drone_3"), ("ceiling_west", "ceiling_east")
+    made = Stage(browser, FakeFlight(drones, cameras), "mixed-team")
     yield made
     made.close()
 

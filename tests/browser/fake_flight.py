@@ -27,14 +27,19 @@ def free_port() -> int:
 class FakeFlight(threading.Thread):
     """Publishes until `stop`; `frozen` silences the tracker, `deaf` drones answer nothing."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, drones: tuple[str, ...] = DRONES, cameras: tuple[str, ...] = ("ceiling",), endpoint: str = ""
+    ) -> None:
         super().__init__(daemon=True)
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.drones, self.cameras = drones, cameras
+        self.endpoint = endpoint or f"tcp/127.0.0.1:{free_port()}"
         self._router = zenoh_bus.open_router(self.endpoint)
         self._session = zenoh_bus.open_bus(self.endpoint, "lab", "fake")._session
         self._buses: dict[str, zenoh_bus.ZenohBus] = {}
-        self.modes = dict.fromkeys(DRONES, "TRACK")
-        self.battery = {"drone_1": 0.82, "drone_2": 0.34}
+        self.modes = dict.fromkeys(drones, "TRACK")
+        self.battery: dict[str, float | None] = {"drone_1": 0.82, "drone_2": 0.34}
+        self.link: dict[str, float | None] = {}
+        self.rate_hz: dict[str, float] = {}
         self.deaf: set[str] = set()
         self.frozen = False
         self.lease = True
@@ -85,9 +90,9 @@ class FakeFlight(threading.Thread):
 
     def drone_at(self, name: str, s: float) -> tuple[float, float, float, float]:
         tx, ty, *_ = self.target_at(s)
-        angle = 0.12 * s + (2.2 if name == "drone_1" else 0.0)
+        angle = 0.12 * s + {"drone_1": 2.2, "drone_3": 4.3}.get(name, 0.0)
         px, py = 0.75 * tx + 1.3 * math.cos(angle), 0.75 * ty + 1.3 * math.sin(angle)
-        return px, py, 2.1 if name == "drone_1" else 1.2, math.atan2(ty - py, tx - px)
+        return px, py, {"drone_1": 2.1, "drone_3": 1.6}.get(name, 1.2), math.atan2(ty - py, tx - px)
 
     # --- what is said ---
 
@@ -109,7 +114,7 @@ class FakeFlight(threading.Thread):
     def _say_truth(self, s: float) -> None:
         bus = self.bus("sim_bridge")
         x, y, vx, vy = self.target_at(s)
-        poses = {TARGET: (x, y, 0.0, math.atan2(vy, vx)), **{name: self.drone_at(name, s) for name in DRONES}}
+        poses = {TARGET: (x, y, 0.0, math.atan2(vy, vx)), **{name: self.drone_at(name, s) for name in self.drones}}
         for name, (px, py, pz, yaw) in poses.items():
             state = m.TruthState(
                 header=bus.header(name),
@@ -123,9 +128,9 @@ class FakeFlight(threading.Thread):
     def _say_estimate(self, s: float) -> None:
         bus = self.bus("tracker")
         entities = []
-        for index, name in enumerate(DRONES):
+        for index, name in enumerate(self.drones):
             x, y, z, yaw = self.drone_at(name, s)
-            a, b, c = 0.004 + 0.002 * math.sin(s), 0.0015 * (1 - 2 * index), 0.003
+            a, b, c = 0.004 + 0.002 * math.sin(s), 0.0015 * (1 - 2 * (index % 2)), 0.003
             cov = [0.0] * 16
             cov[0], cov[1], cov[4], cov[5], cov[10], cov[15] = a, b, b, c, 0.001, 0.002
             mean = (x + 0.04 * math.sin(3 * s), y + 0.04 * math.cos(2 * s), z, yaw)
@@ -135,7 +140,7 @@ class FakeFlight(threading.Thread):
         spread = (0.012 + 0.008 * math.sin(0.4 * s), 0.004, 0.004, 0.008)
         entities.append(m.EntityEstimate(TARGET, "target", mean, spread, (vx, vy), True, 0.1))
         bus.publish(t.ESTIMATE, m.Estimate(header=bus.header("team"), entities=tuple(entities), epoch=1))
-        for name in DRONES:
+        for name in self.drones:
             setpoint = m.VelocitySetpoint(
                 header=bus.header(name),
                 velocity_m_s=(0.35 if name == "drone_1" else 0.1, 0.15, 0.0),
@@ -148,11 +153,11 @@ class FakeFlight(threading.Thread):
     def _say_plan(self, s: float) -> None:
         bus = self.bus("tracker")
         string = math.sin(0.3 * s) > 0
-        edges = [m.Edge("ceiling", "drone_1", 820.0), m.Edge("drone_1", TARGET, 145.0)]
+        edges = [m.Edge(self.cameras[0], "drone_1", 820.0), m.Edge("drone_1", TARGET, 145.0)]
         edges += (
             [m.Edge("drone_1", "drone_2", 210.0), m.Edge("drone_2", TARGET, 380.0)]
             if string
-            else [m.Edge("ceiling", "drone_2", 640.0), m.Edge("drone_2", TARGET, 330.0)]
+            else [m.Edge(self.cameras[-1], "drone_2", 640.0), m.Edge("drone_2", TARGET, 330.0)]
         )
         controls = (
             m.Control("drone_1", (0.35, 0.15, 0.0), 0.1, ()),
@@ -195,18 +200,19 @@ class FakeFlight(threading.Thread):
 
     def _see(self, s: float, tick: int) -> None:
         stamp_ns = time.monotonic_ns() - 20_000_000
-        for name in DRONES:
+        for name in self.drones:
             self._observe(name, f"{name}_camera", TARGET, (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6), stamp_ns)
             if tick % 12 == 0:
                 self._picture(
                     f"{name}_camera", (640, 360), 460.0, (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6), stamp_ns
                 )
-        for name in DRONES:
-            x, y, z, _ = self.drone_at(name, s)
-            self._observe("ceiling", "ceiling", name, (x, -y, 4.2 - z), stamp_ns)
-        if tick % 12 == 0:
-            x, y, z, _ = self.drone_at("drone_1", s)
-            self._picture("ceiling", (1280, 720), 1179.0, (x, -y, 4.2 - z), stamp_ns)
+        for camera in self.cameras:
+            for name in self.drones:
+                x, y, z, _ = self.drone_at(name, s)
+                self._observe(camera, camera, name, (x, -y, 4.2 - z), stamp_ns)
+            if tick % 12 == 0:
+                x, y, z, _ = self.drone_at("drone_1", s)
+                self._picture(camera, (1280, 720), 1179.0, (x, -y, 4.2 - z), stamp_ns)
 
     def _observe(self, observer: str, camera: str, subject: str, at: tuple[float, float, float], stamp_ns: int) -> None:
         bus = self.bus(camera)
@@ -229,16 +235,16 @@ class FakeFlight(threading.Thread):
         bus.publish_bytes(t.IMAGE, bus.header(camera, stamp_ns), paint(size, focal, at))
 
     def _say_vehicles(self, s: float) -> None:
-        for name in DRONES:
+        for name in self.drones:
             bus, mode = self.bus(name), self.modes[name]
             down = mode in ("LANDED", "CUT")
             status = m.VehicleStatus(
                 header=bus.header(name),
                 flight_state=m.FlightState.LANDED if down else m.FlightState.FLYING,
                 mode=mode,
-                battery=self.battery[name],
-                link_quality=0.93,
-                rate_hz=198.0 + math.sin(s),
+                battery=self.battery.get(name),
+                link_quality=self.link.get(name, 0.93),
+                rate_hz=self.rate_hz.get(name, 198.0 + math.sin(s)),
             )
             bus.publish(t.VEHICLE_STATUS, status)
 
@@ -247,13 +253,13 @@ class FakeFlight(threading.Thread):
             bus = self.bus("supervisor")
             header = bus.header("team")
             bus.publish(t.LEASE, m.Lease(header=header, holder="operator", expires_ns=header.stamp_ns + 1_500_000_000))
-        for name in ("tracker", "recorder", "drone_1", "drone_2", "ceiling", "sim_bridge"):
+        for name in ("tracker", "recorder", *self.drones, *self.cameras, "sim_bridge"):
             bus = self.bus(name)
             status = m.ProcessStatus(
                 header=bus.header(name), state=m.Lifecycle.READY, pid=1, cpu=0.12, ticks=tick + 1, overruns=0
             )
             bus.publish(t.PROCESS_STATUS, status)
-        for name in ("ceiling", "drone_1_camera", "drone_2_camera"):
+        for name in (*self.cameras, *(f"{name}_camera" for name in self.drones)):
             bus = self.bus(name)
             status_of_camera = m.CameraStatus(
                 header=bus.header(name), connected=True, fps=15.0, age_ms=131.0, frames=tick, skipped=0, detections=tick
@@ -274,7 +280,7 @@ class FakeFlight(threading.Thread):
             self.commands.append(command)
         now = time.monotonic()
         starts = "operator" in command.scope
-        names = [name for name in command.scope or DRONES if name in DRONES]
+        names = [name for name in command.scope or self.drones if name in self.drones]
         if not starts:
             for name in names:
                 for delay, stage in enumerate((m.AckStage.RECEIVED, m.AckStage.ACCEPTED, m.AckStage.EFFECTIVE)):
@@ -282,7 +288,7 @@ class FakeFlight(threading.Thread):
             return
         for delay, stage in enumerate((m.AckStage.RECEIVED, m.AckStage.ACCEPTED, m.AckStage.EFFECTIVE)):
             self._later.append((now + 0.2 * delay, "operator", command, stage))
-        for name in names or DRONES:
+        for name in names or self.drones:
             self.modes[name] = _LEVEL.get(command.verb, "HOVER")
 
     def _answer(self) -> None:

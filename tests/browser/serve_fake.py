@@ -17,13 +17,15 @@ from groundstation.settings.load import load_field
 ROOT = Path(__file__).parents[2]
 
 
-def field_json(port: int) -> dict[str, Any]:
-    field = load_field(ROOT / "config" / "lab.yaml", [f"console.port={port}"])
+def field_json(port: int, name: str = "lab") -> dict[str, Any]:
+    field = load_field(ROOT / "config" / f"{name}.yaml", [f"console.port={port}"])
     return dict(field.model_dump(mode="json"))
 
 
-def start_console(endpoint: str, port: int, truth: bool = True, loud: bool = False) -> "subprocess.Popen[bytes]":
-    section = {"field": field_json(port), "run_dir": "", "epoch": 1, "truth": truth}
+def start_console(
+    endpoint: str, port: int, truth: bool = True, loud: bool = False, field: str = "lab"
+) -> "subprocess.Popen[bytes]":
+    section = {"field": field_json(port, field), "run_dir": "", "epoch": 1, "truth": truth}
     spec = ChildSpec("console", "console", endpoint, "lab", section=msgspec.json.encode(section).decode())
     process = subprocess.Popen(
         [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"],

@@ -8,16 +8,38 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from fake_flight import FakeFlight
+
+
+def slowness() -> float:
+    """Return how much longer than alone this process waits for its core now: 1 on a machine that has nothing to do."""
+    wall, used = time.monotonic(), time.thread_time()
+    while time.thread_time() - used < 0.1:
+        pass
+    return max(1.0, (time.monotonic() - wall) / 0.1)
+
+
+def assert_told_in_time(page: Any, kind: str) -> None:
+    """Within 1.5 s by the page's own clock, plus what the browser did not let it draw."""
+    mark = page.state()["marks"][kind]
+    assert mark["afterS"] < 1.5 + mark["gapS"]
+
+
+def becomes(page: Any, testid: str, attribute: str, value: str) -> str:
+    """Return the attribute as soon as it has this value, or as it is 15 s later."""
+    deadline = time.monotonic() + 15.0
+    while (now := page.there(testid).get_attribute(attribute) or "") != value and time.monotonic() < deadline:
+        page.page.wait_for_timeout(100)
+    return now
+
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def test_first_frame_comes_soon_and_nothing_leaves_loopback(stage: Any) -> None:
-    began = time.monotonic()
     page = stage.open()
-    took = time.monotonic() - began
     state = page.wait(lambda s: s["draws"] > 20 and s["pictures"]["marks"] > 0)
-    assert took < 15.0  # 5 s on a machine that has nothing else to do; the console process starts within it
+    assert state["marks"]["firstMs"] < 5000.0 * slowness()
     assert set(state["ellipses"]) == {"drone_1", "drone_2", "turtlebot"}
     assert state["trail"]["turtlebot"] > 0
     page.page.wait_for_timeout(1500)
@@ -86,9 +108,8 @@ def test_phone_and_keyboard(stage: Any) -> None:
 def test_frozen_tracker_is_shown_as_stale(stage: Any) -> None:
     page = stage.open()
     stage.flight.frozen = True
-    began = time.monotonic()
-    page.there("banner-tracker").wait_for(timeout=5000)
-    assert time.monotonic() - began < 1.5
+    page.there("banner-tracker").wait_for(timeout=20_000)
+    assert_told_in_time(page, "tracker")
     assert "TRACKER SILENT" in page.there("banner-tracker").inner_text()
     page.page.wait_for_timeout(1500)
     assert "stale" in (page.there("card-turtlebot").get_attribute("class") or "")
@@ -101,7 +122,8 @@ def test_frozen_console_is_shown(stage: Any) -> None:
     page = stage.open()
     os.kill(stage.console.pid, signal.SIGSTOP)
     try:
-        page.there("banner-silent").wait_for(timeout=20_000)  # how soon is for a machine that has nothing else to do
+        page.there("banner-silent").wait_for(timeout=20_000)
+        assert_told_in_time(page, "silent")
         page.there("land-all").click()
         page.page.wait_for_timeout(300)
         assert "NOT CONFIRMED" in page.there("orders").inner_text()
@@ -117,7 +139,7 @@ def test_killed_console_comes_back_with_everything(stage: Any) -> None:
     before = page.state()
     stage.console.kill()
     stage.console.wait(5)
-    page.there("banner-link").wait_for(timeout=3000)
+    page.there("banner-link").wait_for(timeout=20_000)
     page.there("land-all").click()
     page.shot("console_killed")
     assert "NOT SENT" in page.there("orders").inner_text()
@@ -135,10 +157,60 @@ def test_battery_colours_at_their_thresholds(stage: Any) -> None:
     levels = {}
     for value, level in ((0.82, "full"), (0.29, "low"), (0.18, "empty")):
         stage.flight.battery["drone_1"] = value
-        page.page.wait_for_timeout(900)
-        levels[level] = page.there("drone_1-battery").get_attribute("data-battery")
+        levels[level] = becomes(page, "drone_1-battery", "data-battery", level)
     assert all(level == shown for level, shown in levels.items()), levels
     assert "land!" in page.there("drone_1-battery").inner_text()
+
+
+def test_link_telemetry_and_age_colours_at_their_thresholds(stage: Any) -> None:
+    page = stage.open()
+    for value, level, words in (
+        (0.93, "full", "93 %"),
+        (0.59, "low", "weak"),
+        (0.29, "empty", "bad!"),
+        (None, "unknown", "?"),
+    ):
+        stage.flight.link["drone_1"] = value
+        assert becomes(page, "drone_1-link", "data-link", level) == level
+        assert words in page.there("drone_1-link").inner_text()
+    for rate_hz, level in ((9.0, "low"), (0.5, "empty"), (50.0, "")):
+        stage.flight.rate_hz["drone_1"] = rate_hz
+        assert becomes(page, "drone_1-rate", "class", level) == level
+    stage.flight.drones = ("drone_2",)
+    assert becomes(page, "drone_1-heard", "class", "low") == "low"
+    assert "stale" in (page.there("card-drone_1").get_attribute("class") or "")
+    assert becomes(page, "drone_1-heard", "class", "empty") == "empty"
+    assert "stale" not in (page.there("card-drone_2").get_attribute("class") or "")
+
+
+def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:
+    page = mixed_stage.open()
+    state = page.wait(
+        lambda s: s["pictures"]["marks"] > 0 and set(s["ellipses"]) == {*mixed_stage.flight.drones, "turtlebot"}
+    )
+    assert {camera["name"] for camera in state["scene"]["cameras"]} == set(mixed_stage.flight.cameras)
+    for camera in (*mixed_stage.flight.cameras, "drone_1_camera", "drone_2_camera", "drone_3_camera"):
+        page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden")
+    assert page.there("land-all").inner_text().startswith("LAND ALL 3")
+    assert page.there("drone_3-battery").inner_text() == "?"  # not told is not empty
+    page.shot("mixed_team")
+    page.there("drone_3-land").click()
+    page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")
+    assert mixed_stage.flight.commands[0].scope == ("drone_3",)
+    assert not page.troubles, page.troubles
+
+
+def test_a_router_that_comes_back_brings_everything_back(stage: Any) -> None:
+    page = stage.open()
+    modes, endpoint = stage.flight.modes, stage.flight.endpoint
+    stage.flight.stop()
+    page.there("banner-tracker").wait_for(timeout=20_000)
+    stage.flight = FakeFlight(endpoint=endpoint)
+    stage.flight.start()
+    page.there("banner-tracker").wait_for(state="detached", timeout=20_000)
+    page.there("land-all").click()
+    page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")
+    assert set(page.state()["ellipses"]) >= set(modes)
 
 
 def test_a_slow_viewer_slows_nobody(stage: Any) -> None:
@@ -146,10 +218,9 @@ def test_a_slow_viewer_slows_nobody(stage: Any) -> None:
     slow.page.evaluate(
         "() => { setTimeout(() => { const end = performance.now() + 4000; while (performance.now() < end); }, 0); }"
     )
-    before, began = fast.state()["frames"], time.monotonic()
-    fast.page.wait_for_timeout(3000)
-    state, took = fast.state(), time.monotonic() - began
-    assert (state["frames"] - before) / took > 10
-    slow.page.wait_for_timeout(2500)
-    caught_up = slow.state()
-    assert caught_up["connected"] and caught_up["estimateAge"] < 2.0
+    before = fast.state()
+    after = fast.wait(lambda s: s["nowMs"] - before["nowMs"] > 3000)
+    # By the page's clock: 20 a second are sent, and half of them is what a busy machine may lose.
+    assert after["frames"] - before["frames"] > 30
+    caught_up = slow.wait(lambda s: s["connected"] and s["estimateAge"] < 2.0)
+    assert caught_up["seeds"] == 1  # it was never thrown out

@@ -3,13 +3,19 @@
 import click
 
 from groundstation.cli.calibrate_camera import camera
+from groundstation.cli.calibrate_check import check
+from groundstation.cli.calibrate_delay import delay
 from groundstation.cli.calibrate_extrinsics import extrinsics
 
 
-@click.group(epilog="Example: groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --name ceiling")
+@click.group(
+    epilog="\b\nExamples:\n  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
+    "  groundstation calibrate check lab.yaml\n\n"
+    "The order of work for a new lab is in config/README.md, section Calibrate."
+)
 def calibrate() -> None:
     """Measure what the field file and its calibrations say of cameras and sensors."""
 
 
-calibrate.add_command(camera)
-calibrate.add_command(extrinsics)
+for command in (camera, extrinsics, delay, check):
+    calibrate.add_command(command)

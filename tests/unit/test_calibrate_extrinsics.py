@@ -1,4 +1,6 @@
-"""Where a camera is, from markers on the floor: pictures in, lines for the field file out."""
+"""Where a camera is, from markers on the floor: pictures in, lines for the field file out; and does it still hold?"""
+
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -14,6 +16,7 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
 
+CONFIG = Path(__file__).parents[2] / "config"
 LENS = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, residual_px=0.1)
 TURN_DEG = (1.2, -0.8, 15.0)
 CEILING = Pose(world_from_downward_optical(TURN_DEG), np.array([0.2, -0.1, 3.2]))
@@ -159,3 +162,68 @@ def test_a_layout_file_names_its_mistakes(tmp_path, measured):
 def test_nothing_can_be_told_of_no_markers():
     with pytest.raises(DriverError, match="none of the markers 1"):
         place_camera([Mark(1, (0.0, 0.0, 0.0))], {}, LENS, 44.0, 0.005)
+
+
+def lab_with(tmp_path, cameras):
+    """Return a copy of the shipped field with these cameras: name -> (source, pose, turn [deg])."""
+    field = yaml.safe_load((CONFIG / "lab.yaml").read_text())
+    lens = yaml.safe_load((tmp_path / "lens.yaml").read_text())
+    field["cameras"] = {
+        name: {
+            "source": str(source),
+            "calibration": lens,
+            "position_m": [float(value) for value in pose.translation],
+            "rotation_deg": list(turn),
+        }
+        for name, (source, pose, turn) in cameras.items()
+    }
+    field["types"]["ardrone_2"]["camera"]["calibration"] = str(CONFIG / "cameras" / "ardrone_front.yaml")
+    path = tmp_path / "lab.yaml"
+    path.write_text(yaml.safe_dump(field))
+    return str(path)
+
+
+def test_the_check_holds_until_a_camera_was_moved(tmp_path, capsys):
+    laid = {code: (*PLACES[code], 0.0, HEADINGS[code]) for code in (1, 3)}
+    folder, calibration = files_for(tmp_path, LENS, drawn(CEILING, LENS, laid), 1)
+    said = ["--frames=1", *markers({code: PLACES[code] for code in (1, 3)})]
+    field = lab_with(tmp_path, {"ceiling": (folder, CEILING, TURN_DEG)})
+    assert run(["calibrate", "check", field, *said]) == 0
+    assert "DOES NOT" not in capsys.readouterr().out
+    moved = Pose(CEILING.rotation, np.add(CEILING.translation, (0.1, 0.0, 0.0)))
+    assert run(["calibrate", "check", lab_with(tmp_path, {"ceiling": (folder, moved, TURN_DEG)}), *said]) == 1
+    out = capsys.readouterr().out
+    assert "ceiling: has marker 1" in out and "calibrate extrinsics" in out
+    # The lens alone does not mind where the camera hangs, but it minds another lens.
+    assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 0
+    text = (tmp_path / "lens.yaml").read_text()
+    (tmp_path / "lens.yaml").write_text(
+        text.replace("- 0.0\n- 0.0\n- 0.0\n- 0.0\n- 0.0", "- -0.9\n- 0.0\n- 0.0\n- 0.0\n- 0.0")
+    )
+    assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 1
+    assert "lens or focus were changed" in capsys.readouterr().out
+
+
+def test_the_check_compares_what_two_cameras_have_in_view(tmp_path, capsys):
+    laid = {1: (*PLACES[1], 0.0, 0.3)}
+    (tmp_path / "a").mkdir()
+    first, _ = files_for(tmp_path, LENS, drawn(CEILING, LENS, laid), 1)
+    other = Pose(world_from_downward_optical((0.0, 0.0, 0.0)), np.array([0.5, 0.3, 3.5]))
+    cv2.imwrite(str(tmp_path / "a" / "0.png"), drawn(other, LENS, laid))
+    cameras = {"ceiling": (first, CEILING, TURN_DEG), "second": (tmp_path / "a", other, (0.0, 0.0, 0.0))}
+    assert run(["calibrate", "check", lab_with(tmp_path, cameras), "--frames=1"]) == 0
+    assert "ceiling and second have marker 1" in capsys.readouterr().out
+    cameras["second"] = (
+        tmp_path / "a",
+        Pose(other.rotation, np.add(other.translation, (0.0, 0.15, 0.0))),
+        (0.0, 0.0, 0.0),
+    )
+    assert run(["calibrate", "check", lab_with(tmp_path, cameras), "--frames=1"]) == 1
+
+
+def test_the_check_says_what_is_missing(tmp_path, capsys):
+    folder, calibration = files_for(tmp_path, LENS, np.full((720, 1280), 120, np.uint8), 1)
+    assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 0
+    assert "cannot be told: " in capsys.readouterr().out
+    assert run(["calibrate", "check", "http://127.0.0.1:9/video.mjpg"]) == 2
+    assert "--calibration FILE" in capsys.readouterr().err

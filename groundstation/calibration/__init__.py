@@ -1,0 +1,1 @@
+"""What recorded flights tell of sensors: delays, and how cameras are mounted."""

@@ -1,0 +1,305 @@
+"""How late is each sensor? Found in a recorded flight, from what sensors say of the same motion.
+
+A fixed camera sees headings, which a vehicle's gyroscopes tell without delay: that dates its pictures. Its positions
+then date the vehicles' velocities and heights. Cameras on vehicles are dated by the filter: with wrongly dated pictures
+it predicts what they see worse.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.bus.messages import Message, Odometry, RelativeObservation
+from groundstation.calibration.flown import Change, Flown, corrections
+from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
+
+Array = NDArray[np.float64]
+M = TypeVar("M", bound=Message)
+
+# Differences over so long are compared: what drifts more slowly does not count.
+_WINDOW_S = 1.0
+_GRID_S = np.arange(-0.10, 0.2001, 0.01)
+_REACH = 6
+_LEAST_PAIRS = 60
+_SHIFTS_MS = np.array([-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0])
+_ROWS_FREEDOM = 8.0
+# Errors of successive pictures are alike: so many say the same.
+_NEIGHBOURS = 3.0
+_UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """One sensor: the setting, what it says [ms], what was measured and one sigma of it; reason where it was not."""
+
+    sensor: str
+    setting: str
+    now_ms: float
+    measured_ms: float | None = None
+    std_ms: float | None = None
+    reason: str = ""
+
+    @property
+    def sure(self) -> bool:
+        """Return whether the recording tells it to better than 15 ms."""
+        return self.measured_ms is not None and self.std_ms is not None and self.std_ms <= _UNSURE_MS
+
+    @property
+    def differs(self) -> bool:
+        """Return whether the setting is contradicted: by three sigmas, and by more than 10 ms."""
+        if self.measured_ms is None or self.std_ms is None or not self.sure:
+            return False
+        return abs(self.measured_ms - self.now_ms) > max(_TOLERATED_MS, 3.0 * self.std_ms)
+
+
+@dataclass(frozen=True, slots=True)
+class _Track:
+    """A robot as a fixed camera saw it: times [s], positions (n, 3) of its marker [m; world], headings [rad]."""
+
+    times: Array
+    positions: Array
+    headings: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Own:
+    """A robot as it reported itself: times [s], velocities (n, 2) [base_stabilized], heading, roll, pitch, height."""
+
+    times: Array
+    velocities: Array
+    heading: Array
+    roll: Array
+    pitch: Array
+    height: Array
+
+
+def delays(flown: Flown, resolved: Mapping[str, Any]) -> list[Delay]:
+    """Return the delay of every camera, and of velocity and height of every robot."""
+    own = {name: _own(flown, name) for name in resolved["drones"]}
+    found: list[Delay] = []
+    exposure_s: dict[str, float] = {}
+    for name, camera in resolved["cameras"].items():
+        tracks = {drone: _track(flown, name, camera, drone) for drone in own}
+        one = _fixed_camera(name, camera, tracks, own)
+        found.append(one)
+        exposure_s[name] = (one.now_ms - (one.measured_ms or one.now_ms)) / 1e3 if one.sure else 0.0
+    for drone, settings in resolved["drones"].items():
+        seen = [(name, _track(flown, name, camera, drone)) for name, camera in resolved["cameras"].items()]
+        name, track = max(seen, key=lambda pair: len(pair[1].times))
+        moved = _Track(track.times + exposure_s[name], track.positions, track.headings)
+        found += _odometry(drone, settings, moved, own[drone])
+    for drone, settings in resolved["drones"].items():
+        found.append(_onboard_camera(flown, resolved, drone, settings["camera"]["video_delay_ms"]))
+    return found
+
+
+def _track(flown: Flown, name: str, camera: Mapping[str, Any], drone: str) -> _Track:
+    rotation = world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0)))
+    rows = {}
+    for message in _messages(flown, RelativeObservation):
+        if message.observer == name and message.subject == drone and message.yaw_rad is not None:
+            place = rotation @ np.array(message.position_m) + camera["position_m"]
+            rows[message.header.stamp_ns] = (*place, message.yaw_rad)
+    table = np.array([(stamp, *row) for stamp, row in sorted(rows.items())], dtype=np.float64).reshape(-1, 5)
+    return _Track(_seconds(flown, table[:, 0]), table[:, 1:4], np.unwrap(table[:, 4]))
+
+
+def _own(flown: Flown, drone: str) -> _Own:
+    rows = {}
+    for m in _messages(flown, Odometry):
+        if m.header.entity == drone:
+            height = np.nan if m.height_m is None else m.height_m
+            rows[m.header.stamp_ns] = (*m.velocity_m_s[:2], m.yaw_rad, m.roll_rad, m.pitch_rad, height)
+    table = np.array([(stamp, *row) for stamp, row in sorted(rows.items())], dtype=np.float64).reshape(-1, 7)
+    yaw = np.unwrap(table[:, 3])
+    return _Own(_seconds(flown, table[:, 0]), table[:, 1:3], yaw, table[:, 4], table[:, 5], table[:, 6])
+
+
+def _messages(flown: Flown, kind: type[M]) -> list[M]:
+    return [message for _, inputs in flown.ticks for _, message in inputs if isinstance(message, kind)]
+
+
+def _seconds(flown: Flown, stamps_ns: Array) -> Array:
+    return (stamps_ns - flown.ticks[0][0]) / 1e9
+
+
+def _fixed_camera(name: str, camera: Mapping[str, Any], tracks: Mapping[str, _Track], own: Mapping[str, _Own]) -> Delay:
+    now_ms = float(camera["video_delay_ms"])
+    parts = []
+    for drone, track in tracks.items():
+        if len(track.times) > _LEAST_PAIRS and len(own[drone].times) > _LEAST_PAIRS:
+            mine = own[drone]
+            parts.append((track.times, track.headings[:, None], _interpolated(mine.times, mine.heading[:, None])))
+    shift = _shift(parts, scaled=False)
+    if shift is None:
+        return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, reason="it saw too little of any drone's turning")
+    # Exposed later than was thought means that the way to us is shorter.
+    return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, now_ms - 1e3 * shift[0], 1e3 * shift[1])
+
+
+def _odometry(drone: str, settings: Mapping[str, Any], track: _Track, own: _Own) -> list[Delay]:
+    odometry = settings["odometry"]
+    names = [f"drones.{drone}.odometry.{kind}_delay_ms" for kind in ("velocity", "height")]
+    now_ms = [float(odometry[f"{kind}_delay_ms"]) for kind in ("velocity", "height")]
+    if len(track.times) < _LEAST_PAIRS or len(own.times) < _LEAST_PAIRS:
+        reason = "no fixed camera saw it long enough"
+        return [Delay(drone, name, now, reason=reason) for name, now in zip(names, now_ms, strict=True)]
+    body = _body_positions(track, own, settings["marker"]["position_m"])
+    velocity = _shift([(track.times, body[:, :2], _path(track, own))], scaled=True)
+    known = np.isfinite(own.height)
+    height = None
+    if known.sum() > _LEAST_PAIRS:
+        height = _shift(
+            [(track.times, body[:, 2:], _interpolated(own.times[known], own.height[known, None]))], scaled=False
+        )
+    reasons = ("it moved too little in sight of a fixed camera", "it climbed too little, or reports no height")
+    return [
+        Delay(f"{drone} {kind}", name, now, 1e3 * shift[0], 1e3 * shift[1])
+        if shift is not None
+        else Delay(f"{drone} {kind}", name, now, reason=reason)
+        for kind, name, now, shift, reason in zip(
+            ("velocity", "height"), names, now_ms, (velocity, height), reasons, strict=True
+        )
+    ]
+
+
+def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, float]) -> Array:
+    """Return where the drone's centre was, not its marker: that leans with it."""
+    lean = [np.interp(track.times, own.times, angle) for angle in (own.roll, own.pitch)]
+    offsets = [
+        rotation_from_euler(roll, pitch, yaw) @ marker_m for roll, pitch, yaw in zip(*lean, track.headings, strict=True)
+    ]
+    return track.positions - np.array(offsets)
+
+
+def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
+    """Return (times, delay) -> positions that the reported velocities add up to, if they are so late."""
+    at = np.interp(track.times, own.times, own.heading)
+    drift = np.polyfit(track.times, np.unwrap(track.headings - at), 2)
+
+    def path(times: Array, delay_s: float) -> Array:
+        then = own.times - delay_s
+        heading = np.interp(then, own.times, own.heading) + np.polyval(drift, then)
+        c, s = np.cos(heading), np.sin(heading)
+        vx, vy = own.velocities.T
+        world = np.column_stack((c * vx - s * vy, s * vx + c * vy))
+        steps = 0.5 * np.diff(own.times)[:, None] * (world[1:] + world[:-1])
+        summed = np.vstack((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
+        return np.column_stack([np.interp(times, then, summed[:, k]) for k in range(2)])
+
+    return path
+
+
+def _interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]:
+    """Return (times, delay) -> reported values, if they are so late."""
+
+    def at(wanted: Array, delay_s: float) -> Array:
+        return np.column_stack([np.interp(wanted, times - delay_s, column) for column in values.T])
+
+    return at
+
+
+def _shift(
+    parts: list[tuple[Array, Array, Callable[[Array, float], Array]]], scaled: bool
+) -> tuple[float, float] | None:
+    """Return by how much the second of two records of the same motion is late, and one sigma [s].
+
+    parts: times and values (n, k) of one record, and the other as a function; scaled: up to a factor. None when
+    there is too little, or no minimum.
+    """
+    pairs = [(*part, *_pairs(part[0])) for part in parts]
+    pairs = [part for part in pairs if len(part[3]) >= _LEAST_PAIRS]
+    if not pairs:
+        return None
+    # Each part is weighed by its own noise, and what is far beyond it does not decide.
+    noise = [np.median(_misfits(part, 0.0, scaled)) / part[1].shape[1] for part in pairs]
+    chi = np.array(
+        [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(pairs, noise, strict=True)) for delay in _GRID_S]
+    )
+    best = int(np.argmin(chi))
+    if best in (0, len(chi) - 1):
+        return None
+    # A wide parabola: noise makes small dents.
+    near = slice(max(0, best - _REACH), best + _REACH + 1)
+    a, b, _ = np.polyfit(_GRID_S[near], chi[near], 2)
+    if a <= 0.0:
+        return None
+    # Windows overlap: so many of them say the same.
+    rate_hz = len(pairs[0][0]) / float(np.ptp(pairs[0][0]))
+    variance = max(1.0, rate_hz * _WINDOW_S) / a
+    return float(-b / (2.0 * a)), float(np.sqrt(variance))
+
+
+def _pairs(times: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return pairs of indices about a window apart."""
+    second = np.searchsorted(times, times + _WINDOW_S)
+    first = np.flatnonzero(second < len(times))
+    second = second[first]
+    near = times[second] - times[first] < 1.3 * _WINDOW_S
+    return first[near], second[near]
+
+
+def _robust(squares: Array) -> float:
+    return float((_ROWS_FREEDOM * np.log1p(squares / _ROWS_FREEDOM)).sum())
+
+
+def _misfits(part: tuple[Any, ...], delay_s: float, scaled: bool) -> Array:
+    """Return the squared differences (n) of what both records say of each pair."""
+    times, values, other, first, second = part
+    moved = values[second] - values[first]
+    told = other(times, delay_s)
+    told = told[second] - told[first]
+    scale = float((moved * told).sum() / max((told * told).sum(), 1e-12)) if scaled else 1.0
+    return np.asarray(((moved - scale * told) ** 2).sum(axis=1))
+
+
+def _onboard_camera(flown: Flown, resolved: Mapping[str, Any], drone: str, now_ms: float) -> Delay:
+    setting = f"drones.{drone}.camera.video_delay_ms"
+    observed = [c for c in corrections(flown, resolved) if c.observer == drone and c.nis is not None]
+    if len(observed) < _LEAST_PAIRS:
+        return Delay(f"{drone} camera", setting, now_ms, reason="it saw too little")
+    # Fixed weights: a filter that knows less is not surprised either.
+    weights = {}
+    for kind in sorted({(c.subject, len(c.residual)) for c in observed}):
+        mine = [np.reshape(c.covariance, (kind[1], kind[1])) for c in observed if (c.subject, len(c.residual)) == kind]
+        weights[kind] = np.linalg.inv(np.median(mine, axis=0))
+    costs = np.array([_surprise(flown, resolved, drone, weights, float(shift)) for shift in _SHIFTS_MS])
+    best = int(np.argmin(costs))
+    if best in (0, len(costs) - 1):
+        return Delay(f"{drone} camera", setting, now_ms, reason="no delay within 60 ms of the setting fits best")
+    near = slice(max(0, best - 2), best + 3)
+    a, b, _ = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
+    if a <= 0:
+        return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell")
+    std_ms = float(np.sqrt(_NEIGHBOURS / a))
+    return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms)
+
+
+def _surprise(
+    flown: Flown, resolved: Mapping[str, Any], drone: str, weights: Mapping[tuple[str, int], Array], later_ms: float
+) -> float:
+    """Return how badly the filter predicts what a camera sees if its pictures took so much longer; as chi-square."""
+    total = 0.0
+    for c in corrections(flown, resolved, _dated(drone, later_ms)):
+        weight = weights.get((c.subject, len(c.residual))) if c.observer == drone else None
+        if weight is not None:
+            y = np.array(c.residual)
+            total += (_ROWS_FREEDOM + len(y)) * float(np.log1p(y @ weight @ y / _ROWS_FREEDOM))
+    return total
+
+
+def _dated(observer: str, later_ms: float) -> Change:
+    """Return a change that dates an observer's pictures as if they had been so much longer on their way."""
+    shift_ns = round(later_ms * 1e6)
+
+    def change(message: Message) -> Message:
+        if not isinstance(message, RelativeObservation) or message.observer != observer:
+            return message
+        header = msgspec.structs.replace(message.header, stamp_ns=message.header.stamp_ns - shift_ns)
+        return msgspec.structs.replace(message, header=header)
+
+    return change

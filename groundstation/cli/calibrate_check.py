@@ -1,0 +1,168 @@
+"""`groundstation calibrate check`: do calibration and mounting of a camera still hold?"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.sources import lens_of, require_size, source_of, until_interrupted
+from groundstation.errors import GroundStationError, OperatorMistake
+
+if TYPE_CHECKING:
+    from drivers.camera.calibration.marks import Steady
+    from groundstation.geometry.lens import CameraIntrinsics
+    from groundstation.settings.schema import Field
+
+_RESIDUAL_RATIO, _LEAST_LIMIT_PX = 3.0, 0.35
+_PLACE_SIGMAS, _SAME_PLACE_M = 4.0, 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at: what, whether it holds (None: could not be told), and what to do if it does not."""
+
+    what: str
+    holds: bool | None
+    remedy: str = ""
+
+    @property
+    def text(self) -> str:
+        """Return it in a line."""
+        word = {True: "holds", False: "DOES NOT HOLD", None: "cannot be told"}[self.holds]
+        return f"{word}: {self.what}" + (f"; {self.remedy}" if self.remedy and not self.holds else "")
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation calibrate check lab.yaml\n"
+    "  groundstation calibrate check lab.yaml --marker 1=1.0,1.0 --marker 2=-1.0,1.0\n"
+    "  groundstation calibrate check http://192.168.1.50:8080/video.mjpg --calibration cameras/ceiling.yaml\n\n"
+    "With a field file its fixed cameras are looked through, which need markers on the floor; a marker that two of "
+    "them see must be in one place for both. --marker says where one lies.\n\n"
+    "Exit codes: 0 all holds, 1 something does not, 2 wrong usage, 4 no pictures."
+)
+@click.argument("what")
+@click.option("--calibration", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="With a source.")
+@click.option("--marker", "given", multiple=True, metavar="CODE=X,Y", help="A marker at a known place; repeatable.")
+@click.option("--square-mm", type=click.FloatRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
+@click.option("--frames", type=click.IntRange(1, 1000), default=10, show_default=True, help="Pictures to look at.")
+def check(what: str, calibration: Path | None, given: tuple[str, ...], square_mm: float, frames: int) -> int:
+    """Look through the cameras of WHAT (a field file, or a source) at markers that lie still, and judge."""
+    from groundstation.settings.floor_markers import floor_marker_of
+
+    known = {marker.code: np.array(marker.position_m) for marker in map(floor_marker_of, given)}
+    if calibration is not None:
+        context, parameter = click.get_current_context(), click.get_current_context().command.params[0]
+        source = source_of(context, parameter, what)
+        findings = list(
+            _lens_findings(source, *_seen(source, lens_of(calibration), str(calibration), frames), square_mm)
+        )
+    else:
+        findings = list(_field_findings(_field_of(what), known, square_mm, frames))
+    click.echo("\n".join(finding.text for finding in findings))
+    return ExitCode.FAILED if any(finding.holds is False for finding in findings) else ExitCode.OK
+
+
+def _field_of(name: str) -> "Field":
+    from groundstation.settings.files import find_field
+    from groundstation.settings.load import load_field
+
+    if "://" in name or name.startswith("/dev/"):
+        raise click.UsageError(f"{name}: with a source, say which --calibration FILE is meant to hold for it")
+    return load_field(find_field(name))
+
+
+def _seen(
+    source: str, lens: "CameraIntrinsics", calibration: str, frames: int
+) -> tuple["CameraIntrinsics", dict[int, "Steady"]]:
+    from drivers.camera.calibration.feed import shots
+    from drivers.camera.calibration.marks import Gathering
+
+    gathering = Gathering(lens)
+    with until_interrupted():
+        for shot in shots(source, (lens.width_px, lens.height_px)):
+            require_size(shot, lens, calibration)
+            gathering.take(shot.grey)
+            if gathering.pictures >= frames:
+                break
+    return lens, dict(gathering.steady())
+
+
+def _lens_findings(
+    name: str, lens: "CameraIntrinsics", seen: "dict[int, Steady]", square_mm: float
+) -> Iterator[Finding]:
+    from drivers.camera.calibration.marks import flat_points
+    from drivers.camera.pose import planar_poses
+
+    if not seen:
+        yield Finding(f"{name}: no marker in view", None, "lay out two or three, also near the picture's corners")
+        return
+    limit = max(_LEAST_LIMIT_PX, _RESIDUAL_RATIO * lens.residual_px)
+    for code, steady in seen.items():
+        poses = planar_poses(steady.corners, flat_points(square_mm), lens)
+        squared = min((pose.squared_error for pose in poses), default=math.inf)
+        rms = math.sqrt(squared / (2 * len(steady.corners) - 6))
+        remedy = "is the marker flat? else groundstation calibrate camera: lens or focus were changed"
+        yield Finding(f"{name}: marker {code} fits the lens to {rms:.2f} px (limit {limit:.2f})", rms <= limit, remedy)
+
+
+def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, frames: int) -> Iterator[Finding]:
+    from groundstation.geometry.calibration import intrinsics_from_mapping
+
+    places: dict[int, dict[str, tuple[Any, float]]] = {}
+    for name, camera in field.cameras.items():
+        lens = intrinsics_from_mapping(camera.calibration.model_dump())
+        try:
+            _, seen = _seen(camera.source, lens, f"of {name}", frames)
+        except OperatorMistake as error:
+            yield Finding(f"{name}: {error}", False)
+            continue
+        except GroundStationError as error:
+            yield Finding(f"{name}: {error}", False, "check the camera and its address")
+            continue
+        yield from _lens_findings(name, lens, seen, square_mm)
+        for code, steady in seen.items():
+            placed = _placed(camera, lens, steady, square_mm)
+            if placed is not None:
+                places.setdefault(code, {})[name] = placed
+    for code, by_camera in sorted(places.items()):
+        yield from _place_findings(code, by_camera, known.get(code))
+
+
+def _placed(camera: Any, lens: "CameraIntrinsics", steady: "Steady", square_mm: float) -> tuple[Any, float] | None:
+    """Return where a camera has a marker [m; world], and one sigma of that by its mounting and its corners."""
+    from drivers.camera.calibration.marks import flat_points
+    from drivers.camera.pose import planar_poses, pose_covariance
+    from groundstation.geometry.rotations import world_from_downward_optical
+
+    points = flat_points(square_mm)
+    poses = planar_poses(steady.corners, points, lens)
+    if not poses:
+        return None
+    best = min(poses, key=lambda pose: pose.squared_error)
+    rotation = world_from_downward_optical(camera.rotation_deg)
+    own = float(np.sqrt(np.diag(pose_covariance(best, points, lens, lens.residual_px))[3:].max()))
+    reach = float(np.linalg.norm(best.translation))
+    std = math.hypot(own, math.hypot(camera.position_std_m, camera.attitude_std_rad * reach))
+    return rotation @ best.translation + np.array(camera.position_m), std
+
+
+def _place_findings(code: int, by_camera: dict[str, tuple[Any, float]], said: Any) -> Iterator[Finding]:
+    remedy = "a camera was moved: groundstation calibrate extrinsics"
+    for name, (place, std) in by_camera.items():
+        if said is not None:
+            gap = float(np.linalg.norm(place - said))
+            limit = max(_SAME_PLACE_M, _PLACE_SIGMAS * std)
+            text = f"{name}: has marker {code} {gap * 100:.1f} cm from where it lies (limit {limit * 100:.1f})"
+            yield Finding(text, gap <= limit, remedy)
+    names = list(by_camera)
+    for first, second in pairwise(names):
+        (a, std_a), (b, std_b) = by_camera[first], by_camera[second]
+        gap, limit = float(np.linalg.norm(a - b)), max(_SAME_PLACE_M, _PLACE_SIGMAS * math.hypot(std_a, std_b))
+        text = f"{first} and {second} have marker {code} {gap * 100:.1f} cm apart (limit {limit * 100:.1f})"
+        yield Finding(text, gap <= limit, remedy)

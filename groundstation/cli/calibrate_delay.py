@@ -1,0 +1,64 @@
+"""`groundstation calibrate delay`: how late each sensor is, from a recorded flight."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+if TYPE_CHECKING:
+    from groundstation.calibration.delay import Delay
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation calibrate delay runs/20261120T101500Z-lab\n"
+    "  groundstation calibrate delay RUN --json\n\n"
+    "The flight should turn the drones in sight of the fixed camera and move them briskly, for a minute or more. What "
+    "a recording does not tell to 15 ms is not proposed.\n\n"
+    "Exit codes: 0 done, 2 wrong usage, or no recording that can be used."
+)
+@click.argument("recording", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="For programs.")
+def delay(recording: tuple[Path, ...], as_json: bool) -> int:
+    """Measure the delays of cameras, velocities and heights in RECORDING; prints the settings to change.
+
+    Sensors are compared with each other: delays are measured against what gyroscopes say, which is taken as immediate.
+    The same recording gives the same figures.
+    """
+    from groundstation.process import numba_cache
+    from groundstation.recording.reader import RecordingError
+    from groundstation.settings.recorded import recorded_field
+
+    numba_cache.activate()
+    from groundstation.calibration.delay import delays
+    from groundstation.calibration.flown import flown_of
+    from groundstation.replay.source import open_source
+
+    try:
+        source = open_source(recording)
+        field = recorded_field(source.field).model_dump(mode="json")
+        flown = flown_of(source)
+    except RecordingError as error:
+        raise click.UsageError(str(error)) from error
+    found = delays(flown, field)
+    if as_json:
+        click.echo(json.dumps([asdict(one) | {"sure": one.sure} for one in found], indent=2))
+    else:
+        click.echo(f"{source.name}: {flown.duration_s:.0f} s, {sum(flown.cameras.values())} observations")
+        click.echo("\n".join(_lines(found)))
+    return ExitCode.OK
+
+
+def _lines(found: "list[Delay]") -> list[str]:
+    lines = [f"{'sensor':22} {'setting':>9} {'measured':>18}"]
+    for one in found:
+        measured = f"{one.measured_ms:.0f} +- {one.std_ms:.0f} ms" if one.measured_ms is not None else "-"
+        remark = one.reason or ("" if one.sure else "too unsure to use: fly longer, and more briskly")
+        lines.append(f"{one.sensor:22} {one.now_ms:6.0f} ms {measured:>18}  {remark}".rstrip())
+    changed = [one for one in found if one.differs]
+    lines.append("settings to change:" if changed else "no setting is contradicted")
+    lines += [f"  {one.setting}: {one.measured_ms:.0f}" for one in changed]
+    return lines

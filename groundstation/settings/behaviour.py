@@ -84,5 +84,5 @@ class Recording(Section):
 class Console(Section):
     """The web page, on loopback."""
 
-    enabled: bool = False
+    enabled: bool = True
     port: Annotated[int, Field(ge=1024, le=65535)] = 8765

@@ -81,7 +81,7 @@ def test_sections_may_be_left_out(tmp_path: Path) -> None:
     shutil.copytree(FIXTURE.parent / "cameras", tmp_path / "cameras")
     (tmp_path / "small.yaml").write_text(kept, encoding="utf-8")
     field = load_field(tmp_path / "small.yaml")
-    assert (field.safety.min_separation_m, field.estimator.rate_hz, field.console.enabled) == (0.6, 50, False)
+    assert (field.safety.min_separation_m, field.estimator.rate_hz, field.console.enabled) == (0.6, 50, True)
 
 
 def test_the_field_travels_as_json_and_is_frozen(field: Field) -> None:

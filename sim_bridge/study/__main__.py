@@ -9,6 +9,7 @@ from typing import Any
 
 from groundstation.process import numba_cache
 from sim_bridge.scenario import Scenario, parse_scenario
+from sim_bridge.study.summary import summary
 
 _EXAMPLES = """examples:
   python -m sim_bridge.study demo --seed 3 --duration 60
@@ -64,10 +65,14 @@ def main() -> int:
     numba_cache.activate()
     from sim_bridge.study.runner import Study, StudyOptions
 
+    reports = []
     for seed in range(arguments.seed, arguments.seed + arguments.seeds):
         options = StudyOptions(seed, arguments.duration, arguments.outliers, not arguments.hover)
         report = Study(field, scenario, options).run()
         print(json.dumps(report) if arguments.json else _page(report), flush=True)
+        reports.append(report)
+    if len(reports) > 1 and not arguments.json:
+        print(_page({f"mean of {len(reports)}, 95 %": "", **summary(reports, field)}))
     return 0
 
 

@@ -52,7 +52,7 @@ class Study:
         self.site = parse_site(field)
         self.world = World(self.site, scenario, options.seed)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
-        self.score = Score(_SCORE_TICKS * TICK_NS / 1e9)
+        self.score = Score(_SCORE_TICKS * TICK_NS / 1e9, field["estimator"]["gate_probability"])
         self.cpu_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(options.seed, "study")
         self._scenario = scenario

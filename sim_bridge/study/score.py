@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.bus.messages import Verdict
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.gating import gate
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
 
 Array = NDArray[np.float64]
 _MISSING_M, _LOST_M = 1.0, 0.5
+_USED = (Verdict.ACCEPTED, Verdict.INFLATED)
+_DIVERGED = 33.4  # chi-square of 4 degrees of freedom, probability 1e-6
 
 
 @dataclass
@@ -22,16 +26,21 @@ class Score:
     """Collects errors at 10 Hz and corrections as they come; `report` turns them into figures."""
 
     period_s: float
+    gate_probability: float = 0.997
     errors: list[float] = field(default_factory=list)
     nees: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     squares: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     nis: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     verdicts: defaultdict[str, int] = field(default_factory=lambda: defaultdict(int))
     topologies: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    diverged_s: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     switches: int = 0
     separation_m: float = math.inf
     unseen_s: float = 0.0
     _last: str = ""
+
+    def __post_init__(self) -> None:
+        self.gates = {rows: gate(self.gate_probability, rows) for rows in range(1, 5)}
 
     def take(
         self, belief: JointBelief, truth: dict[str, Array], target: str, topology: str, ages_s: dict[str, float]
@@ -47,9 +56,7 @@ class Score:
             error = true - part[:4]
             if block.kind is EntityKind.ROBOT:
                 error[3] = math.remainder(error[3], math.tau)
-            self.nees[block.name].append(float(error @ np.linalg.solve(covariance[:4, :4], error)) / 4)
-            self.nees[f"{block.name} xy"].append(float(error[:2] @ np.linalg.solve(covariance[:2, :2], error[:2])) / 2)
-            self.squares[block.name].append(float(error[:2] @ error[:2]))
+            self._judge(block.name, block.labels, error, covariance[:4, :4])
         self.errors.append(math.sqrt(self.squares[target][-1]) if target in belief.layout else _MISSING_M)
         self.topologies[topology] += self.period_s
         self.switches += bool(self._last) and topology != self._last
@@ -58,12 +65,23 @@ class Score:
         for a, b in combinations(drones, 2):
             self.separation_m = min(self.separation_m, float(np.linalg.norm(a - b)))
 
+    def _judge(self, name: str, labels: tuple[str, ...], error: Array, covariance: Array) -> None:
+        """Take one entity's error; beyond the NEES that a right covariance exceeds once in 1e6, it has diverged."""
+        nees = float(error @ np.linalg.solve(covariance, error))
+        self.nees[name].append(nees / 4)
+        self.nees[f"{name} xy"].append(float(error[:2] @ np.linalg.solve(covariance[:2, :2], error[:2])) / 2)
+        for label, e, variance in zip(labels[2:], error[2:], np.diag(covariance)[2:], strict=False):
+            self.nees[f"{name} {label}"].append(float(e * e / variance))
+        self.squares[name].append(float(error[:2] @ error[:2]))
+        self.diverged_s[name] += self.period_s * (nees > _DIVERGED)
+
     def note(self, correction: Correction) -> None:
-        """Count what became of an observation."""
+        """Count what became of an observation; NIS of those that were used, as they were used."""
         self.verdicts[str(correction.verdict)] += 1
-        if correction.nis is not None:
+        if correction.nis is not None and not correction.joined and correction.verdict in _USED:
             edge = f"{correction.observer}>{correction.subject}"
-            self.nis[edge].append(correction.nis / max(len(correction.residual), 1))
+            rows = len(correction.residual)
+            self.nis[edge].append(min(correction.nis, self.gates[rows]) / rows)
 
     def report(self) -> dict[str, Any]:
         """Return all figures, rounded for reading."""
@@ -80,6 +98,7 @@ class Score:
             "longest_unseen_s": round(self.unseen_s, 1),
             "min_separation_m": round(self.separation_m, 3),
             "anees": {k: round(float(np.mean(v)), 3) for k, v in self.nees.items()},
+            "diverged_s": {k: round(v, 1) for k, v in self.diverged_s.items()},
             "nis": {k: round(float(np.mean(v)), 3) for k, v in sorted(self.nis.items())},
             "verdicts": dict(sorted(self.verdicts.items())),
         }

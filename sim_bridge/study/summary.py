@@ -1,0 +1,61 @@
+"""Several flights together: means over flights with their confidence, since errors within a flight last."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+_NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """Mean over flights and the half width of its two-sided 95 % interval (NaN for a single flight)."""
+
+    mean: float
+    half: float
+    flights: int
+
+    def __str__(self) -> str:
+        return f"{self.mean:.3f} +- {self.half:.3f}"
+
+
+def interval(values: Iterable[float]) -> Interval:
+    """Return the mean of one value per flight; Student's factor by its expansion in 1 / degrees of freedom."""
+    found = np.array([value for value in values if math.isfinite(value)])
+    freedom = len(found) - 1
+    if freedom < 1:
+        return Interval(float(found.mean()) if len(found) else math.nan, math.nan, len(found))
+    factor = _NORMAL_95 + 2.37 / freedom + 2.82 / freedom**2
+    return Interval(float(found.mean()), float(factor * found.std(ddof=1) / math.sqrt(len(found))), len(found))
+
+
+def anees(report: Mapping[str, Any], names: Iterable[str], suffix: str = "") -> float:
+    """Return a flight's mean NEES per degree of freedom over the entities that were ever believed in; NaN for none."""
+    found = [report["anees"][name + suffix] for name in names if name + suffix in report["anees"]]
+    return float(np.mean(found)) if found else math.nan
+
+
+def nis(report: Mapping[str, Any], observers: Iterable[str]) -> float:
+    """Return a flight's mean NIS per degree of freedom over what these observers saw; NaN for nothing."""
+    among = frozenset(observers)
+    found = [value for edge, value in report["nis"].items() if edge.split(">")[0] in among]
+    return float(np.mean(found)) if found else math.nan
+
+
+def summary(reports: Sequence[Mapping[str, Any]], field: Mapping[str, Any]) -> dict[str, Interval]:
+    """Return what decides whether the belief is good and as good as it says, over the flights of one field."""
+    robots, targets, cameras = tuple(field["drones"]), (field["target"]["name"],), tuple(field["cameras"])
+    values = {
+        "target_rmse_m": [report["target_rmse_m"] for report in reports],
+        "target_lost_s": [report["target_lost_s"] for report in reports],
+        "anees robots": [anees(report, robots) for report in reports],
+        "anees robots xy": [anees(report, robots, " xy") for report in reports],
+        "anees target": [anees(report, targets) for report in reports],
+        "anees target xy": [anees(report, targets, " xy") for report in reports],
+        "nis fixed cameras": [nis(report, cameras) for report in reports],
+        "nis onboard cameras": [nis(report, robots) for report in reports],
+    }
+    return {name: interval(found) for name, found in values.items()}

@@ -2,6 +2,7 @@
 
 import os
 import select
+import stat
 import struct
 import sys
 import termios
@@ -21,6 +22,7 @@ from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.cli.stop import choose_run
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.console.orders import OrderDesk
+from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:
     from groundstation.bus.api import Bus
@@ -135,10 +137,23 @@ def _line(desk: OrderDesk, man: DeadMan) -> str:
     return "  ".join([grip[man.grip], *orders[:1]])
 
 
+def _joystick(path: str) -> int:
+    """Return the open device; raises GroundStationError where it cannot be one."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    except OSError as error:
+        raise GroundStationError(f"cannot read {path}: {error.strerror} (is this user in the group input?)") from error
+    if not stat.S_ISCHR(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise GroundStationError(f"{path} is no gamepad: joysticks are /dev/input/js0 and the next")
+    os.set_blocking(descriptor, True)  # only opening must not wait, as that of a pipe would
+    return descriptor
+
+
 @contextmanager
 def _opened(gamepad: str | None) -> Iterator[Handle]:
     if gamepad is not None:
-        descriptor = os.open(gamepad, os.O_RDONLY | os.O_CLOEXEC)
+        descriptor = _joystick(gamepad)
         try:
             yield Handle(descriptor, gamepad=True)
         finally:

@@ -85,7 +85,8 @@ class History:
             there = truth.get(self._target)
             if there is not None:
                 error = round(math.dist(target.mean[:2], there.position_m[:2]), 4)
-        cost = None if plan is None else round(plan.cost * 1e4, 2)
+        # A plan of nobody costs nothing, which is no figure for a curve.
+        cost = None if plan is None or not plan.topology else round(plan.cost * 1e4, 2)
         topology = "" if plan is None else plan.topology
         figures = {"axis_m": axis, "error_m": error, "cost_cm2": cost, "nis": nis, "topology": topology}
         return {"t_ms": now_ns / 1e6, **figures}

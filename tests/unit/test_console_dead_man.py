@@ -5,14 +5,17 @@ import os
 import struct
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Verb
+from groundstation.cli import deadman
 from groundstation.cli.deadman import Handle, watch
 from groundstation.console.dead_man import DeadMan, Grip
+from groundstation.errors import GroundStationError
 
 NS = 1_000_000_000
 
@@ -98,3 +101,19 @@ def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None
     sent = [received.message for received in commands.drain()]
     assert len(sent) >= 2
     assert all(isinstance(c, Command) and c.verb is Verb.HOLD and c.scope == () for c in sent)
+
+
+def test_what_is_no_gamepad_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no joystick")
+    for path, words in (
+        (tmp_path / "notes.txt", "no gamepad"),
+        (tmp_path, "no gamepad"),
+        (tmp_path / "js9", "No such file"),
+    ):
+        with pytest.raises(GroundStationError, match=words), deadman._opened(str(path)):
+            pass
+    with deadman._opened("/dev/null") as handle:
+        assert handle.gamepad
+        man = DeadMan(1)
+        man.press(0)
+        assert handle.feel(man, 1) == (Verb.HOLD, True)  # it has nothing more to say: as good as unplugged

@@ -4,7 +4,7 @@ import { byId, el, seconds, text } from "./dom.js";
 import { drawn } from "./map.js";
 import { ageS, estimateAge, replaying, silentS, store } from "./store.js";
 
-const SILENT_S = 0.8, TRACKER_S = 0.5;
+const SILENT_S = 0.8, TRACKER_S = 0.5, OLD_S = 1;
 const notices = [];
 let eventsShown = "";
 
@@ -56,8 +56,9 @@ export function showHealth() {
   if (!health || health.nis === null) { text(pill, health ? "no innovations yet" : ""); delete pill.dataset.level; return; }
   const good = health.nis >= health.low && health.nis <= health.high, far = health.nis > 2 * health.high;
   pill.className = "pill num";
-  pill.dataset.level = good ? "good" : far ? "bad" : "warn";
-  text(pill, `NIS ${health.nis.toFixed(2)} ${good ? "consistent" : health.nis > health.high ? "overconfident" : "cautious"} · ${(100 * (health.accepted ?? 0)).toFixed(0)} % accepted`);
+  // What a silent tracker was like says nothing of what it is like.
+  pill.dataset.level = estimateAge() > OLD_S ? "wait" : good ? "good" : far ? "bad" : "warn";
+  text(pill, `${estimateAge() > OLD_S ? "was: " : ""}NIS ${health.nis.toFixed(2)} ${good ? "consistent" : health.nis > health.high ? "overconfident" : "cautious"} · ${(100 * (health.accepted ?? 0)).toFixed(0)} % accepted`);
   pill.title = `95 % bounds ${health.low.toFixed(2)} to ${health.high.toFixed(2)}`;
   if (!byId("edges").parentElement.open) return;
   byId("edges").replaceChildren(el("table", {}, el("tr", {}, ...["edge", "NIS", "95 % bounds", "accepted", "last refused"].map((title) => el("th", {}, title))),

@@ -19,7 +19,7 @@ export function buildTeam() {
 }
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
-const BELIEF = ["position", "ellipse", "speed", "by"];
+const BELIEF = ["position", "ellipse", "speed"];
 const WIDE = new Set(["position", "ellipse", "by"]);
 
 function card(name, fields, drone) {

@@ -22,6 +22,7 @@ _VERDICTS = {
     s.OBSERVER_DOUBTED: (Verdict.IMPLAUSIBLE, "far beyond the gate, as is its observer itself"),
     s.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot tell where its subject is"),
 }
+_IDENTITY = tuple(np.eye(4).ravel().tolist())
 
 
 class EventLog:
@@ -121,6 +122,9 @@ def _padded(z: tuple[float, ...], covariance: tuple[float, ...]) -> list[float]:
     rows = len(z)
     if not 1 <= rows <= 4 or len(covariance) != rows * rows:
         raise ValueError(f"a reading has 1 to 4 rows and a square covariance (got {rows}, {len(covariance)})")
-    full = np.eye(4)
-    full[:rows, :rows] = np.reshape(covariance, (rows, rows))
-    return [*z, *[0.0] * (4 - rows), *full.ravel().tolist()]
+    if rows == 4:
+        return [*z, *covariance]
+    full = [*_IDENTITY]
+    for i in range(rows):
+        full[4 * i : 4 * i + rows] = covariance[rows * i : rows * (i + 1)]
+    return [*z, *[0.0] * (4 - rows), *full]

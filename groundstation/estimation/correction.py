@@ -12,10 +12,13 @@ import numpy as np
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import cholesky
+from groundstation.estimation.linear import cholesky, is_positive_definite
 
 
-@kernel("void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])")
+@kernel(
+    "void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])",
+    inlined=True,
+)
 def project(
     P: Array, start_a: int, size_a: int, H_a: Array, start_b: int, size_b: int, H_b: Array, rows: int, W: Array
 ) -> None:
@@ -36,7 +39,10 @@ def project(
                     W[i, j] += f * P[start_b + k, j]
 
 
-@kernel("void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])")
+@kernel(
+    "void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])",
+    inlined=True,
+)
 def project_columns(
     A: Array, start_a: int, size_a: int, H_a: Array, start_b: int, size_b: int, H_b: Array, rows: int, B: Array
 ) -> None:
@@ -55,14 +61,14 @@ def project_columns(
 RESOLUTION = 1e-10
 
 
-@kernel("void(float64[:,::1], float64[:,::1], int64)")
+@kernel("void(float64[:,::1], float64[:,::1], int64)", inlined=True)
 def bound_precision(HPH: Array, R: Array, rows: int) -> None:
     """Raise R to what double precision resolves beside H P H^T, so that P stays positive definite."""
     for i in range(rows):
         R[i, i] += RESOLUTION * abs(HPH[i, i])
 
 
-@kernel("float64(float64[:,::1], float64[:,::1], float64[::1], int64, float64[:,::1])")
+@kernel("float64(float64[:,::1], float64[:,::1], float64[::1], int64, float64[:,::1])", inlined=True)
 def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
     """Return the NIS of a residual and leave the Cholesky factor of S = H P H^T + R; -1 if S is not PD."""
     for i in range(rows):
@@ -81,7 +87,7 @@ def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
     return nis
 
 
-@kernel("float64(float64[:,::1], int64)")
+@kernel("float64(float64[:,::1], int64)", inlined=True)
 def log_determinant(factor: Array, rows: int) -> float:
     """Return log det S from its Cholesky factor."""
     value = 0.0
@@ -108,17 +114,34 @@ def subtract_two(P: Array, V: Array) -> None:
             row[j] -= v_0 * V_0[j] + v_1 * V_1[j]
 
 
-@kernel("void(float64[:,::1], float64[:,::1])")
+@kernel("void(float64[:,::1], float64[:,::1])", inlined=True)
 def subtract_four(P: Array, V: Array) -> None:
-    """Subtract V^T V from P for four rows, in one pass and symmetric to the bit."""
+    """Subtract V^T V from P for four rows, in one pass and symmetric to the bit.
+
+    Four rows of P at a time share what is loaded of V: nearly half of a correction's time is spent here.
+    """
+    n = P.shape[0]
     V_0, V_1, V_2, V_3 = V[0], V[1], V[2], V[3]
-    for a in range(P.shape[0]):
-        row, v_0, v_1, v_2, v_3 = P[a], V_0[a], V_1[a], V_2[a], V_3[a]
-        for j in range(P.shape[0]):
-            row[j] -= (v_0 * V_0[j] + v_1 * V_1[j]) + (v_2 * V_2[j] + v_3 * V_3[j])
+    spare = np.zeros(n)  # for rows beyond the last
+    for a in range(0, n, 4):
+        b, c, d = min(a + 1, n - 1), min(a + 2, n - 1), min(a + 3, n - 1)
+        p = P[a]
+        q = P[b] if b == a + 1 else spare
+        r = P[c] if c == a + 2 else spare
+        t = P[d] if d == a + 3 else spare
+        e_0, e_1, e_2, e_3 = V_0[a], V_1[a], V_2[a], V_3[a]
+        f_0, f_1, f_2, f_3 = V_0[b], V_1[b], V_2[b], V_3[b]
+        g_0, g_1, g_2, g_3 = V_0[c], V_1[c], V_2[c], V_3[c]
+        h_0, h_1, h_2, h_3 = V_0[d], V_1[d], V_2[d], V_3[d]
+        for j in range(n):
+            v_0, v_1, v_2, v_3 = V_0[j], V_1[j], V_2[j], V_3[j]
+            p[j] -= (e_0 * v_0 + e_1 * v_1) + (e_2 * v_2 + e_3 * v_3)
+            q[j] -= (f_0 * v_0 + f_1 * v_1) + (f_2 * v_2 + f_3 * v_3)
+            r[j] -= (g_0 * v_0 + g_1 * v_1) + (g_2 * v_2 + g_3 * v_3)
+            t[j] -= (h_0 * v_0 + h_1 * v_1) + (h_2 * v_2 + h_3 * v_3)
 
 
-@kernel("void(float64[::1], float64[:,::1], int64, float64[:,::1], float64[:,::1], float64[::1])")
+@kernel("void(float64[::1], float64[:,::1], int64, float64[:,::1], float64[:,::1], float64[::1])", inlined=True)
 def apply(mean: Array, P: Array, rows: int, W: Array, factor: Array, y: Array) -> None:
     """Correct mean and P in place, given W = H P (4, n) and the Cholesky factor L of S.
 
@@ -164,4 +187,4 @@ def is_distribution(mean: Array, P: Array, entities: IntArray, aux: Array) -> bo
             return False
         for j in range(size):
             work[i, j] = P[index[i], index[j]]
-    return cholesky(work, size)
+    return is_positive_definite(work, size)

@@ -19,7 +19,7 @@ from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.update import correct, linearise, note_motion, read, write_outcome
 
 
-@kernel("int64(int64[:,::1], float64[:,::1], float64[::1], int64)")
+@kernel("int64(int64[:,::1], float64[:,::1], float64[::1], int64)", inlined=True)
 def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
     """Return why an observation cannot be used whatever it says, or PENDING."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
@@ -35,7 +35,8 @@ def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
 @kernel(
     "float64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
     " float64[::1], float64[::1], int64, float64[::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1],"
-    " float64[:,::1], float64[::1])"
+    " float64[:,::1], float64[::1])",
+    inlined=True,
 )
 def confront(
     means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
@@ -72,7 +73,7 @@ def confront(
     return best + math.log(total)
 
 
-@kernel("void(float64[::1], float64[::1], float64[:,:,:,::1], int64, float64)")
+@kernel("void(float64[::1], float64[::1], float64[:,:,:,::1], int64, float64)", inlined=True)
 def weigh(weights: Array, nis: Array, work: Array, rows: int, factor: float) -> None:
     """Multiply the modes' probabilities by the likelihood of the observation as it was used (S times factor)."""
     modes = weights.shape[0]
@@ -111,7 +112,7 @@ def settle(
     return True
 
 
-@kernel("int64(float64[::1], float64[::1])")
+@kernel("int64(float64[::1], float64[::1])", inlined=True)
 def likeliest(weights: Array, nis: Array) -> int:
     """Return the most probable mode in which the observation can be used, or -1."""
     best = -1
@@ -121,7 +122,7 @@ def likeliest(weights: Array, nis: Array) -> int:
     return best
 
 
-@kernel("float64(float64[::1])")
+@kernel("float64(float64[::1])", inlined=True)
 def least(nis: Array) -> float:
     """Return the smallest NIS of the modes in which the observation can be used."""
     value = math.inf
@@ -134,7 +135,8 @@ def least(nis: Array) -> float:
 @kernel(
     "int64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
     " float64[::1], float64, float64[::1], int64, float64[:,::1], float64[:,:,:,::1], float64[:,:,:,:,::1],"
-    " float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])"
+    " float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
+    inlined=True,
 )
 def choose(
     means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
@@ -161,7 +163,8 @@ def choose(
 
 @kernel(
     "void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1],"
-    " float64[:,:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1])"
+    " float64[:,:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1])",
+    inlined=True,
 )
 def observe(
     means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,

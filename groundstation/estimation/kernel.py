@@ -15,14 +15,17 @@ from numba.extending import intrinsic
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def kernel(signature: str) -> Callable[[Function], Function]:
+def kernel(signature: str, inlined: bool = False) -> Callable[[Function], Function]:
     """Compile a function for one signature; IEEE arithmetic (no fastmath), so that replays agree to the bit.
+
+    inlined: into every kernel that calls it, for what is short or called from one place. To hand over a dozen arrays
+    takes as long as a small kernel's work; but what is copied often makes compiling slow.
 
     Cached only in a directory that the process has chosen by the state of all sources (process/numba_cache.py): beside
     the source, numba would not notice an edited callee or constant of another module.
     """
     cached = bool(getattr(numba.config, "CACHE_DIR", ""))
-    compiled = numba.njit(signature, cache=cached, nogil=True, error_model="numpy", fastmath=False)
+    compiled = numba.njit(signature, cache=cached, nogil=True, error_model="numpy", fastmath=False, forceinline=inlined)
     return cast(Callable[[Function], Function], compiled)
 
 

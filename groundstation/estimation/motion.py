@@ -16,7 +16,7 @@ DIFFUSE_M2 = 100.0
 DIFFUSE_RAD2 = 10.0
 
 
-@kernel("void(float64[:,::1], int64, int64, int64)")
+@kernel("void(float64[:,::1], int64, int64, int64)", inlined=True)
 def mirror(P: Array, start: int, size: int, changed: int) -> None:
     """Copy the first `changed` rows of a block onto its columns, so that P stays symmetric to the bit.
 
@@ -45,7 +45,7 @@ def add_row(P: Array, to: int, source: int, factor: float) -> None:
         P[to, j] += factor * P[source, j]
 
 
-@kernel("void(float64[:,::1], int64, int64, int64, int64, float64)")
+@kernel("void(float64[:,::1], int64, int64, int64, int64, float64)", inlined=True)
 def add_column(P: Array, start: int, size: int, to: int, source: int, factor: float) -> None:
     """Add a multiple of one column to another, within the rows of the block."""
     for i in range(start, start + size):
@@ -76,14 +76,14 @@ def fade(mean: Array, P: Array, start: int, size: int, offset: int, deviation: f
     P[index, index] += deviation * deviation * -math.expm1(-2.0 * share)
 
 
-@kernel("void(float64[:,::1], int64, int64, float64)")
+@kernel("void(float64[:,::1], int64, int64, float64)", inlined=True)
 def wander(P: Array, start: int, offset: int, variance: float) -> None:
     """Let an entry wander at random: more variance; offset -1: nothing happens."""
     if offset >= 0:
         P[start + offset, start + offset] += variance
 
 
-@kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64)")
+@kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64)", inlined=True)
 def predict(mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, dt: float) -> None:
     """Predict all entities that are in the state, each by its own model's kernel."""
     for e in range(entities.shape[0]):

@@ -14,7 +14,8 @@ _SHORTEST_S = 1e-3  # between two readings of one pair, as far as repeated error
 
 @kernel(
     "int64(int64[:,::1], float64[:,::1], int64[::1], float64[::1], float64, float64[::1], int64, float64[::1],"
-    " float64[:,::1])"
+    " float64[:,::1])",
+    inlined=True,
 )
 def read(
     entities: IntArray, parameters: Array, kernels: IntArray, sensor: Array, unused_s: float, event: Array,
@@ -44,7 +45,7 @@ def read(
     return int(rows)
 
 
-@kernel("void(float64[::1], float64[::1], int64[::1], float64[::1], int64)")
+@kernel("void(float64[::1], float64[::1], int64[::1], float64[::1], int64)", inlined=True)
 def note_rates(mean: Array, aux: Array, entity: IntArray, event: Array, offset: int) -> None:
     """Write into the event how fast the first four entries of one entity's block change."""
     for i in range(4):
@@ -57,7 +58,7 @@ def note_rates(mean: Array, aux: Array, entity: IntArray, event: Array, offset: 
         event[offset + 1] = mean[entity[s.ENTITY_START] + s.VY]
 
 
-@kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[::1])")
+@kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[::1])", inlined=True)
 def note_motion(mean: Array, aux: Array, entities: IntArray, event: Array) -> None:
     """Complete an event by what is known when it is reached: how its subject leans, how fast both move."""
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
@@ -66,7 +67,7 @@ def note_motion(mean: Array, aux: Array, entities: IntArray, event: Array) -> No
     note_rates(mean, aux[subject], entities[subject], event, s.EVENT_SUBJECT_RATE)
 
 
-@kernel("void(float64[::1], float64[::1], int64, float64[:,::1], float64[:,::1], float64[:,::1])")
+@kernel("void(float64[::1], float64[::1], int64, float64[:,::1], float64[:,::1], float64[:,::1])", inlined=True)
 def add_timing_noise(sensor: Array, event: Array, rows: int, H_observer: Array, H_subject: Array, R: Array) -> None:
     """Add to R what an uncertain time of measurement does while observer and subject move: var(t) h' h'^T."""
     if sensor[s.SENSOR_TIME_VARIANCE] == 0.0:
@@ -83,7 +84,8 @@ def add_timing_noise(sensor: Array, event: Array, rows: int, H_observer: Array, 
 
 @kernel(
     "float64(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64[::1], float64[::1], float64[::1],"
-    " int64, float64[::1], float64[:,::1], float64[:,:,::1], float64[:,::1], float64[::1])"
+    " int64, float64[::1], float64[:,::1], float64[:,:,::1], float64[:,::1], float64[::1])",
+    inlined=True,
 )
 def linearise(
     mean: Array, P: Array, entities: IntArray, parameters: Array, kernels: IntArray, sensor: Array, event: Array,
@@ -115,7 +117,8 @@ def linearise(
 
 @kernel(
     "void(float64[::1], float64[:,::1], int64[:,::1], int64, float64[:,::1], float64[:,:,::1], float64[:,::1],"
-    " float64[::1], float64)"
+    " float64[::1], float64)",
+    inlined=True,
 )
 def correct(
     mean: Array, P: Array, entities: IntArray, rows: int, R: Array, work: Array, W: Array, y: Array, factor: float
@@ -131,7 +134,7 @@ def correct(
             mean[yaw] = wrap(mean[yaw])
 
 
-@kernel("void(float64[::1], float64, int64, float64[::1], float64[:,:,::1])")
+@kernel("void(float64[::1], float64, int64, float64[::1], float64[:,:,::1])", inlined=True)
 def write_outcome(out: Array, nis: float, rows: int, y: Array, work: Array) -> None:
     """Record residual, S and NIS, so that each correction can explain itself."""
     out[s.OUT_NIS] = nis

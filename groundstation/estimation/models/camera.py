@@ -24,7 +24,7 @@ ROTATION = s.FIRST_SENSOR_OWN
 TRANSLATION, ATTITUDE_VARIANCE, POSITION_VARIANCE = ROTATION + 9, ROTATION + 12, ROTATION + 13
 
 
-@kernel("void(float64[::1], int64[::1], float64[::1], float64[::1])")
+@kernel("void(float64[::1], int64[::1], float64[::1], float64[::1])", inlined=True)
 def observer_angles(mean: Array, entity: IntArray, event: Array, out: Array) -> None:
     """Write (cos, sin) of yaw, of pitch and of roll, the latter two as reported plus the error state."""
     start = entity[s.ENTITY_START]
@@ -38,7 +38,7 @@ def observer_angles(mean: Array, entity: IntArray, event: Array, out: Array) -> 
         out[2 * i + 1] = math.sin(angles[i])
 
 
-@kernel("void(float64[::1], float64[::1], float64[:,::1], float64[::1])")
+@kernel("void(float64[::1], float64[::1], float64[:,::1], float64[::1])", inlined=True)
 def point_in_base(d: Array, cs: Array, D: Array, b: Array) -> None:
     """Rotate d [world's axes] into [base], with the derivatives D (3, 6) by d, yaw, pitch, roll."""
     cy, sy, cp, sp, cr, sr = cs[0], cs[1], cs[2], cs[3], cs[4], cs[5]

@@ -47,7 +47,7 @@ def take_heading(condensed: Array, aux: Array, step: float) -> None:
     aux[s.LAST_YAW], aux[s.LAST_RESET], aux[s.HAS_YAW] = condensed[s.NEWEST_YAW], condensed[s.NEWEST_RESET], 1.0
 
 
-@kernel("float64(float64, float64, float64)")
+@kernel("float64(float64, float64, float64)", inlined=True)
 def position_density(density: float, age_s: float, hold_s: float) -> float:
     """Return the density of the position's noise [m^2/s], larger while the odometry is silent."""
     return density + (SILENT_DENSITY if age_s > hold_s else 0.0)

@@ -58,7 +58,7 @@ AERIAL = SLOW_STATES[:6]
 _TURN_SHARE = 0.02  # of each turn is in error
 
 
-@kernel("void(float64[:,::1], int64[::1], float64[::1], float64[::1], float64, float64)")
+@kernel("void(float64[:,::1], int64[::1], float64[::1], float64[::1], float64, float64)", inlined=True)
 def add_robot_noise(P: Array, entity: IntArray, p: Array, aux: Array, dt: float, turn: float) -> None:
     """Add the process noise of an odometry-driven robot over dt, in which it turned by `turn`."""
     start = entity[s.ENTITY_START]
@@ -73,7 +73,7 @@ def add_robot_noise(P: Array, entity: IntArray, p: Array, aux: Array, dt: float,
     wander(P, start, entity[s.AT_YAW_OFFSET], p[YAW_OFFSET_DENSITY] * dt)
 
 
-@kernel("void(float64[:,::1], int64, int64, float64, float64)")
+@kernel("void(float64[:,::1], int64, int64, float64, float64)", inlined=True)
 def turn_with_heading(P: Array, start: int, size: int, dx: float, dy: float) -> None:
     """Couple the position to the yaw by which a displacement was rotated."""
     for j in range(P.shape[0]):
@@ -82,6 +82,18 @@ def turn_with_heading(P: Array, start: int, size: int, dx: float, dy: float) -> 
         P[start + 1, j] += dx * yaw
     add_column(P, start, size, start, start + s.YAW, -dy)
     add_column(P, start, size, start + 1, start + s.YAW, dx)
+
+
+@kernel("void(float64[::1], float64[:,::1], int64[::1], float64[::1], float64)")
+def fade_errors(mean: Array, P: Array, entity: IntArray, p: Array, dt: float) -> None:
+    """Let all Gauss-Markov entries that the block has decay over dt."""
+    start, size = entity[s.ENTITY_START], entity[s.ENTITY_SIZE]
+    fade(mean, P, start, size, int(p[AT_CLIMB]), p[CLIMB_STD], dt / p[CLIMB_TAU])
+    fade(mean, P, start, size, entity[s.AT_ROLL_ERROR], p[ATTITUDE_STD], dt / p[ATTITUDE_TAU])
+    fade(mean, P, start, size, entity[s.AT_PITCH_ERROR], p[ATTITUDE_STD], dt / p[ATTITUDE_TAU])
+    fade(mean, P, start, size, int(p[AT_HEIGHT_ERROR]), p[HEIGHT_STD], dt / p[HEIGHT_TAU])
+    fade(mean, P, start, size, int(p[AT_BIAS_X]), p[BIAS_STD], dt / p[BIAS_TAU])
+    fade(mean, P, start, size, int(p[AT_BIAS_Y]), p[BIAS_STD], dt / p[BIAS_TAU])
 
 
 @kernel(PREDICT)
@@ -127,12 +139,8 @@ def predict_odometry_robot(
         depend(P, start, size, s.Y, bias_y, -c)
     if climb >= 0:
         depend(P, start, size, s.Z, climb, dt)
-    fade(mean, P, start, size, climb, p[CLIMB_STD], dt / p[CLIMB_TAU])
-    fade(mean, P, start, size, entity[s.AT_ROLL_ERROR], p[ATTITUDE_STD], dt / p[ATTITUDE_TAU])
-    fade(mean, P, start, size, entity[s.AT_PITCH_ERROR], p[ATTITUDE_STD], dt / p[ATTITUDE_TAU])
-    fade(mean, P, start, size, int(p[AT_HEIGHT_ERROR]), p[HEIGHT_STD], dt / p[HEIGHT_TAU])
-    fade(mean, P, start, size, bias_x, p[BIAS_STD], dt / p[BIAS_TAU])
-    fade(mean, P, start, size, bias_y, p[BIAS_STD], dt / p[BIAS_TAU])
+    if size > len(ROBOT_CORE):
+        fade_errors(mean, P, entity, p, dt)
     add_robot_noise(P, entity, p, inputs, dt, turn)
     mirror(P, start, size, 2 if size == 4 else size)
 

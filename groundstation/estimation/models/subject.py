@@ -7,7 +7,7 @@ from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.kernel import kernel
 
 
-@kernel("void(float64[::1], float64[::1], float64[::1])")
+@kernel("void(float64[::1], float64[::1], float64[::1])", inlined=True)
 def lean(p: Array, event: Array, offset: Array) -> None:
     """Write where the marker is from the entity's centre [base_stabilized]: what accelerates leans, and it with it."""
     roll, pitch = event[s.EVENT_SUBJECT_ROLL], event[s.EVENT_SUBJECT_PITCH]
@@ -16,7 +16,7 @@ def lean(p: Array, event: Array, offset: Array) -> None:
     offset[0], offset[2] = cp * p[s.PLACE_X] + sp * up, cp * up - sp * p[s.PLACE_X]
 
 
-@kernel("void(int64[::1], float64[::1], float64[::1], float64, float64[::1])")
+@kernel("void(int64[::1], float64[::1], float64[::1], float64, float64[::1])", inlined=True)
 def marker_offset(entity: IntArray, p: Array, event: Array, yaw: float, offset: Array) -> None:
     """Write where the marker is from the entity's centre [world's axes] for a given heading."""
     offset[0], offset[1], offset[2] = p[s.PLACE_X], p[s.PLACE_Y], p[s.PLACE_Z]
@@ -27,7 +27,7 @@ def marker_offset(entity: IntArray, p: Array, event: Array, yaw: float, offset: 
     offset[0], offset[1] = c * offset[0] - n * offset[1], n * offset[0] + c * offset[1]
 
 
-@kernel("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+@kernel("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1], float64[::1])", inlined=True)
 def marker_point(mean: Array, entity: IntArray, p: Array, event: Array, point: Array, slope: Array) -> None:
     """Write the marker's centre [world] and its derivative (x, y) by the subject's yaw.
 
@@ -49,7 +49,7 @@ def marker_point(mean: Array, entity: IntArray, p: Array, event: Array, point: A
         point[2] += mean[start + entity[s.AT_Z]]
 
 
-@kernel("void(int64[::1], float64[::1], float64[::1], float64[:,::1], int64)")
+@kernel("void(int64[::1], float64[::1], float64[::1], float64[:,::1], int64)", inlined=True)
 def chain_subject(entity: IntArray, slope: Array, by_point: Array, H: Array, row: int) -> None:
     """Write one row of H for the subject's block from the derivative by its marker's point (3)."""
     if entity[s.ENTITY_SIZE] == 0:

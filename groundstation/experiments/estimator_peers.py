@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array
+from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.models.camera import measure_relative_pose
 from groundstation.estimation.models.constant_velocity import ACCELERATION_DENSITY
 from groundstation.estimation.models.fixed_mount import ANGLE_DRIFT, POSITION_DRIFT
@@ -51,12 +51,14 @@ class Ours:
     @property
     def mean(self) -> Array:
         """Return the mean (n)."""
-        return self._state.means[0]
+        mean: Array = self._state.means[0]
+        return mean
 
     @property
     def covariance(self) -> Array:
         """Return the covariance (n, n)."""
-        return self._state.covariances[0]
+        covariance: Array = self._state.covariances[0]
+        return covariance
 
     def predict(self, dt: float, times: int) -> None:
         """Predict the whole team, several times over."""
@@ -128,7 +130,7 @@ class TeamModel:
         mean[self.yaws] = (mean[self.yaws] + math.pi) % math.tau - math.pi
         return mean
 
-    def measured(self, mean: Array, event: Array) -> tuple[Array, Array, Array, Array]:
+    def measured(self, mean: Array, event: Array) -> tuple[Array, Array, Array, IntArray]:
         """Return y, R, H (rows, columns) and the columns of the state that H stands for."""
         t, observer, subject = self.tables, int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
         rows, sensor = int(event[s.EVENT_SIZE]), t.sensors[int(event[s.EVENT_SENSOR])]

@@ -1,10 +1,11 @@
-"""Is the belief as good as it says? Normalised errors over seeded flights of the honest scenario.
+"""Is the belief as good as it says? Normalised errors over seeded flights of the honest scenario: delays, drop-outs,
+2 % gross outliers.
 
-Errors within a flight are correlated over seconds, so flights are the samples: the mean over flights of a flight's
-mean NEES per degree of freedom is judged with a two-sided 95 % t-interval against the stated band.
+Errors within a flight last (a ceiling camera hangs wrong all along), so flights are the samples: judged is the mean
+over flights of a flight's mean NEES, or NIS, per degree of freedom. Its two-sided 95 % t-interval is stated; it must
+be narrow enough for the band 0.8..1.3 to mean something.
 """
 
-import os
 from typing import Any
 
 import numpy as np
@@ -12,35 +13,54 @@ import pytest
 
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import Study, StudyOptions
+from sim_bridge.study.summary import summary
 
 pytestmark = pytest.mark.statistics
+FLIGHTS, DURATION_S, OUTLIERS = 50, 25.0, 0.02
+LOW, HIGH, WIDEST = 0.8, 1.3, 0.3
+Reports = list[dict[str, Any]]
 
 
-def anees(field: dict[str, Any], seeds: range, duration_s: float, outliers: float = 0.0) -> dict[str, np.ndarray]:
-    rows = [Study(field, Scenario(), StudyOptions(seed, duration_s, outliers)).run()["anees"] for seed in seeds]
-    names = ("drone_1", "drone_2", "turtlebot")
-    return {
-        kind: np.array([row[f"{name}{suffix}"] for row in rows for name in names if f"{name}{suffix}" in row])
-        for kind, suffix in (("all", ""), ("xy", " xy"))
-    }
+def fly(field: dict[str, Any], seeds: range, duration_s: float, outliers: float) -> Reports:
+    return [Study(field, Scenario(), StudyOptions(seed, duration_s, outliers)).run() for seed in seeds]
+
+
+def judge(reports: Reports, field: dict[str, Any], names: tuple[str, ...]) -> None:
+    found = summary(reports, field)
+    stated = {name: f"{found[name]} (95 %, {found[name].flights} flights)" for name in names}
+    print(stated)
+    assert all(LOW <= found[name].mean <= HIGH and found[name].half <= WIDEST for name in names), stated
 
 
 def test_a_few_short_flights_are_near_consistent(lab_field: dict[str, Any]) -> None:
-    """4 flights of 12 s, three entities each: a coarse alarm, wide enough for so few."""
-    found = anees(lab_field, range(1, 5), 12.0)
-    assert 0.25 <= found["all"].mean() <= 1.6
-    assert 0.25 <= found["xy"].mean() <= 1.9
+    """4 flights of 12 s: a coarse alarm, wide enough for so few."""
+    found = summary(fly(lab_field, range(1, 5), 12.0, 0.0), lab_field)
+    assert 0.3 <= found["anees robots"].mean <= 1.8
+    assert 0.3 <= found["anees target"].mean <= 1.8
+    assert 0.6 <= found["nis fixed cameras"].mean <= 1.5
+
+
+@pytest.fixture(scope="module")
+def fifty(lab_field: dict[str, Any]) -> Reports:
+    """Some 2.3 s of CPU each. 25 s hold a whole approach, several changes of topology and 900 sightings per flight."""
+    return fly(lab_field, range(100, 100 + FLIGHTS), DURATION_S, OUTLIERS)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-@pytest.mark.skipif("SKEIN_FIFTY_FLIGHTS" not in os.environ, reason="takes 8 min; set SKEIN_FIFTY_FLIGHTS=1 to run it")
-@pytest.mark.parametrize("outliers", [0.0, 0.02])
-def test_fifty_flights_are_consistent(lab_field: dict[str, Any], outliers: float) -> None:
-    """50 flights of 40 s: the 95 % interval of the mean must lie within 0.5..1.3, for positions within 0.6..1.3."""
-    found = anees(lab_field, range(100, 150), 40.0, outliers)
-    for kind, low in (("all", 0.5), ("xy", 0.6)):
-        values = found[kind]
-        half = 2.0 * values.std(ddof=1) / np.sqrt(len(values) / 3)  # entities of one flight are not independent
-        assert low <= values.mean() - half, (kind, values.mean(), half)
-        assert values.mean() + half <= 1.3, (kind, values.mean(), half)
+def test_fifty_flights_are_consistent_in_state(fifty: Reports, lab_field: dict[str, Any]) -> None:
+    judge(fifty, lab_field, ("anees robots", "anees robots xy", "anees target", "anees target xy"))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+def test_fifty_flights_are_consistent_in_innovation(fifty: Reports, lab_field: dict[str, Any]) -> None:
+    judge(fifty, lab_field, ("nis fixed cameras", "nis onboard cameras"))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+def test_fifty_flights_with_outliers_hold_the_target(fifty: Reports) -> None:
+    errors = np.array([report["target_rmse_m"] for report in fifty])
+    assert np.sqrt(np.mean(errors**2)) <= 0.12
+    assert np.mean([report["target_lost_s"] for report in fifty]) <= 0.1, "on average, from the beginning of tracking"

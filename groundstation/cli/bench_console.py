@@ -1,12 +1,11 @@
 """`groundstation bench console`: what the page's server costs, and how old an estimate is when it is sent and drawn."""
 
-import json
 import shutil
 from typing import Any
 
 import click
 
-from groundstation.cli.exits import ExitCode
+from groundstation.cli.bench_limits import judge
 
 _CHROMIUM = "/usr/bin/chromium"
 _LIMITS = {"cpu_percent_of_core": 5.0, "estimate_to_socket_ms": 60.0, "estimate_to_drawn_ms": 60.0}
@@ -29,16 +28,4 @@ def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int
     figures: dict[str, Any] = {"drones": drones, "seconds": seconds, **measure(seconds, drones, browser)}
     figures["ratio_to_peer"] = round(figures["cpu_percent_of_core"] / figures["peer"]["cpu_percent_of_core"], 2)
     figures["load_average"] = load_average()
-    figures["limits"] = _LIMITS
-    broken = [name for name, limit in _LIMITS.items() if name in figures and not _value(figures[name]) <= limit]
-    if as_json:
-        click.echo(json.dumps(figures | {"passed": not broken}, indent=2))
-    else:
-        for name, value in figures.items():
-            click.echo(f"{name.replace('_', ' '):24} {value}")
-        click.echo(f"missed: {', '.join(broken)}" if broken else "all limits are kept")
-    return ExitCode.FAILED if broken else ExitCode.OK
-
-
-def _value(figure: Any) -> float:
-    return float(figure["median"] if isinstance(figure, dict) else figure)
+    return judge(figures, _LIMITS, "median", as_json)

@@ -1,12 +1,11 @@
 """`groundstation bench mavlink`: what driving many vehicles costs, and how late telemetry and set-points are."""
 
-import json
 import os
 from typing import Any
 
 import click
 
-from groundstation.cli.exits import ExitCode
+from groundstation.cli.bench_limits import judge
 
 _LIMITS = {"discovery_s": 2.0, "cores": 0.6, "telemetry_to_bus_ms": 3.0, "setpoint_to_wire_ms": 5.0}
 
@@ -29,16 +28,4 @@ def mavlink(vehicles: int, seconds: float, link: str, as_json: bool) -> int:
     figures["peer"] = {"name": "pymavlink mavutil, receive only", **theirs}
     figures["ratio_to_peer"] = round(figures["us_per_frame"] / theirs["us_per_frame"], 2)
     figures["load_average"] = round(os.getloadavg()[0], 1)
-    figures["limits"] = _LIMITS
-    broken = [name for name, limit in _LIMITS.items() if not _value(figures[name]) <= limit]
-    if as_json:
-        click.echo(json.dumps(figures | {"passed": not broken}, indent=2))
-    else:
-        for name, value in figures.items():
-            click.echo(f"{name.replace('_', ' '):22} {value}")
-        click.echo(f"missed: {', '.join(broken)}" if broken else "all limits are kept")
-    return ExitCode.FAILED if broken else ExitCode.OK
-
-
-def _value(figure: Any) -> float:
-    return float(figure["p99"] if isinstance(figure, dict) else figure)
+    return judge(figures, _LIMITS, "p99", as_json)

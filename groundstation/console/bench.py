@@ -109,7 +109,8 @@ def field_of(drones: tuple[str, ...], port: int) -> dict[str, Any]:
     return lab | {"drones": {name: lab["drones"].get(name, like) for name in drones}}
 
 
-def _page_of(url: str, cameras: list[str]) -> ClientConnection:
+@contextlib.contextmanager
+def _page_of(url: str, cameras: list[str]) -> Iterator[ClientConnection]:
     deadline_s = time.monotonic() + _START_S
     while True:
         try:
@@ -120,16 +121,11 @@ def _page_of(url: str, cameras: list[str]) -> ClientConnection:
             if time.monotonic() > deadline_s:
                 raise GroundStationError(f"the console did not answer at {url} within {_START_S:g} s") from None
             time.sleep(0.1)
-    page = join(url)
-    page.send(json.dumps({"type": "hello", "token": token, "client": "bench"}))
-    page.send(json.dumps({"type": "watch", "cameras": cameras}))
-    return page
-
-
-def join(url: str) -> ClientConnection:
-    """Return a new viewer's connection to the console at an address; it has said nothing yet."""
     origin = Origin(url.rstrip("/"))
-    return connect(f"{url.replace('http', 'ws')}ws", origin=origin, max_size=None, compression=None)
+    with connect(f"{url.replace('http', 'ws')}ws", origin=origin, max_size=None, compression=None) as page:
+        page.send(json.dumps({"type": "hello", "token": token, "client": "bench"}))
+        page.send(json.dumps({"type": "watch", "cameras": cameras}))
+        yield page
 
 
 def watch(page: ClientConnection, seconds: float) -> Viewed:

@@ -42,8 +42,8 @@ def browser() -> Iterator[Any]:
 class Stage:
     """A flight with its console, and pages in front of it."""
 
-    def __init__(self, browser: Any, flight: FakeFlight, field: str = "lab") -> None:
-        self.browser, self.flight, self.field = browser, flight, field
+    def __init__(self, browser: Any, flight: FakeFlight | None = None, field: str = "lab") -> None:
+        self.browser, self.flight, self.field = browser, flight or FakeFlight(), field
         self.port = any_port()
         self.flight.start()
         self.console = self.start_console()
@@ -74,7 +74,7 @@ class Stage:
 
 @pytest.fixture
 def stage(browser: Any) -> Iterator[Stage]:
-    made = Stage(browser, FakeFlight())
+    made = Stage(browser)
     yield made
     made.close()
 

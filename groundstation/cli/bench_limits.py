@@ -1,0 +1,30 @@
+"""Figures of a bench held against their limits, for people or for programs."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+
+def judge(figures: Mapping[str, Any], limits: Mapping[str, float], measure: str, as_json: bool) -> ExitCode:
+    """Print the figures and which limits they miss; a figure that is a mapping is judged by its entry `measure`.
+
+    A limit without its figure is passed over: what it needs is not on this machine.
+    """
+
+    def value(name: str) -> float:
+        figure = figures[name]
+        return float(figure[measure] if isinstance(figure, dict) else figure)
+
+    missed = [name for name, limit in limits.items() if name in figures and not value(name) <= limit]
+    everything = {**figures, "limits": dict(limits)}
+    if as_json:
+        click.echo(json.dumps(everything | {"passed": not missed}, indent=2))
+    else:
+        for name, figure in everything.items():
+            click.echo(f"{name.replace('_', ' '):24} {figure}")
+        click.echo(f"missed: {', '.join(missed)}" if missed else "all limits are kept")
+    return ExitCode.FAILED if missed else ExitCode.OK

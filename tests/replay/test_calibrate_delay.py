@@ -1,0 +1,74 @@
+"""Delays of sensors, measured in a flight whose delays are known: the study's cameras are dated exactly."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from rewritten import rewritten, without
+
+from groundstation.cli.main import groundstation
+from groundstation.recording.chunks import RawRecord
+
+SHIFT_MS = 40.0
+
+
+def measured(folder: Path) -> dict[str, Any]:
+    result = CliRunner().invoke(groundstation, ["calibrate", "delay", str(folder), "--json"], standalone_mode=False)
+    assert result.exception is None, result.exception
+    return {one["sensor"]: one for one in json.loads(result.output)}
+
+
+@pytest.fixture(scope="module")
+def minute(tmp_path_factory: pytest.TempPathFactory, lab_field: dict[str, Any]) -> Path:
+    """A recorded minute of tracking."""
+    from flown_study import FlownStudy
+
+    from sim_bridge.study.runner import StudyOptions
+
+    folder = tmp_path_factory.mktemp("minute")
+    FlownStudy(lab_field, folder, StudyOptions(seed=3, duration_s=60.0)).fly()
+    return folder
+
+
+@pytest.mark.slow
+def test_the_delays_of_cameras_are_found_and_a_wrong_one_moves_with_its_error(minute: Path, tmp_path: Path) -> None:
+    right = measured(minute)
+    assert right == measured(minute)
+    for name in ("ceiling", "drone_1 camera", "drone_2 camera"):
+        one = right[name]
+        assert one["sure"] and abs(one["measured_ms"] - 120.0) < 15.0, one
+    # What a recording does not tell must say so: nothing that is sure may be far from the truth.
+    for drone in ("drone_1", "drone_2"):
+        for kind, truth_ms in (("velocity", 30.0), ("height", 85.0)):
+            one = right[f"{drone} {kind}"]
+            assert not one["sure"] or abs(one["measured_ms"] - truth_ms) < 3.0 * one["std_ms"] + 10.0, one
+
+    def later(record: RawRecord) -> bytes:
+        if record.key.topic.name != "observation":
+            return record.data
+        message = json.loads(record.data)
+        if message["observer"] in ("ceiling", "drone_1"):
+            message["header"]["stamp_ns"] += round(SHIFT_MS * 1e6)
+        return json.dumps(message).encode()
+
+    wrong = measured(rewritten(minute, tmp_path / "wrong", later))
+    for name, sensor_ms in (("ceiling", SHIFT_MS), ("drone_1 camera", SHIFT_MS), ("drone_2 camera", 0.0)):
+        moved = wrong[name]["measured_ms"] - right[name]["measured_ms"]
+        assert moved == pytest.approx(sensor_ms, abs=10.0), name
+
+
+def test_a_recording_without_cameras_is_refused(flown: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        groundstation,
+        ["calibrate", "delay", str(rewritten(flown, tmp_path / "blind", without("observation")))],
+        standalone_mode=False,
+    )
+    assert "no observation of any camera" in str(result.exception)
+
+
+def test_a_short_flight_is_told_to_be_too_short(flown: Path) -> None:
+    result = CliRunner().invoke(groundstation, ["calibrate", "delay", str(flown)], standalone_mode=False)
+    assert result.exception is None, result.exception
+    assert "it saw too little" in result.output or "too unsure" in result.output

@@ -12,7 +12,7 @@ import numpy as np
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import cholesky, is_positive_definite
+from groundstation.estimation.linear import cholesky
 
 
 @kernel(
@@ -90,10 +90,10 @@ def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
 @kernel("float64(float64[:,::1], int64)", inlined=True)
 def log_determinant(factor: Array, rows: int) -> float:
     """Return log det S from its Cholesky factor."""
-    value = 0.0
+    product = 1.0
     for i in range(rows):
-        value += 2.0 * math.log(factor[i, i])
-    return value
+        product *= factor[i, i]
+    return 2.0 * math.log(product)
 
 
 @kernel("void(float64[:,::1], float64[:,::1], int64, float64)")
@@ -116,13 +116,14 @@ def subtract_two(P: Array, V: Array) -> None:
 
 @kernel("void(float64[:,::1], float64[:,::1])", inlined=True)
 def subtract_four(P: Array, V: Array) -> None:
-    """Subtract V^T V from P for four rows, in one pass and symmetric to the bit.
+    """Subtract V^T V from P for the first four rows of V, in one pass and symmetric to the bit.
 
-    Four rows of P at a time share what is loaded of V: nearly half of a correction's time is spent here.
+    Four rows of P at a time share what is loaded of V: nearly half of a correction's time is spent here. The fifth row
+    of V is room for rows beyond the last of P.
     """
     n = P.shape[0]
     V_0, V_1, V_2, V_3 = V[0], V[1], V[2], V[3]
-    spare = np.zeros(n)  # for rows beyond the last
+    spare = V[4]
     for a in range(0, n, 4):
         b, c, d = min(a + 1, n - 1), min(a + 2, n - 1), min(a + 3, n - 1)
         p = P[a]
@@ -149,7 +150,7 @@ def apply(mean: Array, P: Array, rows: int, W: Array, factor: Array, y: Array) -
     P - V^T V + (U - V)^T (U - V). U - V is what rounding did to the gain (1e-16 of V): its square is left out.
     """
     n = P.shape[0]
-    V, u = np.zeros((4, n)), np.empty(4)
+    V, u = np.zeros((5, n)), np.empty(4)
     for i in range(rows):
         u[i] = y[i]
         for j in range(n):
@@ -187,4 +188,4 @@ def is_distribution(mean: Array, P: Array, entities: IntArray, aux: Array) -> bo
             return False
         for j in range(size):
             work[i, j] = P[index[i], index[j]]
-    return is_positive_definite(work, size)
+    return cholesky(work, size)

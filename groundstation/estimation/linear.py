@@ -37,25 +37,3 @@ def cholesky(matrix: Array, size: int) -> bool:
                 value -= matrix[row, k] * matrix[column, k]
             matrix[row, column] = value / root
     return True
-
-
-@kernel("boolean(float64[:,::1], int64)")
-def is_positive_definite(matrix: Array, size: int) -> bool:
-    """Return whether the leading block of a symmetric matrix has a Cholesky factor; overwrites its upper triangle.
-
-    Row by row, so that the inner loop runs along memory: for large matrices many times as fast as `cholesky`.
-    """
-    for i in range(size):
-        row = matrix[i]
-        for k in range(i):
-            above = matrix[k]
-            f = above[i]
-            for j in range(i, size):
-                row[j] -= f * above[j]
-        pivot = row[i]
-        if not (pivot > 0.0 and pivot < math.inf):
-            return False
-        scale = 1.0 / math.sqrt(pivot)
-        for j in range(i, size):
-            row[j] *= scale
-    return True

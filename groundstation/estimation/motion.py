@@ -32,7 +32,7 @@ def mirror(P: Array, start: int, size: int, changed: int) -> None:
             P[j, i] = a[j]
             P[j, c] = b[j]
     for i in range(start, stop):
-        for j in range(start, i):
+        for j in range(start, min(i, start + changed)):
             mean = 0.5 * (P[i, j] + P[j, i])
             P[i, j] = mean
             P[j, i] = mean

@@ -105,12 +105,8 @@ def linearise(
         if sensor[s.SENSOR_ANGLES + i] != 0.0:
             y[i] = wrap(y[i])
     add_timing_noise(sensor, event, rows, work[0], work[1], R)
-    HPH = np.empty((rows, rows))
     project(P, start_o, size_o, work[0], start, size, work[1], rows, W)
-    project_columns(W[:rows], start_o, size_o, work[0], start, size, work[1], rows, HPH)
-    for i in range(rows):
-        for j in range(rows):
-            work[2, i, j] = HPH[i, j]
+    project_columns(W[:rows], start_o, size_o, work[0], start, size, work[1], rows, work[2])
     bound_precision(work[2], R, rows)
     return surprise(work[2], R, y, rows, work[3])
 

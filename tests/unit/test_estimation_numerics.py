@@ -9,7 +9,7 @@ import pytest
 from groundstation.estimation import correction
 from groundstation.estimation.correction import apply, bound_precision, project, project_columns, surprise
 from groundstation.estimation.kernel import kernel
-from groundstation.estimation.linear import cholesky, is_positive_definite
+from groundstation.estimation.linear import cholesky
 from groundstation.estimation.models.height import correct_height
 
 
@@ -158,15 +158,3 @@ def test_a_state_of_any_size_is_corrected(dim: int) -> None:
     np.testing.assert_allclose(corrected, P - K @ S @ K.T, atol=1e-7)
     np.testing.assert_allclose(mean, K @ y, atol=1e-7)
     assert np.array_equal(corrected, corrected.T)
-
-
-def test_positive_definiteness_is_told_from_the_symmetric_matrix() -> None:
-    rng = np.random.default_rng(8)
-    root = rng.normal(size=(40, 40))
-    good = root @ root.T + 1e-6 * np.eye(40)
-    bad = good - 1.1 * np.linalg.eigvalsh(good)[0] * np.eye(40)
-    assert is_positive_definite(good.copy(), 40)
-    assert not is_positive_definite(bad.copy(), 40)
-    assert is_positive_definite(bad.copy(), 3), "the leading block alone is"
-    good[7, 7] = np.nan
-    assert not is_positive_definite(good, 40)

@@ -123,7 +123,8 @@ def predict_odometry_robot(
     climb_rate = p[HAS_CLIMB_RATE] * inputs[s.HELD_VZ]
     if climb >= 0:
         climb_rate += mean[start + climb]
-    inputs[s.RATE_X], inputs[s.RATE_Y], inputs[s.RATE_Z] = dx / dt, dy / dt, climb_rate
+    rate = 1.0 / dt
+    inputs[s.RATE_X], inputs[s.RATE_Y], inputs[s.RATE_Z] = dx * rate, dy * rate, climb_rate
     mean[start] += dx
     mean[start + 1] += dy
     mean[start + s.Z] += climb_rate * dt

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.errors import GroundStationError
+from groundstation.errors import OperatorMistake
 
 Array = NDArray[np.float64]
 ROBOTS = range(1, 6)
 
 
-class DatasetError(GroundStationError):
+class DatasetError(OperatorMistake):
     """A file of the set is missing or is not what it should be."""
 
 

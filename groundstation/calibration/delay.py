@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.bus.messages import Message, Odometry, RelativeObservation
-from groundstation.calibration.flown import Change, Flown, corrections
+from groundstation.calibration.flown import Change, Flown, Surprise
 from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
 
 Array = NDArray[np.float64]
@@ -25,10 +25,11 @@ _WINDOW_S = 1.0
 _GRID_S = np.arange(-0.10, 0.2001, 0.01)
 _REACH = 6
 _LEAST_PAIRS = 60
-_SHIFTS_MS = np.array([-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0])
+_SHIFTS_MS = np.arange(-80.0, 101.0, 20.0)
 _ROWS_FREEDOM = 8.0
 # Errors of successive pictures are alike: so many say the same.
 _NEIGHBOURS = 3.0
+_ROUNDS = 2
 _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 
 
@@ -92,9 +93,8 @@ def delays(flown: Flown, resolved: Mapping[str, Any]) -> list[Delay]:
         name, track = max(seen, key=lambda pair: len(pair[1].times))
         moved = _Track(track.times + exposure_s[name], track.positions, track.headings)
         found += _odometry(drone, settings, moved, own[drone])
-    for drone, settings in resolved["drones"].items():
-        found.append(_onboard_camera(flown, resolved, drone, settings["camera"]["video_delay_ms"]))
-    return found
+    later_ms = {name: -1e3 * shift for name, shift in exposure_s.items()}
+    return found + _onboard_cameras(flown, resolved, later_ms)
 
 
 def _track(flown: Flown, name: str, camera: Mapping[str, Any], drone: str) -> _Track:
@@ -257,20 +257,31 @@ def _misfits(part: tuple[Any, ...], delay_s: float, scaled: bool) -> Array:
     return np.asarray(((moved - scale * told) ** 2).sum(axis=1))
 
 
-def _onboard_camera(flown: Flown, resolved: Mapping[str, Any], drone: str, now_ms: float) -> Delay:
+def _onboard_cameras(flown: Flown, resolved: Mapping[str, Any], later_ms: dict[str, float]) -> list[Delay]:
+    """Return the delays of the cameras on vehicles, one after the other: each is judged by what the others saw.
+
+    later_ms: by how much others are known to be later than their settings say; is added to.
+    """
+    found: dict[str, Delay] = {}
+    for _ in range(_ROUNDS):
+        for drone, settings in resolved["drones"].items():
+            one = _onboard_camera(flown, resolved, drone, float(settings["camera"]["video_delay_ms"]), later_ms)
+            found[drone] = one
+            later_ms[drone] = (one.measured_ms or one.now_ms) - one.now_ms if one.sure else 0.0
+    return list(found.values())
+
+
+def _onboard_camera(
+    flown: Flown, resolved: Mapping[str, Any], drone: str, now_ms: float, later_ms: Mapping[str, float]
+) -> Delay:
     setting = f"drones.{drone}.camera.video_delay_ms"
-    observed = [c for c in corrections(flown, resolved) if c.observer == drone and c.nis is not None]
-    if len(observed) < _LEAST_PAIRS:
+    surprise = Surprise(flown, resolved, drone)
+    if not surprise.enough:
         return Delay(f"{drone} camera", setting, now_ms, reason="it saw too little")
-    # Fixed weights: a filter that knows less is not surprised either.
-    weights = {}
-    for kind in sorted({(c.subject, len(c.residual)) for c in observed}):
-        mine = [np.reshape(c.covariance, (kind[1], kind[1])) for c in observed if (c.subject, len(c.residual)) == kind]
-        weights[kind] = np.linalg.inv(np.median(mine, axis=0))
-    costs = np.array([_surprise(flown, resolved, drone, weights, float(shift)) for shift in _SHIFTS_MS])
+    costs = np.array([surprise.of(resolved, _dated({**later_ms, drone: float(shift)})) for shift in _SHIFTS_MS])
     best = int(np.argmin(costs))
     if best in (0, len(costs) - 1):
-        return Delay(f"{drone} camera", setting, now_ms, reason="no delay within 60 ms of the setting fits best")
+        return Delay(f"{drone} camera", setting, now_ms, reason="no delay within 80 ms of the setting fits best")
     near = slice(max(0, best - 2), best + 3)
     a, b, _ = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
     if a <= 0:
@@ -279,27 +290,13 @@ def _onboard_camera(flown: Flown, resolved: Mapping[str, Any], drone: str, now_m
     return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms)
 
 
-def _surprise(
-    flown: Flown, resolved: Mapping[str, Any], drone: str, weights: Mapping[tuple[str, int], Array], later_ms: float
-) -> float:
-    """Return how badly the filter predicts what a camera sees if its pictures took so much longer; as chi-square."""
-    total = 0.0
-    for c in corrections(flown, resolved, _dated(drone, later_ms)):
-        weight = weights.get((c.subject, len(c.residual))) if c.observer == drone else None
-        if weight is not None:
-            y = np.array(c.residual)
-            total += (_ROWS_FREEDOM + len(y)) * float(np.log1p(y @ weight @ y / _ROWS_FREEDOM))
-    return total
-
-
-def _dated(observer: str, later_ms: float) -> Change:
-    """Return a change that dates an observer's pictures as if they had been so much longer on their way."""
-    shift_ns = round(later_ms * 1e6)
+def _dated(later_ms: Mapping[str, float]) -> Change:
+    """Return a change that dates observers' pictures as if they had been so much longer on their way."""
 
     def change(message: Message) -> Message:
-        if not isinstance(message, RelativeObservation) or message.observer != observer:
+        if not isinstance(message, RelativeObservation) or not later_ms.get(message.observer):
             return message
-        header = msgspec.structs.replace(message.header, stamp_ns=message.header.stamp_ns - shift_ns)
-        return msgspec.structs.replace(message, header=header)
+        stamp_ns = message.header.stamp_ns - round(later_ms[message.observer] * 1e6)
+        return msgspec.structs.replace(message, header=msgspec.structs.replace(message.header, stamp_ns=stamp_ns))
 
     return change

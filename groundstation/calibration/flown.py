@@ -20,6 +20,7 @@ from groundstation.tracker import tracker_from_field
 # A correction counts like one of Student's distribution with so many degrees of freedom: outliers must not decide.
 _FREEDOM = 8.0
 _SETTLING_NS = 3_000_000_000
+_LEAST_SEEN = 60
 
 Change = Callable[[Message], Message]
 
@@ -60,17 +61,6 @@ def flown_of(source: Source) -> Flown:
     return Flown(tuple(longest), clock, cameras)
 
 
-def cost(flown: Flown, resolved: Mapping[str, Any], change: Change = lambda message: message) -> float:
-    """Return minus twice the logarithm of how likely all observations are; smaller is better.
-
-    change: what is to be done to each message before the filter sees it.
-    """
-    total = 0.0
-    for correction in corrections(flown, resolved, change):
-        total += _surprise(correction)
-    return total
-
-
 def corrections(
     flown: Flown, resolved: Mapping[str, Any], change: Change = lambda message: message
 ) -> list[Correction]:
@@ -89,11 +79,28 @@ def corrections(
     return found
 
 
-def _surprise(correction: Correction) -> float:
-    if correction.nis is None or not correction.covariance:
-        return 0.0
-    rows = len(correction.residual)
-    sign, volume = np.linalg.slogdet(np.reshape(correction.covariance, (rows, rows)))
-    if sign <= 0:
-        return 0.0
-    return float(volume) + (_FREEDOM + rows) * math.log1p(correction.nis / _FREEDOM)
+class Surprise:
+    """How badly the filter predicts what one observer sees, as chi-square: under any settings, dated in any way.
+
+    Every observation is weighed as the filter with the recorded settings weighs such ones: a filter that knows less is
+    not surprised either. `enough`: there is something to judge by.
+    """
+
+    def __init__(self, flown: Flown, resolved: Mapping[str, Any], observer: str) -> None:
+        self._flown, self._observer = flown, observer
+        seen = [c for c in corrections(flown, resolved) if c.observer == observer and c.nis is not None]
+        self.enough = len(seen) >= _LEAST_SEEN
+        self._weights: dict[tuple[str, int], Any] = {}
+        for kind in sorted({(c.subject, len(c.residual)) for c in seen}):
+            mine = [np.reshape(c.covariance, (kind[1], kind[1])) for c in seen if (c.subject, len(c.residual)) == kind]
+            self._weights[kind] = np.linalg.inv(np.median(mine, axis=0))
+
+    def of(self, resolved: Mapping[str, Any], change: Change = lambda message: message) -> float:
+        """Return it for these settings and changed messages."""
+        total = 0.0
+        for c in corrections(self._flown, resolved, change):
+            weight = self._weights.get((c.subject, len(c.residual))) if c.observer == self._observer else None
+            if weight is not None:
+                y = np.array(c.residual)
+                total += (_FREEDOM + len(y)) * math.log1p(float(y @ weight @ y) / _FREEDOM)
+        return total

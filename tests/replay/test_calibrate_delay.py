@@ -33,9 +33,9 @@ def minute(tmp_path_factory: pytest.TempPathFactory, lab_field: dict[str, Any]) 
 
 
 @pytest.mark.slow
-def test_the_delays_of_cameras_are_found_and_a_wrong_one_moves_with_its_error(minute: Path, tmp_path: Path) -> None:
+@pytest.mark.timeout(400)
+def test_the_delays_of_cameras_are_found_and_a_wrong_setting_shows(minute: Path, tmp_path: Path) -> None:
     right = measured(minute)
-    assert right == measured(minute)
     for name in ("ceiling", "drone_1 camera", "drone_2 camera"):
         one = right[name]
         assert one["sure"] and abs(one["measured_ms"] - 120.0) < 15.0, one
@@ -54,9 +54,10 @@ def test_the_delays_of_cameras_are_found_and_a_wrong_one_moves_with_its_error(mi
         return json.dumps(message).encode()
 
     wrong = measured(rewritten(minute, tmp_path / "wrong", later))
-    for name, sensor_ms in (("ceiling", SHIFT_MS), ("drone_1 camera", SHIFT_MS), ("drone_2 camera", 0.0)):
-        moved = wrong[name]["measured_ms"] - right[name]["measured_ms"]
-        assert moved == pytest.approx(sensor_ms, abs=10.0), name
+    for name, error_ms in (("ceiling", SHIFT_MS), ("drone_1 camera", SHIFT_MS), ("drone_2 camera", 0.0)):
+        one = wrong[name]
+        assert one["measured_ms"] == pytest.approx(120.0 + error_ms, abs=15.0), name
+        assert abs(one["measured_ms"] - one["now_ms"]) > 20.0 or not error_ms
 
 
 def test_a_recording_without_cameras_is_refused(flown: Path, tmp_path: Path) -> None:
@@ -66,6 +67,10 @@ def test_a_recording_without_cameras_is_refused(flown: Path, tmp_path: Path) -> 
         standalone_mode=False,
     )
     assert "no observation of any camera" in str(result.exception)
+
+
+def test_the_same_recording_gives_the_same_figures(flown: Path) -> None:
+    assert measured(flown) == measured(flown)
 
 
 def test_a_short_flight_is_told_to_be_too_short(flown: Path) -> None:

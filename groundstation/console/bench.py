@@ -14,9 +14,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import cv2
 import msgspec
-import numpy as np
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
@@ -41,9 +39,12 @@ class Viewed:
     latencies_ms: list[float] = field(default_factory=list)
 
 
-def measure(seconds: float, drones: int, browser: str = "") -> dict[str, Any]:
-    """Return the figures; `browser`: path of a Chromium that shows the page for as long once more, "" for none."""
-    pictures = {CAMERA: _jpegs(1), "drone_1_camera": _jpegs(2)}
+def measure(seconds: float, drones: int, jpegs: list[bytes], browser: str = "") -> dict[str, Any]:
+    """Return the figures; two cameras send the pictures in turn.
+
+    browser: path of a Chromium that shows the page for as long once more, "" for none.
+    """
+    pictures = {CAMERA: jpegs, "drone_1_camera": jpegs[::-1]}
     names = tuple(f"drone_{number}" for number in range(1, drones + 1))
     with _served(names) as (process, url, endpoint):
         bus = open_bus(endpoint, _SITE, "bench", timeout_s=5.0)
@@ -198,18 +199,6 @@ def cpu_s(pid: int) -> float:
         with contextlib.suppress(OSError):  # a thread that has just ended
             total_ns += int((task / "schedstat").read_text().split()[0])
     return total_ns / 1e9
-
-
-def _jpegs(seed: int) -> list[bytes]:
-    """Return pictures of noise, about 30 kB each."""
-    noise = np.random.default_rng(seed)
-    made = []
-    for _ in range(8):
-        coarse = noise.integers(60, 180, (90, 160, 3), dtype=np.uint8)
-        good, jpeg = cv2.imencode(".jpg", cv2.resize(coarse, (640, 360)), [cv2.IMWRITE_JPEG_QUALITY, 60])
-        assert good
-        made.append(bytes(jpeg))
-    return made
 
 
 def _free_port() -> int:

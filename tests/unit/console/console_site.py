@@ -1,0 +1,79 @@
+"""A console's server on a real socket, with one drone that hears its commands."""
+
+import asyncio
+import warnings
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.console.scene import bare_scene
+from groundstation.console.server import ConsoleServer, claim_port
+from groundstation.monitor.state import Cast
+
+Test = Callable[["Site"], Awaitable[None]]
+
+
+class Site:
+    def __init__(self) -> None:
+        exchange = MemoryExchange()
+        self.bus = MemoryBus(exchange, "lab", "console")
+        self.drone = MemoryBus(exchange, "lab", "drone_1")
+        self.commands = self.drone.subscribe([t.COMMAND])
+        cast = Cast("lab", {"drone_1": 0.15}, "turtlebot")
+        self.server = ConsoleServer(self.bus, cast, bare_scene("lab", ("drone_1",), True), {}, claim_port(38765))
+        self.port = int(self.server.url.rsplit(":", 1)[1].strip("/"))
+        self.over = False
+
+    async def request(self, raw_path: str, method: str = "GET", **headers: str) -> tuple[int, str, bytes]:
+        """Speak HTTP by hand: a library would tidy the path up before it is sent."""
+        reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
+        lines = [f"{method} {raw_path} HTTP/1.1", f"Host: {headers.pop('host', f'127.0.0.1:{self.port}')}"]
+        lines += [f"{name.replace('_', '-')}: {value}" for name, value in headers.items()]
+        writer.write(("\r\n".join([*lines, "Connection: close"]) + "\r\n\r\n").encode())
+        answer = await asyncio.wait_for(reader.read(), 5)
+        writer.close()
+        head, _, body = answer.partition(b"\r\n\r\n")
+        return int(head.split()[1]), head.decode().lower(), body
+
+    async def token(self) -> str:
+        return (await self.request("/token"))[2].decode()
+
+    def connect(self, origin: str | None = "", **options: Any) -> connect:
+        chosen = f"http://127.0.0.1:{self.port}" if origin == "" else origin
+        return connect(f"ws://127.0.0.1:{self.port}/ws", origin=chosen, max_size=None, **options)  # type: ignore[arg-type]
+
+    async def closed(self, page: ClientConnection) -> tuple[int, str]:
+        """Return code and reason with which the server closes; telemetry on the way is passed over."""
+        with pytest.raises(ConnectionClosed):
+            async with asyncio.timeout(5):
+                while True:
+                    await page.recv()
+        return page.close_code or 0, page.close_reason or ""
+
+
+def run(test: Test) -> None:
+    async def main() -> None:
+        site = Site()
+        serving = asyncio.create_task(site.server.serve(lambda _turns, _late: not site.over))
+        try:
+            await asyncio.sleep(0.05)
+            await asyncio.wait_for(test(site), 20)
+        finally:
+            site.over = True
+            await serving
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        asyncio.run(main())
+
+
+async def until(condition: Callable[[], Any]) -> Any:
+    async with asyncio.timeout(5):
+        while not (value := condition()):
+            await asyncio.sleep(0.02)
+    return value

@@ -1,0 +1,170 @@
+"""The server on a real socket: who gets in, what gets out, and what a bad or slow viewer costs."""
+
+import asyncio
+import json
+import socket
+
+import pytest
+from console_site import Site, run, until
+from websockets.exceptions import InvalidStatus
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.console.board import Board
+from groundstation.console.gate import refusal
+from groundstation.console.pages import load_pages
+from groundstation.console.server import claim_port
+from groundstation.console.viewer import WINDOW, Viewer
+
+
+def test_pages_and_their_headers() -> None:
+    async def test(site: Site) -> None:
+        status, head, body = await site.request("/")
+        assert status == 200 and b"@@TOKEN@@" not in body and (await site.token()).encode() in body
+        for name in ("content-security-policy: default-src 'none'", "x-frame-options: deny", "cache-control: no-store"):
+            assert name in head
+        assert "unsafe" not in head
+        for path in ("/style.css", "/js/main.js", "/vendor/uPlot.min.js", "/vendor/uPlot.LICENSE.txt"):
+            assert (await site.request(path))[0] == 200, path
+
+    run(test)
+
+
+def test_paths_lead_nowhere_else() -> None:
+    async def test(site: Site) -> None:
+        paths = ["/../server.py", "/js/../../server.py", "/%2e%2e/server.py", "/js/..%2f..%2fserver.py", "//etc/passwd"]
+        paths += [
+            "/index.html",
+            "/static/index.html",
+            "/js/",
+            "/js",
+            "/\\..\\server.py",
+            "/js/main.js%00",
+            "/" + "a" * 3000,
+        ]
+        for path in paths:
+            assert (await site.request(path))[0] in (400, 404), path
+
+    run(test)
+
+
+def test_other_sites_get_nothing() -> None:
+    async def test(site: Site) -> None:
+        assert (await site.request("/", host="evil.example"))[0] == 403
+        assert (await site.request("/token", sec_fetch_site="cross-site"))[0] == 403
+        assert (await site.request("/", method="POST"))[0] == 403
+        assert (await site.request("/", host=f"localhost:{site.port}"))[0] == 200
+        for origin in (
+            "http://evil.example",
+            "null",
+            f"https://127.0.0.1:{site.port}",
+            f"http://127.0.0.1:{site.port + 1}",
+            None,
+        ):
+            with pytest.raises(InvalidStatus) as refused:
+                async with site.connect(origin=origin):
+                    pass
+            assert refused.value.response.status_code == 403
+
+    run(test)
+
+
+@pytest.mark.parametrize("host", ["", "127.0.0.1.evil.example", "[", "evil.example:8765", "0.0.0.0", "169.254.1.1"])
+def test_hosts_that_are_not_loopback(host: str) -> None:
+    assert refusal({"type": "http", "method": "GET", "headers": [(b"host", host.encode())]})
+
+
+def test_a_viewer_gets_a_seed_and_then_what_changes() -> None:
+    async def test(site: Site) -> None:
+        async with site.connect() as page:
+            seed = json.loads(await page.recv())
+            assert seed["type"] == "seed" and seed["scene"]["site"] == "lab"
+            status = m.VehicleStatus(
+                header=site.drone.header("drone_1"), flight_state=m.FlightState.FLYING, mode="TRACK", battery=0.5
+            )
+            site.drone.publish(t.VEHICLE_STATUS, status)
+            numbers = [seed["seq"]]
+            for _ in range(WINDOW):
+                delta = json.loads(await page.recv())
+                numbers.append(delta["seq"])
+                if "vehicles" in delta["s"] and delta["s"]["vehicles"]:
+                    break
+            assert delta["s"]["vehicles"]["drone_1"]["mode"] == "TRACK"
+            assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+    run(test)
+
+
+def test_an_order_reaches_the_bus_with_the_token_only() -> None:
+    async def test(site: Site) -> None:
+        token = await site.token()
+        order = {"type": "order", "verb": "LAND", "drones": [], "at_ms": 0}
+        async with site.connect() as page:
+            await page.send(json.dumps({"type": "hello", "token": "guess", "client": "abcd"}))
+            await page.send(json.dumps(order))
+            await until(lambda: site.server.sessions.refused["untrusted"])
+            assert site.commands.drain() == []
+            await page.send(json.dumps({"type": "hello", "token": token, "client": "abcd"}))
+            await page.send(json.dumps(order))
+            (received,) = await until(site.commands.drain)
+            assert received.message.verb is m.Verb.LAND
+
+    run(test)
+
+
+def test_a_viewer_that_does_not_answer_gets_a_window_full_and_then_the_newest() -> None:
+    async def test() -> None:
+        board, sent = Board(), []
+
+        async def keep(frame: str | bytes) -> None:
+            sent.append(frame)
+
+        board.begin()
+        viewer = Viewer(1, board, keep, keep)
+        viewer.watched = frozenset({"ceiling"})
+        task = asyncio.create_task(viewer.run(lambda seq: json.dumps({"seq": seq})))
+        for value in range(40):
+            board.begin()
+            board.put("a", value)
+            viewer.notice()
+            viewer.show("ceiling", b"%d" % value)
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+        texts = [json.loads(frame) for frame in sent if isinstance(frame, str)]
+        assert texts[-1]["seq"] == WINDOW
+        viewer.say("urgent")
+        await asyncio.sleep(0.01)
+        assert sent[-1] == "urgent"  # answers are never held back
+        viewer.saw(WINDOW)
+        await asyncio.sleep(0.01)
+        newest = json.loads(next(frame for frame in reversed(sent) if isinstance(frame, str) and frame != "urgent"))
+        assert newest["s"] == {"a": 39} and sent[-1] == b"39"
+        assert viewer.skipped > 0
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(test())
+
+
+def test_a_port_in_use_is_no_obstacle() -> None:
+    first = claim_port(38801)
+    second = claim_port(first.getsockname()[1])
+    try:
+        assert first.getsockname() != second.getsockname()
+        assert {listener.getsockname()[0] for listener in (first, second)} == {"127.0.0.1"}
+        assert first.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+    finally:
+        first.close()
+        second.close()
+
+
+def test_nothing_is_loaded_from_elsewhere() -> None:
+    """The page works without any network but loopback: no address of anything else is in its files."""
+    for path, file in load_pages("x").items():
+        text = file.content.decode()
+        if path.startswith("/vendor/"):
+            assert "http" not in text.split("*/", 1)[-1] or path.endswith(".txt"), path
+            continue
+        for word in ("https://", "http://", "//cdn"):
+            assert word not in text.replace("http://www.w3.org/2000/svg", ""), (path, word)
+        assert "innerHTML" not in text and "eval(" not in text, path

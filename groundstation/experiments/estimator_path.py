@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from groundstation.bus import codec, keys
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import (
     FlightState,
     Header,
-    Innovation,
     Message,
     Odometry,
     RelativeObservation,
@@ -24,6 +24,7 @@ from groundstation.bus.topics import OBSERVATION, ODOMETRY, VEHICLE_STATUS, Topi
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.intake import Intake
 from groundstation.experiments.estimator_team import CAMERA_HZ, ODOMETRY_HZ, Team, sighting
+from groundstation.runtime.announcer import Announcer
 
 MS = 1_000_000
 TICK_MS = 20  # the tracker's
@@ -100,35 +101,38 @@ def _observation(
     )
 
 
+class _Kept(MemoryBus):
+    """A bus that keeps what was put on it."""
+
+    def __init__(self) -> None:
+        super().__init__(MemoryExchange(), _SITE, "tracker")
+        self.payloads: list[bytes] = []
+
+    def put(self, topic: Topic, entity: str, payload: bytes, attachment: bytes) -> None:
+        self.payloads.append(payload)
+
+
 class Path:
     """The tracker's part from payloads to payloads, without planning."""
 
     def __init__(self, team: Team) -> None:
         self.filter = FixedLagFilter(team.parameters)
         self._intake = Intake(self.filter, team.parameters.sensors, _CLOCK)
-        self._seq = 0
-        self.innovations: list[bytes] = []
+        self._bus = _Kept()
+        self._announcer = Announcer(self._bus, lifetime_ms=0)
+
+    @property
+    def innovations(self) -> list[bytes]:
+        """Return what the last tick said of each observation."""
+        return self._bus.payloads
 
     def tick(self, arrived: list[Arrival], now_ns: int) -> None:
         """Take what has arrived, advance, and say what became of each observation."""
+        self._bus.payloads = []
         for _, key, payload in arrived:
             self._intake.take(str(key), codec.decode(key, payload), now_ns)
         self.filter.advance(now_ns)
-        self.innovations = []
-        for correction in self.filter.take_corrections():
-            self._seq += 1
-            message = Innovation(
-                header=Header(now_ns, _CLOCK, correction.observer, "tracker", self._seq),
-                observer=correction.observer,
-                subject=correction.subject,
-                verdict=correction.verdict,
-                residual=correction.residual,
-                covariance=correction.covariance,
-                nis=correction.nis,
-                latency_ms=correction.latency_ms,
-                reason=correction.reason,
-            )
-            self.innovations.append(codec.encode(message))
+        self._announcer.innovations(self.filter.take_corrections(), now_ns)
 
 
 def fly(team: Team, duration_ms: int, late_ms: int, heights: bool, seed: int) -> dict[str, Any]:

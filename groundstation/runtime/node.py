@@ -32,8 +32,9 @@ def run(child: Child) -> int:
         child.starting("loading kernels")
     else:
         child.starting("compiling kernels (once per version, some 30 s)")
-        other_half = numba_cache.ParallelCompilation(["groundstation.planning.plan"])
-        importlib.import_module("groundstation.estimation.fixed_lag")
+        # Two halves that take about as long and share little.
+        other_half = numba_cache.ParallelCompilation(["groundstation.planning.plan", "groundstation.estimation.models"])
+        importlib.import_module("groundstation.estimation.replay")
         other_half.finish()
     from groundstation.runtime.tracking import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up

@@ -26,7 +26,7 @@ _PRIORITY = {
     Quality.STATE: ("DATA", False),
     Quality.BULK: ("DATA_LOW", False),
 }
-# Batches that wait for a link before what follows is dropped; 2 by default, and an express message is a batch of its own.
+# Batches that wait for a link before what follows is dropped; 2 by default. An express message is a batch of its own.
 # 16, the most there can be, spares the recorder what the tracker got: a replay needs every message. Set-points keep
 # the short queue: a late one is worth nothing.
 _QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}

@@ -9,7 +9,8 @@ from groundstation.cli.calibrate_extrinsics import extrinsics
 
 
 @click.group(
-    epilog="\b\nExamples:\n  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
+    epilog="\b\nExamples:\n"
+    "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
     "  groundstation calibrate check lab.yaml\n\n"
     "The order of work for a new lab is in config/README.md, section Calibrate."
 )

@@ -20,8 +20,9 @@ from groundstation.recording.preamble import Preamble
 from groundstation.recording.reader import RecordingError
 from groundstation.recording.timeline import Timeline
 from groundstation.report import run_facts
-from groundstation.report.build import build_report, judge
+from groundstation.report.build import build_report
 from groundstation.report.gather import gather
+from groundstation.report.judge import judge
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.summary import summary
 

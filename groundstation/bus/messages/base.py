@@ -22,7 +22,7 @@ def _is_finite(value: Any) -> bool:
     if isinstance(value, str):
         return True
     if isinstance(value, tuple):
-        # Most fields are vectors and matrices: several times a second in every process, so without a call for each entry.
+        # Vectors and matrices are most of what is checked: without a call for each entry.
         if set(map(type, value)) == {float}:
             return all(map(math.isfinite, value))
         return all(map(_is_finite, value))

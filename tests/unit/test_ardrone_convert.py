@@ -11,12 +11,12 @@ from drivers.ardrone.convert import (
     motion_from_navdata,
 )
 from drivers.ardrone.orders import motion_from_attitude, orders_from_decision
-from drivers.ardrone.session import Scale
 from drivers.ardrone.velocity_loop import HOVER, Attitude
 from drivers.ardrone.wire import at, options
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.state import ControlState, StateBit, join_control_state
+from drivers.ardrone.wishes import Scale
 from drivers.authority import Action
 from groundstation.bus.messages import FlightState
 from groundstation.geometry.angles import quaternion_from_euler

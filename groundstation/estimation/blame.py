@@ -46,8 +46,11 @@ def is_doubted(aux: Array, settings: Array, at: float) -> bool:
 def has_diverged(aux: Array, settings: Array, at: float) -> bool:
     """Count a wild innovation of one entity; True when they last long enough to blame the belief.
 
-    `observe` ends the count when the entity is seen within the gate.
+    `observe` ends the count when the entity is seen within the gate. What has joined by one observation and was never
+    confirmed since has nothing to set against another.
     """
+    if aux[s.UNCONFIRMED] != 0.0:
+        return True
     if aux[s.STREAK] == 0.0:
         aux[s.STREAK_START] = at
     aux[s.STREAK] += 1.0

@@ -108,7 +108,7 @@ def settle(
         join(means[m], covariances[m], entities[m, subject], priors[subject], pose)
     aux[subject, s.ACTIVE] = 1.0
     aux[subject, s.JOINED_AT] = event[s.EVENT_AT]
-    aux[subject, s.STREAK] = 0.0
+    aux[subject, s.STREAK], aux[subject, s.UNCONFIRMED] = 0.0, 1.0
     return True
 
 
@@ -205,8 +205,10 @@ def observe(
             if out[s.OUT_VERDICT] != s.PENDING:
                 return
             joined = True
-        elif excess <= 1.0:
-            aux[subject, s.STREAK] = 0.0
+        else:
+            aux[subject, s.UNCONFIRMED] = 0.0
+            if excess <= 1.0:
+                aux[subject, s.STREAK] = 0.0
     if joined:
         if not settle(means, covariances, aux, entities, parameters, priors, own, sensor, event, z[use]):
             out[s.OUT_VERDICT] = s.NOT_LOCATED
@@ -266,7 +268,7 @@ def change(
         aux[subject, s.ACTIVE] = 0.0
     elif enters:
         aux[subject, s.ACTIVE] = 1.0
-        aux[subject, s.STREAK] = 0.0
+        aux[subject, s.STREAK] = aux[subject, s.UNCONFIRMED] = 0.0
         aux[subject, s.JOINED_AT] = aux[subject, s.CORRECTED_AT] = event[s.EVENT_AT]
 
 

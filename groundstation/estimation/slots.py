@@ -69,8 +69,9 @@ SENSOR_COLUMNS = 20
     RATE_Y,
     RATE_Z,
     WILD_AT,
-) = range(24)
-AUXILIARY_COLUMNS = 24
+    UNCONFIRMED,
+) = range(25)
+AUXILIARY_COLUMNS = 25
 
 # Odometry condensed into one step of one robot: sums, counts, and the newest yaw.
 (

@@ -87,7 +87,7 @@ def test_bench_help_lists_benches(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_report_names_a_folder_without_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["report", str(tmp_path)]) == 4
+    assert run(["report", str(tmp_path)]) == 2
     assert "no state.mcap in this folder" in capsys.readouterr().err
 
 

@@ -192,7 +192,7 @@ def test_calibrations(lab: Path) -> None:
     assert [problem.split(": ", 1)[1] for problem in problems()] == [
         "fx_px: must be > 0 (got -460.0)",
         "zoom: unknown key; known here: schema_version, model, width_px, height_px, fx_px, fy_px, cx_px, cy_px,"
-        " distortion, residual_px, date",
+        " distortion, residual_px, date, views, std",
     ]
     assert all(problem.startswith("cameras/ardrone_front.yaml:") for problem in problems())
     lens.write_text(text.replace("cx_px: 319.5", "cx_px: 20"), encoding="utf-8")

@@ -80,6 +80,7 @@ def pictures_until(truth, source, condition, seconds=20.0):
     return packets
 
 
+@pytest.mark.slow
 def test_exposures_are_known_in_spite_of_jitter_and_late_frames():
     with rendering(frame_loss=0.05, video_jitter_ms=20.0, video_delay_ms=120.0, fps=15.0) as (truth, source, _):
         packets = pictures_until(truth, source, lambda got: len(got) >= 75)

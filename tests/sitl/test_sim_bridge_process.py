@@ -147,6 +147,7 @@ def test_a_wrong_scenario_is_refused_with_code_2(site: Site) -> None:
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_without_its_supervisor_it_stays_until_the_drone_has_landed(site: Site) -> None:
     """Started by an intermediate process that is killed: flies on, lands for silence, ends, and leaves nobody."""
     site.write(streams={"ceiling": [f"{site.net}.50", 8080]})

@@ -155,6 +155,7 @@ def test_a_refused_arming_lists_all_reasons(hangar, kind, flavour):
         flying.close()
 
 
+@pytest.mark.slow
 def test_a_command_that_is_never_answered_is_said_to_be(hangar, kind):
     emulator, _, (address, port) = hangar.add("ardupilot", 9)
     flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)

@@ -180,6 +180,7 @@ def test_what_goes_over_the_port_is_told_to_the_byte(hangar, opened):
     assert {(h.frame.component, h.frame.sequence) for h in heard} <= numbers
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_goes_and_comes_again_and_again_is_spoken_to_again(hangar, opened):
     emulator, _, (address, port) = hangar.add("px4", 7)
     link = opened(f"udpout:{address}:{port}")

@@ -48,6 +48,8 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "Skein needs Python 3.11 or newer; this is %d.%d. Use: make PYTHON=python3.11 $(MAKECMDGOALS)" % v[:2])'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	@echo "compiling the kernels, once: half a minute"
+	@$(BIN)/python -m groundstation.runtime.kernels
 	@touch $@
 
 clean:

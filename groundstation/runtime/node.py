@@ -7,7 +7,6 @@ needs it is imported only after the kernel cache is chosen.
 from __future__ import annotations
 
 import gc
-import importlib
 import sys
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache
 from groundstation.process.child import Child
 from groundstation.runtime.health import Deadlines
+from groundstation.runtime.kernels import compile_kernels
 
 if TYPE_CHECKING:
     from groundstation.runtime.tracking import Tracking
@@ -32,10 +32,7 @@ def run(child: Child) -> int:
         child.starting("loading kernels")
     else:
         child.starting("compiling kernels (once per version, some 30 s)")
-        # Two halves that take about as long and share little.
-        other_half = numba_cache.ParallelCompilation(["groundstation.planning.plan", "groundstation.estimation.models"])
-        importlib.import_module("groundstation.estimation.replay")
-        other_half.finish()
+        compile_kernels()
     from groundstation.runtime.tracking import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up
 

@@ -16,6 +16,7 @@ _VERDICTS = {
     s.OUT_OF_VIEW: (Verdict.OUT_OF_VIEW, "behind the camera"),
     s.SINGULAR: (Verdict.SINGULAR, "covariance is not positive definite"),
     s.OBSERVER_UNKNOWN: (Verdict.UNKNOWN_ENTITY, "the observer has no belief yet"),
+    s.OBSERVER_UNCONFIRMED: (Verdict.UNKNOWN_ENTITY, "the observer was seen only once so far"),
     s.SUBJECT_GROUNDED: (Verdict.UNKNOWN_ENTITY, "the subject does not fly"),
     s.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
     s.MISTAKEN: (Verdict.IMPLAUSIBLE, "far beyond the gate, but fits another entity: is its marker's id right?"),

@@ -25,6 +25,8 @@ def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
     observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
     if aux[observer, s.ACTIVE] == 0.0:
         return s.OBSERVER_UNKNOWN
+    if aux[observer, s.UNCONFIRMED] != 0.0:
+        return s.OBSERVER_UNCONFIRMED
     if aux[subject, s.ADMITTED] == 0.0:
         return s.SUBJECT_GROUNDED
     if aux[subject, s.ACTIVE] == 0.0 and entities[subject, s.ENTITY_KIND] == s.KIND_ROBOT and rows < 4:
@@ -205,10 +207,8 @@ def observe(
             if out[s.OUT_VERDICT] != s.PENDING:
                 return
             joined = True
-        else:
-            aux[subject, s.UNCONFIRMED] = 0.0
-            if excess <= 1.0:
-                aux[subject, s.STREAK] = 0.0
+        elif excess <= 1.0:
+            aux[subject, s.STREAK] = aux[subject, s.UNCONFIRMED] = 0.0
     if joined:
         if not settle(means, covariances, aux, entities, parameters, priors, own, sensor, event, z[use]):
             out[s.OUT_VERDICT] = s.NOT_LOCATED

@@ -155,7 +155,7 @@ def begin_odometry_robot(
     p, condensed = parameters[e], odometry[e]
     hold_velocity(condensed, aux[e], p[HOLD_S], step)
     take_heading(condensed, aux[e], step)
-    if aux[e, s.ACTIVE] == 0.0 or condensed[s.HEIGHT_COUNT] == 0.0:
+    if aux[e, s.ACTIVE] == 0.0 or aux[e, s.UNCONFIRMED] != 0.0 or condensed[s.HEIGHT_COUNT] == 0.0:
         return
     start = entities[e, s.ENTITY_START]
     error = start + int(p[AT_HEIGHT_ERROR]) if p[AT_HEIGHT_ERROR] >= 0.0 else -1

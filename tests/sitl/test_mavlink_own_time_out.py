@@ -37,7 +37,7 @@ def speed(copter):
     return math.hypot(*copter.airframe.velocity_stabilized())
 
 
-# Over MAVSDK the two vehicles, which feed themselves here, now and then do not come to fly at all: no result, in a minute.
+# Over MAVSDK these two vehicles, which feed themselves, now and then do not come to fly at all: no result, in a minute.
 OVER_MAVSDK = pytest.param(
     "mavsdk", marks=pytest.mark.skipif(not os.environ.get("SKEIN_MAVSDK_STOPS"), reason="set SKEIN_MAVSDK_STOPS=1")
 )

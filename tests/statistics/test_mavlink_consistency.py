@@ -43,7 +43,7 @@ def test_one_short_flight_is_near_consistent(field: dict[str, Any]) -> None:
 def test_fifty_flights_with_the_loop_closed(field: dict[str, Any]) -> None:
     """50 flights of 20 s, some 3 s of CPU each; band 0.8..1.3 for the means, +- 0.3 at most.
 
-    Shorter flights would judge a parked target most of the time (15 s: 0.79): it departs 3 s after the slowest take-off.
+    Shorter flights would judge a parked target (15 s: 0.79): it departs 3 s after the slowest take-off.
     """
     reports = fly(field, range(100, 150), 20.0)
     found = summary(reports, field)

@@ -22,7 +22,7 @@ from groundstation.geometry.rotations import (
 
 # `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
 WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
-# Of the time of exposure about the calibrated delay of a video: +-20 ms, as measured on real streams [s].
+# Of the time of exposure about the calibrated delay of a video: +-20 ms, as the honest scenario has it [s].
 STAMP_STD_S = 0.0115
 # A calibrated velocity scale is good to this, and creeps by this in a second.
 _SCALE_STD, _SCALE_DRIFT = 0.04, 0.002

@@ -44,7 +44,8 @@ class Pilot:
     def order(self, verb: Verb, mode: str) -> None:
         """Order what is in a mode, and ready, to do something: again and again, as a patient operator would."""
         ready = [h.vehicle.name for h in self.hosts if h.watchdog.mode == mode and not h.watchdog.vehicle.not_ready]
-        if not ready:
+        waiting = any(h.watchdog.mode == mode and h.watchdog.vehicle.not_ready for h in self.hosts)
+        if not ready or (waiting and verb is Verb.TAKEOFF):  # together: who flies on what it says itself sinks in time
             return
         header, expires_ns, self.orders = self.bus.header("team"), time.monotonic_ns() + 10**10, self.orders + 1
         self.bus.publish(LEASE, Lease(header=header, holder="op", expires_ns=expires_ns))

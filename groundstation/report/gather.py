@@ -8,19 +8,7 @@ import msgspec
 import numpy as np
 
 from groundstation.bus import messages as m
-from groundstation.bus.topics import (
-    COMMAND,
-    COMMAND_ACK,
-    ESTIMATE,
-    EVENT,
-    INNOVATION,
-    PLAN,
-    PROCESS_STATUS,
-    SIM_STATUS,
-    TRUTH,
-    VEHICLE_STATUS,
-    Topic,
-)
+from groundstation.bus import topics as t
 from groundstation.recording.reader import Record, RecordingError, open_recording, parts
 from groundstation.recording.selection import STATE
 from groundstation.report import run_facts
@@ -30,16 +18,8 @@ from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Ti
 _WANTED = frozenset(
     (topic.plane, topic.name)
     for topic in (
-        COMMAND,
-        COMMAND_ACK,
-        ESTIMATE,
-        EVENT,
-        INNOVATION,
-        PLAN,
-        PROCESS_STATUS,
-        SIM_STATUS,
-        TRUTH,
-        VEHICLE_STATUS,
+        *(t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
+        *(t.PROCESS_STATUS, t.SIM_STATUS, t.TRUTH, t.VEHICLE_STATUS),
     )
 )
 
@@ -61,7 +41,7 @@ def gather(run_dir: Path) -> RunData:
     return data
 
 
-def _is_wanted(topic: Topic) -> bool:
+def _is_wanted(topic: t.Topic) -> bool:
     return (topic.plane, topic.name) in _WANTED
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from groundstation.bus.jpeg import stated_size
 from groundstation.bus.messages import Header, RelativeObservation
 from groundstation.geometry.lens import CameraIntrinsics
 
@@ -20,9 +21,6 @@ _EARLY_NS = 60_000_000
 # A browser decodes what it is sent: 20 megapixels are 80 MB there.
 _MAX_BYTES = 4_000_000
 _MAX_PIXELS = 20_000_000
-# WIRE: JPEG (ISO/IEC 10918-1, B.1.1.3): start-of-frame markers, all of C0..CF but tables (C4, C8, CC).
-_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-_MAX_SEGMENTS = 200
 
 
 class PictureDesk:
@@ -105,27 +103,13 @@ def problem_of(jpeg: bytes) -> str:
     """Return "" for a JPEG that a browser may be given, else what is wrong with it; looks at its head only."""
     if len(jpeg) > _MAX_BYTES:
         return f"picture of {len(jpeg) / 1e6:.0f} MB, at most {_MAX_BYTES / 1e6:.0f} MB are shown"
-    size = jpeg_size(jpeg)
+    size = stated_size(jpeg)
     if size is None:
         return "not a JPEG picture"
     width, height = size
     if not 0 < width * height <= _MAX_PIXELS:
         return f"picture of {width} x {height} pixels, at most {_MAX_PIXELS // 10**6} million are shown"
     return ""
-
-
-def jpeg_size(jpeg: bytes) -> tuple[int, int] | None:
-    """Return width and height that a JPEG's frame header states [px]; None where there is no such header."""
-    if not jpeg.startswith(b"\xff\xd8"):
-        return None
-    at = 2
-    for _ in range(_MAX_SEGMENTS):
-        if at + 9 > len(jpeg) or jpeg[at] != 0xFF:
-            return None
-        if jpeg[at + 1] in _FRAME_MARKERS:
-            return int.from_bytes(jpeg[at + 7 : at + 9], "big"), int.from_bytes(jpeg[at + 5 : at + 7], "big")
-        at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
-    return None
 
 
 def frame_of(camera: str, stamp_ns: int, jpeg: bytes) -> bytes:

@@ -1,13 +1,15 @@
-"""The real driver and a stand-in for the tracker; as a process, `PORT LINK`, for two vehicles on one port.
+"""The real driver and a stand-in for the tracker; as a process, `PORT LINK PLACES`, for two vehicles on one port.
 
-The stand-in tells the driver where the vehicles are (unless told otherwise: where they say they are), takes off and
-flies them forward at 0.4 m/s.
+The stand-in tells the driver where the vehicles are (as a process: as the file PLACES says, x, y, z, yaw of each as
+doubles in the order of FLAVOURS), takes off and flies them forward at 0.4 m/s, at 1.2 m.
 """
 
 import itertools
 import sys
 import time
 from pathlib import Path
+
+import numpy as np
 
 from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of
 from drivers.mavlink.settings import MavlinkDriverSettings
@@ -18,20 +20,27 @@ from groundstation.bus.topics import COMMAND, ESTIMATE, LEASE, SETPOINT
 sys.path.insert(0, str(Path(__file__).parents[1] / "contract"))
 from mavlink_process import FakeProcess
 
+HEIGHT_M = 1.2
 FLAVOURS = {11: "px4", 12: "ardupilot"}
 _COVARIANCE = tuple(1e-4 if place % 5 == 0 else 0.0 for place in range(16))
 
 
-def where_it_says(vehicle):
-    """Return ((x, y, z) [m], yaw [rad]) in the world, or None."""
-    known = vehicle.telemetry
-    return None if known.position_m is None or known.attitude is None else (known.position_m, known.attitude.yaw_rad)
+def places_of(path):
+    """Return a function that reads ((x, y, z) [m], yaw [rad]) of a vehicle in the world from a file others write."""
+    places = np.memmap(path, dtype=float, mode="r", shape=(len(FLAVOURS), 4))
+    rows = {f"v{system}": row for row, system in enumerate(FLAVOURS)}
+
+    def where(vehicle):
+        x, y, z, yaw = (float(value) for value in places[rows[vehicle.name]])
+        return (x, y, z), yaw
+
+    return where
 
 
 class Pilot:
     """turn() is one cycle of the driver and of the tracker's part."""
 
-    def __init__(self, port: int, kind: str, flavours=FLAVOURS, where=where_it_says, **vehicle) -> None:
+    def __init__(self, port: int, kind: str, where, flavours=FLAVOURS, **vehicle) -> None:
         exchange, self.orders, self.where = MemoryExchange(), 0, where
         self.bus = MemoryBus(exchange, "lab", "tracker")
         self.process = FakeProcess(MemoryBus(exchange, "lab", "mavlink"))
@@ -44,8 +53,7 @@ class Pilot:
     def order(self, verb: Verb, mode: str) -> None:
         """Order what is in a mode, and ready, to do something: again and again, as a patient operator would."""
         ready = [h.vehicle.name for h in self.hosts if h.watchdog.mode == mode and not h.watchdog.vehicle.not_ready]
-        waiting = any(h.watchdog.mode == mode and h.watchdog.vehicle.not_ready for h in self.hosts)
-        if not ready or (waiting and verb is Verb.TAKEOFF):  # together: who flies on what it says itself sinks in time
+        if not ready:
             return
         header, expires_ns, self.orders = self.bus.header("team"), time.monotonic_ns() + 10**10, self.orders + 1
         self.bus.publish(LEASE, Lease(header=header, holder="op", expires_ns=expires_ns))
@@ -68,8 +76,8 @@ class Pilot:
                 )
             )  # fmt: skip
             setpoint = VelocitySetpoint(
-                header=self.bus.header(vehicle.name), velocity_m_s=(0.4, 0.0, 0.0), yaw_rate_rad_s=0.0,
-                lifetime_ms=300, epoch=1,
+                header=self.bus.header(vehicle.name), velocity_m_s=(0.4, 0.0, 0.5 * (HEIGHT_M - mean[2])),
+                yaw_rate_rad_s=0.0, lifetime_ms=300, epoch=1,
             )  # fmt: skip
             self.bus.publish(SETPOINT, setpoint)
         self.bus.publish(ESTIMATE, Estimate(header=self.bus.header("team"), entities=tuple(entities), epoch=1))
@@ -94,4 +102,4 @@ class Pilot:
 
 
 if __name__ == "__main__":
-    Pilot(int(sys.argv[1]), sys.argv[2]).fly()
+    Pilot(int(sys.argv[1]), sys.argv[2], places_of(sys.argv[3])).fly()

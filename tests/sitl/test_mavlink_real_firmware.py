@@ -139,7 +139,7 @@ def fly(port, kind, flavour, truth, patience_s):
     """Take off, fly forward at 0.4 m/s for 6 s and land, on the true position; returns the distance flown [m]."""
     pad, yaw = truth()
     options = {"pad_m": pad[:2], "pad_yaw_rad": yaw}
-    pilot = Pilot(port, kind, {SYSTEM: flavour}, lambda vehicle: truth(), **options)
+    pilot = Pilot(port, kind, lambda vehicle: truth(), {SYSTEM: flavour}, **options)
     vehicle, watchdog, turns = pilot.fleet.vehicles[SYSTEM], pilot.hosts[0].watchdog, iter(range(10**9))
 
     def until(condition, seconds, verb=None, mode=""):

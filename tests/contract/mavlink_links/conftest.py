@@ -16,6 +16,8 @@ from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter
 from sim_bridge.world.world import TICK_S
 
 _numbers = itertools.count(1)
+# Two sources at once would be two reset counters: each pose a jump that says nothing of the velocity.
+SILENT_S = 0.2
 
 
 def free_address():
@@ -31,7 +33,7 @@ def free_port():
 
 
 class Hangar:
-    """Vehicles in a room of their own each; `aided`: poses are fed to them by nobody else, so they are given here."""
+    """Vehicles in a room of their own each; `aided`: while nobody else feeds them poses, they are given here."""
 
     def __init__(self):
         self.emulators = {}
@@ -65,7 +67,7 @@ class Hangar:
                     emulator.receive()
                     copter.step((0.0, 0.0, 0.0))
                     copter.estimate.step(copter.airframe, copter.motors_on)
-                    if key in self.aided and tick % 7 == 0:
+                    if key in self.aided and tick % 7 == 0 and copter.estimate.aided_s > SILENT_S:
                         body = copter.airframe
                         copter.estimate.aid((body.x, body.y, body.z), body.yaw, 0)
                     emulator.send()

@@ -66,11 +66,28 @@ def limit_setpoint(
             names.append(wall.name)
     else:
         velocity = np.zeros(3)
+    rate = _turn_within(walls, velocity, rate, parameters.reaction_s, names)
     body = stabilized_from_world(velocity, yaw)
     limited = replace(
         setpoint, velocity_m_s=(float(body[0]), float(body[1]), float(body[2])), yaw_rate_rad_s=float(rate)
     )
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
+
+
+def _turn_within(walls: list[_Wall], velocity: Array, rate: float, reaction_s: float, names: list[str]) -> float:
+    """Return the yaw rate at which no wall's velocity is exceeded.
+
+    A vehicle that holds its velocity in its own frame carries it along when it turns: by that much it is not where the
+    command points, for as long as its reaction takes.
+    """
+    aside = np.array([-velocity[1], velocity[0], 0.0])
+    for wall in walls:
+        outward = reaction_s * rate * float(aside @ wall.normal)
+        room = max(0.0, wall.most - float(velocity @ wall.normal))
+        if outward > room + 1e-9:
+            rate *= room / outward
+            names.append(wall.name)
+    return rate
 
 
 def _hover(setpoint: Setpoint, reason: str) -> Limited:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -66,6 +66,7 @@ def test_output_is_never_above_input_or_limits(
 
 
 @given(place, command, st.booleans())
+@example((3.5625, 0.0, 1.0, 2.0), (0.0, 1.0, 0.0, 1.0), False)  # along the fence while turning
 @settings(max_examples=25, deadline=None)
 def test_the_fence_is_never_crossed(
     start: tuple[float, ...], wish: tuple[float, float, float, float], known: bool

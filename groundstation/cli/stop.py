@@ -25,7 +25,6 @@ _OPERATOR = "operator"
 _STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
 _PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
 _PATIENCE_DEFAULT_S = 5.0
-_REPEAT_S = 0.2
 _CONNECT_S = 0.5
 
 
@@ -54,7 +53,7 @@ def deliver(bus: ZenohBus, book: AckBook, patience_s: float, on_news: Callable[[
             if isinstance(received.message, CommandAck) and book.note(received.message):
                 entity = received.message.header.entity
                 on_news(f"{entity:<12} {book.progress[entity].text()}")
-        if book.unheard and time.monotonic() - repeated > _REPEAT_S:
+        if time.monotonic() - repeated > book.repeat_after_s:
             repeated = time.monotonic()
             bus.publish(COMMAND, book.command)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.bus.api import Bus
+from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.messages import AckStage, Command, CommandAck, Lease, Verb
 from groundstation.bus.topics import COMMAND
 from groundstation.runtime.acknowledgements import AckBook
@@ -14,7 +15,6 @@ STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
 _TEAM = "team"
 _NS_PER_MS = 1_000_000
 _EXPIRY_NS = 5_000_000_000
-_REPEAT_NS = 300_000_000
 _PATIENCE_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 60_000_000_000}
 _PATIENCE_DEFAULT_NS = 8_000_000_000
 # A start that lay in a frozen server's queue must not surprise anybody later; a stop never expires.
@@ -94,12 +94,13 @@ class OrderDesk:
             self._keep(followed)
 
     def step(self, now_ns: int) -> None:
-        """Repeat what was not heard; close what is settled or out of time."""
+        """Repeat what was not answered; close what is settled or out of time."""
         for order in self._orders.values():
             verb = order.book.command.verb
             patience_ns = _PATIENCE_NS.get(verb, _PATIENCE_DEFAULT_NS)
             order.closed = order.closed or order.book.settled or now_ns - order.given_ns > patience_ns
-            if not order.closed and order.by and order.book.unheard and now_ns - order.repeated_ns > _REPEAT_NS:
+            due_ns = order.repeated_ns + order.book.repeat_after_s * NS_PER_S
+            if not order.closed and order.by and now_ns > due_ns:
                 order.repeated_ns = now_ns
                 self._bus.publish(COMMAND, order.book.command)
 

@@ -59,6 +59,14 @@ class AckBook:
         return tuple(name for name, progress in self.progress.items() if progress.stage is None)
 
     @property
+    def repeat_after_s(self) -> float:
+        """Return how long to wait for the next answer before the command is sent again under the same id.
+
+        Whoever has it answers a repetition with its last answer: on this bus any single answer may be lost.
+        """
+        return 0.3 if self.unheard else 1.0
+
+    @property
     def settled(self) -> bool:
         """Whether all answers are final."""
         return all(progress.settled for progress in self.progress.values())

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from groundstation.bus.api import Bus
+from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.messages import AckStage, Command, CommandAck, Event, Lease, Severity, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AckBook
@@ -16,7 +17,6 @@ _TEAM = "team"
 _LEASE_PERIOD_NS = 500_000_000
 _LEASE_LIFE_NS = 1_500_000_000
 _EXPIRY_NS = 5_000_000_000
-_REPEAT_NS = 300_000_000
 _CONFIRM_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 20_000_000_000}
 _CONFIRM_DEFAULT_NS = 6_000_000_000
 _STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
@@ -189,14 +189,14 @@ class Operator:
     # --- what is under way ---------------------------------------------------------------------------------------
 
     def _follow(self, now_ns: int) -> None:
-        """Repeat orders that were not heard; close those that are settled or out of time."""
+        """Repeat orders that were not answered; close those that are settled or out of time."""
         for dialogue in list(self._dialogues):
             book, verb = dialogue.book, dialogue.book.command.verb
             late = now_ns - dialogue.given_ns > _CONFIRM_NS.get(verb, _CONFIRM_DEFAULT_NS)
             if book.settled or late:
                 self._dialogues.remove(dialogue)
                 self._close(dialogue)
-            elif book.unheard and now_ns - dialogue.repeated_ns > _REPEAT_NS:
+            elif now_ns - dialogue.repeated_ns > book.repeat_after_s * NS_PER_S:
                 dialogue.repeated_ns = now_ns
                 self._bus.publish(COMMAND, book.command)
 

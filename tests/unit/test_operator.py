@@ -35,6 +35,8 @@ class Drone:
         self.commands = self.bus.subscribe([COMMAND])
         self.heard: list[Verb] = []
         self.change: tuple[int, FlightState, Command] | None = None
+        self.last: dict[str, AckStage] = {}
+        self.lost: AckStage | None = None  # of this stage the first answer does not arrive
 
     def turn(self, now_ns: int) -> None:
         for received in self.commands.drain():
@@ -52,6 +54,9 @@ class Drone:
             self.observe()
 
     def obey(self, command: Command, now_ns: int) -> None:
+        if command.id in self.last:
+            self.answer(command, self.last[command.id])
+            return
         self.heard.append(command.verb)
         self.answer(command, AckStage.RECEIVED)
         if self.refusal and command.verb is Verb.TAKEOFF:
@@ -62,6 +67,10 @@ class Drone:
         self.change = (now_ns + 500 * MS, after, command)
 
     def answer(self, command: Command, stage: AckStage, reason: str = "") -> None:
+        self.last[command.id] = stage
+        if stage is self.lost:
+            self.lost = None
+            return
         header = self.bus.header(self.name)
         ack = CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
         self.bus.publish(COMMAND_ACK, ack)
@@ -194,6 +203,17 @@ def test_unheard_order_is_repeated_with_the_same_id(scene: Scene) -> None:
     assert len({command.id for command in commands if isinstance(command, Command)}) == 1
     scene.pass_(25.0)
     assert "drone_1: LAND sent / NOT CONFIRMED" in scene.said
+
+
+@pytest.mark.parametrize("stage", [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE])
+def test_an_answer_lost_on_the_bus_is_asked_for_again(scene: Scene, stage: AckStage) -> None:
+    drone = scene.add("drone_1")
+    scene.pass_(0.2)
+    drone.lost = stage
+    scene.operator.land(scene.now_ns)
+    scene.pass_(3.0)
+    assert drone.heard == [Verb.LAND]
+    assert "drone_1: LAND sent / received / accepted / effective" in scene.said
 
 
 def test_another_shell_may_ask_for_take_off(scene: Scene) -> None:

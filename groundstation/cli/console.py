@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.monitor import cast_of, choose
-from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:
     from groundstation.supervisor.runtime_file import RuntimeRecord
@@ -45,11 +44,10 @@ def _field_of(record: "RuntimeRecord") -> dict[str, Any]:
     """Return the resolved field from the recording that is being written, or {}."""
     import msgspec
 
-    from groundstation.recording.reader import open_recording
+    from groundstation.recording.reader import attached_field
 
     try:
-        content = open_recording(Path(record.run_dir) / "state.mcap").attachments["field.json"]
-        field: dict[str, Any] = msgspec.json.decode(content, type=dict)
-    except (GroundStationError, KeyError, OSError, ValueError):
+        field: dict[str, Any] = msgspec.json.decode(attached_field(Path(record.run_dir)), type=dict)
+    except ValueError:
         return {}
     return field

@@ -52,11 +52,11 @@ def choose(name: str | None) -> "RuntimeRecord":
 def cast_of(record: "RuntimeRecord") -> "Cast":
     """Return who takes part, as far as the recording that is being written says it."""
     from groundstation.monitor.state import Cast, cast_from_field
-    from groundstation.recording.reader import RecordingError, open_recording
+    from groundstation.recording.reader import attached_field
 
     try:
-        return cast_from_field(open_recording(Path(record.run_dir) / "state.mcap").attachments["field.json"])
-    except (RecordingError, KeyError, ValueError):
+        return cast_from_field(attached_field(Path(record.run_dir)))
+    except ValueError:
         return Cast(record.site, dict.fromkeys(record.drones, 0.15))
 
 

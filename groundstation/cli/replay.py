@@ -46,6 +46,7 @@ def replay(recording: tuple[Path, ...], rerun: str | None, **options: Any) -> in
 
     RECORDING is a run folder, or the .mcap files of one (default: the newest run in ./runs).
     """
+    from groundstation.cli.report import newest_run
     from groundstation.recording.reader import RecordingError
     from groundstation.replay.source import open_source
 
@@ -55,19 +56,9 @@ def replay(recording: tuple[Path, ...], rerun: str | None, **options: Any) -> in
         if idle:
             raise click.UsageError(f"{', '.join(idle)} belongs to a re-run: add --rerun tracker")
     try:
-        source = open_source(recording or (_newest(),))
+        source = open_source(recording or (newest_run(_RUNS),))
         return _run_again(source, **options) if again else _play(source, **options)
     except RecordingError as error:
-        raise click.UsageError(str(error)) from error
-
-
-def _newest() -> Path:
-    from groundstation.cli.report import newest_run
-    from groundstation.errors import GroundStationError
-
-    try:
-        return newest_run(_RUNS)
-    except GroundStationError as error:
         raise click.UsageError(str(error)) from error
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake
 
 if TYPE_CHECKING:
     from groundstation.report.judge import Report
@@ -84,13 +84,13 @@ def _compare(first: Path, second: Path, as_json: bool) -> None:
 def _run_dir(path: Path) -> Path:
     """Return the run folder that is meant by a folder or by a recording in it."""
     if not path.exists():
-        raise GroundStationError(f"{path}: there is no such run")
+        raise OperatorMistake(f"{path}: there is no such run")
     return path if path.is_dir() else path.parent
 
 
 def newest_run(folder: Path) -> Path:
-    """Return the run folder with the newest recording; raises GroundStationError when there is none."""
-    recordings = sorted(folder.glob("*/state.mcap"), key=lambda path: path.stat().st_mtime)
+    """Return the run folder with the newest recording; raises OperatorMistake when there is none."""
+    recordings = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime)
     if not recordings:
-        raise GroundStationError(f"no recorded run in {folder.absolute()}: name a run folder")
+        raise OperatorMistake(f"no recorded run in {folder.absolute()}: name a run folder")
     return recordings[-1].parent

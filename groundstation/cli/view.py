@@ -91,10 +91,7 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
 def _field_of(record: "RuntimeRecord") -> dict[str, Any]:
     """Return the resolved field from the recording that is being written, or {}."""
     from groundstation.engineering_views.field import field_of
-    from groundstation.recording.reader import RecordingError, open_recording, parts
-    from groundstation.recording.selection import STATE
+    from groundstation.recording.preamble import FIELD_NAME
+    from groundstation.recording.reader import attached_field
 
-    try:
-        return field_of(open_recording(parts(Path(record.run_dir), STATE)[0]).attachments)
-    except (RecordingError, IndexError):
-        return {}
+    return field_of({FIELD_NAME: attached_field(Path(record.run_dir))})

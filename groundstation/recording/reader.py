@@ -1,7 +1,7 @@
 """Reads recordings, whole or cut anywhere: what was flushed before a crash is there, the rest is named as damage."""
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -23,6 +23,7 @@ from groundstation.recording.chunks import UNREADABLE, RawRecord, chunk_data, ch
 from groundstation.recording.origin import RecordingError, require_ours, require_readable
 from groundstation.recording.part_names import numbered_parts
 from groundstation.recording.schemas import is_picture
+from groundstation.recording.selection import STATE
 from groundstation.recording.viewers import picture_parts
 
 __all__ = [
@@ -30,7 +31,9 @@ __all__ = [
     "Record",
     "Recording",
     "RecordingError",
+    "attached_field",
     "decode",
+    "open_parts",
     "open_recording",
     "parts",
     "payload",
@@ -126,6 +129,32 @@ def open_recording(path: Path) -> Recording:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
     require_readable(str(path), recording.metadata)
     return recording
+
+
+def open_parts(paths: Iterable[Path]) -> tuple[list[Recording], dict[Path, str]]:
+    """Return the parts that are recordings, and why each other is none (killed before its first byte).
+
+    Raises the RecordingError of the first of them when none can be read.
+    """
+    opened: list[Recording] = []
+    refused: dict[Path, RecordingError] = {}
+    for path in paths:
+        try:
+            opened.append(open_recording(path))
+        except RecordingError as error:
+            refused[path] = error
+    if refused and not opened:
+        raise next(iter(refused.values()))
+    return opened, {path: str(error).removeprefix(f"{path}: ") for path, error in refused.items()}
+
+
+def attached_field(run_dir: Path) -> bytes:
+    """Return the resolved field (JSON) that a run is recorded with, or `{}` where no part of it says so (yet)."""
+    try:
+        opened, _ = open_parts(parts(run_dir, STATE))
+    except RecordingError:
+        return b"{}"
+    return next((part.attachments["field.json"] for part in opened if "field.json" in part.attachments), b"{}")
 
 
 def _read_preamble(stream: IO[bytes], recording: Recording) -> None:

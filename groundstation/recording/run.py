@@ -9,7 +9,7 @@ from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.keys import Key
 from groundstation.recording.chunks import RawRecord, Wanted, every_topic
 from groundstation.recording.index import Chunk, FileIndex
-from groundstation.recording.reader import RecordingError, open_recording, parts
+from groundstation.recording.reader import RecordingError, open_parts, parts
 from groundstation.recording.selection import RAW, STATE
 
 
@@ -30,21 +30,12 @@ class RecordedRun:
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.indexes: list[FileIndex] = []
-        self.unread: dict[Path, str] = {}
-        refused: list[RecordingError] = []
-        for path in paths:
-            try:
-                opened = open_recording(path)
-            except RecordingError as error:
-                self.unread[path] = str(error).removeprefix(f"{path}: ")
-                refused.append(error)
-                continue
+        readable, self.unread = open_parts(paths)
+        for opened in readable:
             self.metadata = self.metadata or opened.metadata
             self.attachments = self.attachments or opened.attachments
-            self.indexes.append(FileIndex(path))
+            self.indexes.append(FileIndex(opened.path))
             self.indexes[-1].damage[:0] = opened.preamble_damage
-        if not self.indexes:
-            raise refused[0]
         self._places = sorted(
             (_Place(index, chunk) for index in self.indexes for chunk in index.chunks),
             key=lambda place: place.chunk.start_ns,

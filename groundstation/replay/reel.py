@@ -78,6 +78,7 @@ class Reel:
     """All files of a run as one stream of arrivals; times in UNIX ns."""
 
     def __init__(self, source: Source) -> None:
+        self._source_damage = source.damage
         self._run = RecordedRun([*source.state, *source.raw])
         self._files = [_File(index) for index in self._run.indexes if index.chunks]
         self.start_ns = min((file.begins[0] for file in self._files), default=0)
@@ -93,7 +94,7 @@ class Reel:
     @property
     def damage(self) -> list[str]:
         """Return what was wrong with the files."""
-        return self._run.damage
+        return [*self._source_damage, *self._run.damage]
 
     def between(self, after_ns: int, until_ns: int, wanted: Wanted = is_shown) -> Iterator[Arrival]:
         """Yield what came after one time and not after another, in the order in which it came."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from groundstation.recording.reader import Recording, RecordingError, open_recording, parts
+from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
 from groundstation.recording.selection import RAW, STATE
 
 FIELD = "field.json"
@@ -19,9 +19,9 @@ _TYPICAL = "a run folder holds state.mcap"
 class Source:
     """One recorded run.
 
-    state, raw: files in order of time; field: the resolved field as JSON; run, versions: what the recorder noted of
-    the run and of the programs; began_ns: UNIX time of the first message; unix_offset_ns: UNIX time minus the run's
-    boot clock.
+    state, raw: files in order of time, of the state those that can be read; field: the resolved field as JSON;
+    run, versions: what the recorder noted of the run and of the programs; began_ns: UNIX time of the first message;
+    unix_offset_ns: UNIX time minus the run's boot clock; damage: which state files are no recording at all, and why.
     """
 
     name: str
@@ -32,6 +32,7 @@ class Source:
     versions: dict[str, str] = dataclasses.field(default_factory=dict)
     began_ns: int = 0
     unix_offset_ns: int = 0
+    damage: tuple[str, ...] = ()
 
     @property
     def resolved(self) -> dict[str, Any]:
@@ -59,12 +60,13 @@ def open_source(paths: Sequence[Path]) -> Source:
 
 
 def _nearby(folder: Path) -> str:
-    inner = sorted(folder.glob("*/state.mcap"), key=lambda path: path.stat().st_mtime)
+    inner = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime)
     return f"; did you mean {inner[-1].parent}?" if inner else ""
 
 
 def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
-    opened = sorted((open_recording(path) for path in state), key=lambda recording: _created_ns(recording))
+    readable, unread = open_parts(state)
+    opened = sorted(readable, key=lambda recording: _created_ns(recording))
     first = opened[0]
     if FIELD not in first.attachments or "run" not in first.metadata:
         raise RecordingError(f"{first.path}: no recording of a ground station (neither field nor run are in it)")
@@ -80,7 +82,8 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     files = tuple(recording.path for recording in opened)
     versions = first.metadata.get("versions", {})
     began_ns = next((record.log_time_ns for path in files for record in open_recording(path).raw_records()), 0)
-    return Source(name, files, tuple(raw), first.attachments[FIELD], run, versions, began_ns, offset_ns)
+    damage = tuple(f"{path.name}: {why}" for path, why in unread.items())
+    return Source(name, files, tuple(raw), first.attachments[FIELD], run, versions, began_ns, offset_ns, damage)
 
 
 def _created_ns(recording: Recording) -> int:

@@ -117,7 +117,7 @@ class Repetition:
         self._find_unsaid(first_ns, last_ns)
         comparison.recorded_s = (last_ns - first_ns) / 1e9
         comparison.cpu_s = time.process_time() - began_s
-        comparison.damage = self.tape.damage
+        comparison.damage = [*self._source.damage, *self.tape.damage]
 
     def _new_life(self, tick: Tick) -> Rerun:
         comparison, entry = self.comparison, tick.entry

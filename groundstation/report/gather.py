@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
-from groundstation.recording.reader import Record, RecordingError, open_recording, parts
+from groundstation.recording.reader import Record, RecordingError, open_parts, parts
 from groundstation.recording.selection import STATE
 from groundstation.report import run_facts
 from groundstation.report.arena import Arena, arena_from_json
@@ -31,12 +31,13 @@ def gather(run_dir: Path) -> RunData:
         raise RecordingError(f"{run_dir}: no {STATE}.mcap in this folder; is it a run folder?")
     data = RunData(Arena(), run_facts.read(run_dir))
     rows = _Rows(data)
-    for path in paths:
-        recording = open_recording(path)
+    readable, unread = open_parts(paths)
+    data.damage.extend(f"{path.name}: {why}" for path, why in unread.items())
+    for recording in readable:
         if "field.json" in recording.attachments and not data.arena.drones:
             data.arena = _arena(recording.attachments["field.json"], data.damage)
         rows.take(recording.records(_is_wanted))
-        data.damage.extend(f"{path.name}: {damage}" for damage in recording.damage)
+        data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()
     return data
 

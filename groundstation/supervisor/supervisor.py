@@ -282,7 +282,7 @@ class Supervisor:
             site=self.run.site,
             field=self.run.field,
             endpoint=self.run.endpoint,
-            run_dir=str(self.run.run_dir),
+            run_dir=str(self.run.run_dir.absolute()),
             heartbeat=str(self._block.path),
             drones=self.run.drones,
             supervisor=own,

@@ -98,3 +98,12 @@ def test_report_without_argument_takes_the_newest(tmp_path: Path) -> None:
         recording.write_bytes(b"x")
         os.utime(recording, (index, index))
     assert newest_run(tmp_path).name == "a"
+
+
+def test_report_where_nothing_was_recorded_is_a_mistake_of_usage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for arguments in (["report"], ["report", "gone"], ["replay"]):
+        assert run(arguments) == 2
+        assert str(tmp_path / "runs") in (said := capsys.readouterr().err) or "gone: there is no such run" in said

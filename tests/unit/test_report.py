@@ -299,6 +299,14 @@ def test_a_recording_cut_in_flight_still_reports(tmp_path: Path) -> None:
     assert not report.passed
 
 
+def test_a_part_without_a_byte_is_named_and_the_others_are_judged(tmp_path: Path) -> None:
+    fly(tmp_path, Flight())
+    (tmp_path / "state-2.mcap").touch()
+    report = judge(gather(tmp_path), tmp_path)
+    assert report.damage == ("state-2.mcap: not an MCAP recording (the file is empty)",)
+    assert report.passed
+
+
 def test_an_empty_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no state\.mcap in this folder"):
         build_report(tmp_path)

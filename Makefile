@@ -1,4 +1,4 @@
-# make demo, make test: each creates .venv if needed, installs everything, and runs.
+# make demo, make test: each creates .venv if needed, installs everything, and runs. make alone only installs.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -7,7 +7,9 @@ DEMO_ARGS ?=
 
 INTEROP := .interop
 
-.PHONY: demo test test-slow check format interop clean
+.PHONY: install demo test test-slow check format interop clean
+
+install: $(STAMP)
 
 demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)

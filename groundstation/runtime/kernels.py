@@ -15,8 +15,9 @@ def compile_kernels() -> None:
 
 def main() -> None:
     """Compile what is not in the cache yet, so that the first flight starts at once."""
-    if not numba_cache.activate().exists():
-        compile_kernels()
+    # Even where a cache exists: it may be another checkout's, or half filled by a run that was stopped.
+    numba_cache.activate()
+    compile_kernels()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ from typing import Any
 
 from groundstation.estimation.models import (
     ConstantVelocityTarget,
+    CoordinatedTurnTarget,
     FixedMount,
+    ManoeuvringTarget,
     MotionModel,
     MountedCamera,
     ObservationModel,
@@ -31,6 +33,8 @@ _VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
 _LASTING_SHARE, _QUICK_SHARE = 0.6, 0.1
 # A target does the most that it may do for this share of the time.
 _MANOEUVRING_SHARE = 0.07
+# Of the acceleration of a target that turns, what is left to one that goes straight on.
+_STRAIGHT_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +81,7 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
     drones = {name: drone for name, drone in resolved["drones"].items() if drone.get("enabled", True)}
     target, estimator = resolved["target"], resolved["estimator"]
     entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
-    entities[target["name"]] = ConstantVelocityTarget(
-        marker_height_m=target["marker"]["height_m"],
-        acceleration_std_m_s2=math.sqrt(_MANOEUVRING_SHARE) * target["acceleration_std_m_s2"],
-    )
+    entities[target["name"]] = _target(target)
     entities |= {name: _mount(camera) for name, camera in resolved["cameras"].items()}
     cameras: dict[str, ObservationModel] = {
         name: _world_camera(name, camera) for name, camera in resolved["cameras"].items()
@@ -115,6 +116,26 @@ def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
         reports_climb=habits.reports_climb,
         slow_states=AERIAL + _VELOCITY_LABELS,
     )
+
+
+def _target(target: Mapping[str, Any]) -> MotionModel:
+    common = {"marker_height_m": target["marker"]["height_m"], "heading": target.get("heading", False)}
+    acceleration_std = math.sqrt(_MANOEUVRING_SHARE) * target["acceleration_std_m_s2"]
+    model = target.get("model", "constant_velocity")
+    if model == "constant_velocity":
+        return ConstantVelocityTarget(acceleration_std_m_s2=acceleration_std, **common)
+    turns = dict(common)
+    if (rate_deg_s := target.get("turn_rate_std_deg_s")) is not None:
+        turns["turn_rate_std_rad_s"] = math.radians(rate_deg_s)
+    if (correlation_s := target.get("turn_rate_correlation_s")) is not None:
+        turns["turn_rate_correlation_s"] = correlation_s
+    turning = CoordinatedTurnTarget(acceleration_std_m_s2=acceleration_std, **turns)
+    if model == "coordinated_turn":
+        return turning
+    straight = CoordinatedTurnTarget(acceleration_std_m_s2=_STRAIGHT_SHARE * acceleration_std, turning=False, **turns)
+    stays = [target.get(key) for key in ("straight_s", "turning_s")]
+    usual = ManoeuvringTarget().stay_s
+    return ManoeuvringTarget((straight, turning), tuple(own or other for own, other in zip(stays, usual, strict=True)))
 
 
 def _mount(camera: Mapping[str, Any]) -> FixedMount:

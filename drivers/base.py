@@ -75,7 +75,10 @@ class HostProcess(Protocol):
         """Publish the process status when due."""
 
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until a monotonic time, or less when a stop is requested."""
+        """Sleep until a monotonic time or `wake`; False when a stop is requested."""
+
+    def wake(self) -> None:
+        """End a sleep early, the one under way or the next; from any thread."""
 
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
         """Publish something that happened."""

@@ -48,6 +48,15 @@ class VehicleHost:
         self._announced = (self.watchdog.mode, self.watchdog.reason)
         self._silent = False
 
+    def call_on_orders(self, wake: Callable[[], None]) -> None:
+        """Have a function called, on the network's thread, whenever a setpoint or command arrives."""
+        self._setpoints.on_arrival = self._commands.on_arrival = wake
+
+    @property
+    def has_orders(self) -> bool:
+        """Whether a setpoint or command waits for the next turn."""
+        return self._setpoints.waiting or self._commands.waiting
+
     def turn(self, now_ns: int) -> Decision:
         """Run one cycle: orders, decision, command to the vehicle, reports."""
         for received in self._leases.drain():
@@ -197,7 +206,15 @@ def run_hosts(
         if deadline_ns < clock.now_ns():
             overruns += 1
             deadline_ns = clock.now_ns()
-        child.sleep_until(deadline_ns)
+        sleep_serving(child, hosts, deadline_ns)
     for host in hosts:
         host.publish_status(clock.now_ns())
     return 0
+
+
+def sleep_serving(child: HostProcess, hosts: Sequence[VehicleHost], deadline_ns: int) -> None:
+    """Sleep until the next turn; a host that has `child.wake` called on orders turns at once when one arrives."""
+    while child.sleep_until(deadline_ns) and clock.now_ns() < deadline_ns:
+        for host in hosts:
+            if host.has_orders:
+                host.turn(clock.now_ns())

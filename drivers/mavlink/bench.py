@@ -10,9 +10,9 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from drivers.host import VehicleHost
+from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.bench_vehicles import FIRST_SYSTEM
-from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of
+from drivers.mavlink.driver import RATE_HZ, SWITCH_S, Fleet, hosts_of
 from drivers.mavlink.link import Heard, Link
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
@@ -39,6 +39,7 @@ class _Host:
 
     def __init__(self, bus: Bus) -> None:
         self.bus: Bus = bus
+        self._woken = threading.Event()
 
     def beat(self) -> None: ...
     def ready(self, detail: str = "") -> None: ...
@@ -47,8 +48,13 @@ class _Host:
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None: ...
     def sleep_until(self, deadline_ns: int) -> bool:
         """Sleep; never asked to stop."""
-        time.sleep(max(0, deadline_ns - clock.now_ns()) / 1e9)
+        self._woken.wait(max(0, deadline_ns - clock.now_ns()) / 1e9)
+        self._woken.clear()
         return True
+
+    def wake(self) -> None:
+        """End a sleep early."""
+        self._woken.set()
 
 
 class _TimedBus(MemoryBus):
@@ -127,6 +133,7 @@ class _Tracker(threading.Thread):
 
 def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
     """Return CPU [cores], delays [ms] and start-up [s] of the driver; raises DriverError when it never flies them."""
+    sys.setswitchinterval(SWITCH_S)
     port = free_port()
     exchange = MemoryExchange()
     bus = _TimedBus(exchange)
@@ -185,7 +192,7 @@ def _flown(
         if measured is not None and measured[1] and now_ns - measured[0] >= seconds * 1e9:
             break
         deadline_ns = max(deadline_ns + round(1e9 / RATE_HZ), now_ns)
-        host.sleep_until(deadline_ns)
+        sleep_serving(host, hosts, deadline_ns)
     elapsed_s, cpu_s = (clock.now_ns() - measured[0]) / 1e9, time.process_time() - measured[1]
     frames = link.frames - measured[2]
     return {

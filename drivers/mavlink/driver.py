@@ -1,6 +1,7 @@
 """The MAVLink driver: one port, one reader thread, a watchdog per vehicle, and the process entry `run`."""
 
 import logging
+import sys
 import threading
 from collections import Counter
 from collections.abc import Sequence
@@ -18,8 +19,10 @@ from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import DriverError, SettingsError
 
-# A setpoint waits at most one turn: 3.3 ms.
-RATE_HZ = 300.0
+# Of what is due by the clock: poses, questions, status. Orders do not wait for a turn.
+RATE_HZ = 100.0
+# How long one thread of the process may keep the others from the interpreter; Python's own 5 ms is a set-point's limit.
+SWITCH_S = 0.0005
 _SAME_TEXT_NS = 10_000_000_000
 _log = logging.getLogger(__name__)
 
@@ -99,8 +102,11 @@ class Fleet:
 
 
 def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) -> Sequence[VehicleHost]:
-    """Return a host, with its own watchdog, for each vehicle."""
-    return [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v)) for v in settings.vehicles]
+    """Return a host, with its own watchdog, for each vehicle; orders wake the process."""
+    hosts = [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v)) for v in settings.vehicles]
+    for host in hosts:
+        host.call_on_orders(child.wake)
+    return hosts
 
 
 def run(child: HostProcess) -> int:
@@ -109,6 +115,7 @@ def run(child: HostProcess) -> int:
         settings = MavlinkDriverSettings.model_validate_json(child.section)
     except ValidationError as error:
         raise SettingsError([str(error)]) from error
+    sys.setswitchinterval(SWITCH_S)
     fleet = Fleet(child, settings)
     try:
         return run_hosts(child, hosts_of(child, fleet, settings), RATE_HZ, fleet.turn)

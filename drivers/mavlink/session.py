@@ -9,7 +9,7 @@ from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import Origin
 from drivers.mavlink.wire import service, telemetry
-from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.flight import CommandLong, Odometry
 from drivers.mavlink.wire.frames import Message, id_of
 from drivers.mavlink.wire.names import Command, Flavour
 from drivers.mavlink.wire.parameters import value_from_carried
@@ -20,10 +20,11 @@ _HEARTBEAT_NS = 1_000_000_000
 _DISCONNECTED_NS = 2_000_000_000
 _PARAM_BURST = 4
 _ORIGIN_TRIES_PX4 = 5
+_STOPPED = 0.0
 
 
 def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
-    """Return the messages to ask for and their rates [Hz]."""
+    """Return the messages to ask for and their rates [Hz]; `_STOPPED` for what is sent unasked and not used."""
     imu = telemetry.HighresImu if flavour is Flavour.PX4 else telemetry.RawImu
     wanted: dict[type[Message], float] = {
         telemetry.ExtendedSysState: 5.0,
@@ -36,6 +37,9 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
         wanted[imu] = imu_hz
     if flavour is Flavour.ARDUPILOT:
         wanted[telemetry.EkfStatusReport] = 5.0
+    else:
+        # WIRE (mavlink.md 2): unasked, PX4 sends 100 and 30 a second of these, more than all that is used.
+        wanted |= {telemetry.Attitude: _STOPPED, Odometry: _STOPPED}
     return wanted
 
 
@@ -108,7 +112,9 @@ class Session:
         self._connected = True
         for kind, rate_hz in self._rates.items():
             if (key := self._key(kind)) not in requests.accepted:
-                requests.ask(now_ns, key, Command.SET_MESSAGE_INTERVAL, float(id_of(kind)), 1e6 / rate_hz)
+                # WIRE (SET_MESSAGE_INTERVAL): microseconds; -1 stops the stream.
+                interval_us = 1e6 / rate_hz if rate_hz > 0.0 else -1.0
+                requests.ask(now_ns, key, Command.SET_MESSAGE_INTERVAL, float(id_of(kind)), interval_us)
                 break
         return messages + self._service(now_ns)
 

@@ -2,7 +2,7 @@
 
 import threading
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -45,6 +45,7 @@ class Subscription:
     """A bounded queue between the network thread (which only enqueues) and the loop that drains it.
 
     With `newest=True` it keeps the newest sample per key instead. What overflows or is refused is counted.
+    on_arrival: called by the network thread after each sample; it must not block.
     """
 
     def __init__(self, capacity: int = 4096, newest: bool = False) -> None:
@@ -52,6 +53,7 @@ class Subscription:
         self._newest: dict[str, Sample] | None = {} if newest else None
         self._arrived = threading.Event()
         self._lock = threading.Lock()
+        self.on_arrival: Callable[[], None] | None = None
         self.overflowed = 0
         self.refused: Counter[str] = Counter()
 
@@ -64,6 +66,13 @@ class Subscription:
                 self.overflowed += len(self._queue) == self._queue.maxlen
                 self._queue.append(sample)
         self._arrived.set()
+        if self.on_arrival is not None:
+            self.on_arrival()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something arrived since the last drain."""
+        return self._arrived.is_set()
 
     def drain_samples(self) -> list[Sample]:
         """Return and forget all waiting samples, undecoded."""

@@ -112,8 +112,12 @@ class Child:
             return True
         return self._block.age_ns(SUPERVISOR_SLOT, time.monotonic_ns()) < _SUPERVISOR_STALE_NS
 
+    def wake(self) -> None:
+        """End a sleep early, the one under way or the next; from any thread."""
+        self._stop.wake()
+
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until a monotonic time; False when a stop, or the supervisor's death, woke it (each wakes once)."""
+        """Sleep until then or until `wake`; False when a stop, or the supervisor's death, ended it (each wakes once)."""
         return self._stop.sleep_until(deadline_ns)
 
     def beat(self) -> None:

@@ -12,13 +12,14 @@ _NS_PER_MS = 1_000_000
 
 
 class StopSignal:
-    """The wish to stop, and a sleep that ends early when it (or the parent's death) arrives.
+    """The wish to stop, and a sleep that ends early when it (or the parent's death) arrives, or somebody calls `wake`.
 
-    Each of the two wakes one sleep only: a driver that still has to land after a stop keeps its loop rate.
+    Each of them wakes one sleep only: a driver that still has to land after a stop keeps its loop rate.
     """
 
     def __init__(self, parent: ParentWatch) -> None:
         self.requested = False
+        self._nudged = False
         self._parent = parent
         self._parent_reported = False
         self._read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
@@ -34,26 +35,33 @@ class StopSignal:
     def _request(self, _number: int, _frame: object) -> None:
         self.requested = True
 
+    def wake(self) -> None:
+        """End a sleep early, the one under way or the next; from any thread, never blocks."""
+        self._nudged = True
+        with suppress(OSError):  # a full pipe wakes as well
+            os.write(self._write, b"\0")
+
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until a monotonic time; returns False when a stop or the parent's death ended the sleep."""
+        """Sleep until a monotonic time or `wake`; returns False when a stop or the parent's death ended the sleep."""
         poll = select.poll()
         poll.register(self._read, select.POLLIN)
         if self._parent.descriptor >= 0 and not self._parent_reported:
             poll.register(self._parent.descriptor, select.POLLIN)
-        while (left_ns := deadline_ns - time.monotonic_ns()) > 0:
+        while (left_ns := deadline_ns - time.monotonic_ns()) > 0 and not self._nudged:
             if self._woken(poll.poll(max(1, left_ns // _NS_PER_MS) if left_ns >= _NS_PER_MS else 0)):
                 return False
             if left_ns < _NS_PER_MS:
                 time.sleep(max(0, deadline_ns - time.monotonic_ns()) / 1e9)
+        self._nudged = False
         return not self._woken(poll.poll(0))
 
     def _woken(self, ready: list[tuple[int, int]]) -> bool:
         woken = False
         for descriptor, _ in ready:
             if descriptor == self._read:
+                # The interpreter writes the numbers of signals, `wake` writes zeros.
                 with suppress(BlockingIOError):
-                    os.read(self._read, 512)
-                woken |= self.requested
+                    woken |= self.requested and any(os.read(self._read, 512))
             elif not self._parent_reported:
                 self._parent_reported = woken = True
         return woken

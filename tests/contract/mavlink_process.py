@@ -28,5 +28,8 @@ class FakeProcess:
     def sleep_until(self, deadline_ns):
         return True
 
+    def wake(self):
+        pass
+
     def event(self, severity, text, remedy="", entity=None):
         self.events.append((severity, text))

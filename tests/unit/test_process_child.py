@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -61,6 +62,22 @@ def test_death_of_the_parent_wakes_the_sleep_once() -> None:
         parent.close()
 
 
+def test_a_call_from_another_thread_ends_one_sleep() -> None:
+    parent = ParentWatch()
+    stop = StopSignal(parent)
+    caller = threading.Timer(0.05, stop.wake)
+    caller.start()
+    began = time.monotonic_ns()
+    assert stop.sleep_until(began + 20_000 * MS) is True
+    assert time.monotonic_ns() - began < 15_000 * MS
+    caller.join()
+    deadline = time.monotonic_ns() + 20 * MS
+    assert stop.sleep_until(deadline) is True
+    assert time.monotonic_ns() >= deadline
+    stop.close()
+    parent.close()
+
+
 def test_stranger_as_parent_counts_as_dead() -> None:
     watch = ParentWatch(1 if os.getppid() != 1 else 2)
     assert not watch.alive
@@ -79,6 +96,8 @@ def test_stop_wakes_one_sleep_only() -> None:
         assert stop.requested
         assert stop.sleep_until(time.monotonic_ns() + 5000 * MS) is False
         assert stop.sleep_until(time.monotonic_ns() + 5 * MS) is True
+        stop.wake()
+        assert stop.sleep_until(time.monotonic_ns() + 5000 * MS) is True, "it was told to stop before, not now"
     finally:
         stop.close()
         parent.close()

@@ -5,13 +5,15 @@ import math
 
 import pytest
 
-from drivers.host import VehicleHost
+from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.vehicle import MavlinkVehicle
-from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
+from drivers.mavlink.wire.flight import CommandLong, Odometry, SetPositionTargetLocalNed
 from drivers.mavlink.wire.service import SetGpsGlobalOrigin, Timesync
-from drivers.mavlink.wire.telemetry import GpsGlobalOrigin, LocalPositionNed
+from drivers.mavlink.wire.telemetry import Attitude, GpsGlobalOrigin, LocalPositionNed
 from groundstation.bus.messages import Verb
 from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, VEHICLE_STATUS
+
+S = 1_000_000_000
 
 
 def test_it_is_discovered_and_configured_within_two_seconds(rig):
@@ -78,6 +80,31 @@ def test_each_setpoint_goes_out_once_at_most_at_its_rate(rig):
     assert len(rig.sent(SetPositionTargetLocalNed)) <= 1
     rig.run(0.3)
     assert rig.sent(SetPositionTargetLocalNed)[-1][1].vx == 0.0
+
+
+def test_a_setpoint_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
+    rig.track_on()
+    rig.run(0.1)
+    woken, came_ns, next_turn_ns = [], rig.hand.now + 52_000_000, rig.hand.now + 10 * S
+    rig.host.call_on_orders(lambda: woken.append(rig.hand.now))
+
+    def sleep_until(deadline_ns):
+        rig.hand.now = came_ns if not woken else deadline_ns
+        if not woken:
+            rig.track(came_ns)
+        return True
+
+    rig.process.sleep_until = sleep_until
+    rig.link.sent.clear()
+    sleep_serving(rig.process, [rig.host], next_turn_ns)
+    assert [ns for ns, m in rig.link.sent if isinstance(m, SetPositionTargetLocalNed)] == [came_ns]
+    assert woken == [came_ns] and rig.hand.now == next_turn_ns
+
+
+def test_px4_is_asked_to_stop_the_streams_that_nobody_uses(rig_of):
+    rig = rig_of("px4").connect().run(0.5)
+    assert not {Attitude, Odometry} & rig.emulator.services.intervals.keys()
+    assert rig.emulator.services.intervals[LocalPositionNed] == 4
 
 
 def test_setpoints_are_clamped(rig):

@@ -117,7 +117,7 @@ class Child:
         self._stop.wake()
 
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until then or until `wake`; False when a stop, or the supervisor's death, ended it (each wakes once)."""
+        """Sleep until then or until `wake`; False when a stop, or the supervisor's death, ended it (each once)."""
         return self._stop.sleep_until(deadline_ns)
 
     def beat(self) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.bench_vehicles import FIRST_SYSTEM
-from drivers.mavlink.driver import RATE_HZ, SWITCH_S, Fleet, hosts_of
+from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of, share_interpreter
 from drivers.mavlink.link import Heard, Link
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
@@ -133,7 +133,6 @@ class _Tracker(threading.Thread):
 
 def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
     """Return CPU [cores], delays [ms] and start-up [s] of the driver; raises DriverError when it never flies them."""
-    sys.setswitchinterval(SWITCH_S)
     port = free_port()
     exchange = MemoryExchange()
     bus = _TimedBus(exchange)
@@ -142,6 +141,7 @@ def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
     settings = MavlinkDriverSettings.model_validate(
         {"link": {"kind": kind, "target": f"udpin:127.0.0.1:{port}"}, "vehicles": vehicles}
     )
+    share_interpreter(settings)
     host = _Host(bus)
     fleet = Fleet(host, settings)
     link = _TimedLink(fleet.link, bus)

@@ -21,8 +21,9 @@ from groundstation.errors import DriverError, SettingsError
 
 # Of what is due by the clock: poses, questions, status. Orders do not wait for a turn.
 RATE_HZ = 100.0
-# How long one thread of the process may keep the others from the interpreter; Python's own 5 ms is a set-point's limit.
-SWITCH_S = 0.0005
+# How long one thread may keep the others from the interpreter: Python's own 5 ms is all the time a set-point has.
+# MAVSDK has its own threads for every message: shorter turns would cost it a third more CPU.
+_SWITCH_S = {"pymavlink": 0.0005, "mavsdk": 0.005}
 _SAME_TEXT_NS = 10_000_000_000
 _log = logging.getLogger(__name__)
 
@@ -101,6 +102,11 @@ class Fleet:
             vehicle.flush()
 
 
+def share_interpreter(settings: MavlinkDriverSettings) -> None:
+    """Set how long the threads of this process may keep each other waiting."""
+    sys.setswitchinterval(_SWITCH_S[settings.link.kind])
+
+
 def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) -> Sequence[VehicleHost]:
     """Return a host, with its own watchdog, for each vehicle; orders wake the process."""
     hosts = [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v)) for v in settings.vehicles]
@@ -115,7 +121,7 @@ def run(child: HostProcess) -> int:
         settings = MavlinkDriverSettings.model_validate_json(child.section)
     except ValidationError as error:
         raise SettingsError([str(error)]) from error
-    sys.setswitchinterval(SWITCH_S)
+    share_interpreter(settings)
     fleet = Fleet(child, settings)
     try:
         return run_hosts(child, hosts_of(child, fleet, settings), RATE_HZ, fleet.turn)

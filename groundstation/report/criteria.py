@@ -41,7 +41,7 @@ def criteria_of(figures: Figures, arena: Arena, facts: RunFacts) -> list[Criteri
         _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * arena.estimator.rate_hz),
     ]
     if figures.sim_overrun_percent is not None or figures.target is not None:
-        criteria = [*_against_truth(figures, arena), *criteria]
+        criteria = [*_against_truth(figures, arena), *_of_the_demo(figures, facts), *criteria]
         criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, MAX_CPU_CORES))
         criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
     return criteria
@@ -58,10 +58,14 @@ def _against_truth(figures: Figures, arena: Arena) -> Iterator[Criterion]:
     yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
     if len(arena.drones) > 1:
         yield _above("min_separation_m", figures.min_separation_m, arena.safety.min_separation_m)
-        for kind in ("flat", "string"):
-            seconds = figures.topology_seconds.get(kind, 0.0)
-            yield Criterion(f"topology_seconds.{kind}", seconds, ">", 0.0, seconds > 0.0)
     yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
+
+
+def _of_the_demo(figures: Figures, facts: RunFacts) -> Iterator[Criterion]:
+    """Its path leaves the ceiling camera's view at both ends, so that both topologies must occur; see the README."""
+    for kind in ("flat", "string") if facts.mode == "demo" else ():
+        seconds = figures.topology_seconds.get(kind, 0.0)
+        yield Criterion(f"topology_seconds.{kind}", seconds, ">", 0.0, seconds > 0.0)
 
 
 def _promises(figures: Figures, facts: RunFacts) -> Iterator[Criterion]:

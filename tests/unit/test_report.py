@@ -256,10 +256,6 @@ def test_still_flying_at_the_end_fails(tmp_path: Path) -> None:
     assert _failed(tmp_path, Flight(land_at_all=False)) == {"landed"}
 
 
-def test_one_topology_only_fails(tmp_path: Path) -> None:
-    assert _failed(tmp_path, Flight(topology=lambda _time_s: FLAT)) == {"topology_seconds.string"}
-
-
 def test_missed_deadlines_fail(tmp_path: Path) -> None:
     assert _failed(tmp_path, Flight(missed_per_s=1)) == {"tracker_missed_percent"}
 

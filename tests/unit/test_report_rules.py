@@ -1,5 +1,6 @@
 """The rules of the report one by one: what counts as tracking, as a switch, as late, as CPU."""
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -8,7 +9,9 @@ from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
 from groundstation.report.arena import Arena
+from groundstation.report.criteria import criteria_of
 from groundstation.report.interval import tracking_interval
+from groundstation.report.metrics import figures_of
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.safety import all_airborne_s, fence_violation_m
 from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Timed, TruthTrack
@@ -49,6 +52,16 @@ def _truth(ground: list[bool], z: float = 1.0) -> TruthTrack:
 )
 def test_kinds_of_topology(text: str, kind: str) -> None:
     assert topology_use.kind_of(text) == kind
+
+
+@pytest.mark.parametrize(("mode", "failed"), [("demo", {"topology_seconds.string"}), ("sitl", set()), ("fly", set())])
+def test_both_topologies_must_occur_in_the_demo_alone(mode: str, failed: set[str]) -> None:
+    data = _data(plans=[_plan(0.0, "a,b"), _plan(10.0, "a,b")])
+    seconds = topology_use.topology_seconds(data, 0.0, 20.0)
+    figures = msgspec.structs.replace(figures_of(data), topology_seconds=seconds, sim_overrun_percent=0.0)
+    judged = {c.name: c for c in criteria_of(figures, data.arena, RunFacts(mode=mode)) if c.name.startswith("topology")}
+    assert {name for name, criterion in judged.items() if not criterion.ok} == failed
+    assert bool(judged) == (mode == "demo")
 
 
 def test_a_refused_track_starts_nothing() -> None:

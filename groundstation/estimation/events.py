@@ -12,8 +12,8 @@ from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
 from groundstation.estimation.blame import blame
 from groundstation.estimation.correction import log_determinant
-from groundstation.estimation.dispatch import call_locate
-from groundstation.estimation.kernel import kernel
+from groundstation.estimation.dispatch import HANDLE, call_locate
+from groundstation.estimation.kernel import address_of, kernel
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.update import correct, linearise, note_motion, read, write_outcome
@@ -37,8 +37,7 @@ def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
 @kernel(
     "float64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
     " float64[::1], float64[::1], int64, float64[::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1],"
-    " float64[:,::1], float64[::1])",
-    inlined=True,
+    " float64[:,::1], float64[::1])"
 )
 def confront(
     means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
@@ -49,20 +48,9 @@ def confront(
     scores, best = np.empty(modes), -math.inf
     for m in range(modes):
         nis[m] = linearise(
-            means[m],
-            covariances[m],
-            entities[m],
-            parameters[m],
-            kernels,
-            sensor,
-            event,
-            rows,
-            z,
-            R[m],
-            work[m],
-            W[m],
+            means[m], covariances[m], entities[m], parameters[m], kernels, sensor, event, rows, z, R[m], work[m], W[m],
             y[m],
-        )
+        )  # fmt: skip
         scores[m] = -math.inf
         if nis[m] >= 0.0:
             scores[m] = math.log(max(weights[m], 1e-300)) - 0.5 * (nis[m] + log_determinant(work[m, 3], rows))
@@ -163,11 +151,7 @@ def choose(
     return 1 if other > evidence else 0
 
 
-@kernel(
-    "void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1],"
-    " float64[:,:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1])",
-    inlined=True,
-)
+@kernel(HANDLE)
 def observe(
     means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
     priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
@@ -244,13 +228,11 @@ def place(mean: Array, P: Array, entity: IntArray, prior: Array, event: Array) -
                 P[index[i], index[j]] = event[s.EVENT_Z + 4 + 4 * i + j]
 
 
-@kernel(
-    "void(float64[:,::1], float64[:,:,::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1], float64[::1],"
-    " float64[::1])"
-)
+@kernel(HANDLE)
 def change(
-    means: Array, covariances: Array, aux: Array, entities: IntArray, priors: Array, event: Array, out: Array
-) -> None:
+    means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
+    priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
+) -> None:  # fmt: skip
     """Let an entity in, out, or put it somewhere."""
     kind, subject = int(event[s.EVENT_KIND]), int(event[s.EVENT_SUBJECT])
     out[s.OUT_VERDICT] = s.ACCEPTED
@@ -272,30 +254,8 @@ def change(
         aux[subject, s.JOINED_AT] = aux[subject, s.CORRECTED_AT] = event[s.EVENT_AT]
 
 
-@kernel(
-    "void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1],"
-    " float64[:,:,::1], int64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1])"
-)
-def handle(
-    means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
-    priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
-) -> None:  # fmt: skip
-    """Do what one event asks for and write what became of it."""
-    if int(event[s.EVENT_KIND]) == s.EVENT_OBSERVATION:
-        observe(
-            means,
-            covariances,
-            weights,
-            aux,
-            entities,
-            parameters,
-            priors,
-            kernels,
-            sensors,
-            pairs,
-            settings,
-            event,
-            out,
-        )
-    else:
-        change(means, covariances, aux, entities, priors, event, out)
+def event_kernels() -> IntArray:
+    """Return where the kernel for each kind of event is: `replay` calls it there."""
+    kernels = np.full(s.EVENT_KINDS, address_of(change))
+    kernels[s.EVENT_OBSERVATION] = address_of(observe)
+    return kernels

@@ -14,6 +14,7 @@ from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, JointBelief
 from groundstation.estimation.correction import is_distribution
 from groundstation.estimation.event_log import EventLog, observation_columns
+from groundstation.estimation.events import event_kernels
 from groundstation.estimation.layout import EntityKind, Layout
 from groundstation.estimation.measurement import Correction, Measurement, Motion, Reading
 from groundstation.estimation.models.protocol import DrivenModel
@@ -42,7 +43,7 @@ class FixedLagFilter:
         self._index = {name: i for i, name in enumerate(self.names)}
         self._sensors = tuple(parameters.sensors.values())
         self._sensor_index = {name: i for i, name in enumerate(parameters.sensors)}
-        self._tables = tables_from_parameters(parameters)
+        self._tables, self._event_kernels = tables_from_parameters(parameters), event_kernels()
         self._now_ns: int
         self._last: int
         self._step_ns = round(parameters.step_s * NS_PER_S)
@@ -262,6 +263,7 @@ class FixedLagFilter:
         first = min(self._dirty, self._last)
         tables, log = self._tables, self._log
         replay(
+            self._event_kernels,
             tables.entities,
             tables.parameters,
             tables.priors,

@@ -16,6 +16,7 @@ from groundstation.estimation.models import (
     OdometryRobot,
 )
 from groundstation.estimation.models.odometry_robot import AERIAL
+from groundstation.estimation.targets import targets_of
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
     base_from_tilted_optical,
@@ -79,9 +80,9 @@ class EstimatorParameters:
 def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
     """Return the parameters for a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
     drones = {name: drone for name, drone in resolved["drones"].items() if drone.get("enabled", True)}
-    target, estimator = resolved["target"], resolved["estimator"]
+    estimator = resolved["estimator"]
     entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
-    entities[target["name"]] = _target(target)
+    entities |= {name: _target(target) for name, target in targets_of(resolved).items()}
     entities |= {name: _mount(camera) for name, camera in resolved["cameras"].items()}
     cameras: dict[str, ObservationModel] = {
         name: _world_camera(name, camera) for name, camera in resolved["cameras"].items()

@@ -2,8 +2,7 @@
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import call_begin
-from groundstation.estimation.events import handle
+from groundstation.estimation.dispatch import call_begin, call_handle
 from groundstation.estimation.kernel import kernel
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.modes import combine, mix
@@ -48,21 +47,22 @@ def copy_state(
 
 
 @kernel(
-    "void(int64[:,:,::1], float64[:,:,::1], float64[:,:,::1], int64[:,::1], float64[:,::1], float64[::1],"
+    "void(int64[::1], int64[:,:,::1], float64[:,:,::1], float64[:,:,::1], int64[:,::1], float64[:,::1], float64[::1],"
     " float64[:,::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1],"
     " float64[:,:,::1], float64[:,::1], int64[::1], float64[:,::1], int64, int64, float64,"
     " float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])"
 )
 def replay(
-    entities: IntArray, parameters: Array, priors: Array, kernels: IntArray, sensors: Array, settings: Array,
-    transition: Array, ring_means: Array, ring_covariances: Array, ring_weights: Array, ring_aux: Array,
-    ring_pairs: Array, odometry: Array, events: Array, order: IntArray, outcomes: Array, first: int, last: int,
-    now: float, means: Array, covariances: Array, weights: Array, aux: Array, pairs: Array, mean: Array, P: Array,
+    event_kernels: IntArray, entities: IntArray, parameters: Array, priors: Array, kernels: IntArray, sensors: Array,
+    settings: Array, transition: Array, ring_means: Array, ring_covariances: Array, ring_weights: Array,
+    ring_aux: Array, ring_pairs: Array, odometry: Array, events: Array, order: IntArray, outcomes: Array, first: int,
+    last: int, now: float, means: Array, covariances: Array, weights: Array, aux: Array, pairs: Array, mean: Array,
+    P: Array,
 ) -> None:  # fmt: skip
     """Run steps first..last from the checkpoint of step `first`, renewing checkpoints; leaves the belief at `now`.
 
     Checkpoint k is the state at time k * step before anything of step k; rings are indexed modulo their length.
-    `order` lists rows of `events` by time, none before step `first`.
+    `order` lists rows of `events` by time, none before step `first`; event_kernels: addresses by kind of event.
     """
     ring, step = ring_means.shape[0], settings[s.SETTING_STEP]
     slot = first % ring
@@ -89,10 +89,11 @@ def replay(
                 for m in range(weights.shape[0]):
                     predict(means[m], covariances[m], entities[m], parameters[m], aux, at - t)
                 t = at
-            handle(
+            arguments = (
                 means, covariances, weights, aux, entities, parameters, priors, kernels, sensors, pairs, settings,
                 events[row], outcomes[row],
             )  # fmt: skip
+            call_handle(event_kernels[int(events[row, s.EVENT_KIND])], arguments)
             i += 1
         if end > t:
             for m in range(weights.shape[0]):

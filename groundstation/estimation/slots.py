@@ -110,6 +110,7 @@ EVENT_SUBJECT_ROLL, EVENT_SUBJECT_PITCH, EVENT_OBSERVER_RATE, EVENT_SUBJECT_RATE
 EVENT_COLUMNS = 60
 # ADMITTED: may join, and does at once if it has a prior; DISMISSED: leaves; PLACED: is put where the event says.
 EVENT_OBSERVATION, EVENT_ADMITTED, EVENT_DISMISSED, EVENT_PLACED = range(4)
+EVENT_KINDS = 4
 
 # What became of an event: verdict, NIS, rows, residual (4), its covariance (16), flags.
 OUT_VERDICT, OUT_NIS, OUT_SIZE, OUT_RESIDUAL, OUT_COVARIANCE, OUT_OTHER_CHOSEN, OUT_JOINED = 0, 1, 2, 3, 7, 23, 24

@@ -11,6 +11,7 @@ import numpy as np
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
+from groundstation.estimation.events import event_kernels
 from groundstation.estimation.models.camera import measure_relative_pose
 from groundstation.estimation.models.constant_velocity import ACCELERATION_DENSITY
 from groundstation.estimation.models.fixed_mount import ANGLE_DRIFT, POSITION_DRIFT
@@ -45,7 +46,7 @@ class Ours:
     """The kernels of the product, called for many ticks or a whole frame at once."""
 
     def __init__(self, team: Team, state: State) -> None:
-        self._tables, self._state = team.tables, state
+        self._tables, self._state, self._event_kernels = team.tables, state, event_kernels()
         self.outcomes = np.zeros((len(team.edges), s.OUT_COLUMNS))
 
     @property
@@ -69,6 +70,7 @@ class Ours:
         """Take all observations of a frame."""
         t, state = self._tables, self._state
         correct_frame(
+            self._event_kernels,
             state.means,
             state.covariances,
             state.weights,

@@ -9,7 +9,8 @@ def compile_kernels() -> None:
     """Fill the kernel cache; `numba_cache.activate` must have chosen it."""
     # Two halves that take about as long and share little.
     other_half = numba_cache.ParallelCompilation(["groundstation.planning.plan", "groundstation.estimation.models"])
-    importlib.import_module("groundstation.estimation.replay")
+    for module in ("groundstation.estimation.events", "groundstation.estimation.replay"):
+        importlib.import_module(module)
     other_half.finish()
 
 

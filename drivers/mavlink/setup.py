@@ -52,7 +52,10 @@ class Setup:
                     raise DriverError(f"system {self._system} is armed: parameters are not touched")
                 return
         heard = ", ".join(f"{reason} {n}" for reason, n in self._link.rejected.items())
-        raise DriverError(f"system {self._system} does not answer{f' (refused: {heard})' if heard else ''}")
+        refused = f" (refused: {heard})" if heard else ""
+        raise DriverError(
+            f"system {self._system} does not answer{refused}; `groundstation mavlink probe` tells who is on a link"
+        )
 
     def differences(self) -> Iterator[Difference]:
         """Yield what is not as needed."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from groundstation.errors import SettingsError
+from groundstation.errors import OperatorMistake, SettingsError
 
 _OPTION = click.option(
     "--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; may be given often."
@@ -121,19 +121,36 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
     click.echo(f"wrote {output}")
 
 
-@config.command(epilog="\b\nExample:\n  groundstation config init my_lab && groundstation sitl my_lab/lab.yaml")
+@config.command(
+    epilog="\b\nExamples:\n  groundstation config init my_lab && groundstation sitl my_lab/lab.yaml\n"
+    "  groundstation config init my_lab --like mixed-team"
+)
 @click.argument("directory", type=click.Path(path_type=Path, file_okay=False))
-def init(directory: Path) -> None:
+@click.option(
+    "--like",
+    type=click.Choice(["lab", "mixed-team"]),
+    default="lab",
+    show_default=True,
+    help="lab: two AR.Drones, one ceiling camera; mixed-team: AR.Drone, PX4 and ArduPilot vehicle, two cameras.",
+)
+def init(directory: Path, like: str) -> None:
     """Write a commented field file, its camera calibrations and a scenario into DIRECTORY, to start from."""
     from groundstation.settings.files import SHIPPED
 
-    copies = [SHIPPED / "lab.yaml", *sorted(SHIPPED.glob("cameras/*.yaml")), *sorted(SHIPPED.glob("scenarios/*.yaml"))]
+    copies = [
+        SHIPPED / f"{like}.yaml",
+        *sorted(SHIPPED.glob("cameras/*.yaml")),
+        *sorted(SHIPPED.glob("scenarios/*.yaml")),
+    ]
     targets = [directory / source.relative_to(SHIPPED) for source in copies]
     standing = [str(target) for target in targets if target.exists()]
     if standing:
-        raise SettingsError([f"{target}: is there already; nothing was written" for target in standing])
+        raise OperatorMistake(f"{standing[0]}: is there already; nothing was written; name another folder")
     for source, target in zip(copies, targets, strict=True):
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
         click.echo(f"wrote {target}")
-    click.echo(f"next: mend the addresses in {targets[0]}, then: groundstation config check {targets[0]}")
+    click.echo(
+        f"next: groundstation sitl {targets[0]}; for your own lab: room, cameras, addresses and pads in it, then"
+    )
+    click.echo(f"groundstation config check {targets[0]}")

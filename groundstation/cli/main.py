@@ -58,6 +58,28 @@ VERBS: dict[str, Verb] = {
 }
 
 
+_ELSEWHERE = {
+    **dict.fromkeys(("stop", "halt", "abort", "emergency", "kill"), "'land', 'hold' or 'cut-motors'"),
+    **dict.fromkeys(("start", "run", "launch"), "'sitl' or 'fly'"),
+    **{word: f"'config {word}'" for word in ("check", "init", "show", "draw", "schema")},
+    **{word: f"'recording {word}'" for word in ("info", "recover", "cut")},
+    "compare": "'report RUN --compare OTHER'",
+    "print": "'markers print'",
+    "probe": "'ardrone probe' or 'mavlink probe'",
+    "record": "'recording' (each run is recorded by itself)",
+    "setup": "'mavlink setup'",
+}
+"""Words of other ground stations, and those that stand one level down here: the likeness of letters would mislead."""
+
+
+def _meant(word: str) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, VERBS, 1, 0.5)
+    meant = _ELSEWHERE.get(word.lower()) or (f"'{near[0]}'" if near else "")
+    return f" Did you mean {meant}?" if meant else ""
+
+
 class VerbGroup(click.Group):
     """A click group whose commands are imported one at a time, so that `land` does not wait for what it never uses."""
 
@@ -80,11 +102,7 @@ class VerbGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command for the first argument; an unknown one fails with the verb that was probably meant."""
         if args and args[0] not in VERBS and not args[0].startswith("-"):
-            from difflib import get_close_matches
-
-            near = get_close_matches(args[0], VERBS, 1, 0.5)
-            meant = f" Did you mean {near[0]!r}?" if near else ""
-            raise click.UsageError(f"There is no command {args[0]!r}.{meant}", ctx)
+            raise click.UsageError(f"There is no command {args[0]!r}.{_meant(args[0])}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

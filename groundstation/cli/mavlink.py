@@ -6,7 +6,12 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.errors import GroundStationError
+from groundstation.errors import OperatorMistake
+
+_SILENCE = (
+    "is it switched on, is this computer in its network, does another program hold the port, "
+    "and who calls whom: udpin: waits for the vehicle's call, udpout: calls it"
+)
 
 
 @click.group(
@@ -20,14 +25,19 @@ def mavlink() -> None:
 @mavlink.command(
     epilog="\b\nExamples:\n  groundstation mavlink probe udpin:0.0.0.0:14550\n"
     "  groundstation mavlink probe udpout:192.168.1.12:14550 --seconds 5\n"
-    "  groundstation mavlink probe serial:/dev/ttyUSB0:57600"
+    "  groundstation mavlink probe serial:/dev/ttyUSB0:57600\n\n"
+    "Exit codes: 0 somebody answered, 2 wrong usage, 4 nobody did."
 )
 @click.argument("link")
 @click.option("--seconds", type=click.FloatRange(0.5, 60), default=3.0, show_default=True, help="How long to listen.")
 @click.option("--key-file", default="", help="Signing key, for a signed link.")
 @click.option("--mavsdk", "with_mavsdk", is_flag=True, help="Look through MAVSDK instead of pymavlink.")
 def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
-    """List the vehicles that answer on LINK (udpin:, udpout: or serial:), without changing anything on them."""
+    """List the vehicles that answer on LINK, without changing anything on them.
+
+    LINK: udpin:ADDRESS:PORT waits for vehicles that call this computer, udpout:ADDRESS:PORT calls one,
+    serial:DEVICE:BAUD is a radio.
+    """
     from drivers.mavlink.link import open_link
     from drivers.mavlink.probe import probe as look
 
@@ -47,15 +57,15 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
     for reason, count in sorted(opened.rejected.items()):
         click.echo(f"refused: {count} x {reason.replace('_', ' ')}")
     if not found:
-        click.echo(f"nobody answers on {link} within {seconds:g} s", err=True)
-        return ExitCode.FAILED
+        click.echo(f"nobody answers on {link} within {seconds:g} s; {_SILENCE}", err=True)
+        return ExitCode.FAULT
     return ExitCode.OK
 
 
 @mavlink.command(
     epilog="\b\nExamples:\n  groundstation mavlink setup --check lab.yaml drone_2\n"
     "  groundstation mavlink setup --apply lab.yaml drone_2\n\n"
-    "Exit codes: 0 all as needed, 1 differences are left, 2 wrong settings."
+    "Exit codes: 0 all as needed, 1 differences are left, 2 wrong settings, 4 it does not answer, or is armed."
 )
 @click.argument("field", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.argument("drone")
@@ -96,7 +106,7 @@ def _link_settings(target: str, key_file: str, kind: str) -> Any:
         return LinkSettings.model_validate({"kind": kind, "target": target, "key_file": key_file})
     except ValidationError:
         like = "udpin:0.0.0.0:14550, udpout:ADDRESS:PORT, serial:DEVICE:BAUD"
-        raise GroundStationError(f"{target}: must be like {like}; MAVSDK cannot sign") from None
+        raise OperatorMistake(f"{target}: must be like {like}; MAVSDK cannot sign") from None
 
 
 def _vehicle(path: Path, name: str) -> tuple[Any, Any]:
@@ -112,4 +122,4 @@ def _vehicle(path: Path, name: str) -> tuple[Any, Any]:
                 if vehicle.name == name:
                     return settings, vehicle
     known = [n for n, drone in field.drones.items() if drone.mavlink is not None]
-    raise GroundStationError(f"{name} is no MAVLink vehicle of {path}; there are: {', '.join(known) or 'none'}")
+    raise OperatorMistake(f"{name} is no MAVLink vehicle of {path}; there are: {', '.join(known) or 'none'}")

@@ -20,7 +20,7 @@ _NAMES = {"options": "--set", "estimator": "--estimator", "json_file": "--json",
     epilog="\b\nExamples:\n  groundstation replay                                    the newest run, in the console\n"
     "  groundstation replay runs/20261120T101500Z-lab --from 30 --speed 2\n"
     "  groundstation replay RUN --rerun tracker                is today's tracker the recorded one, to the bit?\n"
-    "  groundstation replay RUN --set estimator.gate=4 --set planner.horizon_steps=5\n"
+    "  groundstation replay RUN --set estimator.gate_probability=0.99 --set planner.horizon_steps=5\n"
     "  groundstation replay RUN --estimator other.yaml --output what-if\n\n"
     "Exit codes: 0 done, or identical; 1 the re-run differs; 2 wrong usage, settings, or nothing that can be replayed."
 )

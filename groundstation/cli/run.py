@@ -32,11 +32,13 @@ _SIMULATED: tuple[Option, ...] = (
         "--duration",
         type=click.FloatRange(1, 86_400),
         callback=_refuse_nan,
-        help="Seconds of tracking (default: until Ctrl-C).",
+        help="Seconds of tracking, then it lands (default: until Ctrl-C; demo: 60).",
     ),
     click.option("--seed", type=click.IntRange(0), help="Seed of all noise (default: the scenario's)."),
     click.option(
-        "--report", type=click.Path(file_okay=False, path_type=Path), help="Folder for the run (default: in runs/)."
+        "--report",
+        type=click.Path(file_okay=False, path_type=Path),
+        help="Folder that the run's folder is made in, and the report copied to (default: runs/, no copy).",
     ),
     _HEADLESS,
     _SETTINGS,
@@ -62,12 +64,19 @@ def sitl(field: str, **arguments: Any) -> int:
     return run_simulated("sitl", field, **arguments)
 
 
-@click.command(epilog="\b\nExamples:\n  groundstation fly lab.yaml\n  groundstation takeoff   (from another terminal)")
+@click.command(
+    epilog="\b\nExamples:\n  groundstation fly lab.yaml\n  groundstation takeoff   (from another terminal)\n"
+    "  groundstation land      (from another terminal)\n\n"
+    "Exit codes: 0 all landed, 1 not all said so, 2 wrong settings, 4 a process failed."
+)
 @click.argument("field")
 @_HEADLESS
 @_SETTINGS
 def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
-    """Fly a field file with the real drones. Nobody takes off before Enter, or `groundstation takeoff`."""
+    """Fly a field file with the real drones. Nobody takes off before Enter, or `groundstation takeoff`.
+
+    Ctrl-C lands; a second one stops at once.
+    """
     from groundstation.cli.composition import FLY_ENDPOINT
     from groundstation.cli.flight import FlightPlan
     from groundstation.settings.files import find_field

@@ -19,15 +19,24 @@ def find_scenario(name: str, field_file: Path) -> Path:
 
 def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
     if "/" in name or name.endswith((".yaml", ".yml")):
-        return Path(name)  # read() names a missing file and what was probably meant
+        path = Path(name)
+        _refuse_folder(path, what)
+        return path  # read() names a missing file and what was probably meant
     known: list[str] = []
     for folder in folders:
         candidate = folder / f"{name}.yaml"
         if candidate.is_file():
             return candidate
         known += [path.stem for path in sorted(folder.glob("*.yaml"))]
+    _refuse_folder(Path(name), what)
     from difflib import get_close_matches
 
     near = get_close_matches(name, known, 1, 0.5)
     meant = f"did you mean {near[0]}?" if near else f"there are: {', '.join(dict.fromkeys(known)) or 'none'}"
     raise SettingsError([f"there is no {what} {name!r}, {meant} (or give the path of a YAML file)"])
+
+
+def _refuse_folder(path: Path, what: str) -> None:
+    if path.is_dir():
+        files = ", ".join(str(file) for file in sorted(path.glob("*.yaml")))
+        raise SettingsError([f"{path}: is a folder, not a {what}; in it: {files or 'no .yaml file'}"])

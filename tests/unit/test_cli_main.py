@@ -40,6 +40,24 @@ def test_an_unknown_verb_is_answered_with_the_likely_one(capsys: pytest.CaptureF
     assert cli.run(["version", "--jsn"]) == ExitCode.SETTINGS
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("stop", "'land', 'hold' or 'cut-motors'"), ("check", "'config check'"), ("compare", "'report RUN --compare")],
+)
+def test_words_of_other_ground_stations_lead_to_ours(word: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run([word]) == ExitCode.SETTINGS
+    assert f"Did you mean {meant}" in capsys.readouterr().err
+
+
+def test_a_folder_in_place_of_a_field_file_is_answered_with_the_files_in_it(
+    lab: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(lab.parent)
+    for name in (lab.name, f"{lab.name}/"):
+        assert cli.run(["config", "check", name]) == ExitCode.SETTINGS
+        assert f"is a folder, not a field file; in it: {lab.name}/lab.yaml" in capsys.readouterr().err
+
+
 def test_each_verb_is_where_the_table_says() -> None:
     for name, verb in cli.VERBS.items():
         module, _, function = verb.target.partition(":")

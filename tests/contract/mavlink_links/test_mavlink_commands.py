@@ -4,15 +4,22 @@ import os
 import time
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from pymavlink import mavutil
 
+from drivers.camera.sources.opening import open_source
 from drivers.mavlink.link import UdpLink, open_link, signing_of
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire import telemetry
 from drivers.mavlink.wire.frames import Encoder, Signing
 from groundstation.cli.mavlink import mavlink
 from groundstation.errors import DriverError
+from sim_bridge.devices.camera_stream import PATH, CameraStream
+from sim_bridge.devices.mavlink_open import announced
+from sim_bridge.site import Lens
 
 FIELD = Path(__file__).parents[3] / "config" / "mixed-team.yaml"
 
@@ -21,17 +28,50 @@ def run(*arguments):
     return CliRunner().invoke(mavlink, [str(a) for a in arguments], standalone_mode=False)
 
 
+LENS = Lens(width_px=640, height_px=360, fx_px=554.0, fy_px=554.0, cx_px=319.5, cy_px=179.5, distortion=(0.0,) * 5)
+
+
 def test_probe_names_who_answers(hangar):
-    _, _, (address, port) = hangar.add("ardupilot", 12, aided=True, video="http://127.0.0.1:8080/video.mjpg")
+    video = announced("v12", LENS, 15.0, "http://127.0.0.1:8080/video.mjpg")
+    _, _, (address, port) = hangar.add("ardupilot", 12, aided=True, video=video)
     result = run("probe", f"udpout:{address}:{port}", "--seconds", 2)
     assert result.return_value == 0, result.output
     assert "system  12: ardupilot, 4.6.2, STABILIZE, disarmed, battery" in result.output
     assert "video http://127.0.0.1:8080/video.mjpg" in result.output
 
 
+def test_a_stranger_that_reads_the_announcement_can_open_the_stream(hangar):
+    """Any MAVLink program, by pymavlink's own hands; what it is told is what comes."""
+    stream = CameraStream("127.0.0.1", 0)
+    source = None
+    video = announced("v11", LENS, 15.0, f"http://127.0.0.1:{stream.port}{PATH}")
+    _, _, (address, port) = hangar.add("px4", 11, video=video)
+    ground = mavutil.mavlink_connection(f"udpout:{address}:{port}", dialect="ardupilotmega")
+    try:
+        ground.mav.command_long_send(11, 1, 512, 0, 269, 1, 0, 0, 0, 0, 0)
+        said = ground.recv_match(type="VIDEO_STREAM_INFORMATION", blocking=True, timeout=5)
+        assert (said.type, said.encoding, said.flags & 1) == (2, 0, 1), "MPEG over TCP, running: not RTSP"
+        assert (said.framerate, said.resolution_h, said.resolution_v, said.hfov) == (15.0, 640, 360, 60)
+        source = open_source(said.uri)
+        jpeg = cv2.imencode(".jpg", np.full((said.resolution_v, said.resolution_h), 90, np.uint8))[1].tobytes()
+        packet, deadline = None, time.monotonic() + 10
+        while packet is None and time.monotonic() < deadline:
+            stream.send_at(time.monotonic_ns(), jpeg)
+            packet = source.take_newest(0.1)
+        assert packet is not None and packet.data == jpeg
+        ground.mav.command_long_send(11, 1, 512, 0, 269, 2, 0, 0, 0, 0, 0)
+        answer = ground.recv_match(type="COMMAND_ACK", condition="COMMAND_ACK.result != 0", blocking=True, timeout=5)
+        assert answer.result == 2, "there is no second stream"
+    finally:
+        ground.close()
+        stream.close()
+        if source is not None:
+            source.close()
+
+
 def test_probe_of_nobody_fails(port):
     result = run("probe", f"udpin:127.0.0.1:{port}", "--seconds", 0.5)
-    assert result.return_value == 1 and "nobody answers" in result.output
+    assert result.return_value == 4 and "nobody answers" in result.output
 
 
 @pytest.mark.parametrize(("flavour", "drone", "system"), [("px4", "drone_2", 11), ("ardupilot", "drone_3", 12)])

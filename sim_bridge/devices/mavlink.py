@@ -32,13 +32,14 @@ _TEXT_SIZE = 50
 class MavlinkEmulator:
     """Socket and firmware around one body of the world: `receive`, a step of the world, then `send`, once per tick.
 
-    calls: an address that it speaks to without being spoken to. `silent` stops what it sends, `deaf` drops what
-    arrives (faults). signing: only rightly signed frames count, and all of ours are signed. Times are the world's.
+    calls: an address that it speaks to without being spoken to; video: what it says of its camera. `silent` stops what
+    it sends, `deaf` drops what arrives (faults). signing: only rightly signed frames count, and all of ours are signed.
+    Times are the world's.
     """
 
     def __init__(
         self, name: str, address: Address, flavour: Flavour, system: int, copter: Copter, *, configured: bool = True,
-        calls: Address | None = None, video: str = "", signing: Signing | None = None,
+        calls: Address | None = None, video: t.VideoStreamInformation | None = None, signing: Signing | None = None,
     ) -> None:  # fmt: skip
         self.name = name
         self.silent = False
@@ -47,8 +48,7 @@ class MavlinkEmulator:
         parameters = Parameters(flavour, system, configured)
         self.firmware: Firmware = (Px4 if flavour is Flavour.PX4 else ArduCopter)(copter, parameters)
         self.speaker = Speaker(self.firmware)
-        stream = t.VideoStreamInformation(1, 1, 0, 1, 15.0, 640, 360, 0, 0, 70, name, video) if video else None
-        self.services = Services(system, self.firmware, self.speaker, stream)
+        self.services = Services(system, self.firmware, self.speaker, video)
         self._encoder, self._decoder = Encoder(system, 1, signing), Decoder(signing)
         self._calls = calls
         self._clients: dict[Address, int] = {}

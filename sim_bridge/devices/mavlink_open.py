@@ -1,10 +1,25 @@
 """From a drone of the site to its emulator."""
 
+import math
+
 from drivers.mavlink.wire.names import Flavour
+from drivers.mavlink.wire.telemetry import VideoStreamInformation
+from sim_bridge.devices.camera_stream import PATH
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.order import Order
-from sim_bridge.site import SiteDrone
+from sim_bridge.site import Lens, SiteDrone
 from sim_bridge.world.copter import Copter
+
+# WIRE (VIDEO_STREAM_TYPE, VIDEO_STREAM_ENCODING): JPEGs over HTTP have neither a type nor an encoding of their own.
+# MPEG over TCP, encoding unknown, is nearest, and the address says the rest; RTSP, 0, would send a client the wrong way.
+_TCP_MPEG, _UNKNOWN_ENCODING, _RUNNING = 2, 0, 1
+
+
+def announced(name: str, lens: Lens, fps: float, uri: str) -> VideoStreamInformation:
+    """Return what a vehicle says of its camera: where the pictures are, how many, how large, how wide [deg]."""
+    hfov = round(math.degrees(2.0 * math.atan(lens.width_px / (2.0 * lens.fx_px))))
+    size = lens.width_px, lens.height_px
+    return VideoStreamInformation(1, 1, _TCP_MPEG, _RUNNING, fps, *size, 0, 0, hfov, name, uri, _UNKNOWN_ENCODING)
 
 
 def open_vehicle(name: str, drone: SiteDrone, copter: Copter, order: Order) -> MavlinkEmulator:
@@ -15,10 +30,11 @@ def open_vehicle(name: str, drone: SiteDrone, copter: Copter, order: Order) -> M
     identity = drone.mavlink
     assert identity is not None
     flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
-    video = ""
-    if name in order.streams:
+    video = None
+    if name in order.streams and drone.camera is not None:
         address, port = order.streams[name]
-        video = f"http://{address}:{port}/video.mjpg"
+        uri = f"http://{address}:{port}{PATH}"
+        video = announced(name, drone.camera.calibration, order.scenario.cameras.fps, uri)
     return MavlinkEmulator(
         name,
         (order.addresses[name], identity.port),

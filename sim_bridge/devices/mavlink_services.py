@@ -91,7 +91,7 @@ class Services:
             case Command.SET_MESSAGE_INTERVAL:
                 return self._set_interval(p), []
             case Command.REQUEST_MESSAGE:
-                return self._request(_number(p[0]))
+                return self._request(_number(p[0]), _number(p[1]))
             case Command.REQUEST_AUTOPILOT_CAPABILITIES:
                 return _OK, [self._speaker.version()]
             case Command.GET_HOME_POSITION:
@@ -118,9 +118,10 @@ class Services:
             self.intervals[kind] = max(1, round(interval_us * 1e-6 * TICK_HZ))
         return _OK
 
-    def _request(self, number: int) -> tuple[Answer, list[Message]]:
+    def _request(self, number: int, which: int = 0) -> tuple[Answer, list[Message]]:
         kind = self._by_id.get(number)
-        if kind is t.VideoStreamInformation and self._stream is not None:
+        # WIRE (VIDEO_STREAM_INFORMATION): the second parameter is the stream's number, 0 for all.
+        if kind is t.VideoStreamInformation and self._stream is not None and which in (0, self._stream.stream_id):
             return _OK, [self._stream]
         build = self._speaker.builders.get(kind) if kind is not None else None
         message = build() if build is not None else None

@@ -103,9 +103,7 @@ class Rig:
         self.rng = np.random.default_rng(seed)
         scenario = scenario or CopterScenario()
         self.copter = Copter((0.5, -0.3), 0.4, scenario, response, TICK_S, self.rng)
-        self.emulator = MavlinkEmulator(
-            "v", GROUND, self.flavour, 11, self.copter, configured=configured, video="http://127.0.0.1/v"
-        )
+        self.emulator = MavlinkEmulator("v", GROUND, self.flavour, 11, self.copter, configured=configured)
         self.link = DirectLink(self.emulator)
         exchange = MemoryExchange()
         self.other = MemoryBus(exchange, "lab", "tracker")

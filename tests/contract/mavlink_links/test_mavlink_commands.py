@@ -40,8 +40,9 @@ def test_probe_names_who_answers(hangar):
     assert "video http://127.0.0.1:8080/video.mjpg" in result.output
 
 
-def test_a_stranger_that_reads_the_announcement_can_open_the_stream(hangar):
+def test_a_stranger_that_reads_the_announcement_can_open_the_stream(hangar, monkeypatch):
     """Any MAVLink program, by pymavlink's own hands; what it is told is what comes."""
+    monkeypatch.setenv("MAVLINK20", "1")
     stream = CameraStream("127.0.0.1", 0)
     source = None
     video = announced("v11", LENS, 15.0, f"http://127.0.0.1:{stream.port}{PATH}")

@@ -11,7 +11,7 @@ from sim_bridge.site import Lens, SiteDrone
 from sim_bridge.world.copter import Copter
 
 # WIRE (VIDEO_STREAM_TYPE, VIDEO_STREAM_ENCODING): JPEGs over HTTP have neither a type nor an encoding of their own.
-# MPEG over TCP, encoding unknown, is nearest, and the address says the rest; RTSP, 0, would send a client the wrong way.
+# MPEG over TCP, encoding unknown, is nearest, and the address says the rest; RTSP, 0, would mislead a client.
 _TCP_MPEG, _UNKNOWN_ENCODING, _RUNNING = 2, 0, 1
 
 

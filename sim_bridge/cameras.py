@@ -107,9 +107,11 @@ def _boards(site: Site) -> tuple[BoardSpec, ...]:
         _board(name, drone.marker.printed, drone.marker.position_m, BodyShape.DRONE)
         for name, drone in site.drones.items()
     )
-    marker = site.target.marker
-    place = (0.0, 0.0, marker.height_m)
-    return (*drones, _board(site.target.name, marker.printed, place, BodyShape.TURTLEBOT))
+    targets = tuple(
+        _board(name, target.marker.printed, (0.0, 0.0, target.marker.height_m), BodyShape.TURTLEBOT)
+        for name, target in site.tracked.items()
+    )
+    return drones + targets
 
 
 def _board(body: str, printed: Board | Tag, place: tuple[float, float, float], shape: BodyShape) -> BoardSpec:

@@ -19,6 +19,7 @@ from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.order import Order
 from sim_bridge.truth import TruthBoard, remove_stale_boards
+from sim_bridge.world.unicycle import Unicycle
 from sim_bridge.world.world import World
 
 _TRUTH_TICKS = 4  # 50 Hz
@@ -39,7 +40,7 @@ class Harness:
         self._poll = select.poll()
         self._readers: dict[int, Callable[[], None]] = {}
         self._clock = Clockwork(time.monotonic_ns())
-        self._commands = child.bus.subscribe([SIM_COMMAND], entity=order.site.target.name)
+        self._commands = [child.bus.subscribe([SIM_COMMAND], entity=name) for name in order.site.tracked]
 
     def open(self) -> None:
         """Take the ports, share the truth, start the cameras; returns when everything listens."""
@@ -164,10 +165,10 @@ class Harness:
             self._child.ready(self._inventory)
 
     def _obey(self) -> None:
-        for received in self._commands.drain():
-            command = received.message
-            if isinstance(command, SimCommand) and not steer(self.world, command):
-                self._child.event(Severity.WARNING, f"order {command.action!r} to {received.key.entity} not understood")
+        for received in (one for commands in self._commands for one in commands.drain()):
+            command, name = received.message, received.key.entity
+            if isinstance(command, SimCommand) and not steer(self.world.targets[name], command):
+                self._child.event(Severity.WARNING, f"order {command.action!r} to {name} not understood")
 
     def _tell_cameras(self) -> None:
         """Hand what the drones' configurations say of their video to the processes that render it."""
@@ -181,9 +182,8 @@ class Harness:
             self._child.event(Severity.INFO, line)
 
 
-def steer(world: World, command: SimCommand) -> bool:
-    """Obey a command to the target: drive, stop, path, place; returns whether it was understood."""
-    target = world.target
+def steer(target: Unicycle, command: SimCommand) -> bool:
+    """Obey a command to a target: drive, stop, path, place; returns whether it was understood."""
     match command.action:
         case "drive":
             target.drive(command.speed_m_s, command.turn_rate_rad_s)

@@ -55,6 +55,9 @@ def read_order(path: Path) -> Order:
     if strangers:
         names = ", ".join(site.drones)
         raise SettingsError([f"scenario: drones.firmware_by_drone: {name!r} is none of {names}" for name in strangers])
+    if strangers := sorted(set(scenario.targets) - set(site.tracked)):
+        names = ", ".join(site.tracked)
+        raise SettingsError([f"scenario: targets.{name}: there is no such target, only {names}" for name in strangers])
     missing = sorted(set(site.drones) - set(envelope.addresses))
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])

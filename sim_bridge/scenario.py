@@ -4,7 +4,8 @@ The file format of `config/scenarios/*.yaml`. The ground station passes a scenar
 here. Units are in the key names; a pair of numbers is a range that each drone draws its own value from.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 from typing import Annotated, Literal
 
@@ -25,6 +26,8 @@ def _rising(interval: tuple[float, float]) -> tuple[float, float]:
     return interval
 
 
+# Between targets of which the scenario says nothing by name.
+_APART_TURNS, _APART_M = 0.15, 1.0
 Gain = Annotated[float, Field(ge=0.3, le=1.5)]
 Delay = Annotated[float, Field(ge=0, le=500)]
 Jump = Annotated[float, Field(ge=0, le=180)]
@@ -61,6 +64,21 @@ class TargetScenario(_Section):
     departs_after_team_s: Annotated[float, Field(ge=0)] | None = 3.0
     max_speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.7
     slip: Annotated[float, Field(ge=0, le=0.5)] = 0.05
+
+
+def _beside(scenario: TargetScenario, rank: int) -> TargetScenario:
+    """Return the scenario of the rank-th target (0: the first) where one is told for all, so that none meet.
+
+    On an eight each is some way ahead of the one before (half a turn ahead, they would meet where the path crosses
+    itself); those that wait stand 1 m apart.
+    """
+    path = scenario.path
+    moved: dict[str, object]
+    if isinstance(path, FigureEight):
+        moved = {"start_phase": math.fmod(path.start_phase + rank * _APART_TURNS, 1.0)}
+    else:
+        moved = {"position_m": (path.position_m[0] + rank * _APART_M, path.position_m[1])}
+    return scenario.model_copy(update={"path": path.model_copy(update=moved)})
 
 
 def _known_firmware(name: str) -> str:
@@ -177,15 +195,23 @@ class Fault(_Section):
 
 
 class Scenario(_Section):
-    """A scenario file; every key has the honest figure as its default."""
+    """A scenario file; every key has the honest figure as its default.
+
+    targets: what some targets do, by name, where a field has several; `target` says what all others do.
+    """
 
     schema_version: Literal[1] = 1
     seed: Annotated[int, Field(ge=0)] = 1
     target: TargetScenario = TargetScenario()
+    targets: dict[str, TargetScenario] = {}
     drones: DroneScenario = DroneScenario()
     mavlink: CopterScenario = CopterScenario()
     cameras: CameraScenario = CameraScenario()
     faults: tuple[Fault, ...] = ()
+
+    def of_targets(self, names: Iterable[str]) -> dict[str, TargetScenario]:
+        """Return what each target of a field does."""
+        return {name: self.targets.get(name) or _beside(self.target, rank) for rank, name in enumerate(names)}
 
 
 def parse_scenario(text: str | bytes) -> Scenario:
@@ -231,8 +257,11 @@ _HONEST: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
     ("cameras.video_jitter_ms: >= 20", lambda s: s.cameras.video_jitter_ms >= 20),
     ("cameras.frame_loss: >= 0.05", lambda s: s.cameras.frame_loss >= 0.05),
     ("cameras.corner_noise_px: >= 0.2", lambda s: s.cameras.corner_noise_px >= 0.2),
-    ("target.path: a figure eight at >= 0.2 m/s", lambda s: _is_honest_path(s.target.path)),
-    ("target.slip: > 0", lambda s: s.target.slip > 0),
+    (
+        "target.path: a figure eight at >= 0.2 m/s",
+        lambda s: all(_is_honest_path(target.path) for target in (s.target, *s.targets.values())),
+    ),
+    ("target.slip: > 0", lambda s: all(target.slip > 0 for target in (s.target, *s.targets.values()))),
 )
 
 

@@ -5,9 +5,9 @@ every new key, so what is not named here is ignored.
 """
 
 import math
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from groundstation.errors import SettingsError
 from groundstation.geometry.board import Board
@@ -113,25 +113,42 @@ class TargetMarker(Print):
 
 
 class SiteTarget(_Part):
-    """The TurtleBot."""
+    """A TurtleBot."""
 
-    name: str
     marker: TargetMarker
 
 
+class SingleTarget(SiteTarget):
+    """The only one, with its name."""
+
+    name: str
+
+
 class Site(_Part):
-    """Room, drones, cameras and target of a resolved field."""
+    """Room, drones, cameras of a resolved field, and its target or, by name, its targets."""
 
     site: str
     room: Room
     cameras: dict[str, SiteCamera] = {}
     drones: dict[str, SiteDrone]
-    target: SiteTarget
+    target: SingleTarget | None = None
+    targets: dict[str, SiteTarget] = {}
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.target is None) == (not self.targets):
+            raise ValueError("needs either a target or targets")
+        return self
+
+    @property
+    def tracked(self) -> dict[str, SiteTarget]:
+        """Return the targets by name."""
+        return dict(self.targets) if self.target is None else {self.target.name: self.target}
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Return the names of all that moves: drones in the field's order, then the target."""
-        return (*self.drones, self.target.name)
+        """Return the names of all that moves: drones in the field's order, then the targets."""
+        return (*self.drones, *self.tracked)
 
 
 def parse_site(field: object) -> Site:

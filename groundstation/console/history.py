@@ -18,8 +18,8 @@ _SAMPLE_NS = 500_000_000
 class History:
     """One minute of trails at 5 Hz, two minutes of samples at 2 Hz."""
 
-    def __init__(self, target: str) -> None:
-        self._target = target
+    def __init__(self, targets: tuple[str, ...]) -> None:
+        self._targets = targets
         self._trails: dict[str, deque[tuple[float, float]]] = {}
         self._samples: deque[dict[str, Any]] = deque(maxlen=_SAMPLES)
         self._passed: deque[tuple[str, float, float]] = deque(maxlen=_PASSED)
@@ -77,14 +77,13 @@ class History:
         truth: Mapping[str, TruthState],
     ) -> dict[str, Any]:
         entities = estimate.entities if estimate is not None else ()
-        target = next((entity for entity in entities if entity.name == self._target), None)
-        error = axis = None
-        if target is not None:
-            covariance, size = target.covariance, len(target.mean)
-            axis = round(semi_axes_95(covariance[0], covariance[1], covariance[size + 1])[0], 4)
-            there = truth.get(self._target)
-            if there is not None:
-                error = round(math.dist(target.mean[:2], there.position_m[:2]), 4)
+        targets = [entity for entity in entities if entity.name in self._targets]
+        axes = [semi_axes_95(t.covariance[0], t.covariance[1], t.covariance[len(t.mean) + 1])[0] for t in targets]
+        known = [(target, truth[target.name]) for target in targets if target.name in truth]
+        errors = [math.dist(target.mean[:2], there.position_m[:2]) for target, there in known]
+        # Of several targets the curves show the worst.
+        axis = round(max(axes), 4) if axes else None
+        error = round(max(errors), 4) if errors else None
         # A plan of nobody costs nothing, which is no figure for a curve.
         cost = None if plan is None or not plan.topology else round(plan.cost * 1e4, 2)
         topology = "" if plan is None else plan.topology

@@ -54,21 +54,25 @@ class Watch(FromPage, frozen=True):
 
 
 class Drive(FromPage, frozen=True):
-    """Steers the simulated target."""
+    """Steers a simulated target; the first, if none is named."""
 
     speed_m_s: Annotated[float, msgspec.Meta(ge=-2, le=2)]
     turn_rad_s: Annotated[float, msgspec.Meta(ge=-4, le=4)]
+    target: Name = ""
 
 
 class Place(FromPage, frozen=True):
-    """Puts the simulated target somewhere [world]."""
+    """Puts a simulated target somewhere [world]."""
 
     x_m: Metres
     y_m: Metres
+    target: Name = ""
 
 
 class FollowPath(FromPage, frozen=True):
-    """Sends the simulated target back to its path."""
+    """Sends a simulated target back to its path."""
+
+    target: Name = ""
 
 
 class Play(FromPage, frozen=True):

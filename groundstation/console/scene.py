@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.estimation.targets import targets_of
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
 
@@ -19,14 +20,16 @@ _LENS_FIELDS = ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px")
 
 def scene_from_field(field: Mapping[str, Any], truth: bool) -> Json:
     """Return the scene of a resolved field (decoded JSON)."""
-    target, planner = field["target"], field["planner"]
+    planner = field["planner"]
     return {
         "site": field["site"],
         "truth": truth,
         "room": {"size_m": field["room"]["size_m"], "fence": field["room"]["fence"]},
         "drones": [_drone(name, drone) for name, drone in field["drones"].items()],
         "cameras": [_world_camera(name, camera) for name, camera in field["cameras"].items()],
-        "target": {"name": target["name"], "height_m": target["marker"]["height_m"]},
+        "targets": [
+            {"name": name, "height_m": target["marker"]["height_m"]} for name, target in targets_of(field).items()
+        ],
         "horizon": {"steps": planner["horizon_steps"], "step_s": planner["step_s"]},
         "hysteresis": planner["hysteresis"],
         "planned_range_m": planner["planned_range_m"],
@@ -42,7 +45,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
         "room": {"size_m": [8.0, 6.0, 4.5], "fence": None},
         "drones": [{"name": name, "battery_min": 0.15} for name in drones],
         "cameras": [],
-        "target": {"name": "", "height_m": 0.0},
+        "targets": [],
         "horizon": {"steps": 10, "step_s": 0.3},
         "hysteresis": 0.0,
         "planned_range_m": 2.0,

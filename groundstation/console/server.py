@@ -95,7 +95,7 @@ class ConsoleServer:
         self.state = ConsoleState(cast, self._now_ns())
         self._pictures = PictureDesk(self._lenses)
         token = secrets.token_urlsafe(24)
-        steered = cast.target if scene["truth"] and player is None else ""
+        steered = cast.targets if scene["truth"] and player is None else ()
         desk = OrderDesk(bus, tuple(cast.drones))
         self.sessions = Sessions(bus, desk, token, steered, lambda: self._pictures.frames, player)
         self.app = ConsoleApp(load_pages(token), token, self.board, self.sessions, self._seed, self._now_ns)

@@ -46,7 +46,7 @@ def _ref_of(message: PageMessage) -> str:
 class Sessions:
     """All viewers, the operator among them, and what their pages may do.
 
-    simulated_target: the body that pages may steer, "" outside of simulation; pictures: the newest frame of each
+    simulated_targets: the bodies that pages may steer, none outside of simulation; pictures: the newest frame of each
     camera; player: what replays, where this is a replay: then nothing can be commanded.
     """
 
@@ -55,14 +55,14 @@ class Sessions:
         bus: Bus,
         desk: OrderDesk,
         token: str,
-        simulated_target: str,
+        simulated_targets: tuple[str, ...],
         pictures: Callable[[], Mapping[str, bytes]] = dict,
         player: Player | None = None,
     ) -> None:
         self._bus = bus
         self.desk = desk
         self._token = token
-        self._target = simulated_target
+        self._targets = simulated_targets
         self._newest_pictures = pictures
         self._player = player
         self.helm = Helm()
@@ -165,11 +165,15 @@ class Sessions:
             if replaced and other is not viewer:
                 other.say(encoded("notice", text=f"{viewer.name} has taken over from {replaced}", grave=True, ref=""))
 
-    def _steer(self, viewer: Viewer, message: PageMessage) -> None:
-        if not self._target:
+    def _steer(self, viewer: Viewer, message: Drive | Place | FollowPath) -> None:
+        if not self._targets:
             self._refuse(viewer, "not_simulated", "the target is real: it cannot be steered from here")
             return
-        header = self._bus.header(self._target)
+        name = message.target or self._targets[0]
+        if name not in self._targets:
+            self._refuse(viewer, "unknown_target", f"there is no target {name}")
+            return
+        header = self._bus.header(name)
         match message:
             case Drive(speed_m_s=speed, turn_rad_s=turn):
                 command = SimCommand(header=header, action="drive", speed_m_s=speed, turn_rate_rad_s=turn)
@@ -177,8 +181,6 @@ class Sessions:
                 command = SimCommand(header=header, action="place", position_m=(x, y, 0.0))
             case FollowPath():
                 command = SimCommand(header=header, action="path")
-            case _:
-                return
         self._bus.publish(SIM_COMMAND, command)
 
     def _refuse(self, viewer: Viewer, reason: str, text: str, ref: str = "") -> None:

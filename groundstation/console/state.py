@@ -23,7 +23,7 @@ class ConsoleState:
     def __init__(self, cast: Cast, started_ns: int) -> None:
         self.monitor = MonitorState(cast=cast, started_ns=started_ns)
         self.health = Health()
-        self.history = History(cast.target)
+        self.history = History(cast.targets)
         self.setpoints: dict[str, Seen[m.VelocitySetpoint]] = {}
         self.truth: dict[str, Seen[m.TruthState]] = {}
         self._sample: dict[str, Any] | None = None

@@ -50,7 +50,7 @@ def search_stands(
 ) -> dict[str, Stand]:
     """Return where each robot searches: all within the world-fixed view, looking different ways.
 
-    While the prediction of the first target is any good they fan out around it and sweep over it; later each
+    While the prediction of a target is any good they fan out around it and sweep over it; later each
     goes slowly round an ellipse, opposite to the others, and turns.
     """
     hint = _hint(belief, parameters)
@@ -69,12 +69,16 @@ def search_stands(
 
 
 def _hint(belief: JointBelief, parameters: ControlParameters) -> tuple[float, float] | None:
+    """Return where the target is that is known best, if it is known at all well."""
     if not belief.layout.targets:
         return None
-    name = belief.layout.targets[0]
-    spread = math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
+    spread, name = min((_spread_m(belief, name), name) for name in belief.layout.targets)
     mean = belief.mean_of(name)
     return (float(mean[0]), float(mean[1])) if spread <= parameters.hint_std_m else None
+
+
+def _spread_m(belief: JointBelief, name: str) -> float:
+    return math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
 
 
 def _around(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.bus import messages as m
+from groundstation.estimation.targets import targets_of
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.recording.derived import camera_frames
 from groundstation.recording.viewers import Transform
@@ -18,7 +19,7 @@ Rgb = tuple[int, int, int]
 
 _RING_POINTS = 40
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
-# Safe for colour-blind people (Okabe and Ito, 2008): robots in turn, then the target.
+# Safe for colour-blind people (Okabe and Ito, 2008): robots in turn, then all targets.
 ROBOT_COLOURS: tuple[Rgb, ...] = ((0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233))
 TARGET_COLOUR: Rgb = (213, 94, 0)
 LINK_COLOUR: Rgb = (130, 130, 130)
@@ -28,7 +29,7 @@ ARROW_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A robot or the target: position [m; world], yaw [rad] (0 where there is none), ellipse ring (n, 3) [m; world]."""
+    """A robot or a target: position [m; world], yaw [rad] (0 where there is none), ellipse ring (n, 3) [m; world]."""
 
     name: str
     is_target: bool
@@ -54,14 +55,15 @@ class Scene:
     def __init__(self, field: Mapping[str, Any]) -> None:
         self.field = field
         self.cameras: tuple[Transform, ...] = camera_frames(dict(field))
-        self.target = str(field.get("target", {}).get("name", ""))
-        self._target_height_m = float(field.get("target", {}).get("marker", {}).get("height_m", 0.0))
+        self._target_heights_m = {
+            name: float(target.get("marker", {}).get("height_m", 0.0)) for name, target in targets_of(field).items()
+        }
         self._names = sorted(field.get("drones", {}))
         self._places = {one.child: one.position_m for one in self.cameras if one.parent == "world"}
         self.bodies: dict[str, Body] = {}
 
     def colour(self, name: str) -> Rgb:
-        """Return the colour of a robot or the target."""
+        """Return the colour of a robot or a target."""
         if name not in self._names:
             return TARGET_COLOUR
         return ROBOT_COLOURS[self._names.index(name) % len(ROBOT_COLOURS)]
@@ -75,7 +77,7 @@ class Scene:
     def _body(self, entity: m.EntityEstimate) -> Body:
         size, mean = len(entity.mean), entity.mean
         has_pose = size >= 4
-        height = mean[2] if has_pose else self._target_height_m
+        height = mean[2] if has_pose else self._target_heights_m.get(entity.name, 0.0)
         position = (mean[0], mean[1], height)
         covariance = np.asarray(entity.covariance).reshape(size, size)
         ring = _ring(position, covariance)

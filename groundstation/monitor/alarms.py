@@ -52,9 +52,9 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     age = state.estimate.age_s(now_ns)
     if age > ESTIMATE_SILENT_S:
         yield Alarm(f"tracker: no estimate for {age:.1f} s")
-    target = state.entity(state.cast.target)
-    if target is not None and target.age_s > TARGET_LOST_S:
-        yield Alarm(f"{target.name}: not seen for {target.age_s:.0f} s", False)
+    for target in map(state.entity, state.cast.targets):
+        if target is not None and target.age_s > TARGET_LOST_S:
+            yield Alarm(f"{target.name}: not seen for {target.age_s:.0f} s", False)
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:

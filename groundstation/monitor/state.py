@@ -31,16 +31,17 @@ class _Field(msgspec.Struct, frozen=True):
     site: str = ""
     drones: dict[str, _Drone] = {}
     cameras: dict[str, msgspec.Raw] = {}
-    target: _Target = _Target()
+    target: _Target | None = _Target()
+    targets: dict[str, msgspec.Raw] = {}
 
 
 @dataclass(frozen=True, slots=True)
 class Cast:
-    """Who should be there: drones with their battery limit, the target, world-fixed cameras."""
+    """Who should be there: drones with their battery limit, targets, world-fixed cameras."""
 
     site: str = ""
     drones: dict[str, float] = field(default_factory=dict)
-    target: str = ""
+    targets: tuple[str, ...] = ()
     cameras: tuple[str, ...] = ()
 
 
@@ -48,7 +49,8 @@ def cast_from_field(data: bytes) -> Cast:
     """Return the cast of a resolved field's JSON."""
     resolved = msgspec.json.decode(data, type=_Field)
     drones = {name: drone.limits.battery_min for name, drone in resolved.drones.items()}
-    return Cast(resolved.site, drones, resolved.target.name, tuple(resolved.cameras))
+    single = (resolved.target.name,) if resolved.target and resolved.target.name else ()
+    return Cast(resolved.site, drones, tuple(resolved.targets) or single, tuple(resolved.cameras))
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,8 +65,7 @@ def _entities(state: MonitorState, now_ns: int) -> Table:
     names = dict.fromkeys([*state.cast.drones, *state.vehicles])
     for name in names:
         table.add_row(name, *_vehicle(state, name, now_ns), *_belief(state, name, now_ns))
-    if state.cast.target:
-        name = state.cast.target
+    for name in state.cast.targets:
         table.add_row(Text(name, style="bold"), "", "target", "", "", *_belief(state, name, now_ns))
     return table
 

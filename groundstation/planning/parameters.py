@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from groundstation.estimation.targets import targets_of
 from groundstation.sensing.models import Rectangle
 
 NO_FENCE = Rectangle((-math.inf, math.inf), (-math.inf, math.inf))
@@ -111,15 +112,17 @@ def parameters_from_field(resolved: Mapping[str, Any]) -> PlannerParameters:
         fence=Rectangle(tuple(fence["x_m"]), tuple(fence["y_m"])),
         limits=limits_from_field(resolved),
         noise=_noise(resolved),
+        target_weights={name: target.get("weight", 1.0) for name, target in targets_of(resolved).items()},
         mode=planner["mode"],
     )
 
 
 def _noise(resolved: Mapping[str, Any]) -> ProcessNoise:
-    """Return densities for the worst of the drones; velocity errors last for some 0.8 s, manoeuvres for 0.5 s."""
+    """Return densities for the worst of drones and targets; velocity errors last some 0.8 s, manoeuvres 0.5 s."""
     odometry = [drone["odometry"] for drone in resolved["drones"].values()]
+    briskest = max(target["acceleration_std_m_s2"] for target in targets_of(resolved).values())
     return ProcessNoise(
         robot_position=2.0 * max(o["velocity_std_m_s"] for o in odometry) ** 2,
         robot_yaw=max(math.radians(o["yaw_rate_std_deg_s"]) for o in odometry) ** 2,
-        target_acceleration=0.5 * resolved["target"]["acceleration_std_m_s2"] ** 2,
+        target_acceleration=0.5 * briskest**2,
     )

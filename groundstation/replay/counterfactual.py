@@ -48,7 +48,8 @@ def rows_of(before: RunData, after: RunData) -> list[Row]:
 
 def _figures(figures: Figures) -> dict[str, float | None]:
     rows: dict[str, float | None] = {words: getattr(figures, name) for name, words in _OVERALL.items()}
-    accuracies = {**({"target": figures.target} if figures.target else {}), **figures.robots}
+    single = {"target": figures.target} if figures.target and len(figures.targets) < 2 else figures.targets
+    accuracies = {**single, **figures.robots}
     for name, accuracy in accuracies.items():
         rows[f"{name} rmse [m]"] = accuracy.rmse_m
         rows[f"{name} greatest error [m]"] = accuracy.max_error_m

@@ -43,7 +43,7 @@ class WorldCamera(msgspec.Struct, frozen=True):
 
 
 class Target(msgspec.Struct, frozen=True):
-    """Who is tracked."""
+    """Who is tracked, where it is one alone."""
 
     name: str = "turtlebot"
 
@@ -73,10 +73,16 @@ class Arena(msgspec.Struct, frozen=True):
     room: Room = Room()
     cameras: dict[str, WorldCamera] = {}
     drones: dict[str, msgspec.Raw] = {}
-    target: Target = Target()
+    target: Target | None = Target()
+    targets: dict[str, msgspec.Raw] = {}
     estimator: Estimator = Estimator()
     planner: Planner = Planner()
     safety: Safety = Safety()
+
+    @property
+    def tracked(self) -> tuple[str, ...]:
+        """Return the names of the targets."""
+        return tuple(self.targets) or ((self.target.name,) if self.target else ())
 
     @property
     def heights_m(self) -> tuple[float, ...]:

@@ -51,6 +51,10 @@ def _figures(report: Report) -> Iterator[tuple[str, float | None]]:
         yield f"topology_seconds.{kind}", seconds
     if report.figures.target is not None:
         yield "target.anees", report.figures.target.anees
+    if len(report.figures.targets) > 1:
+        for name, target in sorted(report.figures.targets.items()):
+            yield f"{name}.rmse_m", target.rmse_m
+            yield f"{name}.anees", target.anees
     for name, robot in sorted(report.figures.robots.items()):
         yield f"{name}.rmse_m", robot.rmse_m
         yield f"{name}.anees", robot.anees

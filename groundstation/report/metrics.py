@@ -13,12 +13,16 @@ from groundstation.report.tracks import RunData
 
 
 class Figures(msgspec.Struct, frozen=True, kw_only=True):
-    """What report.json says of a run; None where there was nothing to measure."""
+    """What report.json says of a run; None where there was nothing to measure.
+
+    target_*: of several targets, those of the worst; target: all figures of the one with the largest error.
+    """
 
     tracked_s: float
     target_rmse_m: float | None
     target_lost_s: float | None
     target: Accuracy | None
+    targets: dict[str, Accuracy] = {}
     robots: dict[str, Accuracy]
     max_fence_violation_m: float | None
     min_separation_m: float | None
@@ -49,15 +53,17 @@ def figures_of(data: RunData) -> Figures:
     """Return the figures of a run."""
     interval = tracking_interval(data)
     start, end = interval or (0.0, 0.0)
-    target, robots = _accuracies(data, interval)
+    targets, robots = _accuracies(data, interval)
+    target = max(targets.values(), key=lambda one: one.rmse_m, default=None)
     planner = load.planner_ms(data)
     ticks, missed, rate = load.tracker_deadlines(data)
     cores = load.cpu_cores(data)
     return Figures(
         tracked_s=round(end - start, 3),
         target_rmse_m=target.rmse_m if target else None,
-        target_lost_s=target.lost_s if target else None,
+        target_lost_s=max((one.lost_s for one in targets.values()), default=None),
         target=target,
+        targets=targets,
         robots=robots,
         max_fence_violation_m=safety.max_fence_violation_m(data),
         min_separation_m=safety.min_separation_m(data),
@@ -82,21 +88,23 @@ def figures_of(data: RunData) -> Figures:
     )
 
 
-def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[Accuracy | None, dict[str, Accuracy]]:
+def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[dict[str, Accuracy], dict[str, Accuracy]]:
+    """Return the figures of all targets and of all robots."""
     if interval is None:
-        return None, {}
+        return {}, {}
     grid = time_grid(*interval)
-    name = data.arena.target.name
-    target = None
-    if name in data.truth:
-        target = accuracy(grid, data.truth[name], data.estimates.get(name), 2)
+    targets = {
+        name: accuracy(grid, data.truth[name], data.estimates.get(name), 2)
+        for name in data.arena.tracked
+        if name in data.truth
+    }
     robots = {}
     for robot in data.drones:
         truth = data.truth.get(robot)
         flying = grid[truth.airborne_at(grid)] if truth is not None else grid[:0]
         if truth is not None and len(flying):
             robots[robot] = accuracy(flying, truth, data.estimates.get(robot), 3)
-    return target, robots
+    return targets, robots
 
 
 def _command_to_airborne_s(data: RunData) -> float | None:

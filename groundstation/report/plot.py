@@ -43,13 +43,12 @@ def _interval(data: RunData) -> tuple[float, float]:
 
 def _draw_errors(axes: Axes, data: RunData) -> None:
     grid = time_grid(*_interval(data))
-    target = data.arena.target.name
     top = 1.16 * LOST_ERROR_M
-    for name in (*data.drones, target):
+    for name in (*data.drones, *data.arena.tracked):
         truth = data.truth.get(name)
         if truth is None:
             continue
-        is_target = name == target
+        is_target = name in data.arena.tracked
         errors = errors_at(grid, truth, data.estimates.get(name), 2 if is_target else 3)
         distance = np.linalg.norm(errors, axis=1)
         if not is_target:

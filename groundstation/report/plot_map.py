@@ -21,7 +21,7 @@ def draw_map(axes: Axes, data: RunData) -> None:
     """Draw the map with its legend."""
     _draw_room(axes, data)
     start, end = tracking_interval(data) or (0.0, max(data.end_s, 1.0))
-    for name in (*data.drones, data.arena.target.name):
+    for name in (*data.drones, *data.arena.tracked):
         _draw_entity(axes, data, name, start, end)
     width, depth, _ = data.arena.room.size_m
     axes.set_xlim(-width / 2 - 0.15, width / 2 + 0.15)
@@ -86,8 +86,7 @@ def _draw_estimate(axes: Axes, estimate: EstimateTrack, color: str, start: float
 
 def _legend(data: RunData) -> list[Line2D | Patch]:
     entities: list[Line2D | Patch] = [
-        Line2D([], [], color=color_of(name, data), lw=2.4, label=name)
-        for name in (*data.drones, data.arena.target.name)
+        Line2D([], [], color=color_of(name, data), lw=2.4, label=name) for name in (*data.drones, *data.arena.tracked)
     ]
     return [
         *entities,

@@ -7,6 +7,7 @@ from groundstation.report.tracks import RunData
 INK = "#1b2733"
 MUTED = "#8795a1"
 TARGET_COLOR = "#d55e00"
+TARGET_COLORS = (TARGET_COLOR, "#7a3400", "#f2a26b")
 DRONE_COLORS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5d4fa2")
 KIND_COLORS = {"flat": "#56a3d9", "string": "#e08a1e", "other": "#aab4bd"}
 
@@ -32,7 +33,8 @@ STYLE: Any = {
 
 
 def color_of(name: str, data: RunData) -> str:
-    """Return the colour of a drone or the target."""
+    """Return the colour of a drone or a target."""
     if name in data.drones:
         return DRONE_COLORS[data.drones.index(name) % len(DRONE_COLORS)]
-    return TARGET_COLOR
+    number = data.arena.tracked.index(name) if name in data.arena.tracked else 0
+    return TARGET_COLORS[number % len(TARGET_COLORS)]

@@ -63,10 +63,10 @@ def _details(report: Report) -> Text:
     busiest = sorted(figures.cpu_cores.items(), key=lambda item: -item[1])[:4]
     cores = ", ".join(f"{name} {share:.0%}" for name, share in busiest)
     lines = [f"topologies: {seconds or 'none'}; {figures.topology_switches} switches", f"cpu: {cores or 'unknown'}"]
-    if figures.target is not None and figures.target.anees is not None:
-        lines.append(
-            f"target: covered {figures.target.covered:.0%}, normalised error {figures.target.anees:.2f} (1 = honest)"
-        )
+    for name, target in figures.targets.items():
+        if target.anees is not None:
+            label = "target" if len(figures.targets) == 1 else f"{name}: rms error {target.rmse_m:.3f} m"
+            lines.append(f"{label}: covered {target.covered:.0%}, normalised error {target.anees:.2f} (1 = honest)")
     return Text("\n".join(f"  {line}" for line in lines))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from groundstation.bus.messages import FlightState, Header, Odometry, RelativeObservation, VehicleStatus
+from groundstation.estimation.targets import targets_of
 from groundstation.tracker import tracker_from_field
 
 _START_NS = 1_000_000_000_000
@@ -24,8 +25,8 @@ def warm_up(field: Mapping[str, Any]) -> None:
             for camera in field["cameras"]:
                 sight = _sighting(Header(now_ns, _CLOCK, camera, camera, step), robot, (1.5 * index, 0.5, 2.5))
                 tracker.ingest(f"{camera}/{robot}", sight, now_ns)
-            sight = _sighting(header, field["target"]["name"], (0.0, 0.0, 1.2))
-            tracker.ingest(f"{robot}/target", sight, now_ns)
+            for target in targets_of(field):
+                tracker.ingest(f"{robot}/{target}", _sighting(header, target, (0.0, 0.0, 1.2)), now_ns)
         tracker.advance(now_ns)
     tracker.plan(now_ns)
     tracker.setpoints(now_ns)

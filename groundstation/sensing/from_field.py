@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from groundstation.estimation.targets import targets_of
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.sensing.models import Frustum, Noise, OnboardCamera, SensorSuite, WorldCamera
 
@@ -23,15 +24,15 @@ ATTITUDE_REPEATS = 2.0
 def sensors_from_field(resolved: Mapping[str, Any]) -> SensorSuite:
     """Return the suite for a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
     drones = {name: drone for name, drone in resolved["drones"].items() if drone.get("enabled", True)}
-    target = resolved["target"]
+    targets = targets_of(resolved)
     heights = {name: float(drone["marker"]["position_m"][2]) for name, drone in drones.items()}
     square = min((_square_m(drone["marker"]) for drone in drones.values()), default=0.044)
-    smallest = min(square, _square_m(target["marker"]))
+    smallest = min(square, *(_square_m(target["marker"]) for target in targets.values()))
     reach = resolved["planner"]["planned_range_m"]
     return SensorSuite(
         world={name: _world(camera, square) for name, camera in resolved["cameras"].items()},
         onboard={name: _onboard(drone, smallest, reach) for name, drone in drones.items()},
-        marker_height_m=heights | {target["name"]: float(target["marker"]["height_m"])},
+        marker_height_m=heights | {name: float(target["marker"]["height_m"]) for name, target in targets.items()},
     )
 
 

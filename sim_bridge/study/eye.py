@@ -49,12 +49,15 @@ def _square_m(printed: Board | Tag) -> float:
 
 
 def boards_of(site: Site) -> tuple[Carried, ...]:
-    """Return all boards of a site: drones' and target's."""
+    """Return all boards of a site: drones' and targets'."""
     drones = [
         Carried(name, drone.marker.printed, np.array(drone.marker.position_m)) for name, drone in site.drones.items()
     ]
-    marker = site.target.marker
-    return (*drones, Carried(site.target.name, marker.printed, np.array([0, 0, marker.height_m])))
+    targets = [
+        Carried(name, target.marker.printed, np.array([0, 0, target.marker.height_m]))
+        for name, target in site.tracked.items()
+    ]
+    return (*drones, *targets)
 
 
 class Eye:

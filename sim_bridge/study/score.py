@@ -2,6 +2,7 @@
 
 import math
 from collections import defaultdict
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -27,7 +28,7 @@ class Score:
 
     period_s: float
     gate_probability: float = 0.997
-    errors: list[float] = field(default_factory=list)
+    errors: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     nees: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     squares: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     nis: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -43,7 +44,12 @@ class Score:
         self.gates = {rows: gate(self.gate_probability, rows) for rows in range(1, 5)}
 
     def take(
-        self, belief: JointBelief, truth: dict[str, Array], target: str, topology: str, ages_s: dict[str, float]
+        self,
+        belief: JointBelief,
+        truth: dict[str, Array],
+        targets: Collection[str],
+        topology: str,
+        ages_s: dict[str, float],
     ) -> None:
         """Compare a belief with the truth (rows of the truth board) at one time; ages_s: since each robot was seen."""
         self.unseen_s = max(self.unseen_s, *ages_s.values(), 0.0)
@@ -57,11 +63,13 @@ class Score:
             if block.kind is EntityKind.ROBOT:
                 error[3] = math.remainder(error[3], math.tau)
             self._judge(block.name, block.labels, error, covariance[:4, :4])
-        self.errors.append(math.sqrt(self.squares[target][-1]) if target in belief.layout else _MISSING_M)
+        for target in targets:
+            known = target in belief.layout
+            self.errors[target].append(math.sqrt(self.squares[target][-1]) if known else _MISSING_M)
         self.topologies[topology] += self.period_s
         self.switches += bool(self._last) and topology != self._last
         self._last = topology
-        drones = [row[:3] for name, row in truth.items() if name != target]
+        drones = [row[:3] for name, row in truth.items() if name not in targets]
         for a, b in combinations(drones, 2):
             self.separation_m = min(self.separation_m, float(np.linalg.norm(a - b)))
 
@@ -84,14 +92,15 @@ class Score:
             self.nis[edge].append(min(correction.nis, self.gates[rows]) / rows)
 
     def report(self) -> dict[str, Any]:
-        """Return all figures, rounded for reading."""
-        errors = np.array(self.errors or [_MISSING_M])
+        """Return all figures, rounded for reading; those of the target are those of the worst."""
+        targets = {name: _figures(np.array(errors), self.period_s) for name, errors in self.errors.items()}
+        never = _figures(np.array([_MISSING_M]), self.period_s)
+        worst = {key: max((one[key] for one in targets.values()), default=never[key]) for key in never}
         flat = sum(s for t, s in self.topologies.items() if t and "/" not in t)
         string = sum(s for t, s in self.topologies.items() if "/" in t)
         return {
-            "target_rmse_m": round(float(np.sqrt(np.mean(errors**2))), 4),
-            "target_lost_s": round(float(np.sum(errors > _LOST_M)) * self.period_s, 2),
-            "target_max_m": round(float(errors.max()), 3),
+            **{f"target_{key}": value for key, value in worst.items()},
+            **({"targets": targets} if len(targets) > 1 else {}),
             "robot_rmse_m": {k: round(math.sqrt(float(np.mean(v))), 4) for k, v in self.squares.items()},
             "topology_seconds": {"flat": round(flat, 1), "string": round(string, 1)},
             "topology_switches": self.switches,
@@ -102,3 +111,12 @@ class Score:
             "nis": {k: round(float(np.mean(v)), 3) for k, v in sorted(self.nis.items())},
             "verdicts": dict(sorted(self.verdicts.items())),
         }
+
+
+def _figures(errors: Array, period_s: float) -> dict[str, float]:
+    """Return what is said of a target's errors, a missing estimate counted as 1 m."""
+    return {
+        "rmse_m": round(float(np.sqrt(np.mean(errors**2))), 4),
+        "lost_s": round(float(np.sum(errors > _LOST_M)) * period_s, 2),
+        "max_m": round(float(errors.max()), 3),
+    }

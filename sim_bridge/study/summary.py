@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.estimation.targets import targets_of
+
 _NORMAL_95 = 1.96
 
 
@@ -47,7 +49,7 @@ def nis(report: Mapping[str, Any], observers: Iterable[str]) -> float:
 
 def summary(reports: Sequence[Mapping[str, Any]], field: Mapping[str, Any]) -> dict[str, Interval]:
     """Return what decides whether the belief is good and as good as it says, over the flights of one field."""
-    robots, targets, cameras = tuple(field["drones"]), (field["target"]["name"],), tuple(field["cameras"])
+    robots, targets, cameras = tuple(field["drones"]), tuple(targets_of(field)), tuple(field["cameras"])
     values = {
         "target_rmse_m": [report["target_rmse_m"] for report in reports],
         "target_lost_s": [report["target_lost_s"] for report in reports],

@@ -25,9 +25,9 @@ _CROSSTALK_TICKS = 8
 
 
 class World:
-    """Drones, target, and the onboard sensors of each drone.
+    """Drones, targets, and the onboard sensors of each drone.
 
-    `bodies` names the rows of `states()`: the drones, then the target.
+    `bodies` names the rows of `states()`: the drones, then the targets.
     """
 
     def __init__(self, site: Site, scenario: Scenario, seed: int) -> None:
@@ -44,9 +44,9 @@ class World:
             sensors = generator_of(seed, f"{name}/onboard")
             magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
             self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
-        self.target_name = site.target.name
-        self.target = Unicycle(scenario.target, TICK_S, generator_of(seed, site.target.name))
-        self._departs_after_s = scenario.target.departs_after_team_s or 0.0
+        paths = scenario.of_targets(site.tracked)
+        self.targets = {name: Unicycle(path, TICK_S, generator_of(seed, name)) for name, path in paths.items()}
+        self._depart_after_s = {name: path.departs_after_team_s or 0.0 for name, path in paths.items()}
         self._together_s = 0.0
         self._downwash = scenario.drones.downwash
         self._crosstalk = scenario.drones.ultrasound_crosstalk
@@ -77,9 +77,10 @@ class World:
                 drone.estimate.step(drone.airframe, drone.motors_on)
             else:
                 self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed)
-        self._let_target_depart()
-        self.target.step()
-        self.target.confine(self._half_room[0], self._half_room[1])
+        self._let_targets_depart()
+        for target in self.targets.values():
+            target.step()
+            target.confine(self._half_room[0], self._half_room[1])
         self.ticks += 1
 
     def states(self) -> NDArray[np.float64]:
@@ -87,13 +88,15 @@ class World:
         rows = self._states
         for index, drone in enumerate(self.drones.values()):
             rows[index] = drone.airframe.row()
-        rows[-1] = self.target.row()
+        for index, target in enumerate(self.targets.values(), len(self.drones)):
+            rows[index] = target.row()
         return rows
 
-    def _let_target_depart(self) -> None:
-        if self.target.parked and len(self.airborne) == len(self.drones):
+    def _let_targets_depart(self) -> None:
+        if len(self.airborne) == len(self.drones) and any(target.parked for target in self.targets.values()):
             self._together_s += TICK_S
-            self.target.parked = self._together_s < self._departs_after_s
+            for name, target in self.targets.items():
+                target.parked = target.parked and self._together_s < self._depart_after_s[name]
 
     @property
     def copters(self) -> dict[str, Copter]:

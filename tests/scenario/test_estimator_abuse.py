@@ -209,7 +209,7 @@ def test_who_joins_by_a_wild_sighting_is_put_right_by_the_next(lab_field: dict[s
 
 def test_a_kidnapped_target_is_found_again_and_nobody_else_doubted(lab_field: dict[str, Any]) -> None:
     flight = Abused(lab_field, as_it_is).fly(BEGIN_S)
-    target = flight.world.target
+    target = flight.world.targets["turtlebot"]
     target.place(target.x - 0.3, target.y)
     flight.fly()
     assert flight.joined_again() <= {"turtlebot"}

@@ -18,14 +18,14 @@ NS = 1_000_000_000
 
 
 class Room:
-    def __init__(self, target: str = "turtlebot") -> None:
+    def __init__(self, targets: tuple[str, ...] = ("turtlebot",)) -> None:
         exchange = MemoryExchange()
         self.bus = MemoryBus(exchange, "lab", "console")
         self.others = MemoryBus(exchange, "lab", "drone_1")
         self.heard = self.others.subscribe([t.COMMAND])
         self.steering = self.others.subscribe([t.SIM_COMMAND])
         self.desk = OrderDesk(self.bus, DRONES)
-        self.sessions = Sessions(self.bus, self.desk, "secret", target)
+        self.sessions = Sessions(self.bus, self.desk, "secret", targets)
         self.now_ns = clock.now_ns()
 
     def lease(self) -> None:
@@ -186,7 +186,12 @@ def test_only_a_simulated_target_is_steered() -> None:
         room.sessions.handle(viewer, message)
     actions = [item.message.action for item in room.steering.drain()]  # type: ignore[union-attr]
     assert actions == ["drive", "place", "path"]
-    real = Room(target="")
+    several = Room(targets=("one", "other"))
+    for steered in (Place(0.0, 0.0), Place(1.0, 1.0, target="other"), Place(1.0, 1.0, target="drone_1")):
+        several.sessions.handle(several.viewer(1), steered)
+    assert [item.key.entity for item in several.steering.drain()] == ["one", "other"]
+    assert several.sessions.refused == {"unknown_target": 1}
+    real = Room(targets=())
     real.sessions.handle(real.viewer(1), Place(1.0, 1.0))
     assert real.steering.drain() == [] and real.sessions.refused == {"not_simulated": 1}
 

@@ -72,7 +72,7 @@ def test_a_board_tells_what_changed_since() -> None:
 
 
 def test_sections_say_what_came() -> None:
-    state, board = ConsoleState(Cast("lab", {"drone_1": 0.15}, "turtlebot"), NS), Board()
+    state, board = ConsoleState(Cast("lab", {"drone_1": 0.15}, ("turtlebot",)), NS), Board()
     setpoint = m.VelocitySetpoint(
         header=header("drone_1"), velocity_m_s=(0.1, 0, 0), yaw_rate_rad_s=0.2, lifetime_ms=300, epoch=3
     )
@@ -131,7 +131,7 @@ def test_sections_say_what_came() -> None:
 
 
 def test_what_was_never_seen_can_still_be_said() -> None:
-    state, board = ConsoleState(Cast("lab", {}, "turtlebot"), 0), Board()
+    state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Board()
     state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])
     board.begin()
     state.put(board, NS)
@@ -139,7 +139,7 @@ def test_what_was_never_seen_can_still_be_said() -> None:
 
 
 def test_history_keeps_trails_and_samples_within_bounds() -> None:
-    history = History("turtlebot")
+    history = History(("turtlebot",))
     samples = [history.step(NS + k * 50_000_000, estimate(NS + k * 50_000_000), None, 1.0, {}) for k in range(20 * 200)]
     kept = history.as_json()
     assert len(kept["trails"]["drone_1"]) == 300 and kept["trails"]["drone_1"][-1] == (1.0, 2.0)
@@ -263,7 +263,7 @@ def test_footprints_are_true_to_scale(field: dict[str, Any]) -> None:
     onboard = np.array(scene["drones"][0]["camera"]["rays"])
     assert onboard[:, 0].min() > 0  # tilted 45 degrees down with less than 90 of view: all of it lies ahead
     assert onboard[:, 2].max() < 0
-    assert json.loads(json.dumps(scene))["target"]["name"] == "turtlebot"
+    assert json.loads(json.dumps(scene))["targets"][0]["name"] == "turtlebot"
 
 
 def test_a_scene_without_a_field() -> None:

@@ -15,7 +15,7 @@ from groundstation.monitor.table import render
 
 S = 1_000_000_000
 NOW = 100 * S
-CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, "turtlebot", ("ceiling",))
+CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",))
 
 
 class World:
@@ -203,4 +203,4 @@ def test_the_line_names_modes_and_alarms(world: World) -> None:
 
 def test_the_cast_comes_from_the_resolved_field() -> None:
     field = b'{"site":"lab","drones":{"d":{"limits":{"battery_min":0.2}}},"cameras":{"c":{}},"target":{"name":"t"}}'
-    assert cast_from_field(field) == Cast("lab", {"d": 0.2}, "t", ("c",))
+    assert cast_from_field(field) == Cast("lab", {"d": 0.2}, ("t",), ("c",))

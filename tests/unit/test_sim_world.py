@@ -266,13 +266,13 @@ def test_the_target_waits_until_the_whole_team_has_been_in_the_air_long_enough()
     first.autopilot.take_off()
     for _ in range(round(8.0 / TICK_S)):
         world.step()
-    assert world.target.speed == 0.0
+    assert world.targets["turtlebot"].speed == 0.0
     second.autopilot.take_off()
     while len(world.airborne) < 2:
         world.step()
     for _ in range(round(0.9 / TICK_S)):
         world.step()
-    assert world.target.speed == 0.0
+    assert world.targets["turtlebot"].speed == 0.0
     for _ in range(round(2.0 / TICK_S)):
         world.step()
-    assert world.target.speed > 0.1
+    assert world.targets["turtlebot"].speed > 0.1

@@ -51,19 +51,31 @@ def _errors(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
     grid, starts = _grids(runs)
     curves = []
     for color, label, start, (data, _) in zip(DRONE_COLORS, ("first", "second"), starts, runs, strict=False):
-        truth = data.truth.get(data.arena.target.name)
-        if truth is not None:
-            errors = errors_at(grid + start, truth, data.estimates.get(data.arena.target.name), 2)
-            curves.append(Curve(label, color, points(np.linalg.norm(errors, axis=1))))
+        for rank, name in enumerate(data.arena.tracked):
+            truth = data.truth.get(name)
+            if truth is not None:
+                errors = errors_at(grid + start, truth, data.estimates.get(name), 2)
+                distances = points(np.linalg.norm(errors, axis=1))
+                curves.append(Curve(_label(label, name, data), color, distances, dashed=rank > 0))
     return Chart("Target error", "m", "distance between estimate and truth", times(grid), curves)
+
+
+def _label(run: str, target: str, data: RunData) -> str:
+    return run if len(data.arena.tracked) == 1 else f"{run}, {target}"
 
 
 def _beliefs(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
     grid, starts = _grids(runs)
     curves = [
-        Curve(label, color, points(semi_axis_m(data.estimates[data.arena.target.name], grid + start)))
+        Curve(
+            _label(label, name, data),
+            color,
+            points(semi_axis_m(data.estimates[name], grid + start)),
+            dashed=rank > 0,
+        )
         for color, label, start, (data, _) in zip(DRONE_COLORS, ("first", "second"), starts, runs, strict=False)
-        if data.arena.target.name in data.estimates
+        for rank, name in enumerate(data.arena.tracked)
+        if name in data.estimates
     ]
     note = "larger semi-axis of the target's 95 % ellipse"
     return Chart("Believed uncertainty of the target", "m", note, times(grid), curves)

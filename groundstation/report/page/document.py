@@ -26,7 +26,7 @@ def write_page(data: RunData, report: Report, path: Path) -> None:
     findings = report.findings
     flight, health = flight_charts(data, start_s, end_s), health_charts(data, start_s, end_s)
     sections = [
-        ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report, data.arena.target.name)),
+        ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report)),
         ("Room", f'<div class="map">{_room(data)}</div>'),
         ("Flight", holders(flight, 0)),
         ("Topology", tables.switches_table(findings)),

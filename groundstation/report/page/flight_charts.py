@@ -28,7 +28,7 @@ def _spans(data: RunData, grid: Array) -> list[Span]:
 
 
 def _names(data: RunData) -> tuple[str, ...]:
-    return (data.arena.target.name, *data.drones)
+    return (*data.arena.tracked, *data.drones)
 
 
 def _errors(data: RunData, grid: Array) -> Chart:
@@ -36,7 +36,7 @@ def _errors(data: RunData, grid: Array) -> Chart:
     for name in _names(data):
         truth = data.truth.get(name)
         if truth is not None:
-            size = 2 if name == data.arena.target.name else 3
+            size = 2 if name in data.arena.tracked else 3
             distance = np.linalg.norm(errors_at(grid, truth, data.estimates.get(name), size), axis=1)
             if size == 3:
                 distance[~truth.airborne_at(grid)] = np.nan

@@ -38,7 +38,7 @@ def _nis(data: RunData, start_s: float, end_s: float) -> Chart:
 
 def _nees(data: RunData, grid: Array) -> Chart:
     curves = []
-    for name in (data.arena.target.name, *data.drones):
+    for name in (*data.arena.tracked, *data.drones):
         truth, estimate = data.truth.get(name), data.estimates.get(name)
         if truth is not None and estimate is not None and len(estimate.time_s):
             values = nees_per_dof(grid, truth, estimate)

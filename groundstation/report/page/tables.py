@@ -39,9 +39,9 @@ def criteria_table(report: Report) -> str:
     return table(("", "criterion", "value", "limit"), rows, "No criterion applies.")
 
 
-def accuracy_table(report: Report, target: str) -> str:
+def accuracy_table(report: Report) -> str:
     """Return errors and consistency of every entity over the tracking interval."""
-    entities = {**({target: report.figures.target} if report.figures.target else {}), **report.figures.robots}
+    entities = {**report.figures.targets, **report.figures.robots}
     rows = [
         (name, number(item.rmse_m), number(item.max_error_m), number(item.lost_s, 1), f"{item.covered:.0%}",
          number(item.anees, 2), "–" if item.yaw_rmse_rad is None else f"{item.yaw_rmse_rad * 57.29578:.1f}")

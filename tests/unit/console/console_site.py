@@ -24,7 +24,7 @@ class Site:
         self.bus = MemoryBus(exchange, "lab", "console")
         self.drone = MemoryBus(exchange, "lab", "drone_1")
         self.commands = self.drone.subscribe([t.COMMAND])
-        cast = Cast("lab", {"drone_1": 0.15}, "turtlebot")
+        cast = Cast("lab", {"drone_1": 0.15}, ("turtlebot",))
         self.server = ConsoleServer(self.bus, cast, bare_scene("lab", ("drone_1",), True), {}, claim_port(38765))
         self.port = int(self.server.url.rsplit(":", 1)[1].strip("/"))
         self.over = False

@@ -3,7 +3,7 @@
 import { byId, el, seconds, text } from "./dom.js";
 import { on, watch } from "./link.js";
 import { colourOf } from "./palette.js";
-import { ageS, store } from "./store.js";
+import { ageS, isTarget, store } from "./store.js";
 
 const STALE_S = 1.5;
 const feeds = new Map(), visible = new Set();
@@ -66,7 +66,7 @@ function draw(name, { canvas, bitmap, stamp }) {
   const zoom = width / found.width;
   for (const mark of found.marks) {
     const [u, v, r] = [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)], colour = colourOf(mark.subject);
-    const tint = mark.subject === store.scene.target.name ? "#ffe14d" : colour;
+    const tint = isTarget(mark.subject) ? "#ffe14d" : colour;
     for (const [style, line] of [["#000", 5], [tint, 2.5]]) {
       g.strokeStyle = style;
       g.lineWidth = line;

@@ -3,7 +3,7 @@
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./pen.js";
-import { ageS, entities, entity, estimateAge, store } from "./store.js";
+import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
 const ARROW_S = 1.5, OLD_S = 2;
 // Who has not been seen for long is greyed even while the tracker speaks.
@@ -12,9 +12,8 @@ const fade = (body) => (body.age_s > OLD_S ? 0.45 : 1);
 export function drawTrails(g, view) {
   const alpha = g.globalAlpha;
   for (const [name, trail] of Object.entries(store.trails)) {
-    const isTarget = name === store.scene.target.name;
     g.strokeStyle = colourOf(name);
-    g.lineWidth = isTarget ? 2 : 1.3;
+    g.lineWidth = isTarget(name) ? 2 : 1.3;
     const third = Math.ceil(trail.length / 3);
     for (let part = 0; part < 3; part++) {
       const piece = trail.slice(Math.max(0, part * third - 1), (part + 1) * third);
@@ -29,8 +28,13 @@ export function drawTrails(g, view) {
 }
 
 function drawPrediction(g, view) {
-  const target = entity(store.scene.target.name);
-  if (!target) return;
+  for (const { name } of store.scene.targets) {
+    const target = entity(name);
+    if (target) drawPredictionOf(g, view, target);
+  }
+}
+
+function drawPredictionOf(g, view, target) {
   const { steps, step_s: step } = store.scene.horizon, [vx, vy] = target.velocity, [x, y] = target.mean;
   const points = [];
   for (let k = 0; k <= steps; k++) points.push([x + vx * step * k, y + vy * step * k]);

@@ -3,7 +3,7 @@
 import { bodyToWorld, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./pen.js";
-import { ageS, droneNames, entities, entity, isSeen, store } from "./store.js";
+import { ageS, droneNames, entities, entity, isSeen, store, targetHeight } from "./store.js";
 
 const FIGURE_PX = 75;
 
@@ -32,7 +32,7 @@ export function drawFootprints(g, view) {
     if (!body || !drone.camera) continue;
     const [ox, oy] = bodyToWorld(drone.camera.position_m, body.mean[3]);
     const eye = [body.mean[0] + ox, body.mean[1] + oy, body.mean[2] + drone.camera.position_m[2]];
-    const points = footprint(drone.camera.rays, eye, body.mean[3], store.scene.target.height_m);
+    const points = footprint(drone.camera.rays, eye, body.mean[3], targetHeight());
     if (!points.length) continue;
     path(g, view, points, true);
     g.fillStyle = g.strokeStyle = colourOf(drone.name);

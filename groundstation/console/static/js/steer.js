@@ -1,4 +1,5 @@
-// The map's pointer and keys: pan and zoom always; dragging and driving the target in simulation only.
+// The map's pointer and keys: pan and zoom always; dragging and driving targets in simulation only.
+// Keys drive the one that was dragged last, the first at the start.
 
 import { byId } from "./dom.js";
 import { send } from "./link.js";
@@ -7,21 +8,25 @@ import { entity, steerable, store } from "./store.js";
 const SPEED_M_S = 0.4, TURN_RAD_S = 1.2, PERIOD_MS = 100, GRAB_PX = 24, PLACE_MS = 100;
 const KEYS = { ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
 const down = new Set(), pointers = new Map();
-let ghost = null, driving = 0, lastPlaced = 0;
+let ghost = null, driving = 0, lastPlaced = 0, held = "";
 
 export const ghostPoint = () => ghost;
 
-function targetPoint(view) {
-  const { name } = store.scene.target, there = store.s.truth?.[name]?.position ?? entity(name)?.mean;
-  return there && view.point(there[0], there[1]);
+function grabbed(view, x, y) {
+  return store.scene.targets.find(({ name }) => {
+    const there = store.s.truth?.[name]?.position ?? entity(name)?.mean;
+    if (!there) return false;
+    const [px, py] = view.point(there[0], there[1]);
+    return Math.hypot(px - x, py - y) < GRAB_PX;
+  });
 }
 
 export function startSteering(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    const at = steerable() && pointers.size === 1 ? targetPoint(view) : null;
-    if (at && Math.hypot(at[0] - event.offsetX, at[1] - event.offsetY) < GRAB_PX) ghost = view.world(event.offsetX, event.offsetY);
+    const target = steerable() && pointers.size === 1 ? grabbed(view, event.offsetX, event.offsetY) : null;
+    if (target) [held, ghost] = [target.name, view.world(event.offsetX, event.offsetY)];
   });
   canvas.addEventListener("pointermove", (event) => move(event, view));
   for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, (event) => drop(event, view));
@@ -65,7 +70,7 @@ function inside([x, y]) {
 function place() {
   lastPlaced = performance.now();
   const [x_m, y_m] = inside(ghost);
-  send("place", { x_m, y_m });
+  send("place", { x_m, y_m, target: held });
 }
 
 function key(event, view) {
@@ -80,7 +85,7 @@ function key(event, view) {
 function drive() {
   clearInterval(driving);
   const [forward, left] = [...down].reduce(([a, b], name) => [a + KEYS[name][0], b + KEYS[name][1]], [0, 0]);
-  const order = () => send("drive", { speed_m_s: forward * SPEED_M_S, turn_rad_s: left * TURN_RAD_S });
+  const order = () => send("drive", { speed_m_s: forward * SPEED_M_S, turn_rad_s: left * TURN_RAD_S, target: held });
   order();
   if (down.size) driving = setInterval(order, PERIOD_MS);
 }

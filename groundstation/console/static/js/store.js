@@ -78,6 +78,9 @@ function extendTrails(estimate) {
 export const entities = () => store.s.estimate?.entities ?? [];
 export const entity = (name) => entities().find((candidate) => candidate.name === name);
 export const estimateAge = () => ageS(store.s.estimate?.at);
+export const isTarget = (name) => (store.scene?.targets ?? []).some((target) => target.name === name);
+// Footprints are drawn at one height: that of the highest target's marker.
+export const targetHeight = () => Math.max(0, ...(store.scene?.targets ?? []).map((target) => target.height_m));
 export const droneNames = () => (store.scene?.drones ?? []).map((drone) => drone.name);
 export const seenBy = (name) => (store.s.sightings ?? []).filter(([, subject, at]) => subject === name && ageS(at) < 0.6).map(([observer]) => observer);
 export const isSeen = (observer, subject) => (store.s.sightings ?? []).some(([o, s, at]) => o === observer && s === subject && ageS(at) < 0.6);

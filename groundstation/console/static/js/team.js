@@ -1,4 +1,4 @@
-// A card for each drone and one for the target.
+// A card for each drone and one for each target.
 
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
@@ -12,9 +12,9 @@ const cards = new Map();
 
 export function buildTeam() {
   cards.clear();
-  const { drones, target } = store.scene;
+  const { drones, targets } = store.scene;
   const nodes = drones.map((drone) => card(drone.name, ["battery", "rate", "link", "heard", "position", "ellipse", "seen", "speed", "by"], true));
-  if (target.name) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
+  for (const target of targets) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
   byId("team").replaceChildren(...nodes);
 }
 

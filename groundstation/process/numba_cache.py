@@ -49,6 +49,23 @@ def activate(packages: Iterable[str] = FLIGHT) -> Path:
     return folder
 
 
+def is_complete(folder: Path) -> bool:
+    """Tell whether this checkout's flying kernels are all in a cache that `activate` returned."""
+    return _mark(folder).exists()
+
+
+def mark_complete(folder: Path) -> None:
+    """Remember that they are: the folder alone may be another checkout's, or half filled by a stopped compilation."""
+    with suppress(OSError):  # then it is looked through once more next time
+        folder.mkdir(parents=True, exist_ok=True)
+        _mark(folder).touch()
+
+
+def _mark(folder: Path) -> Path:
+    checkout = hashlib.sha256(bytes(Path(__file__).parents[1])).hexdigest()[:16]  # numba keys what it keeps by path too
+    return folder / f"complete-{checkout}"
+
+
 def _forget_old(base: Path) -> None:
     with suppress(OSError):  # another process may be tidying as well
         folders = sorted(base.glob("numba-*"), key=lambda path: path.stat().st_mtime, reverse=True)

@@ -28,11 +28,11 @@ _SWITCH_INTERVAL_S = 0.001  # how long the planner's thread may keep the interpr
 def run(child: Child) -> int:
     """Run the tracker until it is stopped or its supervisor is gone; returns the exit code."""
     cache = numba_cache.activate()
-    if cache.exists():
+    if numba_cache.is_complete(cache):
         child.starting("loading kernels")
     else:
         child.starting("compiling kernels (once per version, some 30 s)")
-        compile_kernels()
+        compile_kernels(cache)
     from groundstation.runtime.tracking import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up
 

@@ -36,6 +36,16 @@ def test_old_states_are_forgotten(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     assert left == [*(f"numba-{number:02d}" for number in range(8, 20)), "other"]
 
 
+def test_a_cache_counts_as_complete_only_when_all_was_compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    folder = tmp_path / "numba-1"
+    (folder / "another_checkouts_kernels").mkdir(parents=True)
+    assert not numba_cache.is_complete(folder)
+    numba_cache.mark_complete(folder)
+    assert numba_cache.is_complete(folder)
+    monkeypatch.setattr(numba_cache, "__file__", "/another/checkout/groundstation/process/numba_cache.py")
+    assert not numba_cache.is_complete(folder)
+
+
 def test_another_process_compiles_what_it_is_asked_for(tmp_path: Path) -> None:
     other = numba_cache.ParallelCompilation(["json", "a_module_that_is_missing"])
     other.finish()  # failing there is no failure here: what is missing is compiled where it is imported

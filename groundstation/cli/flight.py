@@ -77,6 +77,10 @@ class Flight:
         operator.step(now_ns)
         return now_ns
 
+    def _state(self) -> str:
+        unwell = self._supervisor.unwell
+        return f"NOT WELL YET: {', '.join(unwell)}" if unwell else "all processes are ready"
+
     # --- fly -----------------------------------------------------------------------------------------------------
 
     def _fly(self, operator: Operator) -> str:
@@ -84,9 +88,11 @@ class Flight:
         now_ns = self._turn(operator)
         if self._plan.asks:
             self._prompting = True
-            self._say("ready. Press Enter to take off and track (Ctrl-C ends), or use: groundstation takeoff")
+            self._say(
+                f"{self._state()}. Press Enter to take off and track (Ctrl-C ends), or use: groundstation takeoff"
+            )
         else:
-            self._say("all processes are ready; taking off")
+            self._say(f"{self._state()}; taking off")
             operator.take_off(now_ns)
             self._supervisor.show_screen()
         began_ns = now_ns

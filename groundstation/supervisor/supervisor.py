@@ -27,6 +27,7 @@ SOURCE = "supervisor"
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200_000_000
 _OPTIONAL_GRACE_S = 5.0
+_SAME_NOTE_S = 8.0
 _log = logging.getLogger(__name__)
 
 
@@ -88,6 +89,13 @@ class Supervisor:
         self._wait_for([p for p in others if p.spec.required])
         self._wait_for([p for p in others if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
 
+    @property
+    def unwell(self) -> list[str]:
+        """What was started and does not work (yet): a camera without pictures, a drone that does not answer."""
+        return [
+            _in_words(p) for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY
+        ]
+
     def show_screen(self) -> None:
         """Hand the terminal to the process that draws on it, if the table has one."""
         for process in self.processes:
@@ -98,7 +106,7 @@ class Supervisor:
     def _wait_for(self, processes: list[ManagedProcess], limit_s: float | None = None) -> None:
         began = time.monotonic()
         waiting = list(processes)
-        next_note = began + 2.0
+        next_note, noted = began + 2.0, ""
         while waiting:
             self.step()
             now = time.monotonic()
@@ -113,9 +121,9 @@ class Supervisor:
                 for process in waiting:
                     self._event(Severity.WARNING, process, "is not ready; going on without it", "see its log")
                 return
-            if now > next_note and waiting:
-                next_note = now + 2.0
-                waits = ", ".join(f"{p.spec.name} ({p.detail or p.state.name.lower()})" for p in waiting)
+            waits = ", ".join(_in_words(p) for p in waiting)
+            if waiting and now > (next_note + _SAME_NOTE_S if waits == noted else next_note):
+                next_note, noted = now + 2.0, waits
                 self._terminal.say(f"  waiting for {waits}")
 
     def _launch(self, process: ManagedProcess) -> None:
@@ -292,3 +300,8 @@ class Supervisor:
             runtime_file.write(self._record)
         except OSError as error:  # the run is worth more than its signpost
             _log.error("cannot write the runtime file: %s", error)
+
+
+def _in_words(process: ManagedProcess) -> str:
+    state = "not there" if process.state is SlotState.EMPTY else process.state.name.lower()
+    return f"{process.spec.name} ({process.detail or state})"

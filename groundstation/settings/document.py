@@ -92,7 +92,8 @@ def read(path: Path, name: str = "") -> Node:
     """Return a file's content; raises SettingsError naming file and line of all that makes it unreadable."""
     name = name or str(path)
     try:
-        content = path.read_bytes()
+        with path.open("rb") as stream:
+            content = stream.read(_MAX_BYTES + 1)  # a device (`/dev/zero`) has no end
     except FileNotFoundError:
         raise SettingsError([f"{name}: no such file{_neighbours(path)}"]) from None
     except OSError as error:

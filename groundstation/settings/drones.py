@@ -7,7 +7,7 @@ from pydantic import Field
 
 from groundstation.settings.marker import Marker
 from groundstation.settings.room import Calibration
-from groundstation.settings.values import Address, Section, Source, Vector2, Vector3, VideoDelay
+from groundstation.settings.values import Address, OnVehicle, Section, Source, Vector2, VideoDelay
 
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
 Delay = Annotated[float, Field(ge=0, le=1000)]
@@ -37,7 +37,7 @@ class Limits(Section):
 class RobotMarker(Marker):
     """The marker flat on top of a drone, and where its centre is [base]."""
 
-    position_m: Vector3 = (0.0, 0.0, 0.08)
+    position_m: OnVehicle = (0.0, 0.0, 0.08)
 
 
 class OnboardCamera(Section):
@@ -45,7 +45,7 @@ class OnboardCamera(Section):
 
     source: Source
     calibration: Calibration
-    position_m: Vector3 = (0.0, 0.0, 0.0)
+    position_m: OnVehicle = (0.0, 0.0, 0.0)
     tilt_down_deg: Annotated[float, Field(ge=-90, le=90)] = 45.0
     pan_left_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     video_delay_ms: VideoDelay = 120.0

@@ -53,6 +53,8 @@ def _is_source(value: str) -> str:
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Vector2 = Annotated[tuple[float, float], of_length(2)]
 Vector3 = Annotated[tuple[float, float, float], of_length(3)]
+_Offset = Annotated[float, Field(ge=-2, le=2)]
+OnVehicle = Annotated[tuple[_Offset, _Offset, _Offset], of_length(3)]  # a typing error in a place tears the estimate
 Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]

@@ -208,6 +208,10 @@ OPTIONS = [
     ("drones.x.pad_m=[0, 0]", "there is no drones.x, there are drone_1, drone_2"),
     ("site.name=a", "site is a single value, nothing lies below it"),
     ("room.fence.x_m.0=-9", "room.fence.x_m: must lie inside the room, -4 to 4 (got -9 to 3.7)"),
+    (
+        "drones.drone_1.camera.position_m=[30, 0, 0]",
+        "drones.drone_1.camera.position_m[0]: must be <= 2 (got 30)",
+    ),
     ("room.fence.x_m.2=-9", "room.fence.x_m is a list of 2, '2' is not in it"),
     ("planner", "must look like path.to.key=value"),
     ("=3", "must look like path.to.key=value"),
@@ -222,6 +226,13 @@ OPTIONS = [
 @pytest.mark.usefixtures("lab")
 def test_wrong_options_are_named_as_options(option: str, expected: str) -> None:
     assert problems(option) == [f"--set {option}: {expected}"]
+
+
+@pytest.mark.usefixtures("lab")
+def test_a_file_without_end_is_given_up() -> None:
+    expected = "/dev/zero: is larger than 1000000 bytes: not a settings file"
+    assert problems(name="/dev/zero") == [expected]
+    assert expected in problems("cameras.ceiling.calibration=/dev/zero")[0]
 
 
 @pytest.mark.usefixtures("lab")

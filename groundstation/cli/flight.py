@@ -79,7 +79,7 @@ class Flight:
 
     def _state(self) -> str:
         unwell = self._supervisor.unwell
-        return f"NOT WELL YET: {', '.join(unwell)}" if unwell else "all processes are ready"
+        return f"NOT WELL YET (see above): {', '.join(unwell)}" if unwell else "all processes are ready"
 
     # --- fly -----------------------------------------------------------------------------------------------------
 

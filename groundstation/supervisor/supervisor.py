@@ -91,9 +91,9 @@ class Supervisor:
 
     @property
     def unwell(self) -> list[str]:
-        """What was started and does not work (yet): a camera without pictures, a drone that does not answer."""
+        """Names of what was started and does not work (yet): a camera without pictures, a silent drone."""
         return [
-            _in_words(p) for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY
+            p.spec.name for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY
         ]
 
     def show_screen(self) -> None:

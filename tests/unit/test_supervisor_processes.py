@@ -219,7 +219,7 @@ def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     camera = supervisor.processes[1]
     assert 2 <= camera.life <= 4
     assert not supervisor.failure
-    assert [text.partition(" ")[0] for text in supervisor.unwell] == ["ceiling", "drone_1"]
+    assert supervisor.unwell == ["ceiling", "drone_1"]
 
 
 def test_late_start_is_waited_for(make: Callable[..., Supervisor]) -> None:

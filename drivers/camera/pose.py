@@ -115,9 +115,10 @@ def choose(
     if len(ranked) == 1:
         return PoseChoice(best, None, residual)
     gap = _cost(ranked[1], variance, gravity) - _cost(ranked[0], variance, gravity)
+    if gap >= ambiguity_cost:
+        return PoseChoice(best, None, residual)
     other = relative_pose(ranked[1], points, intrinsics, gravity, floor_px)
-    ambiguous = gap < ambiguity_cost and _differ(best, other)
-    return PoseChoice(best, other if ambiguous else None, residual)
+    return PoseChoice(best, other if _differ(best, other) else None, residual)
 
 
 def _cost(pose: PlanarPose, variance: float, gravity: Gravity) -> float:

@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 # Newton converges quadratically from the distorted point; 12 steps are ample even for k1 = -0.5 at the corners.
 _NEWTON_STEPS = 12
-_NEWTON_TOLERANCE = 1e-13
+# The error that is left is of the order of the last step's square.
+_NEWTON_TOLERANCE = 1e-8
 _MAX_RADIUS = 4.0
 
 
@@ -125,6 +126,12 @@ def _distort(x: Array, y: Array, distortion: tuple[float, ...]) -> tuple[Array, 
 
 def _distort_jacobian(x: Array, y: Array, distortion: tuple[float, ...]) -> Array:
     """Return d(distorted) / d(undistorted) (..., 2, 2)."""
+    xx, xy, yy = _distort_slopes(x, y, distortion)
+    return np.stack((np.stack((xx, xy), -1), np.stack((xy, yy), -1)), -2)
+
+
+def _distort_slopes(x: Array, y: Array, distortion: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    """Return the elements xx, xy = yx, yy of that Jacobian."""
     k1, k2, p1, p2, k3 = distortion
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -132,7 +139,7 @@ def _distort_jacobian(x: Array, y: Array, distortion: tuple[float, ...]) -> Arra
     xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
     xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
     yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
-    return np.stack((np.stack((xx, xy), -1), np.stack((xy, yy), -1)), -2)
+    return xx, xy, yy
 
 
 def _undistort(x_d: Array, y_d: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
@@ -143,8 +150,7 @@ def _undistort(x_d: Array, y_d: Array, distortion: tuple[float, ...]) -> tuple[A
     for _ in range(_NEWTON_STEPS):
         x_now, y_now = _distort(x, y, distortion)
         error_x, error_y = x_now - x_d, y_now - y_d
-        jacobian = _distort_jacobian(x, y, distortion)
-        a, b, d = jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 1, 1]
+        a, b, d = _distort_slopes(x, y, distortion)
         determinant = a * d - b * b
         determinant = np.where(np.abs(determinant) < 1e-6, 1e-6, determinant)
         step_x, step_y = (d * error_x - b * error_y) / determinant, (a * error_y - b * error_x) / determinant

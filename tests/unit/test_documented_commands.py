@@ -1,0 +1,103 @@
+"""Every `groundstation ...` and `python -m ...` that a README or a help text shows can be typed as it stands."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+import pytest
+
+from groundstation.cli import main as cli
+from groundstation.settings.files import SHIPPED
+from groundstation.settings.load import load_field
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "config" / "README.md"]
+DOCUMENTS += sorted(path for name in ("groundstation", "drivers", "sim_bridge") for path in (ROOT / name).rglob("*.md"))
+DOCUMENTS = [path for path in DOCUMENTS if "shipped" not in path.parts]  # config/ once more
+
+FENCED = re.compile(r"```\w*\n(.*?)```", re.S)
+INLINE = re.compile(r"`([^`]+)`")
+INDENTED = re.compile(r"^(?: {4,})(\S.*)$", re.M)
+COMMAND = re.compile(r"(?:^|[^\w./=-])groundstation ([a-z].*)")
+MODULE = re.compile(r"python -m ([\w.]+)")
+
+
+def shown(text: str) -> Iterator[str]:
+    """Yield the lines of code of a Markdown text; what prose breaks over two lines is one."""
+    for block in FENCED.findall(text):
+        yield from re.sub(r"\s#.*", "", block.replace("\\\n", " ")).splitlines()
+    prose = FENCED.sub("", text)
+    yield from (re.sub(r"\s+", " ", code) for code in INLINE.findall(prose))
+    yield from INDENTED.findall(prose)
+
+
+def commands(groups: click.Command, path: str) -> Iterator[tuple[str, click.Command]]:
+    yield path, groups
+    if isinstance(groups, click.Group):
+        context = click.Context(groups)
+        for name in groups.list_commands(context):
+            found = groups.get_command(context, name)
+            assert found is not None
+            yield from commands(found, f"{path} {name}".strip())
+
+
+VERBS = dict(commands(cli.groundstation, ""))
+
+
+def mistakes(line: str) -> Iterator[str]:
+    """Yield what cannot be typed in the arguments of `groundstation`."""
+    words = shlex.split(line.split("  ")[0].split(" (")[0].split(" && ")[0].split(" | ")[0])
+    command: click.Command = cli.groundstation
+    while words and isinstance(command, click.Group):
+        alternatives = words.pop(0).strip(",.:;`").split("|")
+        found = [command.get_command(click.Context(command), name) for name in alternatives if name[0] != "-"]
+        if None in found:
+            yield f"no verb {alternatives}"
+        if len(found) != 1 or found[0] is None:
+            return
+        command = found[0]
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    for place, word in enumerate(words):
+        name = word.partition("=")[0].strip("[],.;:)")
+        if name.startswith("-") and name.lstrip("-") and not name[1:2].isdigit() and name not in known | {"--help"}:
+            yield f"no option {name}"
+        if word == "--set":
+            load_field(SHIPPED / "lab.yaml", (words[place + 1],))
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_what_a_document_shows_can_be_typed(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    wrong = []
+    for line in shown(text):
+        for found in COMMAND.findall(line):
+            wrong += [f"groundstation {found}: {mistake}" for mistake in mistakes(found)]
+        for module in MODULE.findall(line):
+            if module.split(".")[0] in ("groundstation", "drivers", "sim_bridge") and find_spec(module) is None:
+                wrong.append(f"no module {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_help_shows_what_can_be_typed() -> None:
+    wrong = []
+    for path, command in VERBS.items():
+        for line in (command.epilog or "").replace("\\\n", " ").splitlines():
+            for found in COMMAND.findall(line):
+                wrong += [f"{path}: groundstation {found}: {mistake}" for mistake in mistakes(found)]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_readme_names_every_verb() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    unnamed = [verb for verb in cli.VERBS if not re.search(rf"groundstation {verb}\b", text)]
+    assert not unnamed, unnamed
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_of_a_document_lead_somewhere(path: Path) -> None:
+    links = re.findall(r"\]\(([^)#\s]+)\)", path.read_text(encoding="utf-8"))
+    lost = [link for link in links if "://" not in link and not (path.parent / link).exists()]
+    assert not lost, lost

@@ -5,7 +5,6 @@ from collections import deque
 from drivers.mavlink.wire.telemetry import Statustext
 
 _PIECE = 50
-_TOGETHER_NS = 1_000_000_000
 _WARNING = 4
 _JUMP_MS = 1000
 _PIECES = 8

@@ -10,8 +10,6 @@ from typing import Any
 
 from groundstation.planning.planar.parameters import PlanarParameters
 
-PEERS = ("naive", "numpy", "jax")
-
 # A solve of the naive peer is estimated instead of run when one topology alone would take this share of its time.
 _SHARE = 0.5
 

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.camera.calibration.pattern import Pattern
 from drivers.camera.detect import spacing_px
-from drivers.camera.lattice import find_lattice
 from drivers.camera.search import saddle_points, search
 from groundstation.geometry.lens import CameraIntrinsics
 
@@ -32,13 +32,13 @@ def photographs():
 
 
 def found_corners(picture):
-    return find_lattice(picture, 9, 6)
+    return Pattern(9, 6, 25.0).corners(picture)
 
 
 def test_all_boards_are_found_and_refined_to_a_fifth_of_a_pixel():
     """13 of 13; the residual is that of an own calibration with these corners, its lens model included."""
     pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in photographs()]
-    corners = [find_lattice(picture, 9, 6) for picture in pictures]
+    corners = [found_corners(picture) for picture in pictures]
     assert len(corners) == 13
     assert all(found is not None for found in corners)
     plane = np.array([[x, y, 0.0] for y in range(6) for x in range(9)], dtype=np.float32)
@@ -49,9 +49,9 @@ def test_all_boards_are_found_and_refined_to_a_fifth_of_a_pixel():
     assert matrix[0, 0] == pytest.approx(535.9, rel=0.01)
 
 
-def test_a_picture_without_a_board_has_no_lattice():
+def test_a_picture_without_a_board_has_no_corners():
     floor = np.random.default_rng(0).integers(60, 180, (480, 640)).astype(np.uint8)
-    assert find_lattice(floor, 9, 6) is None
+    assert found_corners(floor) is None
 
 
 @pytest.mark.parametrize("name", ["left01.jpg", "left03.jpg", "left05.jpg", "left12.jpg"])

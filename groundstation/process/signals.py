@@ -61,7 +61,8 @@ class StopSignal:
             if descriptor == self._read:
                 # The interpreter writes the numbers of signals, `wake` writes zeros.
                 with suppress(BlockingIOError):
-                    woken |= self.requested and any(os.read(self._read, 512))
+                    signalled = any(os.read(self._read, 512))
+                    woken |= signalled and self.requested
             elif not self._parent_reported:
                 self._parent_reported = woken = True
         return woken

@@ -71,9 +71,10 @@ def test_a_call_from_another_thread_ends_one_sleep() -> None:
     assert stop.sleep_until(began + 20_000 * MS) is True
     assert time.monotonic_ns() - began < 15_000 * MS
     caller.join()
-    deadline = time.monotonic_ns() + 20 * MS
+    deadline, spent = time.monotonic_ns() + 300 * MS, time.process_time()
     assert stop.sleep_until(deadline) is True
     assert time.monotonic_ns() >= deadline
+    assert time.process_time() - spent < 0.1, "the call is over: it sleeps and does not spin"
     stop.close()
     parent.close()
 

@@ -6,13 +6,14 @@ from typing import Any
 import click
 
 from groundstation.cli.bench_limits import judge
+from groundstation.cli.numbers import FiniteRange
 
 _CHROMIUM = "/usr/bin/chromium"
 _LIMITS = {"cpu_percent_of_core": 5.0, "estimate_to_socket_ms": 60.0, "estimate_to_drawn_ms": 60.0}
 
 
 @click.command(epilog="Example: groundstation bench console --seconds 20 --json")
-@click.option("--seconds", type=click.FloatRange(2, 600), default=20.0, show_default=True, help="How long.")
+@click.option("--seconds", type=FiniteRange(2, 600), default=20.0, show_default=True, help="How long.")
 @click.option("--drones", type=click.IntRange(1, 20), default=4, show_default=True, help="How many talk.")
 @click.option("--no-browser", is_flag=True, help="Leave out what needs Chromium.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")

@@ -14,6 +14,7 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 
 # Start-up, take-off, landing and report around the tracking itself; then SIGTERM (which lands), then SIGKILL.
 _OVERHEAD_S = 240.0
@@ -68,7 +69,7 @@ class Outcome:
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=3, show_default=True, help="How many.")
 @click.option("--first", type=int, default=1, show_default=True, help="The first seed.")
-@click.option("--duration", type=click.FloatRange(1, 3600), help="Seconds of tracking each (default: the demo's own).")
+@click.option("--duration", type=FiniteRange(1, 3600), help="Seconds of tracking each (default: the demo's own).")
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for all runs (default: in ./runs)."
 )

@@ -6,13 +6,14 @@ from typing import Any
 import click
 
 from groundstation.cli.bench_limits import judge
+from groundstation.cli.numbers import FiniteRange
 
 _LIMITS = {"discovery_s": 2.0, "cores": 0.6, "telemetry_to_bus_ms": 3.0, "setpoint_to_wire_ms": 5.0}
 
 
 @click.command(epilog="Example: groundstation bench mavlink --link mavsdk --json")
 @click.option("--vehicles", type=click.IntRange(1, 50), default=10, show_default=True, help="How many.")
-@click.option("--seconds", type=click.FloatRange(1, 600), default=10.0, show_default=True, help="How long.")
+@click.option("--seconds", type=FiniteRange(1, 600), default=10.0, show_default=True, help="How long.")
 @click.option("--link", type=click.Choice(["pymavlink", "mavsdk"]), default="pymavlink", show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def mavlink(vehicles: int, seconds: float, link: str, as_json: bool) -> int:

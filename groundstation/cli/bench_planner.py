@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from groundstation.cli.numbers import FiniteRange
 from groundstation.process import numba_cache
 
 _LAYOUTS = ("two-level", "random", "string", "flat")
@@ -45,7 +46,7 @@ def numbers(value: str, option: str, low: int, high: int) -> list[int]:
 @click.option("--peer", default="", help=f"Also time {', '.join(_PEERS)} (comma-separated), each in a child process.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=9, show_default=True, help="Rounds; each runs all.")
 @click.option("--seed", type=click.IntRange(0), default=3, show_default=True, help="Of the beliefs.")
-@click.option("--limit", "limit_s", type=click.FloatRange(0.1), default=20.0, show_default=True, help="Seconds a peer "
+@click.option("--limit", "limit_s", type=FiniteRange(0.1), default=20.0, show_default=True, help="Seconds a peer "
               "may take for one step; beyond it the rest is extrapolated and marked.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
 def planner(robots: str, layout: str, peer: str, repeats: int, seed: int, limit_s: float, as_json: bool) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 
 if TYPE_CHECKING:
     from groundstation.bus.api import Sample
@@ -20,7 +21,7 @@ _LIMITS = {"write_percent_of_core": 8.0, "open_s": 1.0, "seek_s": 0.2}
 
 
 @click.command(epilog="Example: groundstation bench recording --minutes 2 --json")
-@click.option("--minutes", type=click.FloatRange(0.1, 120), default=10.0, show_default=True, help="Length of the run.")
+@click.option("--minutes", type=FiniteRange(0.1, 120), default=10.0, show_default=True, help="Length of the run.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the made-up run.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def recording(minutes: float, seed: int, as_json: bool) -> int:

@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.sources import lens_of, require_size, source_of, until_interrupted
 from groundstation.errors import GroundStationError, OperatorMistake
 
@@ -49,7 +50,7 @@ class Finding:
 @click.argument("what")
 @click.option("--calibration", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="With a source.")
 @click.option("--marker", "given", multiple=True, metavar="CODE=X,Y", help="A marker at a known place; repeatable.")
-@click.option("--square-mm", type=click.FloatRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
+@click.option("--square-mm", type=FiniteRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
 @click.option("--frames", type=click.IntRange(1, 1000), default=10, show_default=True, help="Pictures to look at.")
 def check(what: str, calibration: Path | None, given: tuple[str, ...], square_mm: float, frames: int) -> int:
     """Look through the cameras of WHAT (a field file, or a source) at markers that lie still, and judge."""

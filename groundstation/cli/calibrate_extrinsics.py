@@ -8,6 +8,7 @@ import click
 import numpy as np
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.sources import lens_of, require_folder, require_size, source_of, until_interrupted
 from groundstation.errors import OperatorMistake
 
@@ -43,8 +44,8 @@ _ROLLED_DEG = 1.0
 @click.option(
     "--markers", "layout", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="YAML with all markers."
 )
-@click.option("--square-mm", type=click.FloatRange(5, 200), help="Side of their squares.  [default: 44]")
-@click.option("--marker-std-mm", type=click.FloatRange(0.1, 200), help="How well they were placed.  [default: 5]")
+@click.option("--square-mm", type=FiniteRange(5, 200), help="Side of their squares.  [default: 44]")
+@click.option("--marker-std-mm", type=FiniteRange(0.1, 200), help="How well they were placed.  [default: 5]")
 @click.option("--frames", type=click.IntRange(1, 1000), default=20, show_default=True, help="Pictures to average.")
 @click.option("--onboard", is_flag=True, help="A drone's camera on a bench instead of one fixed in the world.")
 @click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write the last picture, annotated.")

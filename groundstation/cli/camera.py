@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.sources import lens_of, require_folder, require_size, source_of, until_interrupted
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def camera() -> None:
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The camera's calibration; without it markers have no distance.",
 )
-@click.option("--square-mm", type=click.FloatRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
+@click.option("--square-mm", type=FiniteRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Write annotated pictures here.")
 @click.option("--stream", is_flag=True, help="Serve them as MJPEG on loopback, for a browser.")
 @click.option("--port", type=click.IntRange(0, 65535), default=_PORT, show_default=True, help="Where; 0: any free one.")

@@ -12,7 +12,7 @@ from typing import Any
 from drivers.ardrone.wire import at
 from drivers.camera.settings import SourceKind, parse_source
 from drivers.registry import entry_point
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, DriverSection, core_section, driver_sections, rerouted
 from groundstation.supervisor.network import Network
@@ -47,7 +47,7 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
         probe.unlink()
         free = _free_bytes(path)
     except OSError as error:
-        raise GroundStationError(f"cannot write to {path}: {error.strerror} (--set recording.directory=...)") from error
+        raise OperatorMistake(f"cannot write to {path}: {error.strerror} (--set recording.directory=...)") from error
     if free < _MIN_FREE_BYTES:
         path.rmdir()
         raise GroundStationError(f"only {free / 1e6:.0f} MB are free for {parent}: make room before take-off")

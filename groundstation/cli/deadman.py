@@ -18,11 +18,11 @@ import click
 from groundstation.bus.messages import CommandAck, Verb
 from groundstation.bus.topics import COMMAND_ACK
 from groundstation.bus.zenoh_bus import open_bus
-from groundstation.cli.exits import ExitCode, UnreachableError
+from groundstation.cli.exits import ExitCode
 from groundstation.cli.stop import choose_run
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.console.orders import OrderDesk
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake
 
 if TYPE_CHECKING:
     from groundstation.bus.api import Bus
@@ -160,7 +160,7 @@ def _opened(gamepad: str | None) -> Iterator[Handle]:
             os.close(descriptor)
         return
     if not sys.stdin.isatty():
-        raise UnreachableError("no keyboard here: run it in a terminal, or give --gamepad")
+        raise OperatorMistake("no keyboard here: run it in a terminal, or give --gamepad")
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:

@@ -1,5 +1,6 @@
 """Exit codes of the `groundstation` command, for scripts."""
 
+import errno
 from enum import IntEnum
 
 import click
@@ -35,6 +36,21 @@ _MEANING = {
 }
 
 
+# A path that was named on the command line and cannot be read or written there.
+_WRONG_PLACE = frozenset(
+    (
+        errno.EACCES,
+        errno.EEXIST,
+        errno.EISDIR,
+        errno.ENAMETOOLONG,
+        errno.ENOENT,
+        errno.ENOTDIR,
+        errno.EPERM,
+        errno.EROFS,
+    )
+)
+
+
 class UnreachableError(GroundStationError):
     """No running ground station answers."""
 
@@ -43,6 +59,8 @@ def exit_code_of(error: BaseException) -> ExitCode:
     """Return the code that a failed command ends with."""
     match error:
         case SettingsError() | OperatorMistake() | click.UsageError():
+            return ExitCode.SETTINGS
+        case OSError(filename=place, errno=number) if place is not None and number in _WRONG_PLACE:
             return ExitCode.SETTINGS
         case UnreachableError():
             return ExitCode.UNREACHABLE

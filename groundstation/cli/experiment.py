@@ -10,6 +10,7 @@ import click
 
 from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
 from groundstation.cli.experiment_mrclam import mrclam
+from groundstation.cli.numbers import FiniteRange
 from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ def _world(command: Callable[..., None]) -> Callable[..., None]:
         click.option("--json", "as_json", is_flag=True, help="Write the summary to standard output."),
         click.option("--figures/--no-figures", default=True, help="Draw pictures and an animation."),
         _option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-NAME."),
-        _option("--kidnap", type=click.FloatRange(0, 1), default=0.0, help="Chance per step that the target jumps."),
-        _option("--dropout", type=click.FloatRange(0, 1), default=0.0, help="Share of readings that are lost."),
+        _option("--kidnap", type=FiniteRange(0, 1), default=0.0, help="Chance per step that the target jumps."),
+        _option("--dropout", type=FiniteRange(0, 1), default=0.0, help="Share of readings that are lost."),
         _option("--first-seed", type=click.IntRange(0), default=1, help="Of the seeds, which count up from it."),
     ):
         command = option(command)

@@ -169,6 +169,8 @@ def _tell(error: BaseException) -> None:
             click.echo("\n".join([*problems, f"{count}: nothing was started"]), err=True)
         case click.Abort() | KeyboardInterrupt():
             click.echo("interrupted", err=True)
+        case OSError(filename=place, strerror=why) if place is not None:
+            click.echo(f"groundstation: {place}: {why}", err=True)
         case BrokenPipeError():
             sys.stderr.close()  # the reader of our output has gone; python would complain once more at exit
         case _:

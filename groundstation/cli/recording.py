@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 
 if TYPE_CHECKING:
     from groundstation.recording.info import RecordingInfo
@@ -87,8 +88,8 @@ def recover(recording: Path, output: Path | None) -> int:
 
 @recording.command()
 @click.argument("recording", type=EXISTING)
-@click.option("--from", "from_s", type=click.FloatRange(0), default=0.0, help="Begin [s since the start].")
-@click.option("--to", "to_s", type=click.FloatRange(0), help="End [s since the start] (default: the end).")
+@click.option("--from", "from_s", type=FiniteRange(0), default=0.0, help="Begin [s since the start].")
+@click.option("--to", "to_s", type=FiniteRange(0), help="End [s since the start] (default: the end).")
 @click.option("--output", type=click.Path(path_type=Path), help="New folder, or file for a file (default: beside it).")
 def cut(recording: Path, from_s: float, to_s: float | None, output: Path | None) -> int:
     """Write a stretch of a recording to a new one, with all attachments and with what was known when it begins."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 
 if TYPE_CHECKING:
     from groundstation.replay.source import Source
@@ -37,8 +38,8 @@ _NAMES = {"options": "--set", "estimator": "--estimator", "json_file": "--json",
     "--output", type=click.Path(path_type=Path), help="Write a re-run as a run folder, for report and replay."
 )
 @click.option("--port", type=click.IntRange(1024, 65535), help="Where to serve (default: the field's console.port).")
-@click.option("--from", "from_s", type=click.FloatRange(0), help="Begin so many seconds after the recording's start.")
-@click.option("--speed", type=click.FloatRange(0.1, 20), help="Times as fast as it was (default: 1).")
+@click.option("--from", "from_s", type=FiniteRange(0), help="Begin so many seconds after the recording's start.")
+@click.option("--speed", type=FiniteRange(0.1, 20), help="Times as fast as it was (default: 1).")
 @click.option("--paused", is_flag=True, help="Wait for the page to press play.")
 @click.option("--headless", is_flag=True, help="End when the recording does, instead of waiting for the page.")
 def replay(recording: tuple[Path, ...], rerun: str | None, **options: Any) -> int:

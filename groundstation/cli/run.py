@@ -12,14 +12,9 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
 
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-
-def _refuse_nan(_context: click.Context, _parameter: click.Parameter, value: float | None) -> float | None:
-    if value != value:  # a range lets nan pass, and a flight of nan seconds would never end
-        raise click.BadParameter("nan is no number of seconds.")
-    return value
 
 
 _SETTINGS = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
@@ -30,8 +25,7 @@ _SIMULATED: tuple[Option, ...] = (
     ),
     click.option(
         "--duration",
-        type=click.FloatRange(1, 86_400),
-        callback=_refuse_nan,
+        type=FiniteRange(1, 86_400),
         help="Seconds of tracking, then it lands (default: until Ctrl-C; demo: 60).",
     ),
     click.option("--seed", type=click.IntRange(0), help="Seed of all noise (default: the scenario's)."),

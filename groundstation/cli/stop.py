@@ -16,7 +16,7 @@ from groundstation.bus.messages import AckStage, Command, CommandAck, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.cli.exits import ExitCode, UnreachableError
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AckBook
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.runtime_file import RuntimeRecord
@@ -73,7 +73,7 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -
     record = choose_run(run)
     strangers = [name for name in drones if name not in record.drones]
     if strangers:
-        raise GroundStationError(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
+        raise OperatorMistake(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
     source = f"cli_{os.getpid()}"
     try:
         bus = open_bus(record.endpoint, record.site, source, timeout_s=_CONNECT_S)

@@ -110,7 +110,7 @@ def recover(path: Path, target: Path) -> tuple[int, list[str]]:
             raise RecordingError(
                 f"{path}: nothing can be recovered: {'; '.join(index.damage) or 'it holds no messages'}"
             )
-    return writer.written, index.damage
+    return writer.written, [*opened.preamble_damage, *index.damage]
 
 
 def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) -> int:

@@ -73,6 +73,12 @@ def test_a_duration_that_never_ends_is_refused(seconds: str, capsys: pytest.Capt
     assert "--duration" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--from=nan", "--from=inf", "--speed=nan"])
+def test_a_replay_begins_and_runs_at_numbers(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["replay", option]) == ExitCode.SETTINGS
+    assert option.partition("=")[0] in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", sorted(cli.VERBS))
 def test_each_verb_has_examples_in_its_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     module = cli.VERBS[name].target.partition(":")[0]
@@ -91,6 +97,8 @@ def test_each_verb_has_examples_in_its_help(name: str, capsys: pytest.CaptureFix
         (DriverError("a"), 4),
         (GroundStationError("a"), 4),
         (OSError("a"), 4),
+        (FileNotFoundError(2, "No such file or directory", "a"), 2),
+        (OSError(28, "No space left on device", "a"), 4),
         (KeyboardInterrupt(), 130),
         (click.Abort(), 130),
         (ZeroDivisionError(), 70),
@@ -105,6 +113,7 @@ def test_exit_codes(error: BaseException, code: int) -> None:
     [
         (DriverError("drone_1 does not answer"), "groundstation: drone_1 does not answer\n"),
         (SettingsError(["a:1: b", "a:2: c"]), "a:1: b\na:2: c\n2 problems: nothing was started\n"),
+        (PermissionError(13, "Permission denied", "/a/b"), "groundstation: /a/b: Permission denied\n"),
         (KeyboardInterrupt(), "\ninterrupted\n"),
     ],
 )

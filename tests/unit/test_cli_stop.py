@@ -116,7 +116,7 @@ def test_named_drone_only(team: FakeTeam) -> None:
     assert set(answers_of(cli("land", "drone_2", "--json"))) == {"drone_2"}
     assert all(command.scope == ("drone_2",) for command in team.heard)
     result = cli("land", "drone_9")
-    assert result.returncode == 4 and "there is no drone drone_9" in result.stderr
+    assert result.returncode == 2 and "there is no drone drone_9" in result.stderr
 
 
 def test_cutting_the_motors_asks(team: FakeTeam) -> None:

@@ -9,21 +9,20 @@ import argparse
 import ipaddress
 import json
 import os
-import select
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
 
 from groundstation.errors import GroundStationError
-from sim_bridge.cameras import Cameras, render_specs
+from sim_bridge.cameras import render_specs
 from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
-from sim_bridge.devices.ardrone_video import PORT, VideoMode
+from sim_bridge.devices.ardrone_video import PORT
 from sim_bridge.scenario import DroneScenario, Scenario, Standstill, TargetScenario
 from sim_bridge.site import Site
-from sim_bridge.truth import TruthBoard, remove_stale_boards
+from sim_bridge.stage import Stage
 from sim_bridge.world.world import TICK_NS, World
 
 _SPACING_M = 2.0
@@ -67,43 +66,29 @@ class Hangar:
         parked = TargetScenario(path=Standstill(position_m=(6.0, 0.0)))
         self._scenario = Scenario(drones=DroneScenario(firmware=firmware.name), target=parked)
         self.world = World(self._site, self._scenario, seed)
-        self.emulators: dict[str, ArDroneEmulator] = {}
-        self._poll = select.poll()
-        self._readers: dict[int, ArDroneEmulator] = {}
-        self._board: TruthBoard | None = None
-        self._cameras: Cameras | None = None
+        self._stage = Stage(self.world)
         try:
             for address, drone in self.world.ardrones.items():
                 onboard = self.world.onboard[address]
                 emulator = ArDroneEmulator(address, address, drone, onboard, firmware=firmware)
-                self.emulators[address] = emulator
-                self._readers[emulator.fileno()] = emulator
-                self._poll.register(emulator, select.POLLIN)
+                self._stage.add(address, emulator, emulator.fileno())
         except GroundStationError:
             self.close()
             raise
 
     def open_video(self, should_stop: Callable[[], bool]) -> None:
         """Serve the pictures of all drones; returns when every port listens. Raises GroundStationError."""
-        remove_stale_boards()
         name = f"{os.getpid()}-hangar"
-        self._board = TruthBoard.create(name, self.world.bodies)
-        streams = {address: (address, PORT) for address in self.emulators}
-        self._cameras = Cameras(render_specs(self._site, self._scenario, streams, name, self._seed))
-        self._cameras.wait_until_serving(should_stop)
+        self._stage.share_truth(name)
+        streams = {address: (address, PORT) for address in self._stage.emulators}
+        specs = render_specs(self._site, self._scenario, streams, name, self._seed)
+        self._stage.open_cameras(specs, should_stop)
 
     def tick(self, stamp_ns: int) -> None:
         """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
-        for descriptor, _ in self._poll.poll(0):
-            self._readers[descriptor].receive()
-        self.world.step()
-        for emulator in self.emulators.values():
-            emulator.send()
-        if self._board is not None:
-            self._board.write(stamp_ns, self.world.states())
-        if self._cameras is not None and self.world.ticks % _MODE_TICKS == 0:
-            for name, emulator in self.emulators.items():
-                self._cameras.set_mode(name, VideoMode.configured(emulator.control.configuration.integer))
+        self._stage.tick(stamp_ns)
+        if self.world.ticks % _MODE_TICKS == 0:
+            self._stage.tell_cameras()
 
     def truth(self) -> str:
         """Return where each drone really is [m, m/s, rad; world] and what it does, as a line of JSON."""
@@ -121,15 +106,7 @@ class Hangar:
 
     def close(self) -> None:
         """Stop the pictures and close all ports; idempotent."""
-        if self._cameras is not None:
-            self._cameras.stop()
-            self._cameras = None
-        for emulator in self.emulators.values():
-            emulator.close()
-        self.emulators.clear()
-        if self._board is not None:
-            self._board.close()
-            self._board = None
+        self._stage.close()
 
 
 def serve(hangar: Hangar, seconds: float, tell_truth: bool, should_stop: Callable[[], bool]) -> None:

@@ -2,23 +2,19 @@
 
 import gc
 import os
-import select
 import time
-from collections.abc import Callable
 
 from groundstation.bus.messages import Severity, SimCommand, SimStatus, TruthState
 from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
 from groundstation.process.child import Child
-from sim_bridge.cameras import Cameras, render_specs
+from sim_bridge.cameras import render_specs
 from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import FIRMWARES
-from sim_bridge.devices.ardrone_video import VideoMode
-from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.order import Order
-from sim_bridge.truth import TruthBoard, remove_stale_boards
+from sim_bridge.stage import Stage
 from sim_bridge.world.unicycle import Unicycle
 from sim_bridge.world.world import World
 
@@ -34,26 +30,21 @@ class Harness:
     def __init__(self, child: Child, order: Order) -> None:
         self._child, self._order = child, order
         self.world = World(order.site, order.scenario, order.seed)
-        self.emulators: dict[str, ArDroneEmulator | MavlinkEmulator] = {}
-        self._board: TruthBoard | None = None
-        self._cameras: Cameras | None = None
-        self._poll = select.poll()
-        self._readers: dict[int, Callable[[], None]] = {}
+        self._stage = Stage(self.world)
         self._clock = Clockwork(time.monotonic_ns())
         self._commands = [child.bus.subscribe([SIM_COMMAND], entity=name) for name in order.site.tracked]
 
     def open(self) -> None:
         """Take the ports, share the truth, start the cameras; returns when everything listens."""
         self._open_emulators()
-        self._faults = FaultSchedule(self._order.scenario.faults, self.world, self.emulators)
-        remove_stale_boards()
+        self._faults = FaultSchedule(self._order.scenario.faults, self.world, self._stage.emulators)
         name = f"{os.getpid()}-{self._order.site.site}"
-        self._board = TruthBoard.create(name, self.world.bodies)
+        self._stage.share_truth(name)
         order = self._order
         if order.streams:
             self._child.starting(f"{len(order.streams)} cameras")
-            self._cameras = Cameras(render_specs(order.site, order.scenario, order.streams, name, order.seed))
-            self._cameras.wait_until_serving(lambda: self._child.stop_requested)
+            specs = render_specs(order.site, order.scenario, order.streams, name, order.seed)
+            self._stage.open_cameras(specs, lambda: self._child.stop_requested)
 
     def run(self) -> None:
         """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""
@@ -75,20 +66,14 @@ class Harness:
 
     def tick(self, stamp_ns: int) -> None:
         """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
-        for descriptor, _ in self._poll.poll(0):
-            self._readers[descriptor]()
-        self.world.step()
-        for emulator in self.emulators.values():
-            emulator.send()
-        if self._board is not None:
-            self._board.write(stamp_ns, self.world.states())
+        self._stage.tick(stamp_ns)
         ticks = self.world.ticks
         if ticks % _TRUTH_TICKS == 0:
             self._publish_truth(stamp_ns)
         if ticks % _COMMAND_TICKS == 0:
             self._obey()
             self._break_things()
-            self._tell_cameras()
+            self._stage.tell_cameras()
             self._child.tick_status(self._clock.judged, self._clock.overruns)
         if ticks % _STATUS_TICKS == 0:
             self._publish_status()
@@ -96,35 +81,23 @@ class Harness:
 
     def close(self) -> None:
         """Stop the cameras, close the ports, remove the truth; idempotent."""
-        if self._cameras is not None:
-            self._cameras.stop()
-            self._cameras = None
-        for emulator in self.emulators.values():
-            emulator.close()
-        self.emulators.clear()
-        if self._board is not None:
-            self._board.close()
-            self._board = None
+        self._stage.close()
 
     def _open_emulators(self) -> None:
         order = self._order
         for name, copter in self.world.copters.items():
             vehicle = open_vehicle(name, order.site.drones[name], copter, order)
-            self.emulators[name] = vehicle
-            self._poll.register(vehicle.socket, select.POLLIN)
-            self._readers[vehicle.socket.fileno()] = vehicle.receive
+            self._stage.add(name, vehicle, vehicle.socket.fileno())
         for name, drone in self.world.ardrones.items():
             address = order.addresses[name]
             drones = order.scenario.drones
             firmware = FIRMWARES[drones.firmware_of(name)].without(drones.omit_options)
             emulator = ArDroneEmulator(name, address, drone, self.world.onboard[name], drones.navdata_hz, firmware)
-            self.emulators[name] = emulator
-            self._poll.register(emulator, select.POLLIN)
-            self._readers[emulator.fileno()] = emulator.receive
+            self._stage.add(name, emulator, emulator.fileno())
 
     @property
     def _inventory(self) -> str:
-        return f"{len(self.emulators)} drones, {len(self._order.streams)} cameras"
+        return f"{len(self._stage.emulators)} drones, {len(self._order.streams)} cameras"
 
     def _all_landed(self) -> bool:
         return not any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())
@@ -157,7 +130,8 @@ class Harness:
     def _judge(self) -> None:
         """Say once what spoils this run, and when it no longer does."""
         faults = [] if self._clock.keeps_time else ["more than 1 % of the ticks late by > 10 ms: this run is invalid"]
-        ended = self._cameras.ended() if self._cameras is not None else []
+        cameras = self._stage.cameras
+        ended = cameras.ended() if cameras is not None else []
         faults += [f"the render process of {name} ended" for name in ended]
         if faults:
             self._child.degrade("; ".join(faults))
@@ -169,13 +143,6 @@ class Harness:
             command, name = received.message, received.key.entity
             if isinstance(command, SimCommand) and not steer(self.world.targets[name], command):
                 self._child.event(Severity.WARNING, f"order {command.action!r} to {name} not understood")
-
-    def _tell_cameras(self) -> None:
-        """Hand what the drones' configurations say of their video to the processes that render it."""
-        for name in self._cameras.configurable if self._cameras is not None else ():
-            emulator = self.emulators[name]
-            if self._cameras is not None and isinstance(emulator, ArDroneEmulator):
-                self._cameras.set_mode(name, VideoMode.configured(emulator.control.configuration.integer))
 
     def _break_things(self) -> None:
         for line in self._faults.apply(self.world.time_s):

@@ -1,0 +1,71 @@
+"""What every loop of emulated devices turns: world, devices at their sockets, shared truth, pictures."""
+
+import select
+from collections.abc import Callable, Iterable
+
+from sim_bridge.cameras import Cameras
+from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.devices.ardrone_video import VideoMode
+from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.render.spec import RenderSpec
+from sim_bridge.truth import TruthBoard, remove_stale_boards
+from sim_bridge.world.world import World
+
+
+class Stage:
+    """A world and its devices; `close` releases everything, in any state."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.emulators: dict[str, ArDroneEmulator | MavlinkEmulator] = {}
+        self.cameras: Cameras | None = None
+        self._board: TruthBoard | None = None
+        self._poll = select.poll()
+        self._readers: dict[int, Callable[[], None]] = {}
+
+    def add(self, name: str, emulator: ArDroneEmulator | MavlinkEmulator, descriptor: int) -> None:
+        """Take a device in, and read from it whenever its descriptor has something."""
+        self.emulators[name] = emulator
+        self._poll.register(descriptor, select.POLLIN)
+        self._readers[descriptor] = emulator.receive
+
+    def share_truth(self, name: str) -> None:
+        """Let render processes read the states of all bodies under that name."""
+        remove_stale_boards()
+        self._board = TruthBoard.create(name, self.world.bodies)
+
+    def open_cameras(self, specs: Iterable[RenderSpec], should_stop: Callable[[], bool]) -> None:
+        """Start the render processes; returns when every stream is served. Raises GroundStationError."""
+        self.cameras = Cameras(specs)
+        self.cameras.wait_until_serving(should_stop)
+
+    def tick(self, stamp_ns: int) -> None:
+        """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
+        for descriptor, _ in self._poll.poll(0):
+            self._readers[descriptor]()
+        self.world.step()
+        for emulator in self.emulators.values():
+            emulator.send()
+        if self._board is not None:
+            self._board.write(stamp_ns, self.world.states())
+
+    def tell_cameras(self) -> None:
+        """Hand what the drones' configurations say of their video to the processes that render it."""
+        if self.cameras is None:
+            return
+        for name in self.cameras.configurable:
+            emulator = self.emulators[name]
+            if isinstance(emulator, ArDroneEmulator):
+                self.cameras.set_mode(name, VideoMode.configured(emulator.control.configuration.integer))
+
+    def close(self) -> None:
+        """Stop the cameras, close the ports, remove the truth; idempotent."""
+        if self.cameras is not None:
+            self.cameras.stop()
+            self.cameras = None
+        for emulator in self.emulators.values():
+            emulator.close()
+        self.emulators.clear()
+        if self._board is not None:
+            self._board.close()
+            self._board = None

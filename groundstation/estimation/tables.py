@@ -21,6 +21,8 @@ _KINDS = {
     EntityKind.LANDMARK: s.KIND_LANDMARK,
 }
 _NEVER_S = -1e9
+# Numbers in one line of the cache. Rows of P that begin on a line spare a quarter of a correction's time.
+_LINE = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,11 @@ class Tables:
     def dim(self) -> int:
         """Return the dimension of the state."""
         return int(self.entities[0, :, s.ENTITY_SIZE].sum())
+
+    @property
+    def width(self) -> int:
+        """Return the length of the arrays that hold the state: `dim` and entries that stay zero, in whole lines."""
+        return -(-self.dim // _LINE) * _LINE
 
     def part(self, entity: int) -> slice:
         """Return where an entity's block stands in the state."""
@@ -116,7 +123,8 @@ def _transition(models: tuple[MotionModel, ...], step_s: float) -> Array:
 class State:
     """Mean and covariance per mode, the modes' probabilities, and what is remembered of entities and pairs.
 
-    With a leading ring axis in checkpoints. Entities with a prior are in it from the start.
+    Means and covariances are `Tables.width` wide. With a leading ring axis in checkpoints.
+    Entities with a prior are in it from the start.
     """
 
     means: Array
@@ -132,10 +140,10 @@ class State:
 
 def empty_state(tables: Tables, admitted: Array, leading: tuple[int, ...] = ()) -> State:
     """Return the state before anything was measured; admitted (entities): who may join."""
-    modes, n, entities, sensors = tables.modes, tables.dim, len(admitted), len(tables.sensors)
+    modes, n, entities, sensors = tables.modes, tables.width, len(admitted), len(tables.sensors)
     state = State(
-        np.zeros((*leading, modes, n)),
-        np.zeros((*leading, modes, n, n)),
+        _zeros_on_a_line((*leading, modes, n)),
+        _zeros_on_a_line((*leading, modes, n, n)),
         np.full((*leading, modes), 1.0 / modes),
         np.zeros((*leading, entities, s.AUXILIARY_COLUMNS)),
         np.full((*leading, sensors, entities), _NEVER_S),
@@ -148,3 +156,10 @@ def empty_state(tables: Tables, admitted: Array, leading: tuple[int, ...] = ()) 
         state.covariances[..., part, part] = np.diag(tables.priors[index, 1, :size])
         state.aux[..., index, s.ACTIVE] = 1.0
     return state
+
+
+def _zeros_on_a_line(shape: tuple[int, ...]) -> Array:
+    size = math.prod(shape)
+    room: Array = np.zeros(size + _LINE)
+    first = -room.ctypes.data // room.itemsize % _LINE
+    return room[first : first + size].reshape(shape)

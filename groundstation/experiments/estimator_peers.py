@@ -52,13 +52,14 @@ class Ours:
     @property
     def mean(self) -> Array:
         """Return the mean (n)."""
-        mean: Array = self._state.means[0]
+        mean: Array = self._state.means[0, : self._tables.dim]
         return mean
 
     @property
     def covariance(self) -> Array:
         """Return the covariance (n, n)."""
-        covariance: Array = self._state.covariances[0]
+        n = self._tables.dim
+        covariance: Array = self._state.covariances[0, :n, :n]
         return covariance
 
     def predict(self, dt: float, times: int) -> None:
@@ -151,7 +152,8 @@ class DenseNumpy:
     """The textbook in numpy with H restricted to the columns of an edge's two blocks, one edge after the other."""
 
     def __init__(self, team: Team, state: State) -> None:
-        self.model, self.mean, self.covariance = TeamModel(team), state.means[0].copy(), state.covariances[0].copy()
+        self.model, n = TeamModel(team), team.tables.dim
+        self.mean, self.covariance = state.means[0, :n].copy(), state.covariances[0, :n, :n].copy()
 
     def predict(self, dt: float, times: int) -> None:
         """Predict the whole team, several times over."""
@@ -196,8 +198,9 @@ class Filterpy:
                 self.x = u
 
         self.model = TeamModel(team)
-        self.filter = Moved(self.model.dim, 4)
-        self.filter.x, self.filter.P = state.means[0].copy(), state.covariances[0].copy()
+        n = self.model.dim
+        self.filter = Moved(n, 4)
+        self.filter.x, self.filter.P = state.means[0, :n].copy(), state.covariances[0, :n, :n].copy()
 
     @property
     def mean(self) -> Array:

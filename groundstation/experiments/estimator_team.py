@@ -131,8 +131,8 @@ def joined_state(team: Team, rng: np.random.Generator) -> State:
         part = tables.part(i)
         deviations[part.start + 4 : part.stop] = np.sqrt(tables.priors[i, 1, 4 : part.stop - part.start])
     P = deviations[:, None] * (0.5 * root @ root.T + 0.5 * np.eye(n)) * deviations
-    state.covariances[0] = 0.5 * (P + P.T)
-    state.means[0] = team.truth
+    state.covariances[0, :n, :n] = 0.5 * (P + P.T)
+    state.means[0, :n] = team.truth
     state.aux[:, s.ACTIVE] = 1.0
     for name in team.robots:
         state.aux[team.index(name), [s.HELD_VX, s.HELD_VY, s.YAW_RATE]] = SPEED_M_S, -0.5 * SPEED_M_S, TURN_RAD_S

@@ -1,5 +1,7 @@
 """Events in order of measurement time, in rows that the compiled filter reads."""
 
+import math
+import struct
 from bisect import bisect_left, insort
 
 import numpy as np
@@ -23,6 +25,7 @@ _VERDICTS = {
     s.OBSERVER_DOUBTED: (Verdict.IMPLAUSIBLE, "far beyond the gate, as is its observer itself"),
     s.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot tell where its subject is"),
 }
+_ROW, _REST = struct.Struct(f"{s.EVENT_COLUMNS}d"), (0.0,) * s.EVENT_COLUMNS
 _IDENTITY = tuple(np.eye(4).ravel().tolist())
 
 
@@ -40,8 +43,7 @@ class EventLog:
         if not self._free:
             self._grow()
         row = self._free.pop()
-        self.events[row] = 0.0
-        self.events[row, : len(columns)] = columns
+        _ROW.pack_into(self.events.data, row * _ROW.size, *columns, *_REST[len(columns) :])
         self.outcomes[row] = 0.0
         insort(self._order, (stamp_ns, tie, row))
         return row
@@ -64,7 +66,7 @@ class EventLog:
 
     def correction(self, row: int, observer: str, subject: str, latency_ms: float) -> Correction:
         """Return the outcome of an observation as a value."""
-        out = self.outcomes[row]
+        out = self.outcomes[row].tolist()
         verdict, reason = _VERDICTS[int(out[s.OUT_VERDICT])]
         size = int(out[s.OUT_SIZE])
         joined = bool(out[s.OUT_JOINED])
@@ -74,10 +76,10 @@ class EventLog:
             reason = (reason + "; " if reason else "") + "the other pose hypothesis is more likely"
         if size == 0:
             return Correction(observer, subject, verdict, reason, latency_ms=latency_ms, joined=joined)
-        residual = tuple(out[s.OUT_RESIDUAL : s.OUT_RESIDUAL + size].tolist())
-        covariance = tuple(out[s.OUT_COVARIANCE : s.OUT_COVARIANCE + size * size].tolist())
-        nis = float(out[s.OUT_NIS])
-        if not (np.isfinite(nis) and nis >= 0.0):
+        residual = tuple(out[s.OUT_RESIDUAL : s.OUT_RESIDUAL + size])
+        covariance = tuple(out[s.OUT_COVARIANCE : s.OUT_COVARIANCE + size * size])
+        nis = out[s.OUT_NIS]
+        if not 0.0 <= nis < math.inf:
             return Correction(observer, subject, verdict, reason, latency_ms=latency_ms)
         return Correction(observer, subject, verdict, reason, residual, covariance, nis, latency_ms, joined)
 

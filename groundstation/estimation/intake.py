@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Container
+from operator import itemgetter
 
 from groundstation.bus.messages import (
     ClockOffset,
@@ -30,6 +31,11 @@ _REMEMBERED, _REMEMBERED_AT_MOST = 512, 8192
 # A sensor that still measures does not repeat itself so often for so long [s].
 _FROZEN_ODOMETRY, _FROZEN_SIGHT = (10, 0.5), (4, 0.3)
 _SYMMETRY = 1e-6  # of covariances, beside the deviations of their rows
+# What takes the triangles out of row-major values, by rows: most covariances are symmetric to the bit.
+_TRIANGLES = {
+    3: (itemgetter(1, 2, 5), itemgetter(3, 6, 7)),
+    4: (itemgetter(1, 2, 3, 6, 7, 11), itemgetter(4, 8, 12, 9, 13, 14)),
+}
 
 REASONS = {
     Verdict.LATE: "older than the rewind reaches",
@@ -171,7 +177,8 @@ def _is_covariance(values: tuple[float, ...], rows: int) -> bool:
     variances = values[:: rows + 1]
     if min(variances) <= 0.0:
         return False
-    return all(
+    upper, lower = _TRIANGLES[rows]
+    return upper(values) == lower(values) or all(
         abs(values[i * rows + j] - values[j * rows + i])
         <= _SYMMETRY * math.sqrt(variances[i]) * math.sqrt(variances[j])
         for i in range(rows)
@@ -180,4 +187,7 @@ def _is_covariance(values: tuple[float, ...], rows: int) -> bool:
 
 
 def _plausible(*values: float) -> bool:
-    return all(abs(value) < _ABSURD for value in values)  # nan compares false
+    for value in values:  # noqa: SIM110 - a third of the time of a generator, ten thousand times a second
+        if not -_ABSURD < value < _ABSURD:  # nan compares false
+            return False
+    return True

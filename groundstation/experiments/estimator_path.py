@@ -33,11 +33,11 @@ _START_NS = 10**12
 _CLOCK, _SITE = "bench", "lab"
 _ODOMETRY_LATE_MS, _DETECTION_LATE_MS = 2, 4  # in order: what a wire and a decoder take
 
-Arrival = tuple[int, keys.Key, bytes]
+Arrival = tuple[int, keys.Key, str, bytes]
 
 
 def flight(team: Team, duration_ms: int, late_ms: int, heights: bool, rng: np.random.Generator) -> list[Arrival]:
-    """Return what arrives in a flight as (time, key, payload), in order; cameras expose at times of their own.
+    """Return what arrives in a flight as (time, key, its text, payload), in order; cameras have phases of their own.
 
     late_ms: of the observations, odometry is in time; heights: whether odometry carries one.
     """
@@ -60,7 +60,7 @@ def flight(team: Team, duration_ms: int, late_ms: int, heights: bool, rng: np.ra
 
 def _packed(stamp_ns: int, topic: Topic, message: Message, late_ms: int) -> Arrival:
     key = keys.Key(_SITE, message.header.entity, topic, message.header.source)
-    return stamp_ns + late_ms * MS, key, codec.encode(message)
+    return stamp_ns + late_ms * MS, key, str(key), codec.encode(message)
 
 
 def _header(name: str, stamp_ns: int, seq: int) -> Header:
@@ -129,8 +129,8 @@ class Path:
     def tick(self, arrived: list[Arrival], now_ns: int) -> None:
         """Take what has arrived, advance, and say what became of each observation."""
         self._bus.payloads = []
-        for _, key, payload in arrived:
-            self._intake.take(str(key), codec.decode(key, payload), now_ns)
+        for _, key, text, payload in arrived:
+            self._intake.take(text, codec.decode(key, payload), now_ns)
         self.filter.advance(now_ns)
         self._announcer.innovations(self.filter.take_corrections(), now_ns)
 

@@ -42,12 +42,12 @@ def test_a_batch_of_one_edge_is_a_correction_like_any_other():
 def test_the_path_explains_every_observation(late_ms):
     team = team_of(minimal_parameters(4))
     arrivals = estimator_path.flight(team, 200, late_ms, True, np.random.default_rng(1))
-    assert [at for at, _, _ in arrivals] == sorted(at for at, _, _ in arrivals)
+    assert [at for at, *_ in arrivals] == sorted(at for at, *_ in arrivals)
     path, seen = estimator_path.Path(team), []
     for now_ns, arrived in estimator_path.ticks(arrivals):
         path.tick(arrived, now_ns)
         seen += path.innovations
-    observations = sum(key.topic.name == "observation" for _, key, _ in arrivals)
+    observations = sum(key.topic.name == "observation" for _, key, _, _ in arrivals)
     assert len(seen) == observations
     observer = json.loads(seen[-1])["observer"]
     last = codec.decode(keys.Key("lab", observer, INNOVATION, "tracker"), seen[-1])
@@ -65,6 +65,18 @@ def test_the_command_reports_rows_and_agreement():
     assert [row["delay_ms"] for row in found["path"]] == [0, 120] * 3
     assert all(row["joined"] == row["entities"] for row in found["path"])
     assert found["targets"] == {}, "only 30 robots are judged"
+
+
+def test_the_path_of_blocks_as_flown_is_judged_on_its_own():
+    kernels = [{"robots": 30, "blocks": "minimal", "method": "ours", "predict_us": 1.0, "correct_us": 1.0}]
+    about = {"robots": 30, "heights": False, "to_in_order": 1.0, "delay_ms": 0, "us_per_observation": 59.0}
+    late, flown = {"delay_ms": 120}, {"blocks": "product"}
+    heights = {"heights": True, "us_per_observation": 61.0}
+    paths = [about | {"blocks": "minimal"}, about | {"blocks": "minimal"} | late, about | flown, about | flown | late]
+    paths += [about | flown | heights, about | flown | heights | late]
+    found = estimator_bench.targets({"kernels": kernels, "path": paths})
+    met = {name: target["met"] for name, target in found.items() if name.startswith("path")}
+    assert met == {"path_us_per_observation": True, "path_as_flown_us": True, "path_as_flown_heights_us": False}
 
 
 def test_without_filterpy_the_rest_is_timed_and_the_remedy_named(monkeypatch):

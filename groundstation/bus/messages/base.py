@@ -4,6 +4,7 @@ import math
 from typing import Annotated, Any
 
 import msgspec
+from msgspec.structs import astuple
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -14,23 +15,33 @@ _WHOLE_LIMIT = 2**63
 Whole = Annotated[int, msgspec.Meta(ge=-_WHOLE_LIMIT, le=_WHOLE_LIMIT - 1)]
 
 
+_ALWAYS = frozenset((str, bool, type(None)))  # types of values that cannot be out of range
+
+
 def _is_finite(value: Any) -> bool:
+    kind = type(value)
+    if kind is tuple and set(map(type, value)) == {float}:
+        # Vectors and matrices are most of what is checked: no sum of them is finite if one of them is not.
+        return math.isfinite(sum(value)) or all(map(math.isfinite, value))
+    if kind is Header:
+        return _is_whole(value.stamp_ns) and _is_whole(value.seq)
     if isinstance(value, float):
         return math.isfinite(value)
     if isinstance(value, int):
-        return -_WHOLE_LIMIT <= value < _WHOLE_LIMIT
+        return _is_whole(value)
     if isinstance(value, str):
         return True
     if isinstance(value, tuple):
-        # Vectors and matrices are most of what is checked: without a call for each entry.
-        if set(map(type, value)) == {float}:
-            return all(map(math.isfinite, value))
         return all(map(_is_finite, value))
     if isinstance(value, msgspec.Struct):
         return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
     if isinstance(value, dict):
         return all(map(_is_finite, value.values()))
     return True
+
+
+def _is_whole(value: int) -> bool:
+    return -_WHOLE_LIMIT <= value < _WHOLE_LIMIT
 
 
 class Header(msgspec.Struct, frozen=True, gc=False):
@@ -53,9 +64,11 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     header: Header
 
     def __post_init__(self) -> None:
-        for name in self.__struct_fields__:
-            if not _is_finite(getattr(self, name)):
-                raise ValueError(f"{name} is not finite")
+        for value in astuple(self):
+            if type(value) in _ALWAYS or _is_finite(value):
+                continue
+            name = next(name for name in self.__struct_fields__ if not _is_finite(getattr(self, name)))
+            raise ValueError(f"{name} is not finite")
 
 
 def require_square(name: str, covariance: tuple[float, ...], sizes: tuple[int, ...]) -> None:

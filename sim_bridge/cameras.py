@@ -132,6 +132,8 @@ def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
 
 
 def _render(spec: RenderSpec, modes: Connection | None) -> None:
+    # Linux shares the processor out by session first (autogroup): drawing must not use up what the bridge's loop gets.
+    os.setsid()
     from sim_bridge.render.process import run
 
     raise SystemExit(run(spec, modes))

@@ -5,7 +5,7 @@ import multiprocessing
 import os
 import socket
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, MutableSequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -131,12 +131,12 @@ def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
     return CameraScenario(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages)
 
 
-def _render(spec: RenderSpec, modes: Connection | None) -> None:
+def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:
     # Linux shares the processor out by session first (autogroup): drawing must not use up what the bridge's loop gets.
     os.setsid()
     from sim_bridge.render.process import run
 
-    raise SystemExit(run(spec, modes))
+    raise SystemExit(run(spec, modes, tally))
 
 
 class Cameras:
@@ -148,12 +148,17 @@ class Cameras:
         self._specs = tuple(specs)
         self._processes: dict[str, SpawnProcess] = {}
         self._modes: dict[str, tuple[Connection, VideoMode]] = {}
+        self._tallies: list[MutableSequence[int]] = []
         for spec in self._specs:
             told: Connection | None = None
+            tally = context.RawArray("q", 2)
+            self._tallies.append(tally)
             if spec.kind is StreamKind.ARDRONE:
                 told, teller = context.Pipe(duplex=False)
                 self._modes[spec.camera] = teller, VideoMode()
-            process = context.Process(target=_render, args=(spec, told), name=f"render-{spec.camera}", daemon=True)
+            process = context.Process(
+                target=_render, args=(spec, told, tally), name=f"render-{spec.camera}", daemon=True
+            )
             process.start()
             self._processes[spec.camera] = process
             if told is not None:
@@ -182,6 +187,11 @@ class Cameras:
             self._modes[drone] = teller, mode
             with suppress(OSError):  # a process that has ended is reported by `ended`
                 teller.send(tuple(mode))
+
+    @property
+    def pictures(self) -> tuple[int, int]:
+        """Return how many pictures were drawn, and how many of them were not ready when they should have arrived."""
+        return sum(tally[0] for tally in self._tallies), sum(tally[1] for tally in self._tallies)
 
     def ended(self) -> list[str]:
         """Return the cameras whose process is gone."""

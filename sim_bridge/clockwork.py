@@ -18,8 +18,9 @@ class Clockwork:
     def __init__(self, now_ns: int) -> None:
         self.deadline_ns = now_ns
         self.ticks = 0
-        self.judged = 0
-        self.overruns = 0
+        self.judged = self.overruns = 0
+        self.pictures = self.late_pictures = 0
+        self._drawn = (0, 0)
 
     def next_deadline(self) -> int:
         """Return when the next tick is due [ns]."""
@@ -35,7 +36,19 @@ class Clockwork:
         if late_ns > _GIVE_UP_NS:
             self.deadline_ns = now_ns
 
+    def count_pictures(self, drawn: int, late: int, matters: bool = True) -> None:
+        """Take how many pictures there were so far in all, and how many of them came late."""
+        if matters:
+            self.pictures += drawn - self._drawn[0]
+            self.late_pictures += late - self._drawn[1]
+        self._drawn = (drawn, late)
+
     @property
-    def keeps_time(self) -> bool:
-        """Whether at most 1 % of the judged ticks were late: otherwise the run is invalid."""
-        return self.overruns <= max(1.0, TOLERATED_SHARE * self.judged)
+    def faults(self) -> list[str]:
+        """Return why the run is invalid: more than 1 % of the judged ticks, or of the pictures, were late."""
+        found = []
+        if self.overruns > max(1.0, TOLERATED_SHARE * self.judged):
+            found.append("more than 1 % of the ticks late by > 10 ms: this run is invalid")
+        if self.late_pictures > max(1.0, TOLERATED_SHARE * self.pictures):
+            found.append("more than 1 % of the pictures drawn too late: this run is invalid")
+        return found

@@ -74,6 +74,8 @@ class Harness:
             self._obey()
             self._break_things()
             self._stage.tell_cameras()
+            if self._stage.cameras is not None:
+                self._clock.count_pictures(*self._stage.cameras.pictures, matters=not self._all_landed())
             self._child.tick_status(self._clock.judged, self._clock.overruns)
         if ticks % _STATUS_TICKS == 0:
             self._publish_status()
@@ -123,13 +125,15 @@ class Harness:
             header=bus.header(self._child.name),
             ticks=clock.judged,
             overruns=clock.overruns,
+            pictures=clock.pictures,
+            late_pictures=clock.late_pictures,
             airborne=self.world.airborne,
         )
         bus.publish(SIM_STATUS, status)
 
     def _judge(self) -> None:
         """Say once what spoils this run, and when it no longer does."""
-        faults = [] if self._clock.keeps_time else ["more than 1 % of the ticks late by > 10 ms: this run is invalid"]
+        faults = self._clock.faults
         cameras = self._stage.cameras
         ended = cameras.ended() if cameras is not None else []
         faults += [f"the render process of {name} ended" for name in ended]

@@ -88,7 +88,8 @@ class _Rows:
                 counters = (message.pid, message.ticks, message.overruns, message.overflowed)
                 self._processes[message.header.entity].append((time_s, message.cpu, *map(float, counters)))
             case m.SimStatus():
-                self._sim.append((time_s, 0.0, float(message.ticks), float(message.overruns)))
+                counts = (message.ticks, message.overruns, message.pictures, message.late_pictures)
+                self._sim.append((time_s, *map(float, counts)))
             case m.Command():
                 data.commands.append(Timed(time_s, message))
             case m.CommandAck():

@@ -57,11 +57,11 @@ def overflowed(data: RunData) -> dict[str, int]:
 
 
 def sim_overrun_percent(data: RunData) -> float | None:
-    """Return late ticks of the simulator in percent; None where there was none."""
+    """Return late ticks of the simulator in percent, or late pictures if that is more; None where there was none."""
     if data.sim_counters is None:
         return None
-    ticks, overruns = data.sim_counters[-1, 1:]
-    return float(100.0 * overruns / max(ticks, 1.0))
+    ticks, overruns, pictures, late = data.sim_counters[-1]
+    return float(100.0 * max(overruns / max(ticks, 1.0), late / max(pictures, 1.0)))
 
 
 def planner_ms(data: RunData) -> tuple[float, float] | None:

@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import MutableSequence
 from multiprocessing.connection import Connection
 from types import FrameType
 
@@ -24,10 +25,10 @@ _IDLE_S = 0.05
 _REPEATED_AFTER_MS = 200.0
 
 
-def run(spec: RenderSpec, modes: Connection | None = None) -> int:
+def run(spec: RenderSpec, modes: Connection | None = None, tally: MutableSequence[int] | None = None) -> int:
     """Render and serve until SIGTERM or until the parent has gone; returns the exit code.
 
-    modes: what an AR.Drone's configuration says of its video, as it changes.
+    modes: what an AR.Drone's configuration says of its video, as it changes; tally: see _Exposures.
     """
     stop = threading.Event()
     _obey_signals(stop)
@@ -35,7 +36,7 @@ def run(spec: RenderSpec, modes: Connection | None = None) -> int:
     truth = TruthBoard.attach(spec.truth_name, spec.bodies)
     output = open_output(spec, modes)
     try:
-        _Exposures(spec, truth, output).run(stop)
+        _Exposures(spec, truth, output, [0, 0] if tally is None else tally).run(stop)
     finally:
         output.close()
         truth.close()
@@ -81,10 +82,13 @@ def active_outage(outages: tuple[Outage, ...], seconds: float) -> OutageKind | N
 
 
 class _Exposures:
-    """The camera's loop: exposures on an absolute schedule."""
+    """The camera's loop: exposures on an absolute schedule.
 
-    def __init__(self, spec: RenderSpec, truth: TruthBoard, output: Output) -> None:
-        self._spec, self._truth, self._output = spec, truth, output
+    tally: counts the pictures, and those among them that were not ready when they should have arrived.
+    """
+
+    def __init__(self, spec: RenderSpec, truth: TruthBoard, output: Output, tally: MutableSequence[int]) -> None:
+        self._spec, self._truth, self._output, self._tally = spec, truth, output, tally
         self._link = Link(spec)
         self._first_ns = 0
         self._last_ns = 0
@@ -118,3 +122,5 @@ class _Exposures:
         if release_ns is None or outage is not None or not self._output.clients:
             return
         self._output.show(states, exposure_ns, release_ns)
+        self._tally[1] += time.monotonic_ns() > release_ns
+        self._tally[0] += 1

@@ -152,3 +152,8 @@ def test_ellipse_holds_95_percent() -> None:
     samples = np.random.default_rng(1).normal(size=(20000, 2)) * [1.0, 2.0]
     inside = (samples[:, 1] / major) ** 2 + (samples[:, 0] / minor) ** 2 <= 1
     assert np.mean(inside) == pytest.approx(0.95, abs=0.006)
+
+
+@pytest.mark.parametrize(("counters", "percent"), [([1000, 5, 0, 0], 0.5), ([1000, 5, 200, 4], 2.0)])
+def test_a_simulator_is_as_late_as_the_worse_of_its_ticks_and_pictures(counters: list[int], percent: float) -> None:
+    assert load.sim_overrun_percent(_data(sim_counters=np.array([counters], dtype=float))) == pytest.approx(percent)

@@ -22,8 +22,13 @@ class SimCommand(Message, frozen=True, kw_only=True):
 
 
 class SimStatus(Message, frozen=True, kw_only=True):
-    """How well the simulator keeps real time: ticks since something flew, late ones among them, and who is airborne."""
+    """How well the simulator keeps real time: ticks since something flew, late ones among them, and who is airborne.
+
+    pictures: of all emulated cameras, since something flew; late_pictures: not ready when they should have arrived.
+    """
 
     ticks: int
     overruns: int
+    pictures: int = 0
+    late_pictures: int = 0
     airborne: tuple[str, ...] = ()

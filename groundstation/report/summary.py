@@ -26,13 +26,14 @@ def summary(report: Report) -> RenderableType:
 def comparison(first: Report, second: Report) -> RenderableType:
     """Return the figures of two runs beside each other, for rich to print."""
     table = Table(box=None, pad_edge=True, header_style="dim")
-    for title in ("figure", first.run_dir.name, second.run_dir.name, "change"):
-        table.add_column(title, justify="left" if title == "figure" else "right")
+    table.add_column("figure", no_wrap=True)
+    for title in ("first", "second", "change"):
+        table.add_column(title, justify="right")
     for row in differences(first, second):
         table.add_row(
             row.figure, *(_text(value) if value is not None else "–" for value in (row.first, row.second, row.change))
         )
-    return table
+    return Group(Text(f" first: {first.run_dir.name}, second: {second.run_dir.name}", style="dim"), table)
 
 
 def _verdict(report: Report) -> Text:

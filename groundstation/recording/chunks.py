@@ -1,5 +1,6 @@
 """The records inside an MCAP file of ours: framing, chunks and messages, each taken as far as it is sound."""
 
+import os
 import struct
 import zlib
 from collections import Counter
@@ -26,6 +27,10 @@ _MESSAGE = struct.Struct("<HIQQ")
 # Nothing we write is longer; a longer length field is damage, not a reason to reserve the memory.
 _MAX_RECORD_BYTES = 1 << 30
 _MAX_CHUNK_BYTES = 1 << 28
+# WIRE (MCAP specification): a chunk's record from its opcode to the length of its records, compressed as ours are.
+_CHUNK = struct.Struct("<BQQQQII4sQ")
+_MARK, _MARK_AT = struct.pack("<I4s", 4, b"zstd"), struct.calcsize("<BQQQQI")
+_BLOCK_BYTES = 1 << 20
 # What a damaged body of a record makes its parser raise.
 UNREADABLE = (ValueError, EOFError, struct.error, zstandard.ZstdError, McapError)
 
@@ -50,19 +55,61 @@ class RawRecord:
 
 
 def frames(stream: IO[bytes], damage: list[str]) -> Iterator[tuple[int, bytes]]:
-    """Yield whole records as (opcode, body) until the footer, or until the file ends early."""
+    """Yield whole records as (opcode, body) until the footer, or until the file ends early.
+
+    Behind a record that cannot be one it goes on with the next whole chunk.
+    """
     stream.seek(len(MCAP0_MAGIC))
     while True:
         at = stream.tell()
         head = stream.read(RECORD.size)
         opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, _MAX_RECORD_BYTES + 1)
         body = stream.read(length) if length <= _MAX_RECORD_BYTES else b""
-        if len(body) < length:
-            damage.append(f"cut off at byte {at}" if at or head else "empty")
-            return
+        if len(body) < length or not is_record(opcode):
+            if not skip_damage(stream, at, damage):
+                return
+            continue
         yield opcode, body
         if opcode == Opcode.FOOTER:
             return
+
+
+def is_record(opcode: int) -> bool:
+    """Return whether an opcode stands for a record that a file of ours may hold."""
+    return Opcode.HEADER <= opcode <= Opcode.DATA_END
+
+
+def skip_damage(stream: IO[bytes], at: int, damage: list[str]) -> bool:
+    """Go to the next whole chunk behind a record that cannot be one, and say what is lost; False: nothing follows."""
+    found = _next_chunk(stream, at + 1)
+    damage.append(f"cut off at byte {at}" if found is None else f"unreadable from byte {at} to {found}")
+    if found is not None:
+        stream.seek(found)
+    return found is not None
+
+
+def _next_chunk(stream: IO[bytes], after: int) -> int | None:
+    size = stream.seek(0, os.SEEK_END)
+    for start in range(after, size, _BLOCK_BYTES):
+        stream.seek(start)
+        block = stream.read(_BLOCK_BYTES + len(_MARK) - 1)
+        found = block.find(_MARK)
+        while found >= 0:
+            begin = start + found - _MARK_AT
+            if begin >= after and _is_chunk(stream, begin, size):
+                return begin
+            found = block.find(_MARK, found + 1)
+    return None
+
+
+def _is_chunk(stream: IO[bytes], begin: int, size: int) -> bool:
+    stream.seek(begin)
+    head = stream.read(_CHUNK.size)
+    if len(head) < _CHUNK.size:
+        return False
+    opcode, length, *_, records = _CHUNK.unpack(head)
+    body = _CHUNK.size - RECORD.size + records
+    return bool(opcode == Opcode.CHUNK and length == body and begin + RECORD.size + length <= size)
 
 
 def chunk_data(body: bytes, damage: list[str]) -> bytes:

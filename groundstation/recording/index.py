@@ -24,6 +24,8 @@ from groundstation.recording.chunks import (
     count_messages,
     declarations,
     every_topic,
+    is_record,
+    skip_damage,
 )
 
 # WIRE (MCAP specification, records Chunk and Message Index): the fixed fields at their head.
@@ -77,9 +79,11 @@ class FileIndex:
             stream.seek(at)
             head = stream.read(RECORD.size)
             opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, size)
-            if at + RECORD.size + length > size:
-                self.damage.append(f"cut off at byte {at}")
-                return
+            if at + RECORD.size + length > size or not is_record(opcode):
+                if not skip_damage(stream, at, self.damage):
+                    return
+                at = stream.tell()
+                continue
             if opcode == Opcode.CHUNK and length >= _CHUNK_HEAD.size:
                 self.chunks.append(Chunk(at, length, *_CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))))
             elif opcode == Opcode.MESSAGE_INDEX and self.chunks and length >= _INDEX_HEAD.size:

@@ -98,6 +98,22 @@ def test_what_a_longer_file_holds_a_shorter_one_does_not_exceed(whole: bytes, fo
     assert counts == sorted(counts) and counts[-1] > 1000
 
 
+def test_a_flipped_length_costs_its_chunk_and_not_the_flight(whole: bytes, folder: Path) -> None:
+    path = folder / "state.mcap"
+    path.write_bytes(whole)
+    run = open_run(path)
+    total, chunks = sum(run.counts().values()), run.indexes[0].chunks
+    assert len(chunks) > 4
+    lost = chunks[2]
+    for bit in (3, 61):  # a little too long, and longer than any disk
+        data = bytearray(whole)
+        data[lost.offset + 1 + bit // 8] ^= 1 << bit % 8
+        path.write_bytes(data)
+        assert sum(open_run(path).counts().values()) >= total - 2 * sum(lost.counts.values())
+        assert _read_everything(path) > total / 2
+    assert any(f"unreadable from byte {lost.offset} to " in text for text in open_run(path).damage)
+
+
 def test_a_length_that_promises_too_much_is_damage_not_memory(whole: bytes, folder: Path) -> None:
     path = folder / "state.mcap"
     path.write_bytes(whole[: len(whole) // 2] + struct.pack("<BQ", 6, 1 << 62) + whole[len(whole) // 2 :])

@@ -14,28 +14,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.bus.messages import Message, Odometry, RelativeObservation
-from groundstation.calibration.flown import Change, Flown, Surprise
+from groundstation.calibration.flown import Change as Dating
+from groundstation.calibration.flown import Flown, Surprise
+from groundstation.calibration.shift import Part, across, briefly, interpolated, rate_hz, shift_between
+from groundstation.estimation.models import OdometryRobot
+from groundstation.estimation.parameters import parameters_from_field
 from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
 
 Array = NDArray[np.float64]
 M = TypeVar("M", bound=Message)
 
-# Differences over so long are compared: what drifts more slowly does not count.
-_WINDOW_S = 1.0
-_GRID_S = np.arange(-0.10, 0.2001, 0.01)
-_REACH = 6
+# A height is told by climbs of so much within the window, for so long.
+_CLIMB_M, _CLIMBING_S = 0.2, 10.0
 _LEAST_PAIRS = 60
 _SHIFTS_MS = np.arange(-80.0, 101.0, 20.0)
-_ROWS_FREEDOM = 8.0
 # Errors of successive pictures are alike: so many say the same.
 _NEIGHBOURS = 3.0
 _ROUNDS = 2
+_TURN = "turn the drones to and fro in its sight, or let the target circle them"
+_DASH = "dash to and fro in sight of a fixed camera, or chase a target that keeps turning back; or fly four minutes"
+_CLIMB = "take off and land some five times in sight of a fixed camera, in one recording"
+_WATCH = "turn and move while it sees the target or another drone"
 _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """One sensor: the setting, what it says [ms], what was measured and one sigma of it; reason where it was not."""
+    """One sensor: the setting, what it says [ms], what was measured and one sigma of it; reason where it was not.
+
+    flight: which flight would tell it.
+    """
 
     sensor: str
     setting: str
@@ -43,6 +51,7 @@ class Delay:
     measured_ms: float | None = None
     std_ms: float | None = None
     reason: str = ""
+    flight: str = ""
 
     @property
     def sure(self) -> bool:
@@ -81,6 +90,8 @@ class _Own:
 def delays(flown: Flown, resolved: Mapping[str, Any]) -> list[Delay]:
     """Return the delay of every camera, and of velocity and height of every robot."""
     own = {name: _own(flown, name) for name in resolved["drones"]}
+    models = parameters_from_field(resolved).entities
+    habits = {name: model for name, model in models.items() if isinstance(model, OdometryRobot)}
     found: list[Delay] = []
     exposure_s: dict[str, float] = {}
     for name, camera in resolved["cameras"].items():
@@ -92,7 +103,7 @@ def delays(flown: Flown, resolved: Mapping[str, Any]) -> list[Delay]:
         seen = [(name, _track(flown, name, camera, drone)) for name, camera in resolved["cameras"].items()]
         name, track = max(seen, key=lambda pair: len(pair[1].times))
         moved = _Track(track.times + exposure_s[name], track.positions, track.headings)
-        found += _odometry(drone, settings, moved, own[drone])
+        found += _odometry(drone, settings, habits[drone], moved, own[drone])
     later_ms = {name: -1e3 * shift for name, shift in exposure_s.items()}
     return found + _onboard_cameras(flown, resolved, later_ms)
 
@@ -129,40 +140,50 @@ def _seconds(flown: Flown, stamps_ns: Array) -> Array:
 
 def _fixed_camera(name: str, camera: Mapping[str, Any], tracks: Mapping[str, _Track], own: Mapping[str, _Own]) -> Delay:
     now_ms = float(camera["video_delay_ms"])
-    parts = []
+    parts: list[Part] = []
     for drone, track in tracks.items():
         if len(track.times) > _LEAST_PAIRS and len(own[drone].times) > _LEAST_PAIRS:
             mine = own[drone]
-            parts.append((track.times, track.headings[:, None], _interpolated(mine.times, mine.heading[:, None])))
-    shift = _shift(parts, scaled=False)
+            turned = interpolated(mine.times, mine.heading[:, None])
+            parts.append(Part(track.times, track.headings[:, None], turned, across(track.times)))
+    shift = shift_between(parts, scaled=False)
     if shift is None:
-        return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, reason="it saw too little of any drone's turning")
+        return Delay(
+            name,
+            f"cameras.{name}.video_delay_ms",
+            now_ms,
+            reason="it saw too little of any drone's turning",
+            flight=_TURN,
+        )
     # Exposed later than was thought means that the way to us is shorter.
-    return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, now_ms - 1e3 * shift[0], 1e3 * shift[1])
+    return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, now_ms - 1e3 * shift[0], 1e3 * shift[1], flight=_TURN)
 
 
-def _odometry(drone: str, settings: Mapping[str, Any], track: _Track, own: _Own) -> list[Delay]:
+def _odometry(drone: str, settings: Mapping[str, Any], habits: OdometryRobot, track: _Track, own: _Own) -> list[Delay]:
     odometry = settings["odometry"]
     names = [f"drones.{drone}.odometry.{kind}_delay_ms" for kind in ("velocity", "height")]
     now_ms = [float(odometry[f"{kind}_delay_ms"]) for kind in ("velocity", "height")]
     if len(track.times) < _LEAST_PAIRS or len(own.times) < _LEAST_PAIRS:
         reason = "no fixed camera saw it long enough"
-        return [Delay(drone, name, now, reason=reason) for name, now in zip(names, now_ms, strict=True)]
+        told = zip(("velocity", "height"), names, now_ms, (_DASH, _CLIMB), strict=True)
+        return [Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight) for kind, name, now, flight in told]
     body = _body_positions(track, own, settings["marker"]["position_m"])
-    velocity = _shift([(track.times, body[:, :2], _path(track, own))], scaled=True)
+    lasting_s = habits.velocity_bias_correlation_s
+    velocity = shift_between([Part(track.times, body[:, :2], _path(track, own), briefly(track.times, lasting_s))], True)
     known = np.isfinite(own.height)
     height = None
-    if known.sum() > _LEAST_PAIRS:
-        height = _shift(
-            [(track.times, body[:, 2:], _interpolated(own.times[known], own.height[known, None]))], scaled=False
-        )
+    in_a_second = across(track.times)
+    climbing = np.abs(in_a_second(body[:, 2:])) > _CLIMB_M
+    if known.sum() > _LEAST_PAIRS and climbing.sum() >= _CLIMBING_S * rate_hz(track.times):
+        reported = interpolated(own.times[known], own.height[known, None])
+        height = shift_between([Part(track.times, body[:, 2:], reported, in_a_second)], False)
     reasons = ("it moved too little in sight of a fixed camera", "it climbed too little, or reports no height")
     return [
-        Delay(f"{drone} {kind}", name, now, 1e3 * shift[0], 1e3 * shift[1])
+        Delay(f"{drone} {kind}", name, now, 1e3 * shift[0], 1e3 * shift[1], flight=flight)
         if shift is not None
-        else Delay(f"{drone} {kind}", name, now, reason=reason)
-        for kind, name, now, shift, reason in zip(
-            ("velocity", "height"), names, now_ms, (velocity, height), reasons, strict=True
+        else Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight)
+        for kind, name, now, shift, reason, flight in zip(
+            ("velocity", "height"), names, now_ms, (velocity, height), reasons, (_DASH, _CLIMB), strict=True
         )
     ]
 
@@ -194,69 +215,6 @@ def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
     return path
 
 
-def _interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]:
-    """Return (times, delay) -> reported values, if they are so late."""
-
-    def at(wanted: Array, delay_s: float) -> Array:
-        return np.column_stack([np.interp(wanted, times - delay_s, column) for column in values.T])
-
-    return at
-
-
-def _shift(
-    parts: list[tuple[Array, Array, Callable[[Array, float], Array]]], scaled: bool
-) -> tuple[float, float] | None:
-    """Return by how much the second of two records of the same motion is late, and one sigma [s].
-
-    parts: times and values (n, k) of one record, and the other as a function; scaled: up to a factor. None when
-    there is too little, or no minimum.
-    """
-    pairs = [(*part, *_pairs(part[0])) for part in parts]
-    pairs = [part for part in pairs if len(part[3]) >= _LEAST_PAIRS]
-    if not pairs:
-        return None
-    # Each part is weighed by its own noise, and what is far beyond it does not decide.
-    noise = [np.median(_misfits(part, 0.0, scaled)) / part[1].shape[1] for part in pairs]
-    chi = np.array(
-        [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(pairs, noise, strict=True)) for delay in _GRID_S]
-    )
-    best = int(np.argmin(chi))
-    if best in (0, len(chi) - 1):
-        return None
-    # A wide parabola: noise makes small dents.
-    near = slice(max(0, best - _REACH), best + _REACH + 1)
-    a, b, _ = np.polyfit(_GRID_S[near], chi[near], 2)
-    if a <= 0.0:
-        return None
-    # Windows overlap: so many of them say the same.
-    rate_hz = len(pairs[0][0]) / float(np.ptp(pairs[0][0]))
-    variance = max(1.0, rate_hz * _WINDOW_S) / a
-    return float(-b / (2.0 * a)), float(np.sqrt(variance))
-
-
-def _pairs(times: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return pairs of indices about a window apart."""
-    second = np.searchsorted(times, times + _WINDOW_S)
-    first = np.flatnonzero(second < len(times))
-    second = second[first]
-    near = times[second] - times[first] < 1.3 * _WINDOW_S
-    return first[near], second[near]
-
-
-def _robust(squares: Array) -> float:
-    return float((_ROWS_FREEDOM * np.log1p(squares / _ROWS_FREEDOM)).sum())
-
-
-def _misfits(part: tuple[Any, ...], delay_s: float, scaled: bool) -> Array:
-    """Return the squared differences (n) of what both records say of each pair."""
-    times, values, other, first, second = part
-    moved = values[second] - values[first]
-    told = other(times, delay_s)
-    told = told[second] - told[first]
-    scale = float((moved * told).sum() / max((told * told).sum(), 1e-12)) if scaled else 1.0
-    return np.asarray(((moved - scale * told) ** 2).sum(axis=1))
-
-
 def _onboard_cameras(flown: Flown, resolved: Mapping[str, Any], later_ms: dict[str, float]) -> list[Delay]:
     """Return the delays of the cameras on vehicles, one after the other: each is judged by what the others saw.
 
@@ -277,20 +235,22 @@ def _onboard_camera(
     setting = f"drones.{drone}.camera.video_delay_ms"
     surprise = Surprise(flown, resolved, drone)
     if not surprise.enough:
-        return Delay(f"{drone} camera", setting, now_ms, reason="it saw too little")
+        return Delay(f"{drone} camera", setting, now_ms, reason="it saw too little", flight=_WATCH)
     costs = np.array([surprise.of(resolved, _dated({**later_ms, drone: float(shift)})) for shift in _SHIFTS_MS])
     best = int(np.argmin(costs))
     if best in (0, len(costs) - 1):
-        return Delay(f"{drone} camera", setting, now_ms, reason="no delay within 80 ms of the setting fits best")
+        return Delay(
+            f"{drone} camera", setting, now_ms, reason="none within 80 ms of the setting fits best", flight=_WATCH
+        )
     near = slice(max(0, best - 2), best + 3)
     a, b, _ = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
     if a <= 0:
-        return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell")
+        return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell", flight=_WATCH)
     std_ms = float(np.sqrt(_NEIGHBOURS / a))
-    return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms)
+    return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms, flight=_WATCH)
 
 
-def _dated(later_ms: Mapping[str, float]) -> Change:
+def _dated(later_ms: Mapping[str, float]) -> Dating:
     """Return a change that dates observers' pictures as if they had been so much longer on their way."""
 
     def change(message: Message) -> Message:

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 @click.command(
     epilog="\b\nExamples:\n  groundstation calibrate delay runs/20261120T101500Z-lab\n"
     "  groundstation calibrate delay RUN --json\n\n"
-    "The flight should turn the drones in sight of the fixed camera and move them briskly, for a minute or more. What "
-    "a recording does not tell to 15 ms is not proposed.\n\n"
+    "The flight should turn the drones in sight of the fixed camera and move them briskly, for a minute or more; "
+    "heights want five take-offs and landings. What a recording does not tell to 15 ms is not proposed, and what "
+    "flight would tell it is said.\n\n"
     "Exit codes: 0 done, 2 wrong usage, or no recording that can be used."
 )
 @click.argument("recording", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
@@ -56,9 +57,15 @@ def _lines(found: "list[Delay]") -> list[str]:
     lines = [f"{'sensor':22} {'setting':>9} {'measured':>18}"]
     for one in found:
         measured = f"{one.measured_ms:.0f} +- {one.std_ms:.0f} ms" if one.measured_ms is not None else "-"
-        remark = one.reason or ("" if one.sure else "too unsure to use: fly longer, and more briskly")
+        remark = one.reason or ("" if one.sure else "too unsure to use")
         lines.append(f"{one.sensor:22} {one.now_ms:6.0f} ms {measured:>18}  {remark}".rstrip())
     changed = [one for one in found if one.differs]
     lines.append("settings to change:" if changed else "no setting is contradicted")
     lines += [f"  {one.setting}: {one.measured_ms:.0f}" for one in changed]
-    return lines
+    flights: dict[str, list[str]] = {}
+    for one in found:
+        if not one.sure:
+            flights.setdefault(one.flight, []).append(one.sensor)
+    if flights:
+        lines.append("not told by this recording; a flight that would tell:")
+    return lines + [f"  {', '.join(sensors)}: {flight}" for flight, sensors in flights.items()]

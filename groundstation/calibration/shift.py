@@ -1,0 +1,128 @@
+"""By how much one record of a motion is later than another: their changes are compared under many delays."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Differences over so long are compared: what drifts more slowly does not count.
+_WINDOW_S = 1.0
+# Of velocities: a vehicle's velocity loop answers an error of its velocity within some 0.2 s, and then what was really
+# flown depends on the error. So short differences are taken, less what an error that lasts has in common with before.
+_BRIEF_S = 0.13
+# Of those, so many say the same beyond what overlaps, by the scatter over flights: pictures are not dated alike.
+_ALIKE = 4.0
+_GRID_S = np.arange(-0.10, 0.2001, 0.01)
+_REACH = 6
+_LEAST = 60
+_FREEDOM = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Differences of a record: over a window, less `kept` of those over the window before. Indices into its times.
+
+    alike: so many of them say the same, beyond those that overlap.
+    """
+
+    window_s: float
+    before: NDArray[np.intp]
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    kept: float = 0.0
+    alike: float = 1.0
+
+    def __call__(self, values: Array) -> Array:
+        """Return the differences (n, k) of values (times, k)."""
+        now = values[self.second] - values[self.first]
+        return now - self.kept * (values[self.first] - values[self.before]) if self.kept else now
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Two records of one motion: times and values (n, k) of one, the other as a function, what is compared."""
+
+    times: Array
+    values: Array
+    other: Callable[[Array, float], Array]
+    change: Change
+
+
+def _pairs(times: Array, window_s: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return pairs of indices about a window apart."""
+    second = np.searchsorted(times, times + window_s)
+    first = np.flatnonzero(second < len(times))
+    second = second[first]
+    near = times[second] - times[first] < 1.3 * window_s + 0.03
+    return first[near], second[near]
+
+
+def across(times: Array) -> Change:
+    """Return the differences over a second of a record with these times."""
+    first, second = _pairs(times, _WINDOW_S)
+    return Change(_WINDOW_S, first, first, second)
+
+
+def briefly(times: Array, lasting_s: float) -> Change:
+    """Return short differences of positions, freed of an error of the velocity that lasts so long [s]."""
+    first, second = _pairs(times, _BRIEF_S)
+    follows = np.full(len(times), -1)
+    follows[first] = second
+    kept = follows[second] >= 0
+    share = float(np.exp(-_BRIEF_S / lasting_s))
+    return Change(_BRIEF_S, first[kept], second[kept], follows[second[kept]], share, _ALIKE)
+
+
+def interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]:
+    """Return (times, delay) -> reported values, if they are so late."""
+
+    def at(wanted: Array, delay_s: float) -> Array:
+        return np.column_stack([np.interp(wanted, times - delay_s, column) for column in values.T])
+
+    return at
+
+
+def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None:
+    """Return by how much the second of two records of the same motion is late, and one sigma [s].
+
+    scaled: up to a factor. None when there is too little, or no minimum.
+    """
+    parts = [part for part in parts if len(part.change(part.values)) >= _LEAST]
+    if not parts:
+        return None
+    # Each part is weighed by its own noise, and what is far beyond it does not decide.
+    noise = [np.median(_misfits(part, 0.0, scaled)) / part.values.shape[1] for part in parts]
+    chi = np.array(
+        [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(parts, noise, strict=True)) for delay in _GRID_S]
+    )
+    best = int(np.argmin(chi))
+    if best in (0, len(chi) - 1):
+        return None
+    # A wide parabola: noise makes small dents.
+    near = slice(max(0, best - _REACH), best + _REACH + 1)
+    a, b, _ = np.polyfit(_GRID_S[near], chi[near], 2)
+    if a <= 0.0:
+        return None
+    # Differences overlap: so many of them say the same.
+    change = parts[0].change
+    variance = change.alike * max(1.0, rate_hz(parts[0].times) * change.window_s) / a
+    return float(-b / (2.0 * a)), float(np.sqrt(variance))
+
+
+def rate_hz(times: Array) -> float:
+    """Return how often a record was taken."""
+    return len(times) / float(np.ptp(times))
+
+
+def _robust(squares: Array) -> float:
+    return float((_FREEDOM * np.log1p(squares / _FREEDOM)).sum())
+
+
+def _misfits(part: Part, delay_s: float, scaled: bool) -> Array:
+    """Return the squared differences (n) of what both records say of each change."""
+    moved, told = part.change(part.values), part.change(part.other(part.times, delay_s))
+    scale = float((moved * told).sum() / max((told * told).sum(), 1e-12)) if scaled else 1.0
+    return np.asarray(((moved - scale * told) ** 2).sum(axis=1))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.bus.api import Subscription
-from groundstation.bus.messages import Event, ProcessStatus, Severity
+from groundstation.bus.messages import Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.topics import EVENT, PROCESS_STATUS
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.errors import GroundStationError
@@ -64,6 +64,7 @@ class Supervisor:
         self._record: runtime_file.RuntimeRecord | None = None
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
         self._stopping = False
+        self._degraded: set[ManagedProcess] = set()
 
     # --- start ---------------------------------------------------------------------------------------------------
 
@@ -112,7 +113,7 @@ class Supervisor:
             now = time.monotonic()
             for process in [p for p in waiting if p.is_up]:
                 waiting.remove(process)
-                self._terminal.say(f"  {process.spec.name:<12} {process.state.name.lower()}  {process.detail}".rstrip())
+                self._tell_state(process)
             if self.failure:
                 raise GroundStationError(self.failure)
             if self.interrupts.stop_requested:
@@ -171,6 +172,8 @@ class Supervisor:
             status = details.get(process.spec.name)
             if isinstance(status, ProcessStatus):
                 process.detail = status.detail
+                if process in self._degraded and status.state is Lifecycle.READY:
+                    self._tell_state(process)
 
     def _watch(self, process: ManagedProcess, now_ns: int) -> None:
         if not process.running:
@@ -272,6 +275,10 @@ class Supervisor:
         self._block.path.unlink(missing_ok=True)
 
     # --- words ---------------------------------------------------------------------------------------------------
+
+    def _tell_state(self, process: ManagedProcess) -> None:
+        (self._degraded.discard if process.state is SlotState.READY else self._degraded.add)(process)
+        self._terminal.say(f"  {process.spec.name:<12} {process.state.name.lower()}  {process.detail}".rstrip())
 
     def _event(self, severity: Severity, process: ManagedProcess, text: str, remedy: str = "") -> None:
         _log.warning("%s %s %s", severity, process.spec.name, text)

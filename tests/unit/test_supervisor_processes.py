@@ -29,6 +29,9 @@ def turn(child):
 def obedient(child):
     settings = json.loads(child.section)
     time.sleep(settings.get("slow_s", 0))
+    if settings.get("hoarse_s"):
+        child.degrade("no picture")
+        time.sleep(settings["hoarse_s"])
     print("epoch", settings.get("epoch"), flush=True)
     child.ready("fine")
     while not child.stop_requested and child.supervisor_alive:
@@ -222,10 +225,10 @@ def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     assert supervisor.unwell == ["ceiling", "drone_1"]
 
 
-def test_late_start_is_waited_for(make: Callable[..., Supervisor]) -> None:
-    supervisor = make(spec("tracker", "obedient", section='{"slow_s": 0.7}'))
+def test_late_start_is_waited_for_and_a_recovery_told(make: Callable[..., Supervisor], tmp_path: Path) -> None:
+    supervisor = make(spec("ceiling", "obedient", section='{"slow_s": 0.7, "hoarse_s": 0.4}'))
     supervisor.start()
-    assert supervisor.processes[1].is_up
+    until(supervisor, lambda: "ceiling      ready  fine" in (tmp_path / "terminal").read_text())
 
 
 def test_end_of_what_the_run_stands_on_ends_the_run(make: Callable[..., Supervisor]) -> None:

@@ -32,6 +32,7 @@ Gain = Annotated[float, Field(ge=0.3, le=1.5)]
 Delay = Annotated[float, Field(ge=0, le=500)]
 Jump = Annotated[float, Field(ge=0, le=180)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Place = Annotated[float, Field(ge=-100, le=100)]
 
 
 class FigureEight(_Section):
@@ -42,14 +43,14 @@ class FigureEight(_Section):
     half_width_m: Annotated[float, Field(gt=0, le=50)] = 0.8
     speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.2
     start_phase: Annotated[float, Field(ge=0, le=1)] = 0.0
-    centre_m: tuple[float, float] = (0.0, 0.0)
+    centre_m: tuple[Place, Place] = (0.0, 0.0)
 
 
 class Standstill(_Section):
     """A target that waits where it is until it is steered over `@sim`."""
 
     shape: Literal["none"] = "none"
-    position_m: tuple[float, float] = (0.0, 0.0)
+    position_m: tuple[Place, Place] = (0.0, 0.0)
     yaw_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
 
 
@@ -61,7 +62,7 @@ class TargetScenario(_Section):
     """
 
     path: Annotated[FigureEight | Standstill, Field(discriminator="shape")] = FigureEight()
-    departs_after_team_s: Annotated[float, Field(ge=0)] | None = 3.0
+    departs_after_team_s: Annotated[float, Field(ge=0, le=86_400)] | None = 3.0
     max_speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.7
     slip: Annotated[float, Field(ge=0, le=0.5)] = 0.05
 
@@ -147,7 +148,7 @@ class CameraScenario(_Section):
     shot_noise: photon noise at white, one sigma in grey levels; floor: what lies under the scene.
     """
 
-    fps: Annotated[float, Field(gt=0, le=60)] = 15.0
+    fps: Annotated[float, Field(ge=0.1, le=60)] = 15.0
     video_delay_ms: Annotated[float, Field(ge=0, le=1000)] = 120.0
     video_jitter_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
     frame_loss: Annotated[float, Field(ge=0, le=1)] = 0.05

@@ -34,13 +34,12 @@ def load_scenario(path: Path, options: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def _faults(plain: dict[str, Any]) -> list[dict[str, Any]]:
-    result = subprocess.run(
-        [sys.executable, "-m", "sim_bridge.check"],
-        input=json.dumps(plain).encode(),
-        capture_output=True,
-        timeout=_CHECK_LIMIT_S,
-        check=False,
-    )
+    command = [sys.executable, "-m", "sim_bridge.check"]
+    given = json.dumps(plain).encode()
+    try:
+        result = subprocess.run(command, input=given, capture_output=True, timeout=_CHECK_LIMIT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise GroundStationError(f"the simulator did not judge the scenario within {_CHECK_LIMIT_S:g} s") from error
     if result.returncode not in (0, 2):
         raise GroundStationError(f"the simulator cannot judge the scenario: {result.stderr.decode(errors='replace')}")
     faults: list[dict[str, Any]] = json.loads(result.stdout)

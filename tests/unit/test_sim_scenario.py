@@ -75,3 +75,17 @@ def test_faults_need_what_they_use() -> None:
         parse_scenario('{"faults": [{"kind": "navdata_silent", "entity": "d", "start_s": 2, "end_s": 1}]}')
     with pytest.raises(SettingsError, match="value belongs to battery_drop"):
         parse_scenario('{"faults": [{"kind": "battery_drop", "entity": "d", "start_s": 2}]}')
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        {"cameras": {"fps": 1e-300}},
+        {"target": {"departs_after_team_s": 1e308}},
+        {"target": {"path": {"shape": "none", "position_m": [1e300, 0.0]}}},
+        {"target": {"path": {"shape": "figure_eight", "centre_m": [0.0, -1e300]}}},
+    ],
+)
+def test_absurd_values_are_refused(scenario: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError):
+        parse_scenario(json.dumps(scenario))

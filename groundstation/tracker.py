@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
 from groundstation.control.safety import Limited, limit_setpoint
+from groundstation.control.seeking import spread_m
 from groundstation.control.setpoints import HOVER, setpoints_from_plan
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
@@ -173,10 +174,24 @@ class Tracker:
         age = min((self.filter.age_s(name) for name in self._targets), default=math.inf)
         return age if math.isfinite(age) else None
 
+    def _missing(self) -> tuple[str, ...]:
+        """Return the targets that nobody has seen for too long, or ever."""
+        limit = self.parameters.control.lost_after_s
+        return tuple(name for name in self._targets if not self.filter.age_s(name) <= limit)
+
+    def _hopeless(self) -> tuple[str, ...]:
+        """Return the missing targets that no plan can go by: a scout looks for them while others are tracked."""
+        missing = self._missing()
+        if len(missing) == len(self._targets):
+            return ()
+        limit = self.parameters.control.hint_std_m
+        known = [name for name in missing if name in self._belief.layout]
+        return tuple(name for name in known if spread_m(self._belief, name) > limit)
+
     def request(self) -> PlanRequest:
         """Return the snapshot that the next plan is to be made on."""
         warm = {} if self.current is None else {k: np.asarray(v) for k, v in self.current.controls.items()}
-        return PlanRequest(self._belief.core(), self._topology, warm)
+        return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm)
 
     def adopt(self, plan: PlanResult) -> None:
         """Put a finished plan in force, as far as its robots still fly."""
@@ -207,7 +222,7 @@ class Tracker:
         belief = self._belief.core()
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         wanted = setpoints_from_plan(
-            self.current, belief, airborne, self.target_age_s(), p.control, p.sensors, unseen_s
+            self.current, belief, airborne, self.target_age_s(), p.control, p.sensors, unseen_s, self._missing()
         )
         velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
         return {

@@ -43,6 +43,10 @@ def check(field: str, options: tuple[str, ...], scenario: str | None, as_json: b
     return 2 if problems else 0
 
 
+def _targets(names: tuple[str, ...]) -> str:
+    return f"{'target' if len(names) == 1 else 'targets'} {', '.join(names)}"
+
+
 def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
@@ -52,7 +56,7 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
     problems: list[str] = []
     try:
         field = load_field(path, options)
-        team = f"{len(field.drones)} drone(s), {len(field.cameras)} fixed camera(s), target {field.target.name}"
+        team = f"{len(field.drones)} drone(s), {len(field.cameras)} fixed camera(s), {_targets(tuple(field.tracked))}"
     except SettingsError as error:
         problems += error.problems
     if scenario is not None:
@@ -116,8 +120,8 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
         raise click.UsageError(f"--output {output}: must end in .png, .svg or .pdf")
     path = find_field(field)
     settings = load_field(path, options)
-    target_path = drawing.path_of(load_scenario(find_scenario(scenario, path))) if scenario else []
-    drawing.draw(settings, output, target_path)
+    plain = load_scenario(find_scenario(scenario, path)) if scenario else {}
+    drawing.draw(settings, output, drawing.paths_of(plain, settings.tracked))
     click.echo(f"wrote {output}")
 
 

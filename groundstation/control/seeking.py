@@ -1,7 +1,7 @@
 """Where robots stand and look while they search for a target, or fly back to where they are seen."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,14 +46,18 @@ def return_stand(mean: Array, parameters: ControlParameters, sensors: SensorSuit
 
 
 def search_stands(
-    belief: JointBelief, robots: Sequence[str], parameters: ControlParameters, sensors: SensorSuite
+    belief: JointBelief,
+    robots: Sequence[str],
+    parameters: ControlParameters,
+    sensors: SensorSuite,
+    targets: Collection[str],
 ) -> dict[str, Stand]:
-    """Return where each robot searches: all within the world-fixed view, looking different ways.
+    """Return where each robot searches for targets: all within the world-fixed view, looking different ways.
 
-    While the prediction of a target is any good they fan out around it and sweep over it; later each
+    While the prediction of one of them is any good they fan out around it and sweep over it; later each
     goes slowly round an ellipse, opposite to the others, and turns.
     """
-    hint = _hint(belief, parameters)
+    hint = _hint(belief, parameters, targets)
     seconds = belief.stamp_ns * 1e-9
     stands = {}
     for index, name in enumerate(robots):
@@ -68,16 +72,19 @@ def search_stands(
     return stands
 
 
-def _hint(belief: JointBelief, parameters: ControlParameters) -> tuple[float, float] | None:
-    """Return where the target is that is known best, if it is known at all well."""
-    if not belief.layout.targets:
+def _hint(belief: JointBelief, parameters: ControlParameters, targets: Collection[str]) -> tuple[float, float] | None:
+    """Return where the one of the targets is that is known best, if it is known at all well."""
+    spread, name = min(
+        ((spread_m(belief, name), name) for name in targets if name in belief.layout), default=(math.inf, "")
+    )
+    if not spread <= parameters.hint_std_m:
         return None
-    spread, name = min((_spread_m(belief, name), name) for name in belief.layout.targets)
     mean = belief.mean_of(name)
-    return (float(mean[0]), float(mean[1])) if spread <= parameters.hint_std_m else None
+    return float(mean[0]), float(mean[1])
 
 
-def _spread_m(belief: JointBelief, name: str) -> float:
+def spread_m(belief: JointBelief, name: str) -> float:
+    """Return the standard deviation of a position along the axis on which it is known worst [m]."""
     return math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
 
 

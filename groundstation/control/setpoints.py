@@ -1,7 +1,7 @@
 """Setpoints of all robots from a plan: held velocities, height slots, and the way back or around when needed."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,11 +43,13 @@ def setpoints_from_plan(
     parameters: ControlParameters,
     sensors: SensorSuite,
     unseen_s: Mapping[str, float] = NEVER_UNSEEN,
+    missing: Collection[str] = (),
 ) -> dict[str, Setpoint]:
     """Return a setpoint for every airborne robot.
 
     plan: the last valid one, or None; target_age_s: since any target was last observed, None if never;
-    unseen_s: since a camera last saw each robot.
+    unseen_s: since a camera last saw each robot; missing: targets not seen for too long, or never: while others are
+    tracked, one robot searches for them.
     """
     fresh = target_age_s is not None and target_age_s <= parameters.lost_after_s and bool(belief.layout.targets)
     robots = [name for name in belief.layout.robots if name in airborne]
@@ -63,7 +65,12 @@ def setpoints_from_plan(
         )
         for name in airborne
     }
-    stands = search_stands(belief, robots, parameters, sensors)
+    tracking = [name for name in robots if phases[name] is Phase.TRACK]
+    scout = _scout(belief, tracking, missing) if fresh and missing else None
+    if scout is not None:
+        phases[scout] = Phase.SEARCH
+    wanted_targets = tuple(missing) if scout is not None else belief.layout.targets
+    stands = search_stands(belief, robots, parameters, sensors, wanted_targets)
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
         if phase is Phase.UNKNOWN:
@@ -75,6 +82,14 @@ def setpoints_from_plan(
             stand = stands[name] if phase is Phase.SEARCH else return_stand(belief.mean_of(name), parameters, sensors)
             wanted[name] = _towards(name, stand, phase, belief, robots, parameters)
     return wanted
+
+
+def _scout(belief: JointBelief, tracking: Sequence[str], missing: Collection[str]) -> str | None:
+    """Return the robot that can be spared: the farthest from what is tracked; None where it would be the only one."""
+    seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in missing]
+    if len(tracking) < 2 or not seen:
+        return None
+    return max(tracking, key=lambda name: min(math.dist(belief.mean_of(name)[:2], place) for place in seen))
 
 
 def is_lost(

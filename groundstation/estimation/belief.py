@@ -1,5 +1,6 @@
 """The joint Gaussian belief as a value."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,9 +39,12 @@ class JointBelief:
         part = self.layout.block(name).slice
         return self.covariance[part, part]
 
-    def core(self) -> "JointBelief":
-        """Return the belief of robots' (x, y, z, yaw) and targets' (x, y, vx, vy) alone, the rest marginalised."""
-        blocks = [block for block in self.layout.blocks if block.kind is not EntityKind.CAMERA]
+    def core(self, without: Collection[str] = ()) -> "JointBelief":
+        """Return the belief of robots' (x, y, z, yaw) and targets' (x, y, vx, vy) alone, the rest marginalised.
+
+        without: names of those that are left out too.
+        """
+        blocks = [b for b in self.layout.blocks if b.kind is not EntityKind.CAMERA and b.name not in without]
         kept = [block.start + i for block in blocks for i in range(CORE_SIZE)]
         layout = Layout()
         for block in blocks:

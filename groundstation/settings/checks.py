@@ -11,7 +11,7 @@ from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
 from groundstation.settings.marker import Marker
 from groundstation.settings.room import Calibration, Room, WorldCamera
-from groundstation.settings.target import Target
+from groundstation.settings.target import OneOfTargets, Target, TrackedBody
 
 Finding = tuple[KeyPath, str]
 
@@ -29,9 +29,16 @@ class Parts:
     cameras: dict[str, WorldCamera] = field(default_factory=dict)
     drones: dict[str, Drone] = field(default_factory=dict)
     target: Target | None = None
+    targets: dict[str, OneOfTargets] = field(default_factory=dict)
     estimator: Estimator | None = None
     planner: Planner | None = None
     safety: Safety | None = None
+
+    @property
+    def tracked(self) -> dict[KeyPath, tuple[str, TrackedBody]]:
+        """Return name and settings of each target by its path in the file."""
+        several: dict[KeyPath, tuple[str, TrackedBody]] = {("targets", n): (n, one) for n, one in self.targets.items()}
+        return several if self.target is None else {("target",): (self.target.name, self.target), **several}
 
     @property
     def flying(self) -> dict[str, Drone]:
@@ -112,9 +119,8 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
     sources: list[tuple[KeyPath, object, str]] = [
         (("cameras", name, "source"), camera.source, name) for name, camera in parts.cameras.items()
     ]
-    if parts.target is not None:
-        marker = parts.target.marker
-        codes.append((("target", "marker", _key_of(marker)), marker.identity, parts.target.name))
+    for path, (name, target) in parts.tracked.items():
+        codes.append(((*path, "marker", _key_of(target.marker)), target.marker.identity, name))
     sources += [(("drones", name, "camera", "source"), d.camera.source, name) for name, d in parts.drones.items()]
     yield from _unique(codes, "marker code")
     yield from _unique(sources, "camera source")
@@ -172,6 +178,7 @@ def _names(parts: Parts) -> Iterator[Finding]:
     named += [(("cameras", name), name) for name in parts.cameras]
     if parts.target is not None:
         named.append((("target", "name"), parts.target.name))
+    named += [(("targets", name), name) for name in parts.targets]
     for path, name in named:
         if name in RESERVED or name.startswith("sim_") or name.endswith("_camera"):
             yield path, f"the name {name} is taken by the ground station itself"
@@ -180,7 +187,7 @@ def _names(parts: Parts) -> Iterator[Finding]:
 
 def _kind_of(path: KeyPath) -> str:
     """Return what kind of thing a path of the field file names."""
-    return {"drones": "a drone", "cameras": "a camera"}.get(str(path[0]), "the target")
+    return {"drones": "a drone", "cameras": "a camera", "targets": "a target"}.get(str(path[0]), "the target")
 
 
 def _heights(parts: Parts) -> Iterator[Finding]:
@@ -192,7 +199,7 @@ def _heights(parts: Parts) -> Iterator[Finding]:
             ("planner", "level_heights_m"),
             f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones (got {len(rows)})",
         )
-    low = parts.target.marker.height_m + _ROBOT_HEIGHT_M if parts.target else 0.0
+    low = max((one.marker.height_m + _ROBOT_HEIGHT_M for _, one in parts.tracked.values()), default=0.0)
     high = math.inf
     if parts.room is not None:
         low, high = max(low, parts.room.fence.z_m[0]), parts.room.fence.z_m[1]

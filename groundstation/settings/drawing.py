@@ -1,7 +1,7 @@
 """A field to scale, from above and from the side: what fixed cameras see at each height slot, and how drones look."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,19 +11,21 @@ from groundstation.settings.schema import Field
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Paths = dict[str, list[tuple[float, float]]]
+
 _SLOT_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown")
 _TARGET_COLOUR = "tab:red"
 
 
-def draw(field: Field, output: Path, target_path: list[tuple[float, float]] | None = None) -> None:
-    """Write a picture of the field (PNG, SVG or PDF by the file's ending); target_path: points on the floor [world]."""
+def draw(field: Field, output: Path, paths: Paths | None = None) -> None:
+    """Write a picture of the field (PNG, SVG or PDF by the file's ending); paths: those of `paths_of`."""
     from matplotlib.figure import Figure
 
     width, depth, height = field.room.size_m
     figure = Figure(figsize=(width * 1.15 + 0.6, (depth + height) * 1.15 + 1.6), layout="constrained")
     top, side = figure.subplots(2, 1, sharex=True, height_ratios=(depth, height))
-    _draw_top(top, field, target_path or [])
-    _draw_side(side, field, target_path or [])
+    _draw_top(top, field, paths or {})
+    _draw_side(side, field, paths or {})
     for axes, (low, high), label in ((top, (-depth / 2, depth / 2), "y [m]"), (side, (0.0, height), "z [m]")):
         axes.set(xlim=(-width / 2, width / 2), ylim=(low, high), ylabel=label, aspect="equal")
         axes.grid(alpha=0.25)
@@ -32,9 +34,13 @@ def draw(field: Field, output: Path, target_path: list[tuple[float, float]] | No
     figure.savefig(output, dpi=110)
 
 
-def path_of(scenario: Mapping[str, Any]) -> list[tuple[float, float]]:
-    """Return points of a scenario's target path [m; world]: a figure eight, or none for a target that waits."""
-    path = scenario.get("target", {}).get("path", {})
+def paths_of(scenario: Mapping[str, Any], targets: Iterable[str]) -> Paths:
+    """Return points of each target's path in a scenario [m; world]: a figure eight, or none for a target that waits."""
+    own, common = scenario.get("targets", {}), scenario.get("target", {})
+    return {name: _points(own.get(name, common).get("path", {})) for name in targets}
+
+
+def _points(path: Mapping[str, Any]) -> list[tuple[float, float]]:
     if path.get("shape") != "figure_eight":
         return []
     phases = [math.tau * n / 200 for n in range(201)]
@@ -64,7 +70,7 @@ def marker_height(field: Field, slot_m: float) -> float:
     return slot_m + max(drone.marker.position_m[2] for drone in field.drones.values())
 
 
-def _draw_top(axes: "Axes", field: Field, target_path: list[tuple[float, float]]) -> None:
+def _draw_top(axes: "Axes", field: Field, paths: Paths) -> None:
     fence = field.room.fence
     _box(axes, fence.x_m, fence.y_m, linestyle="--", edgecolor="grey", label="fence")
     for name, camera in field.cameras.items():
@@ -79,12 +85,13 @@ def _draw_top(axes: "Axes", field: Field, target_path: list[tuple[float, float]]
         axes.plot(*drone.pad_m, "ko", markerfacecolor="none")
         axes.annotate(name, drone.pad_m, textcoords="offset points", xytext=(6, 6))
         axes.arrow(*drone.pad_m, 0.3 * math.cos(heading), 0.3 * math.sin(heading), head_width=0.08, color="black")
-    if target_path:
-        axes.plot(*zip(*target_path, strict=True), color=_TARGET_COLOUR, label=f"path of {field.target.name}")
+    for name, points in paths.items():
+        if points:
+            axes.plot(*zip(*points, strict=True), color=_TARGET_COLOUR, label=f"path of {name}")
     axes.legend(loc="upper right", fontsize="small")
 
 
-def _draw_side(axes: "Axes", field: Field, target_path: list[tuple[float, float]]) -> None:
+def _draw_side(axes: "Axes", field: Field, paths: Paths) -> None:
     fence = field.room.fence
     _box(axes, fence.x_m, fence.z_m, linestyle="--", edgecolor="grey")
     for camera in field.cameras.values():
@@ -92,17 +99,18 @@ def _draw_side(axes: "Axes", field: Field, target_path: list[tuple[float, float]
         length, _ = footprint(camera, 0.0)
         axes.fill([x, x - length, x + length], [z, 0.0, 0.0], color="grey", alpha=0.12)
         axes.plot(x, z, "k^")
-    board = field.target.marker.height_m
-    reach = max((abs(x) for x, _ in target_path), default=0.0)
-    axes.plot((-reach, reach), (board, board), color=_TARGET_COLOUR, marker="s", markersize=4)
+    boards = {name: target.marker.height_m for name, target in field.tracked.items()}
+    for name, board in boards.items():
+        along = [x for x, _ in paths.get(name, [])] or [0.0]
+        axes.plot((min(along), max(along)), (board, board), color=_TARGET_COLOUR, marker="s", markersize=4)
     for slot, colour in zip(slots(field), _SLOT_COLOURS, strict=False):
         axes.axhline(slot, color=colour, linewidth=0.8)
         axes.annotate(f"slot {slot:g} m", (fence.x_m[0], slot), textcoords="offset points", xytext=(3, 3))
-    _draw_view(axes, field, board)
+    _draw_view(axes, field, max(boards.values()))
 
 
 def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
-    """Draw the first drone in its lowest slot, looking at the target: as far behind as its tilt asks for."""
+    """Draw the first drone in its lowest slot, looking at the (highest) target: as far behind as its tilt asks for."""
     drone = next(iter(field.drones.values()))
     camera, slot = drone.camera, slots(field)[-1]
     height = slot + camera.position_m[2] - board_m

@@ -29,6 +29,7 @@ def field_file_schema() -> dict[str, Any]:
         "types": {"type": "object", "additionalProperties": reference},
     }
     schema["required"] = sorted({*schema["required"], "schema_version"})
+    schema["anyOf"] = [{"required": ["target"]}, {"required": ["targets"]}]
     return {"$schema": _DIALECT, **schema, "title": "Field file"}
 
 

@@ -9,7 +9,7 @@ from groundstation.errors import SettingsError
 from groundstation.settings.document import KeyPath, Node, Origin, dotted, parse, read
 from groundstation.settings.wording import problem
 
-NAMED = ("drones", "cameras", "types")
+NAMED = ("drones", "cameras", "targets", "types")
 
 
 def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:

@@ -33,6 +33,7 @@ def field_of_tree(tree: Node, options: Sequence[str], path: Path) -> Field:
     problems += _worded(errors, levels.tree, Field, calibrations.failed, levels.untyped)
     for fragment in (levels.defaults, *levels.types.values()):
         problems += _worded(_partial_errors(fragment), fragment, Drone, calibrations.failed)
+    problems += _target_or_targets(levels.tree)
     parts = _sound_parts(levels.tree.plain(), [error["loc"] for error in errors])
     problems += [problem(levels.tree.origin_of(at), text) for at, text in findings(parts)]
     if problems:
@@ -62,6 +63,20 @@ def _require_version(tree: Node, problems: list[str]) -> None:
     if version.value != SCHEMA_VERSION or isinstance(version.value, bool):
         text = f"must be {SCHEMA_VERSION}, the version that this program reads (got {json.dumps(version.plain())})"
         raise SettingsError([*problems, problem(version.origin, text)])
+
+
+def _target_or_targets(tree: Node) -> list[str]:
+    """Return what is wrong with a field that says in no way, or in two, what is tracked."""
+    single, several = (_given(tree.get(key)) for key in ("target", "targets"))
+    if single is None and several is None:
+        return [f"{tree.origin}: target: is required (or targets, for several)"]
+    if single is not None and several is not None:
+        return [problem(several.origin, "must not stand beside target: put all into targets, each by its name")]
+    return []
+
+
+def _given(node: Node | None) -> Node | None:
+    return None if node is None or node.value is None or node.value == {} else node
 
 
 def _errors(model: type[Any], tree: Node) -> list[Any]:
@@ -115,6 +130,7 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
     return Parts(
         cameras=named("cameras"),
         drones=named("drones"),
+        targets=named("targets"),
         **{name: sound(Field.model_fields[name].annotation, name) for name in single},
     )
 

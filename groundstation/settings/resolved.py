@@ -4,6 +4,7 @@ import io
 
 from groundstation.settings.drones import Drone
 from groundstation.settings.schema import Field
+from groundstation.settings.target import OneOfTargets, TrackedBody
 
 # Printed so that nobody has to guess what wins; drivers.watchdog is where it is enforced.
 STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > set-point > TAKEOFF"
@@ -35,12 +36,8 @@ def summary_of(field: Field) -> str:
         lines.append(f"camera {name}: {camera.source}, {camera.position_m[2]:g} m up, looks {camera.looking},")
         lines.append(f"  observes {' and '.join(camera.observes)}")
     lines += [line for name, drone in field.drones.items() for line in _drone_lines(name, drone)]
-    marker = field.target.marker
-    lines += [
-        f"target {field.target.name}: marker {marker.identity} at {marker.height_m:g} m",
-        "",
-        *_safety_lines(field),
-    ]
+    lines += [_target_line(name, target) for name, target in field.tracked.items()]
+    lines += ["", *_safety_lines(field)]
     return "\n".join(lines)
 
 
@@ -57,6 +54,12 @@ def _drone_lines(name: str, drone: Drone) -> list[str]:
         f" turn {limits.max_yaw_rate_deg_s:g} deg/s; lands below {limits.battery_min:.0%} battery"
         f" held {limits.battery_hold_s:g} s",
     ]
+
+
+def _target_line(name: str, target: TrackedBody) -> str:
+    motion = target.model.replace("_", " ")
+    weight = f", weight {target.weight:g}" if isinstance(target, OneOfTargets) else ""
+    return f"target {name}: marker {target.marker.identity} at {target.marker.height_m:g} m, {motion}{weight}"
 
 
 def _pair(point: tuple[float, float]) -> str:

@@ -183,7 +183,7 @@ def _world_camera(field: Field, name: str, camera: WorldCamera, phase_s: float) 
         "rotation_deg": camera.rotation_deg,
     }
     robots = list(field.drones) if "robots" in camera.observes else []
-    targets = [field.target.name] if "targets" in camera.observes else []
+    targets = list(field.tracked) if "targets" in camera.observes else []
     common = _camera(field, camera.source, camera.calibration, camera.video_delay_ms, phase_s)
     return CameraDriverSettings.model_validate({"name": name, "mount": mount, "observes": robots + targets, **common})
 
@@ -218,6 +218,8 @@ def _markers(field: Field) -> list[dict[str, Any]]:
         {"entity": name, "kind": "robot", "position_m": drone.marker.position_m, **drone.marker.printed}
         for name, drone in field.drones.items()
     ]
-    marker = field.target.marker
-    target = {"entity": field.target.name, "kind": "target", "position_m": marker.position_m, **marker.printed}
-    return [*robots, target]
+    targets = [
+        {"entity": name, "kind": "target", "position_m": target.marker.position_m, **target.marker.printed}
+        for name, target in field.tracked.items()
+    ]
+    return robots + targets

@@ -1,4 +1,4 @@
-"""The target: what is tracked, by which marker it is known, and how it moves."""
+"""The targets: what is tracked, by which marker it is known, and how it moves."""
 
 from typing import Annotated, Literal, Self
 
@@ -60,6 +60,12 @@ class Target(TrackedBody):
     """The one ground robot that is tracked."""
 
     name: Name
+
+
+class OneOfTargets(TrackedBody):
+    """One of several ground robots; weight: what its uncertainty counts beside that of the others."""
+
+    weight: Annotated[float, Field(gt=0, le=100)] = 1.0
 
 
 def _foreign(key: str) -> PydanticCustomError:

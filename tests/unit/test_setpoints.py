@@ -153,3 +153,13 @@ def test_the_flight_mode_table() -> None:
         if expected is None:
             expected = Phase.RETURN if lost else Phase.TRACK if fresh and planned else Phase.SEARCH
         assert phase_of(Situation(airborne, known, lost, fresh, planned)) is expected
+
+
+def test_while_one_target_is_tracked_the_robot_farthest_from_it_searches_for_a_missing_one() -> None:
+    at = belief((-0.5, 0.5, 1.3, 0.0), (-1.5, -0.5, 1.3, 0.0))
+    common = (plan((1.3, 1.3), "drone_1,drone_2"), at, NAMES, 0.1, CONTROL, SENSORS)
+    assert {s.phase for s in setpoints_from_plan(*common).values()} == {Phase.TRACK}
+    out = setpoints_from_plan(*common, missing=("other",))
+    assert (out["drone_1"].phase, out["drone_2"].phase) == (Phase.TRACK, Phase.SEARCH)
+    alone = setpoints_from_plan(common[0], at, ("drone_1",), 0.1, CONTROL, SENSORS, missing=("other",))
+    assert alone["drone_1"].phase is Phase.TRACK

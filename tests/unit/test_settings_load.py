@@ -10,7 +10,7 @@ import pytest
 from groundstation.errors import SettingsError
 from groundstation.geometry.board import VALID_CODES
 from groundstation.settings.document import Origin, dotted, parse
-from groundstation.settings.drawing import footprint, marker_height, path_of, slots
+from groundstation.settings.drawing import footprint, marker_height, paths_of, slots
 from groundstation.settings.files import SHIPPED, find_field, find_scenario
 from groundstation.settings.json_schema import field_file_schema
 from groundstation.settings.levels import merged
@@ -136,7 +136,8 @@ def test_the_json_schema_knows_every_key_of_the_file() -> None:
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
     assert schema["additionalProperties"] is False
-    assert set(schema["required"]) == {"schema_version", "site", "room", "cameras", "drones", "target", "planner"}
+    assert set(schema["required"]) == {"schema_version", "site", "room", "cameras", "drones", "planner"}
+    assert schema["anyOf"] == [{"required": ["target"]}, {"required": ["targets"]}]
     assert set(schema["properties"]) == {*Field.model_fields, "defaults", "types"}
     definitions = schema["$defs"]
     assert "required" not in definitions["Level"]
@@ -213,6 +214,8 @@ def test_the_drawing_is_to_scale(field: Field) -> None:
     assert marker_height(field, 2.2) == pytest.approx(2.28)
     assert footprint(ceiling, 2.2) == pytest.approx((2.0 * 640 / 1179, 2.0 * 360 / 1179))
     assert footprint(ceiling, 9.0) == (0, 0)
-    eight = path_of({"target": {"path": {"shape": "figure_eight", "half_length_m": 3, "half_width_m": 1}}})
-    assert max(eight) == pytest.approx((3, 0))
-    assert path_of({}) == []
+    eight = {"path": {"shape": "figure_eight", "half_length_m": 3, "half_width_m": 1}}
+    paths = paths_of({"target": eight, "targets": {"b": {"path": {"shape": "none"}}}}, ("a", "b"))
+    assert max(paths["a"]) == pytest.approx((3, 0))
+    assert paths["b"] == []
+    assert paths_of({}, ("a",)) == {"a": []}

@@ -6,10 +6,16 @@ from typing import Any
 
 import pytest
 
+from groundstation.errors import SettingsError
 from groundstation.estimation.models import ConstantVelocityTarget, CoordinatedTurnTarget, ManoeuvringTarget
 from groundstation.estimation.parameters import parameters_from_field
+from groundstation.planning import parameters as planning
+from groundstation.sensing.from_field import sensors_from_field
 from groundstation.settings.load import load_field
+from groundstation.settings.schema import Field
+from groundstation.settings.sections import DriverKind, driver_sections
 
+CONFIG = Path(__file__).parents[2] / "config"
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml"
 
 
@@ -42,3 +48,56 @@ def test_figures_of_the_model_replace_its_own() -> None:
     assert isinstance(turning, CoordinatedTurnTarget)
     assert math.isclose(turning.turn_rate_std_rad_s, math.pi / 2)
     assert turning.turn_rate_correlation_s == CoordinatedTurnTarget().turn_rate_correlation_s
+
+
+def two_targets(*options: str) -> Field:
+    return load_field(CONFIG / "two-targets.yaml", options)
+
+
+def problems_of(tmp_path: Path, old: str, new: str) -> list[str]:
+    text = (CONFIG / "two-targets.yaml").read_text(encoding="utf-8")
+    assert text.count(old) == 1, old
+    path = tmp_path / "two.yaml"
+    path.write_text(text.replace(old, new).replace("calibration: ", f"calibration: {CONFIG}/"), encoding="utf-8")
+    with pytest.raises(SettingsError) as caught:
+        load_field(path)
+    return caught.value.problems
+
+
+def test_several_targets_reach_estimator_planner_and_every_camera() -> None:
+    field = two_targets("targets.turtlebot_2.weight=4", "targets.turtlebot_2.model=coordinated_turn")
+    assert Field.model_validate_json(field.model_dump_json()) == field
+    plain = field.model_dump(mode="json")
+    entities = parameters_from_field(plain).entities
+    assert isinstance(entities["turtlebot_1"], ConstantVelocityTarget)
+    assert isinstance(entities["turtlebot_2"], CoordinatedTurnTarget)
+    assert planning.parameters_from_field(plain).target_weights == {"turtlebot_1": 1.0, "turtlebot_2": 4.0}
+    assert {"turtlebot_1", "turtlebot_2"} <= set(sensors_from_field(plain).marker_height_m)
+    cameras = [section for section in driver_sections(field) if section.kind is DriverKind.CAMERA]
+    assert len(cameras) == 3
+    assert all('"turtlebot_1"' in camera.section and '"turtlebot_2"' in camera.section for camera in cameras)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("marker: {code: 6,", "marker: {code: 5,", "targets.turtlebot_2.marker.code: marker code 5 is already that of"),
+        ("  turtlebot_2:", "  drone_1:", "targets.drone_1: the name drone_1 is already that of a drone"),
+        ("  turtlebot_2:", "  tracker:", "targets.tracker: the name tracker is taken by the ground station itself"),
+        ("targets:  ", "target: {name: third, marker: {code: 9}}\ntargets:  ", "targets: must not stand beside target"),
+    ],
+)
+def test_what_is_wrong_with_several_targets_is_named(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    found = problems_of(tmp_path, old, new)
+    assert len(found) == 1
+    assert expected in found[0] and found[0].startswith(f"{tmp_path}/two.yaml:")
+
+
+def test_a_field_without_any_target_is_refused() -> None:
+    with pytest.raises(SettingsError, match="target: is required"):
+        load_field(FIXTURE, ["target=null"])
+
+
+def test_an_option_invents_no_target() -> None:
+    with pytest.raises(SettingsError, match="did you mean targets"):
+        two_targets("targets.turtlebot_3.weight=2")

@@ -8,8 +8,6 @@ from contextlib import suppress
 
 from groundstation.process.parent import ParentWatch
 
-_NS_PER_MS = 1_000_000
-
 
 class StopSignal:
     """The wish to stop, and a sleep that ends early when it (or the parent's death) arrives, or somebody calls `wake`.
@@ -43,21 +41,21 @@ class StopSignal:
 
     def sleep_until(self, deadline_ns: int) -> bool:
         """Sleep until a monotonic time or `wake`; returns False when a stop or the parent's death ended the sleep."""
-        poll = select.poll()
-        poll.register(self._read, select.POLLIN)
+        watched = [self._read]
         if self._parent.descriptor >= 0 and not self._parent_reported:
-            poll.register(self._parent.descriptor, select.POLLIN)
-        while (left_ns := deadline_ns - time.monotonic_ns()) > 0 and not self._nudged:
-            if self._woken(poll.poll(max(1, left_ns // _NS_PER_MS) if left_ns >= _NS_PER_MS else 0)):
+            watched.append(self._parent.descriptor)
+        # select, unlike poll, takes less than a millisecond: one wait and one wake-up for each sleep.
+        while True:
+            left_ns = 0 if self._nudged else max(0, deadline_ns - time.monotonic_ns())
+            if self._woken(select.select(watched, (), (), left_ns / 1e9)[0]):
                 return False
-            if left_ns < _NS_PER_MS:
-                time.sleep(max(0, deadline_ns - time.monotonic_ns()) / 1e9)
-        self._nudged = False
-        return not self._woken(poll.poll(0))
+            if self._nudged or time.monotonic_ns() >= deadline_ns:
+                self._nudged = False
+                return True
 
-    def _woken(self, ready: list[tuple[int, int]]) -> bool:
+    def _woken(self, ready: list[int]) -> bool:
         woken = False
-        for descriptor, _ in ready:
+        for descriptor in ready:
             if descriptor == self._read:
                 # The interpreter writes the numbers of signals, `wake` writes zeros.
                 with suppress(BlockingIOError):

@@ -21,6 +21,8 @@ _M_S2_FROM_MG = _STANDARD_GRAVITY_M_S2 / 1000
 # Figures beyond these are no measurement of an AR.Drone.
 _MOST_MDEG = 360_000.0
 _MOST_MM_S = 30_000.0
+_MOST_MM = 100_000
+_MOST_DEG_S, _MOST_MG = 5_000.0, 50_000.0
 # A heading step is a jump when it exceeds what the gyro explains by this much.
 _JUMP_RAD = math.radians(8)
 _JUMP_RATE_RAD_S = math.radians(100)
@@ -82,10 +84,11 @@ def motion_from_navdata(packet: Navdata) -> Motion | None:
 def _require_sane(demo: Demo) -> None:
     angles, speeds = demo[2:5], demo[6:9]
     # Comparisons with a NaN are false, so one chained comparison refuses it together with what is too large.
-    if all(-_MOST_MDEG <= a <= _MOST_MDEG for a in angles) and all(-_MOST_MM_S <= v <= _MOST_MM_S for v in speeds):
+    sane = all(-_MOST_MDEG <= a <= _MOST_MDEG for a in angles) and all(-_MOST_MM_S <= v <= _MOST_MM_S for v in speeds)
+    if sane and demo.altitude_mm <= _MOST_MM:
         return
     finite = all(map(math.isfinite, angles + speeds))
-    raise WireError("implausible" if finite else "not_finite", f"DEMO {angles} {speeds}")
+    raise WireError("implausible" if finite else "not_finite", f"DEMO {angles} {speeds} {demo.altitude_mm}")
 
 
 def _height(state: int, demo: Demo) -> float | None:
@@ -98,6 +101,8 @@ def _imu_from_phys(phys: PhysMeasures) -> tuple[Vector3, Vector3]:
     ax, ay, az = phys.accelerations_mg
     if not math.isfinite(wx + wy + wz + ax + ay + az):
         raise WireError("not_finite", "PHYS_MEASURES")
+    if max(map(abs, (wx, wy, wz))) > _MOST_DEG_S or max(map(abs, (ax, ay, az))) > _MOST_MG:
+        raise WireError("implausible", "PHYS_MEASURES")
     rates = (wx * _RAD_FROM_DEG, -wy * _RAD_FROM_DEG, -wz * _RAD_FROM_DEG)
     return rates, (ax * _M_S2_FROM_MG, -ay * _M_S2_FROM_MG, -az * _M_S2_FROM_MG)
 

@@ -106,6 +106,17 @@ def test_non_finite_imu_and_climb_are_refused():
         motion_from_navdata(packet(altitude=options.Altitude(vz_mm_s=math.nan)))
 
 
+def test_what_no_drone_reaches_is_refused():
+    for bad in (
+        options.PhysMeasures(rates_deg_s=(0.0, 3e38, 0.0)),
+        options.PhysMeasures(accelerations_mg=(-3e38, 0.0, 0.0)),
+    ):
+        with pytest.raises(WireError, match="implausible"):
+            motion_from_navdata(packet(phys=bad))
+    with pytest.raises(WireError, match="implausible"):
+        motion(altitude_mm=2**31 - 1)
+
+
 @pytest.mark.parametrize(
     ("state", "phase", "expected"),
     [

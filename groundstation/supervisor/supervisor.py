@@ -310,5 +310,5 @@ class Supervisor:
 
 
 def _in_words(process: ManagedProcess) -> str:
-    state = "not there" if process.state is SlotState.EMPTY else process.state.name.lower()
+    state = "starting" if process.state is SlotState.EMPTY else process.state.name.lower()
     return f"{process.spec.name} ({process.detail or state})"

@@ -77,7 +77,8 @@ function draw(name, { canvas, bitmap, stamp }) {
     g.font = `700 ${13 * Math.min(2, devicePixelRatio || 1)}px system-ui, "DejaVu Sans", sans-serif`;
     g.lineWidth = 4;
     g.strokeStyle = "#000";
-    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`, left = Math.min(u + r + 5, width - g.measureText(words).width - 4);
+    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`, long = g.measureText(words).width, beside = u + r + 5;
+    const left = beside + long <= width - 4 ? beside : Math.max(4, u - r - 5 - long); // at the right edge it would lie on the ring
     g.strokeText(words, left, v + 5);
     g.fillStyle = tint;
     g.fillText(words, left, v + 5);

@@ -7,6 +7,7 @@ import math
 
 from groundstation.estimation import slots as s
 from groundstation.estimation.belief import Array, IntArray
+from groundstation.estimation.columns import copy_two
 from groundstation.estimation.dispatch import call_predict
 from groundstation.estimation.kernel import kernel
 
@@ -18,19 +19,17 @@ DIFFUSE_RAD2 = 10.0
 
 @kernel("void(float64[:,::1], int64, int64, int64)", inlined=True)
 def mirror(P: Array, start: int, size: int, changed: int) -> None:
-    """Copy the first `changed` rows of a block onto its columns, so that P stays symmetric to the bit.
-
-    Two rows at a time: half of the cost of a prediction is in the cache lines that this touches.
-    """
+    """Copy the first `changed` rows of a block onto its columns, so that P stays symmetric to the bit."""
     stop = start + size
-    for i in range(start, start + changed, 2):
-        a, b, c = P[i], P[min(i + 1, stop - 1)], min(i + 1, stop - 1)
+    for i in range(start, start + changed - 1, 2):
+        copy_two(P, i, 0, start)
+        copy_two(P, i, stop, P.shape[0])
+    if changed % 2 == 1:
+        last = start + changed - 1
         for j in range(start):
-            P[j, i] = a[j]
-            P[j, c] = b[j]
+            P[j, last] = P[last, j]
         for j in range(stop, P.shape[0]):
-            P[j, i] = a[j]
-            P[j, c] = b[j]
+            P[j, last] = P[last, j]
     for i in range(start, stop):
         for j in range(start, min(i, start + changed)):
             mean = 0.5 * (P[i, j] + P[j, i])

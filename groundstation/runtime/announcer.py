@@ -13,6 +13,7 @@ from groundstation.bus.messages import (
     Innovation,
     JournalEntry,
     Plan,
+    SensorLateness,
     VelocitySetpoint,
     Verb,
 )
@@ -38,8 +39,8 @@ class Announcer:
         header = self._bus.header(TEAM, now_ns)
         self._bus.publish(ESTIMATE, Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch))
 
-    def belief(self, tracker: Tracker, now_ns: int) -> None:
-        """Publish the joint belief."""
+    def belief(self, tracker: Tracker, lateness: tuple[SensorLateness, ...], now_ns: int) -> None:
+        """Publish the joint belief, and by how much cameras seem late."""
         belief = tracker.belief
         upper = belief.covariance[np.triu_indices(belief.layout.dim)]
         message = Belief(
@@ -47,6 +48,7 @@ class Announcer:
             mean=tuple(belief.mean.tolist()),
             covariance_upper=tuple(upper.tolist()),
             layout=belief.layout.labels,
+            lateness=lateness,
         )
         self._bus.publish(BELIEF, message)
 

@@ -12,9 +12,11 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Message, Severity
 from groundstation.planning.plan import Planner
 from groundstation.runtime.announcer import TEAM, Announcer
+from groundstation.runtime.consistency import ConsistencyWatch
 from groundstation.runtime.health import UnseenWatch
 from groundstation.runtime.inbox import Inbox
 from groundstation.runtime.journal import FAULT, Adoption, entry_of
+from groundstation.runtime.picture_age import PictureAge
 from groundstation.runtime.plan_worker import PlanWorker
 from groundstation.tracker import Notice, PlanRequest, Tracker, tracker_from_field
 
@@ -90,6 +92,8 @@ class Tracking:
         self.notices: list[Notice] = []
         self._bus = bus
         self._announcer = Announcer(bus, field["safety"]["setpoint_lifetime_ms"])
+        self._contradictions = ConsistencyWatch(self.tracker.parameters.estimator.entities)
+        self._picture_age = PictureAge(field, feed.clock)
         self._unseen = UnseenWatch(field["safety"]["unseen_land_after_s"])
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
@@ -102,7 +106,11 @@ class Tracking:
         tracker, announcer = self.tracker, self._announcer
         ingested = self.inbox.pop_ready()
         for key, message in ingested:
-            tracker.ingest(key, message, now_ns)
+            verdict = tracker.ingest(key, message, now_ns)
+            if verdict is None:
+                self._picture_age.take(message)
+            else:
+                self._contradictions.refused(message, verdict, now_ns)
         tracker.advance(now_ns)
         adopted = self._worker.poll()
         if adopted is not None and adopted.plan is not None:
@@ -113,10 +121,12 @@ class Tracking:
         announcer.setpoints(tracker, limited, now_ns)
         announcer.estimate(tracker, now_ns)
         if self._tick % self._belief_every == 0:
-            announcer.belief(tracker, now_ns)
+            announcer.belief(tracker, self._picture_age.lateness(), now_ns)
         if adopted is not None and adopted.plan is not None:
             announcer.plan(adopted.plan, limited, "HOLD" if tracker.holding else adopted.plan.mode)
-        announcer.innovations(tracker.take_corrections(), now_ns)
+        corrections = tracker.take_corrections()
+        announcer.innovations(corrections, now_ns)
+        self._contradictions.take(corrections, now_ns)
         announcer.journal(entry_of(self._bus.header(TEAM, now_ns), self._tick, now_ns, ingested, adopted))
         if adopted is not None and adopted.stop_reason == FAULT:
             self.notices.append(Notice(Severity.ERROR, "planning failed", "the last plan stays in force for a while"))
@@ -135,6 +145,7 @@ class Tracking:
             text = "flies, but no camera has seen it for too long: ordered to land"
             self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
         if self._tick % self.rate_hz == 0:
+            self.notices += self._contradictions.notices(now_ns) + self._picture_age.notices()
             self._report_refusals()
 
     def _report_refusals(self) -> None:

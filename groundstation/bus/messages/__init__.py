@@ -4,7 +4,15 @@ Frames and units follow the field names; covariances are row-major tuples of an 
 """
 
 from groundstation.bus.messages.base import Header, Message, Quaternion, Vector3
-from groundstation.bus.messages.belief import Belief, EntityEstimate, Estimate, Innovation, JournalEntry, Verdict
+from groundstation.bus.messages.belief import (
+    Belief,
+    EntityEstimate,
+    Estimate,
+    Innovation,
+    JournalEntry,
+    SensorLateness,
+    Verdict,
+)
 from groundstation.bus.messages.flight import (
     AckStage,
     Command,
@@ -54,6 +62,7 @@ __all__ = [
     "ProcessStatus",
     "Quaternion",
     "RelativeObservation",
+    "SensorLateness",
     "Severity",
     "SimCommand",
     "SimStatus",

@@ -30,12 +30,24 @@ class Estimate(Message, frozen=True, kw_only=True):
     epoch: int
 
 
+class SensorLateness(msgspec.Struct, frozen=True):
+    """By how much longer a camera's way to us seems than its setting says, and one sigma [ms]; nothing acts on it."""
+
+    sensor: str
+    offset_ms: float
+    std_ms: float
+
+
 class Belief(Message, frozen=True, kw_only=True):
-    """The joint belief: mean, upper triangle of the covariance packed by rows, and what each entry is (<= 5 Hz)."""
+    """The joint belief: mean, upper triangle of the covariance packed by rows, and what each entry is (<= 5 Hz).
+
+    lateness: of the cameras whose delay the flight tells.
+    """
 
     mean: tuple[float, ...]
     covariance_upper: tuple[float, ...]
     layout: tuple[str, ...]
+    lateness: tuple[SensorLateness, ...] = ()
 
 
 class Verdict(StrEnum):

@@ -1,0 +1,154 @@
+"""Who contradicts the belief for seconds on end? The operator is told whom, and what to do; nothing is done by itself.
+
+The filter inflates what lies beyond the gate and re-initialises what diverged. What goes on all the same has a cause
+that it cannot mend: a camera that was knocked, a wrong setting, a sensor or a stream that hangs.
+"""
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from groundstation.bus.messages import Message, Odometry, RelativeObservation, Severity, Verdict
+from groundstation.estimation.measurement import Correction
+from groundstation.tracker import Notice
+
+# NIS per degree of freedom is 1 where the belief is right. Up at the first, down again at the second, each for so long.
+_FAR, _NEAR, _LASTING_NS = 4.0, 2.0, 3_000_000_000
+# One sighting counts no more than this: a wild one alone is none of a lasting contradiction.
+_MOST = 12.0
+_FORGETTING_S, _SILENT_NS = 2.0, 2_000_000_000
+_LEAST_SIGHTINGS = 10.0
+_FROZEN_NS = 1_000_000_000
+
+_SENSOR_REMEDY = "check how its camera is mounted, its calibration and its video_delay_ms (groundstation calibrate)"
+_SUBJECT_REMEDY = (
+    "check its marker and its odometry settings, and the cameras that see it; hold or land it if it strays"
+)
+_FROZEN_REMEDY = "it counts for nothing until it moves on; restart its stream or its driver, or land what depends on it"
+
+
+@dataclass(slots=True)
+class _Edge:
+    """Forgetting sums of one observer's sightings of one subject, and the last time."""
+
+    total: float = 0.0
+    count: float = 0.0
+    at_ns: int = 0
+
+    def take(self, surprise: float, now_ns: int) -> None:
+        kept = 0.5 ** ((now_ns - self.at_ns) / (_FORGETTING_S * 1e9)) if self.at_ns else 0.0
+        self.total, self.count, self.at_ns = kept * self.total + surprise, kept * self.count + 1.0, now_ns
+
+    @property
+    def mean(self) -> float:
+        return self.total / self.count
+
+
+@dataclass(slots=True)
+class _Alarm:
+    """One entity: whether it is told of, and since when it asks for the other."""
+
+    raised: bool = False
+    since_ns: int | None = None
+
+    def changes(self, wanted: bool, after_ns: int, now_ns: int) -> bool:
+        """Return whether it changes now: once the other has been wanted long enough."""
+        if wanted == self.raised:
+            self.since_ns = None
+            return False
+        self.since_ns = now_ns if self.since_ns is None else self.since_ns
+        if now_ns - self.since_ns < after_ns:
+            return False
+        self.raised, self.since_ns = wanted, None
+        return True
+
+
+class ConsistencyWatch:
+    """Fed with what became of observations and with what was refused; `notices` once a tick or less often."""
+
+    def __init__(self, names: Collection[str]) -> None:
+        self._edges: dict[tuple[str, str], _Edge] = {}
+        self._alarms = {name: _Alarm() for name in names}
+        self._frozen = {name: _Alarm() for name in names}
+        self._froze_at: dict[tuple[str, str], int] = {}
+
+    def refused(self, message: Message, verdict: Verdict, now_ns: int) -> None:
+        """Take a message that was refused: one that repeats itself says that its sensor hangs."""
+        if verdict is Verdict.FROZEN and message.header.entity in self._frozen:
+            kind = {RelativeObservation: "camera", Odometry: "odometry"}.get(type(message), "sensor")
+            self._froze_at[message.header.entity, kind] = now_ns
+
+    def take(self, corrections: Iterable[Correction], now_ns: int) -> None:
+        """Take what became of observations; those that brought their subject in say nothing of the belief before."""
+        for c in corrections:
+            if c.nis is not None and c.residual and not c.joined and {c.observer, c.subject} <= self._alarms.keys():
+                edge = self._edges.setdefault((c.observer, c.subject), _Edge())
+                edge.take(min(c.nis / len(c.residual), _MOST), now_ns)
+
+    def notices(self, now_ns: int) -> list[Notice]:
+        """Return what has become worth telling, or is over."""
+        return self._contradictions(now_ns) + self._freezes(now_ns)
+
+    def _contradictions(self, now_ns: int) -> list[Notice]:
+        live = {
+            pair: edge.mean
+            for pair, edge in self._edges.items()
+            if now_ns - edge.at_ns <= _SILENT_NS and edge.count >= _LEAST_SIGHTINGS
+        }
+        far = {pair for pair, mean in live.items() if mean > _FAR}
+        blamed: dict[str, list[tuple[str, str]]] = {}
+        for pair in far:
+            blamed.setdefault(_culprit(pair, far, live), []).append(pair)
+        found = []
+        for name, alarm in self._alarms.items():
+            own = [mean for pair, mean in live.items() if name in pair]
+            wanted = name in blamed if not alarm.raised else bool(own) and max(own) > _NEAR
+            if not own or not alarm.changes(wanted, _LASTING_NS, now_ns):
+                continue
+            if not alarm.raised:
+                found.append(Notice(Severity.INFO, "sightings agree with the belief again", entity=name))
+                continue
+            pairs = sorted(blamed[name])
+            worst = max(live[pair] for pair in pairs)
+            found.append(Notice(Severity.WARNING, _text(name, pairs, worst), _remedy(name, pairs), name))
+        return found
+
+    def _freezes(self, now_ns: int) -> list[Notice]:
+        found = []
+        for name, alarm in self._frozen.items():
+            kinds = [k for (who, k), at_ns in self._froze_at.items() if who == name and now_ns - at_ns <= _FROZEN_NS]
+            if not alarm.changes(bool(kinds), 0, now_ns):
+                continue
+            if alarm.raised:
+                text = f"its {' and '.join(sorted(kinds))} repeats the same numbers to the last bit: refused as frozen"
+                found.append(Notice(Severity.WARNING, text, _FROZEN_REMEDY, name))
+            else:
+                found.append(Notice(Severity.INFO, "no longer frozen", entity=name))
+        return found
+
+
+def _culprit(pair: tuple[str, str], far: Collection[tuple[str, str]], live: Collection[tuple[str, str]]) -> str:
+    """Return whom to name for one contradicting pair: the observer if it alone contradicts, or contradicts elsewhere.
+
+    Where all that see a subject contradict the belief of it, the subject is named: which of them is right, none can
+    tell.
+    """
+    observer, subject = pair
+    rivals = [other for other in live if other[1] == subject and other[0] != observer]
+    elsewhere = [other for other in live if other[0] == observer and other[1] != subject]
+    if elsewhere and all(other in far for other in elsewhere):
+        return observer
+    if rivals and not any(other in far for other in rivals):
+        return observer
+    return subject
+
+
+def _text(name: str, pairs: list[tuple[str, str]], worst: float) -> str:
+    if all(observer == name for observer, _ in pairs):
+        what = f"what its camera sees of {', '.join(subject for _, subject in pairs)}"
+    else:
+        what = f"what {' and '.join(observer for observer, _ in pairs)} {'see' if len(pairs) > 1 else 'sees'} of it"
+    return f"{what} contradicts the belief for {_LASTING_NS // 10**9} s: NIS {worst:.0f} per degree of freedom, not 1"
+
+
+def _remedy(name: str, pairs: list[tuple[str, str]]) -> str:
+    return _SENSOR_REMEDY if all(observer == name for observer, _ in pairs) else _SUBJECT_REMEDY

@@ -1,0 +1,71 @@
+"""Are a camera's pictures as old as its setting says? The operator is told when they are not; nothing else follows."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from groundstation.bus.messages import Message, Odometry, RelativeObservation, SensorLateness, Severity
+from groundstation.estimation.lateness import Lateness, LatenessWatch
+from groundstation.tracker import Notice
+
+# Told from so many sigmas and so much on; withdrawn below the second.
+_SIGMAS, _TOLERATED_S = 3.0, 0.015
+_SIGMAS_AGAIN, _TOLERATED_AGAIN_S = 2.0, 0.010
+
+
+class PictureAge:
+    """Feeds a LatenessWatch with what the tracker accepted, and turns what it tells into notices.
+
+    clock: whose stamps count; those of another host would need its offset.
+    """
+
+    def __init__(self, field: Mapping[str, Any], clock: str) -> None:
+        self._watch, self._clock = LatenessWatch(), clock
+        cameras = {name: f"cameras.{name}.video_delay_ms" for name in field["cameras"]}
+        drones = field["drones"].items()
+        cameras |= {name: f"drones.{name}.camera.video_delay_ms" for name, drone in drones if drone.get("camera")}
+        self._settings = cameras
+        self._delays_ms = {name: _delay_ms(field, name) for name in cameras}
+        self._told: dict[str, bool] = {}
+
+    def take(self, message: Message) -> None:
+        """Take a message that the tracker accepted."""
+        header = message.header
+        if header.clock != self._clock:
+            return
+        if isinstance(message, Odometry):
+            self._watch.turned(header.entity, header.stamp_ns, message.yaw_rad, message.reset)
+        elif isinstance(message, RelativeObservation) and message.observer in self._settings:
+            name = message.observer
+            self._watch.saw(name, name, message.subject, header.stamp_ns, message.yaw_rad)
+
+    def lateness(self) -> tuple[SensorLateness, ...]:
+        """Return what is known of the cameras' delays."""
+        return tuple(SensorLateness(one.sensor, 1e3 * one.offset_s, 1e3 * one.std_s) for one in self._watch.told())
+
+    def notices(self) -> list[Notice]:
+        """Return which cameras are to be told of, or no longer; call it about once a second."""
+        found = []
+        for one in self._watch.told():
+            told, off_s = self._told.get(one.sensor, False), abs(one.offset_s)
+            if not told and off_s > max(_TOLERATED_S, _SIGMAS * one.std_s):
+                self._told[one.sensor] = True
+                found.append(self._warning(one))
+            elif told and off_s < max(_TOLERATED_AGAIN_S, _SIGMAS_AGAIN * one.std_s):
+                self._told[one.sensor] = False
+                found.append(
+                    Notice(Severity.INFO, "its pictures are as old as configured after all", entity=one.sensor)
+                )
+        return found
+
+    def _warning(self, one: Lateness) -> Notice:
+        now_ms = self._delays_ms[one.sensor]
+        than = "older" if one.offset_s > 0.0 else "newer"
+        text = f"its pictures seem {1e3 * abs(one.offset_s):.0f} +- {1e3 * one.std_s:.0f} ms {than} than configured"
+        better = max(0.0, now_ms + 1e3 * one.offset_s)
+        setting = f"{self._settings[one.sensor]}: {better:.0f} (now {now_ms:.0f})"
+        return Notice(Severity.WARNING, text, f"set {setting}, or run groundstation calibrate delay", one.sensor)
+
+
+def _delay_ms(field: Mapping[str, Any], name: str) -> float:
+    camera = field["cameras"][name] if name in field["cameras"] else field["drones"][name]["camera"]
+    return float(camera["video_delay_ms"])

@@ -25,7 +25,7 @@ def console(name: str | None, port: int | None) -> None:
 
     record = choose(name)
     cast, field = cast_of(record), _field_of(record)
-    truth = any(process.role == "sim_bridge" for process in record.processes)
+    truth = record.simulated
     scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
     listener = claim_port(port or field.get("console", {}).get("port", 8765))
     bus = open_bus(record.endpoint, record.site, f"console_{os.getpid()}", timeout_s=2.0)

@@ -28,14 +28,20 @@ _PATIENCE_DEFAULT_S = 5.0
 _CONNECT_S = 0.5
 
 
-def choose_run(name: str | None) -> RuntimeRecord:
-    """Return the running ground station, or the named one of several; raises UnreachableError."""
+def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
+    """Return the running ground station, or the named one of several; raises UnreachableError.
+
+    stops: without a name the real drones are meant, whatever is rehearsed beside them.
+    """
     records = runtime_file.live_records()
     if name is not None:
         records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
     if not records:
         which = f" called {name}" if name else ""
         raise UnreachableError(f"no ground station{which} is running here (start one with: groundstation fly FIELD)")
+    if len(records) > 1 and stops and name is None:
+        # In an emergency nobody reads a list of runs.
+        records = [record for record in records if not record.simulated] or records
     if len(records) > 1:
         lines = "\n".join(f"  --run {r.name}  {r.field}, {', '.join(r.drones)}" for r in records)
         raise UnreachableError(f"several ground stations are running, choose one:\n{lines}")
@@ -70,7 +76,7 @@ def signal_drivers(record: RuntimeRecord) -> list[str]:
 
 def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -> int:
     """Carry out one verb; returns the exit code."""
-    record = choose_run(run)
+    record = choose_run(run, stops=verb in _STOPS)
     strangers = [name for name in drones if name not in record.drones]
     if strangers:
         raise OperatorMistake(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
@@ -128,7 +134,7 @@ def _without_router(verb: Verb, record: RuntimeRecord, as_json: bool, error: Gro
 
 def _verb(verb: Verb, text: str) -> click.Command:
     @click.argument("drones", nargs=-1)
-    @click.option("--run", metavar="NAME", help="Which ground station, if several run here.")
+    @click.option("--run", metavar="NAME", help="Which ground station, if several run here (a stop: the real drones).")
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
     def callback(drones: tuple[str, ...], run: str | None, as_json: bool, **more: Any) -> int:
         if verb is Verb.CUT_MOTORS and not more["yes"]:

@@ -51,6 +51,11 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
         """Whether any process of it still runs (drivers outlive a killed supervisor until they have landed)."""
         return any(process.alive for process in (self.supervisor, *self.processes))
 
+    @property
+    def simulated(self) -> bool:
+        """Whether its drones are emulated."""
+        return any(process.role == "sim_bridge" for process in self.processes)
+
 
 def start_time(pid: int) -> int | None:
     """Return when a process started [clock ticks since boot], or None if there is none or it is a zombie."""

@@ -147,6 +147,14 @@ def test_several_runs_must_be_told_apart(team: FakeTeam) -> None:
     assert cli("land", "--run", "lab").returncode == 0
 
 
+def test_a_stop_means_the_real_drones_whatever_is_rehearsed_beside_them(team: FakeTeam) -> None:
+    simulator = ProcessRecord("sim_bridge", "sim_bridge", os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+    announce("tcp/127.0.0.1:9", site="rehearsal", processes=(simulator,))
+    assert cli("land").returncode == 0
+    assert team.heard
+    assert cli("takeoff").returncode == 3, "a start is never guessed"
+
+
 def test_silent_router_signals_the_drivers_and_no_stranger(runtime: Path) -> None:
     with subprocess.Popen(["sleep", "30"]) as driver, subprocess.Popen(["sleep", "30"]) as stranger:
         started = runtime_file.start_time(driver.pid) or 0

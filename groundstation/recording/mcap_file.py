@@ -1,5 +1,6 @@
 """One MCAP file: a channel per key, schemas from the messages themselves, chunks closed at every flush."""
 
+import errno
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -63,9 +64,14 @@ class McapFile:
         return self._sound_bytes
 
     def flush(self) -> None:
-        """Close the chunk and hand everything to the kernel: what was written so far survives a kill -9."""
+        """Close the chunk and hand everything to the kernel: what was written so far survives a kill -9.
+
+        A file that somebody has removed is an error: the kernel would take everything, and nothing would be left.
+        """
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._sound_bytes = self._stream.tell()
+        if os.fstat(self._stream.fileno()).st_nlink == 0:
+            raise OSError(errno.ENOENT, "the file was removed")
 
     def close(self) -> None:
         """Write indexes and footer and close; idempotent."""

@@ -130,6 +130,7 @@ class FileSeries:
 
     def _begin(self, now_ns: int) -> McapFile:
         """Open the next part; raises OSError, and leaves the current one as it is, when there is no room."""
+        self._folder.mkdir(parents=True, exist_ok=True)  # somebody may have removed it
         if not self._has_room():
             raise OSError(errno.ENOSPC, "no space left on the disk")
         number = 1 + max((number for number, _ in numbered_parts(self._folder, self._stem)), default=0)

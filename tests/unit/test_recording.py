@@ -1,6 +1,7 @@
 """Recording: times, refusals, files that survive write errors, cut files."""
 
 import errno
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -254,6 +255,26 @@ def test_series_begins_no_file_without_room_and_leaves_no_fragments(tmp_path: Pa
     assert series.lost == 5
     assert len(series.take_troubles()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_goes_on_after_its_folder_was_removed(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    series = FileSeries(folder, "state", PREAMBLE)
+    entries = list(_entries(20))
+    for entry in entries[:10]:
+        series.write(entry, 0)
+    shutil.rmtree(folder)
+    series.tick(S)
+    (trouble,) = series.take_troubles()
+    assert trouble.text == "cannot write the state recording: the file was removed"
+    series.tick(S + RETRY_PERIOD_NS)
+    for entry in entries[10:]:
+        series.write(entry, 4 * S)
+    series.close()
+    (part,) = parts(folder, "state")
+    assert len(list(open_recording(part).records())) == 10
+    assert (series.written, series.lost) == (10, 10)
 
 
 def test_a_restarted_recorder_does_not_overwrite(tmp_path: Path) -> None:

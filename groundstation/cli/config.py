@@ -48,12 +48,14 @@ def _targets(names: tuple[str, ...]) -> str:
 
 
 def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
+    from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
     from groundstation.settings.scenario import load_scenario
 
     path = find_field(name)
     problems: list[str] = []
+    field = None
     try:
         field = load_field(path, options)
         team = f"{len(field.drones)} drone(s), {len(field.cameras)} fixed camera(s), {_targets(tuple(field.tracked))}"
@@ -61,7 +63,10 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
         problems += error.problems
     if scenario is not None:
         try:
-            load_scenario(find_scenario(scenario, path))
+            plain = load_scenario(find_scenario(scenario, path))
+            if field is not None:
+                paths = drawing.paths_of(plain, field.tracked)
+                problems += [f"{scenario}: {sentence}" for sentence in drawing.beyond_walls(field, paths)]
         except SettingsError as error:
             problems += error.problems
     if problems:

@@ -98,6 +98,7 @@ def run_simulated(
     """Fly a field in the simulator, judge the run, and return the exit code."""
     from groundstation.cli.composition import Simulation, simulated
     from groundstation.cli.flight import FlightPlan
+    from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
     from groundstation.settings.scenario import load_scenario
@@ -109,6 +110,8 @@ def run_simulated(
     chosen = load_scenario(find_scenario(scenario, path))
     if seed is None:
         seed = int(chosen.get("seed", 1))
+    for sentence in drawing.beyond_walls(loaded, drawing.paths_of(chosen, loaded.tracked)):
+        click.echo(f"scenario {scenario}: {sentence}", err=True)
     net = network.claim(runtime_file.folder())
     try:
         plan = FlightPlan(duration, asks=False, limits=limits)

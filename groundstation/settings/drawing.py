@@ -40,6 +40,20 @@ def paths_of(scenario: Mapping[str, Any], targets: Iterable[str]) -> Paths:
     return {name: _points(own.get(name, common).get("path", {})) for name in targets}
 
 
+def beyond_walls(field: Field, paths: Paths) -> list[str]:
+    """Return a sentence for each target whose path leaves the room."""
+    width, depth, _ = field.room.size_m
+    found = []
+    for name, points in paths.items():
+        x, y = (max((abs(point[axis]) for point in points), default=0.0) for axis in (0, 1))
+        if x > width / 2 or y > depth / 2:
+            found.append(
+                f"the path of {name} leaves the room: up to x {x:.1f}, y {y:.1f} m from its middle, walls at "
+                f"{width / 2:g} and {depth / 2:g} m; set its path in a scenario of your own"
+            )
+    return found
+
+
 def _points(path: Mapping[str, Any]) -> list[tuple[float, float]]:
     if path.get("shape") != "figure_eight":
         return []

@@ -218,6 +218,14 @@ def test_config_init_starts_a_field_and_overwrites_nothing(tmp_path: Path, capsy
     assert (folder / "lab.yaml").read_text(encoding="utf-8") == "mine"
 
 
+def test_a_path_that_leaves_the_room_is_told_before_the_rehearsal(
+    lab: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    narrow = ("--set", "room.size_m=[8, 1.5, 4.5]", "--set", "room.fence.y_m=[-0.7, 0.7]")
+    assert cli.run(["config", "check", "lab.yaml", "--scenario", "realistic", *narrow]) == 2
+    assert "realistic: the path of turtlebot leaves the room" in capsys.readouterr().err
+
+
 def test_config_draw(lab: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["config", "draw", "lab.yaml", "--scenario", "realistic", "--output", "room.svg"]) == 0
     text = (lab / "room.svg").read_text(encoding="utf-8")

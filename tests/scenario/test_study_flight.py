@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
-from sim_bridge.scenario import Scenario
+from groundstation.settings.load import load_field
+from groundstation.settings.scenario import load_scenario
+from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.study.runner import Study, StudyOptions
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +46,17 @@ def test_grossly_wrong_sightings_do_no_harm(lab_field: dict[str, Any]) -> None:
     report = Study(lab_field, Scenario(), StudyOptions(seed=3, duration_s=15.0, outliers=0.02)).run()
     assert report["verdicts"]["IMPLAUSIBLE"] > 0
     assert max(report["robot_rmse_m"][name] for name in ("drone_1", "drone_2")) <= 0.12
+
+
+def test_two_targets_are_found_and_held() -> None:
+    scenario = parse_scenario(json.dumps(load_scenario(ROOT / "config/scenarios/two-targets.yaml")))
+    field = load_field(ROOT / "config/two-targets.yaml").model_dump(mode="json")
+    report = Study(field, scenario, StudyOptions(seed=1, duration_s=15.0)).run()
+    for name, target in report["targets"].items():
+        assert target["lost_s"] <= 4.0, name  # until it is found
+        assert report["robot_rmse_m"][name] <= 0.12, name
+    assert report["target_rmse_m"] == max(target["rmse_m"] for target in report["targets"].values())
+    assert report["min_separation_m"] >= 0.6
 
 
 def test_the_command_line_prints_json() -> None:

@@ -4,13 +4,18 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from groundstation.errors import SettingsError
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, Layout
 from groundstation.estimation.models import ConstantVelocityTarget, CoordinatedTurnTarget, ManoeuvringTarget
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.planning import parameters as planning
+from groundstation.planning.plan import Planner
 from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, driver_sections
@@ -101,3 +106,18 @@ def test_a_field_without_any_target_is_refused() -> None:
 def test_an_option_invents_no_target() -> None:
     with pytest.raises(SettingsError, match="did you mean targets"):
         two_targets("targets.turtlebot_3.weight=2")
+
+
+@pytest.mark.parametrize(("heavy", "side"), [("turtlebot_1", 1.0), ("turtlebot_2", -1.0)])
+def test_a_lone_drone_turns_to_the_target_that_weighs_more(heavy: str, side: float) -> None:
+    plain = two_targets(f"targets.{heavy}.weight=50").model_dump(mode="json")
+    layout = Layout().with_entity("drone_1", EntityKind.ROBOT, ROBOT_CORE)
+    for name in ("turtlebot_1", "turtlebot_2"):
+        layout = layout.with_entity(name, EntityKind.TARGET, TARGET_CORE)
+    mean = np.array([0.0, 0.0, 1.6, 0.0, 0.7, 1.0, 0.0, 0.0, 0.7, -1.0, 0.0, 0.0])
+    variances = np.array([0.03] * 4 + [0.3, 0.3, 0.1, 0.1] * 2) ** 2
+    planner = Planner(planning.parameters_from_field(plain), sensors_from_field(plain))
+    belief = JointBelief(mean, np.diag(variances), layout, 0)
+    plan = planner.plan(belief, Topology.flat(["drone_1"]), {}, lambda: False)
+    _, left_m_s, turn_rad_s = plan.controls["drone_1"]
+    assert side * left_m_s > 0.05 and side * turn_rad_s > 0.2

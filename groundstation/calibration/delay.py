@@ -243,10 +243,14 @@ def _onboard_camera(
             f"{drone} camera", setting, now_ms, reason="none within 80 ms of the setting fits best", flight=_WATCH
         )
     near = slice(max(0, best - 2), best + 3)
-    a, b, _ = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
+    fit = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
+    a, b, _ = fit
     if a <= 0:
         return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell", flight=_WATCH)
-    std_ms = float(np.sqrt(_NEIGHBOURS / a))
+    # Costs that lie on no parabola are dents: a dent moves the minimum as well.
+    off = costs[near] - np.polyval(fit, _SHIFTS_MS[near])
+    dents = float(np.sqrt((off @ off) / (len(off) - len(fit))))
+    std_ms = float(np.sqrt((_NEIGHBOURS + dents) / a))
     return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms, flight=_WATCH)
 
 

@@ -89,7 +89,9 @@ class Recorder:
     def _report(self, series: FileSeries) -> None:
         for trouble in series.take_troubles():
             severity = Severity.INFO if trouble.recovered else Severity.ERROR
-            remedy = "" if trouble.recovered else f"free space in {self._folder}; the flight is not affected"
+            remedy = (
+                "" if trouble.recovered else f"make room in {self._folder}, leave it there; the flight is not affected"
+            )
             self._child.event(severity, trouble.text, remedy)
             if trouble.recovered:
                 self.announce()

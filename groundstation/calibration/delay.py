@@ -34,14 +34,16 @@ _ROUNDS = 2
 _TURN = "turn the drones to and fro in its sight, or let the target circle them"
 _DASH = "dash to and fro in sight of a fixed camera, or chase a target that keeps turning back; or fly four minutes"
 _CLIMB = "take off and land some five times in sight of a fixed camera, in one recording"
-_WATCH = "turn and move while it sees the target or another drone"
+_TARGET_ONLY = "doubtful: it saw hardly any other drone, and how the target moves nobody knows"
+_WATCH = "turn and move while it sees another drone"
 _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """One sensor: the setting, what it says [ms], what was measured and one sigma of it; reason where it was not.
+    """One sensor: the setting, what it says [ms], what was measured and one sigma of it.
 
+    reason: why it was not measured, or why what was measured is not to be trusted.
     flight: which flight would tell it.
     """
 
@@ -60,8 +62,8 @@ class Delay:
 
     @property
     def differs(self) -> bool:
-        """Return whether the setting is contradicted: by three sigmas, and by more than 10 ms."""
-        if self.measured_ms is None or self.std_ms is None or not self.sure:
+        """Return whether something trustworthy contradicts the setting: by three sigmas, and by more than 10 ms."""
+        if self.measured_ms is None or self.std_ms is None or not self.sure or self.reason:
             return False
         return abs(self.measured_ms - self.now_ms) > max(_TOLERATED_MS, 3.0 * self.std_ms)
 
@@ -243,15 +245,13 @@ def _onboard_camera(
             f"{drone} camera", setting, now_ms, reason="none within 80 ms of the setting fits best", flight=_WATCH
         )
     near = slice(max(0, best - 2), best + 3)
-    fit = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
-    a, b, _ = fit
+    a, b, _ = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
     if a <= 0:
         return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell", flight=_WATCH)
-    # Costs that lie on no parabola are dents: a dent moves the minimum as well.
-    off = costs[near] - np.polyval(fit, _SHIFTS_MS[near])
-    dents = float(np.sqrt((off @ off) / (len(off) - len(fit))))
-    std_ms = float(np.sqrt((_NEIGHBOURS + dents) / a))
-    return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms, flight=_WATCH)
+    std_ms = float(np.sqrt(_NEIGHBOURS / a))
+    drones = sum(m.observer == drone and m.subject in resolved["drones"] for m in _messages(flown, RelativeObservation))
+    doubt = "" if drones >= _LEAST_PAIRS else _TARGET_ONLY
+    return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms, doubt, _WATCH)
 
 
 def _dated(later_ms: Mapping[str, float]) -> Dating:

@@ -64,7 +64,7 @@ def _lines(found: "list[Delay]") -> list[str]:
     lines += [f"  {one.setting}: {one.measured_ms:.0f}" for one in changed]
     flights: dict[str, list[str]] = {}
     for one in found:
-        if not one.sure:
+        if not one.sure or one.reason:
             flights.setdefault(one.flight, []).append(one.sensor)
     if flights:
         lines.append("not told by this recording; a flight that would tell:")

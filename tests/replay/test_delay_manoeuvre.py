@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from groundstation.bus.messages import Message, RelativeObservation, Severity
-from groundstation.calibration.delay import delays
+from groundstation.calibration.delay import Delay, delays
 from groundstation.calibration.flown import Flown
 from groundstation.runtime.picture_age import PictureAge
 from sim_bridge.scenario import Scenario
@@ -91,3 +91,9 @@ def test_velocities_are_dated_by_a_flight_that_dashes_to_and_fro(
         one = found[f"{name} velocity"]
         assert one.sure and one.measured_ms == pytest.approx(truth_ms, abs=15.0), (one, truth_ms)
     assert found["ceiling"].measured_ms == pytest.approx(120.0, abs=8.0)
+
+
+def test_only_what_is_sure_and_not_doubted_is_proposed() -> None:
+    assert Delay("ceiling", "cameras.ceiling.video_delay_ms", 120.0, 160.0, 5.0).differs
+    assert not Delay("ceiling", "cameras.ceiling.video_delay_ms", 120.0, 160.0, 20.0).differs
+    assert not Delay("ceiling", "cameras.ceiling.video_delay_ms", 120.0, 160.0, 5.0, "doubtful").differs

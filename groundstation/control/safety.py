@@ -57,6 +57,7 @@ def limit_setpoint(
     velocity = world_from_stabilized(clipped, yaw)
     known = velocities or {}
     walls = _fence(robot, belief, parameters, known) + _others(robot, belief, parameters, known)
+    walls += [_turning(wall, rate, parameters.reaction_s) for wall in walls]
     for _ in range(PASSES):
         exceeded = [wall for wall in walls if float(velocity @ wall.normal) > wall.most + 1e-9]
         if not exceeded:
@@ -66,7 +67,6 @@ def limit_setpoint(
             names.append(wall.name)
     else:
         velocity = np.zeros(3)
-    rate = _turn_within(walls, velocity, rate, parameters.reaction_s, names)
     body = stabilized_from_world(velocity, yaw)
     limited = replace(
         setpoint, velocity_m_s=(float(body[0]), float(body[1]), float(body[2])), yaw_rate_rad_s=float(rate)
@@ -74,20 +74,15 @@ def limit_setpoint(
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
 
 
-def _turn_within(walls: list[_Wall], velocity: Array, rate: float, reaction_s: float, names: list[str]) -> float:
-    """Return the yaw rate at which no wall's velocity is exceeded.
+def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:
+    """Return the wall as a turning vehicle meets it.
 
-    A vehicle that holds its velocity in its own frame carries it along when it turns: by that much it is not where the
-    command points, for as long as its reaction takes.
+    A vehicle that holds its velocity v in its own frame carries it along when it turns: it flies v + T rate (z x v),
+    for as long as its reaction T lags behind. What is projected on a half-space that contains zero only shrinks.
     """
-    aside = np.array([-velocity[1], velocity[0], 0.0])
-    for wall in walls:
-        outward = reaction_s * rate * float(aside @ wall.normal)
-        room = max(0.0, wall.most - float(velocity @ wall.normal))
-        if outward > room + 1e-9:
-            rate *= room / outward
-            names.append(wall.name)
-    return rate
+    tilted = wall.normal + reaction_s * rate * np.array([wall.normal[1], -wall.normal[0], 0.0])
+    size = max(float(np.linalg.norm(tilted)), 1e-9)
+    return _Wall(wall.name, tilted / size, wall.most / size)
 
 
 def _hover(setpoint: Setpoint, reason: str) -> Limited:

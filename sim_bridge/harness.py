@@ -7,6 +7,7 @@ import time
 from groundstation.bus.messages import Severity, SimCommand, SimStatus, TruthState
 from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
 from groundstation.process.child import Child
+from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
 from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
@@ -50,6 +51,7 @@ class Harness:
         """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""
         self._child.ready(self._inventory)
         gc.collect()
+        go_first()  # it stands for drones, which do not wait for this machine
         gc.freeze()  # the start's objects live as long as the process: never look at them again
         self._clock = Clockwork(time.monotonic_ns())
         orphaned_ns = 0

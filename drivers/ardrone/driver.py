@@ -31,6 +31,7 @@ from drivers.host import VehicleHost, run_hosts
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity
 from groundstation.errors import SettingsError
+from groundstation.process.priority import go_first
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
@@ -213,6 +214,7 @@ def run(child: HostProcess) -> int:
             child.event(notice.severity, f"{drone.name}: {notice.text}", notice.remedy, drone.name)
 
     try:
+        go_first()
         return run_hosts(child, [VehicleHost(child, drone, settings.authority)], RATE_HZ, tell)
     finally:
         drone.close()

@@ -16,6 +16,7 @@ from groundstation.bus import clock
 from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache
 from groundstation.process.child import Child
+from groundstation.process.priority import go_first
 from groundstation.runtime.health import Deadlines
 from groundstation.runtime.kernels import compile_kernels
 
@@ -56,6 +57,7 @@ def _loop(child: Child, tracking: Tracking) -> None:
     period_ns = clock.NS_PER_S // tracking.rate_hz
     deadlines = Deadlines(period_ns, clock.now_ns())
     child.ready()
+    go_first()
     while not child.stop_requested and child.supervisor_alive:
         now_ns = clock.now_ns()
         deadlines.start_tick(now_ns)

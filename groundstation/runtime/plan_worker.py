@@ -10,6 +10,7 @@ import msgspec
 
 from groundstation.errors import EstimatorFault
 from groundstation.planning.plan import Planner
+from groundstation.process.priority import Rank, go_first
 from groundstation.runtime.journal import Adoption
 from groundstation.tracker import PlanRequest
 
@@ -60,6 +61,7 @@ class PlanWorker:
         self._thread.join(timeout=2.0)
 
     def _run(self) -> None:
+        go_first(Rank.PLAN)
         while True:
             with self._wake:
                 while self._request is None and not self._closed:

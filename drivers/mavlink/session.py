@@ -5,6 +5,8 @@ ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN come
 changed nor told: it is asked for as well. PX4 flies indoors without: nothing waits for its answer.
 """
 
+from collections import Counter
+
 from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import Origin
@@ -19,6 +21,7 @@ _PARAM_PERIOD_NS = 500_000_000
 _HEARTBEAT_NS = 1_000_000_000
 _DISCONNECTED_NS = 2_000_000_000
 _PARAM_BURST = 4
+_PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
 _STOPPED = 0.0
 
@@ -57,6 +60,7 @@ class Session:
         self._connected = False
         self._found: dict[str, float] = {}
         self._asked: set[str] = set()
+        self._param_tries: Counter[str] = Counter()
         self._has_origin = False
         self._origin_tries = 0
         self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
@@ -80,11 +84,16 @@ class Session:
         if missing:
             return f"asking for {missing[0].__name__}"
         if self.unread:
-            return f"reading parameter {self.unread[0]}"
+            return self._unread_detail(self.unread[0])
         if self.problems:
             return f"parameter {self.problems[0]}: groundstation mavlink setup --apply"
         ready = self._has_origin or self._flavour is Flavour.PX4
         return "" if ready else "waiting for the origin to be taken"
+
+    def _unread_detail(self, name: str) -> str:
+        if self._param_tries[name] < _PARAM_TRIES:
+            return f"reading parameter {name}"
+        return f"it does not know parameter {name}: is its firmware PX4 1.16 or ArduCopter 4.6?"
 
     def hear_parameter(self, message: service.ParamValue) -> None:
         """Take a parameter's value; raises WireError."""
@@ -107,6 +116,7 @@ class Session:
             if self._connected:
                 self._connected, self._has_origin, self._origin_tries = False, False, 0
                 self._found.clear()
+                self._param_tries.clear()
                 requests.forget()
             return messages
         self._connected = True
@@ -129,8 +139,10 @@ class Session:
         if unread and (now_ns >= self._next_param_ns or self._asked.isdisjoint(unread)):
             self._next_param_ns = now_ns + _PARAM_PERIOD_NS
             # A burst at a time, so that a slow radio is not flooded; answers bring the next one forward.
-            messages += [service.ParamRequestRead(self._system, 1, name, -1) for name in unread[:_PARAM_BURST]]
-            self._asked = set(unread[:_PARAM_BURST])
+            burst = sorted(unread, key=self._param_tries.__getitem__)[:_PARAM_BURST]
+            messages += [service.ParamRequestRead(self._system, 1, name, -1) for name in burst]
+            self._param_tries.update(burst)
+            self._asked = set(burst)
         return messages
 
     def _origin_requests(self) -> list[Message]:

@@ -86,8 +86,9 @@ class Arena(msgspec.Struct, frozen=True):
 
     @property
     def heights_m(self) -> tuple[float, ...]:
-        """Return all distinct height slots, lowest first."""
-        return tuple(sorted({height for row in self.planner.level_heights_m for height in row}))
+        """Return the distinct height slots that this team can use, lowest first."""
+        rows = self.planner.level_heights_m[: len(self.drones)]
+        return tuple(sorted({height for row in rows for height in row}))
 
 
 def arena_from_json(data: bytes) -> Arena:

@@ -42,7 +42,7 @@ def _draw_room(axes: Axes, data: RunData) -> None:
         fence = Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fill=False, ec="#b03a2e", lw=1.0, ls="--")
         axes.add_patch(fence)
     for camera in data.arena.cameras.values():
-        for height in data.arena.heights_m:
+        for index, height in enumerate(data.arena.heights_m):
             half_x, half_y = camera.footprint_half_m(height)
             x, y, _ = camera.position_m
             box = Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, fc=_CAMERA, alpha=0.06, lw=0, zorder=0)
@@ -50,8 +50,9 @@ def _draw_room(axes: Axes, data: RunData) -> None:
             axes.add_patch(
                 Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, fill=False, ec=_CAMERA, lw=0.7, ls=":")
             )
-            axes.annotate(f"{height:g} m", (x + half_x, y - half_y), xytext=(-3, 3), textcoords="offset points",
-                          ha="right", va="bottom", fontsize=8, color=_CAMERA)  # fmt: skip
+            side, ha = (1, "right") if index % 2 == 0 else (-1, "left")  # neighbours do not hide each other
+            axes.annotate(f"{height:g} m", (x + side * half_x, y - half_y), xytext=(-3 * side, 3),
+                          textcoords="offset points", ha=ha, va="bottom", fontsize=8, color=_CAMERA)  # fmt: skip
 
 
 def _draw_entity(axes: Axes, data: RunData, name: str, start: float, end: float) -> None:

@@ -191,6 +191,6 @@ class Study:
         belief = self.tracker.belief
         ages_s = {name: self.tracker.filter.age_s(name) for name in belief.layout.robots}
         self.score.take(belief, truth, tuple(self.world.targets), str(self.tracker.topology), ages_s)
-        drones = states[:-1, :3]
+        drones = states[: len(self.world.drones), :3]
         outside = np.maximum(self._fence[:, 0] - drones, drones - self._fence[:, 1])
         self.fence_violation_m = max(self.fence_violation_m, float(outside.max()))

@@ -22,6 +22,7 @@ from groundstation.errors import MessageError
 from groundstation.recording.chunks import UNREADABLE, RawRecord, chunk_data, chunk_records, frames
 from groundstation.recording.origin import RecordingError, require_ours, require_readable
 from groundstation.recording.part_names import numbered_parts
+from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.schemas import is_picture
 from groundstation.recording.selection import STATE
 from groundstation.recording.viewers import picture_parts
@@ -154,7 +155,7 @@ def attached_field(run_dir: Path) -> bytes:
         opened, _ = open_parts(parts(run_dir, STATE))
     except RecordingError:
         return b"{}"
-    return next((part.attachments["field.json"] for part in opened if "field.json" in part.attachments), b"{}")
+    return next((part.attachments[FIELD_NAME] for part in opened if FIELD_NAME in part.attachments), b"{}")
 
 
 def _read_preamble(stream: IO[bytes], recording: Recording) -> None:

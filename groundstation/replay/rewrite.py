@@ -9,11 +9,11 @@ from groundstation.bus.messages import Message
 from groundstation.bus.topics import JOURNAL, Topic
 from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
-from groundstation.recording.preamble import Preamble
+from groundstation.recording.preamble import FIELD_NAME, Preamble
 from groundstation.recording.reader import RawRecord, RecordingError, open_recording
 from groundstation.recording.timeline import Timeline
 from groundstation.replay import versions
-from groundstation.replay.source import FIELD, Source
+from groundstation.replay.source import Source
 from groundstation.replay.ticks import OUTPUTS
 from groundstation.replay.verify import Lived, Repetition
 
@@ -36,7 +36,7 @@ def live_again(source: Source, repetition: Repetition, folder: Path, field: byte
     folder.mkdir(parents=True, exist_ok=True)
     opened = open_recording(source.state[0])
     attachments = {name: (opened.media_types.get(name, ""), data) for name, data in opened.attachments.items()}
-    attachments[FIELD] = ("application/json", field)
+    attachments[FIELD_NAME] = ("application/json", field)
     note = {"replay": {"of": source.name, "changes": changes}, "versions": {**source.versions, **versions.current()}}
     created = int(source.run.get("created_unix_ns", "0"))
     if _FACTS in opened.attachments:

@@ -8,10 +8,10 @@ from typing import Any
 
 import msgspec
 
+from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
 from groundstation.recording.selection import RAW, STATE
 
-FIELD = "field.json"
 _TYPICAL = "a run folder holds state.mcap"
 
 
@@ -68,14 +68,14 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     readable, unread = open_parts(state)
     opened = sorted(readable, key=lambda recording: _created_ns(recording))
     first = opened[0]
-    if FIELD not in first.attachments or "run" not in first.metadata:
+    if FIELD_NAME not in first.attachments or "run" not in first.metadata:
         raise RecordingError(f"{first.path}: no recording of a ground station (neither field nor run are in it)")
     sites = {recording.metadata.get("run", {}).get("clock", "") for recording in opened}
     if len(sites) > 1:
         raise RecordingError(f"{', '.join(map(str, state))}: these are not parts of one recording")
     run = first.metadata["run"]
     try:
-        msgspec.json.decode(first.attachments[FIELD], type=dict[str, Any])
+        msgspec.json.decode(first.attachments[FIELD_NAME], type=dict[str, Any])
         offset_ns = int(run.get("unix_offset_ns", "0"))
     except (msgspec.DecodeError, ValueError) as error:
         raise RecordingError(f"{first.path}: its field or run cannot be read ({error})") from error
@@ -83,7 +83,7 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     versions = first.metadata.get("versions", {})
     began_ns = next((record.log_time_ns for path in files for record in open_recording(path).raw_records()), 0)
     damage = tuple(f"{path.name}: {why}" for path, why in unread.items())
-    return Source(name, files, tuple(raw), first.attachments[FIELD], run, versions, began_ns, offset_ns, damage)
+    return Source(name, files, tuple(raw), first.attachments[FIELD_NAME], run, versions, began_ns, offset_ns, damage)
 
 
 def _created_ns(recording: Recording) -> int:

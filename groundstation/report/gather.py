@@ -9,6 +9,7 @@ import numpy as np
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
+from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Record, RecordingError, open_parts, parts
 from groundstation.recording.selection import STATE
 from groundstation.report import run_facts
@@ -34,8 +35,8 @@ def gather(run_dir: Path) -> RunData:
     readable, unread = open_parts(paths)
     data.damage.extend(f"{path.name}: {why}" for path, why in unread.items())
     for recording in readable:
-        if "field.json" in recording.attachments and not data.arena.drones:
-            data.arena = _arena(recording.attachments["field.json"], data.damage)
+        if FIELD_NAME in recording.attachments and not data.arena.drones:
+            data.arena = _arena(recording.attachments[FIELD_NAME], data.damage)
         rows.take(recording.records(_is_wanted))
         data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()

@@ -18,6 +18,7 @@ from groundstation.calibration.flown import Change as Dating
 from groundstation.calibration.flown import Flown, Surprise
 from groundstation.calibration.shift import Part, across, briefly, interpolated, rate_hz, shift_between
 from groundstation.estimation.models import OdometryRobot
+from groundstation.estimation.parabola import least
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
 
@@ -239,19 +240,17 @@ def _onboard_camera(
     if not surprise.enough:
         return Delay(f"{drone} camera", setting, now_ms, reason="it saw too little", flight=_WATCH)
     costs = np.array([surprise.of(resolved, _dated({**later_ms, drone: float(shift)})) for shift in _SHIFTS_MS])
-    best = int(np.argmin(costs))
-    if best in (0, len(costs) - 1):
+    found = least(_SHIFTS_MS, costs, 2)
+    if found is None:
         return Delay(
             f"{drone} camera", setting, now_ms, reason="none within 80 ms of the setting fits best", flight=_WATCH
         )
-    near = slice(max(0, best - 2), best + 3)
-    a, b, _ = np.polyfit(_SHIFTS_MS[near], costs[near], 2)
-    if a <= 0:
+    if found.curvature <= 0:
         return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell", flight=_WATCH)
-    std_ms = float(np.sqrt(_NEIGHBOURS / a))
+    std_ms = float(np.sqrt(_NEIGHBOURS / found.curvature))
     drones = sum(m.observer == drone and m.subject in resolved["drones"] for m in _messages(flown, RelativeObservation))
     doubt = "" if drones >= _LEAST_PAIRS else _TARGET_ONLY
-    return Delay(f"{drone} camera", setting, now_ms, float(now_ms - b / (2 * a)), std_ms, doubt, _WATCH)
+    return Delay(f"{drone} camera", setting, now_ms, now_ms + found.place, std_ms, doubt, _WATCH)
 
 
 def _dated(later_ms: Mapping[str, float]) -> Dating:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.estimation.parabola import least
+
 Array = NDArray[np.float64]
 
 # Differences over so long are compared: what drifts more slowly does not count.
@@ -98,18 +100,13 @@ def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None
     chi = np.array(
         [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(parts, noise, strict=True)) for delay in _GRID_S]
     )
-    best = int(np.argmin(chi))
-    if best in (0, len(chi) - 1):
-        return None
-    # A wide parabola: noise makes small dents.
-    near = slice(max(0, best - _REACH), best + _REACH + 1)
-    a, b, _ = np.polyfit(_GRID_S[near], chi[near], 2)
-    if a <= 0.0:
+    found = least(_GRID_S, chi, _REACH)
+    if found is None or found.curvature <= 0.0:
         return None
     # Differences overlap: so many of them say the same.
     change = parts[0].change
-    variance = change.alike * max(1.0, rate_hz(parts[0].times) * change.window_s) / a
-    return float(-b / (2.0 * a)), float(np.sqrt(variance))
+    variance = change.alike * max(1.0, rate_hz(parts[0].times) * change.window_s) / found.curvature
+    return found.place, float(np.sqrt(variance))
 
 
 def rate_hz(times: Array) -> float:

@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from groundstation.estimation.belief import Array
+from groundstation.estimation.parabola import least
 
 # Lateness that is tried out [s], and about how far apart the two sightings are that are compared [s].
 _TRIED_S = np.arange(-0.10, 0.2001, 0.02)
 _WINDOW_S, _WIDEST_S = 1.0, 1.3
 _KEPT_S, _SPACING_S = 3.0, 0.01
-_NEAR = 4  # of the best one, so many tried ones to each side make the parabola: noise makes small dents
+_NEAR = 4
 _HALF_LIFE_S = 60.0
 # Deviation of such a difference, and from how many of them squared on a wild one must not decide.
 _COARSE_STD_RAD, _WILD = 0.03, 8.0
@@ -86,16 +87,13 @@ class _Sensor:
 
     def told(self) -> tuple[float, float] | None:
         """Return lateness and one sigma [s]; None where it is not told."""
-        best = int(np.argmin(self.chi))
-        if self.pairs < _LEAST_PAIRS or best in (0, len(_TRIED_S) - 1):
-            return None
-        near = slice(max(0, best - _NEAR), best + _NEAR + 1)
-        a, b, _ = np.polyfit(_TRIED_S[near], self.chi[near], 2)
-        if a <= 0.0:
+        found = least(_TRIED_S, self.chi, _NEAR) if self.pairs >= _LEAST_PAIRS else None
+        if found is None or found.curvature <= 0.0:
             return None
         # Pairs overlap: by the scatter over flights, those of half a window say the same. Scaled by the misfit left.
-        variance = max(1.0, 0.5 * self.overlapping / self.pairs) * float(self.chi[best]) / self.pairs / a
-        return float(-b / (2.0 * a)), math.sqrt(variance)
+        left = float(self.chi[found.nearest]) / self.pairs
+        variance = max(1.0, 0.5 * self.overlapping / self.pairs) * left / found.curvature
+        return found.place, math.sqrt(variance)
 
 
 class LatenessWatch:

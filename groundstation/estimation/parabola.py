@@ -1,0 +1,28 @@
+"""Where a cost that was tried at a few places is least: by a parabola, wide enough that noise makes small dents."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.estimation.belief import Array
+
+
+class Least(NamedTuple):
+    """A minimum: the tried place nearest to it, where it is, and half of the cost's second derivative there."""
+
+    nearest: int
+    place: float
+    curvature: float
+
+
+def least(places: Array, costs: Array, reach: int) -> Least | None:
+    """Return the minimum of costs tried at places, fitted to so many to each side of the best; None at the edge.
+
+    A curvature of 0 or less says that the costs tell no minimum; `place` is nan then.
+    """
+    best = int(np.argmin(costs))
+    if best in (0, len(costs) - 1):
+        return None
+    near = slice(max(0, best - reach), best + reach + 1)
+    a, b, _ = np.polyfit(places[near], costs[near], 2)
+    return Least(best, float(-b / (2.0 * a)) if a > 0.0 else float("nan"), float(a))

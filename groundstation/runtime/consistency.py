@@ -108,8 +108,7 @@ class ConsistencyWatch:
                 found.append(Notice(Severity.INFO, "sightings agree with the belief again", entity=name))
                 continue
             pairs = sorted(blamed[name])
-            worst = max(live[pair] for pair in pairs)
-            found.append(Notice(Severity.WARNING, _text(name, pairs, worst), _remedy(name, pairs), name))
+            found.append(_warning(name, pairs, max(live[pair] for pair in pairs)))
         return found
 
     def _freezes(self, now_ns: int) -> list[Notice]:
@@ -142,13 +141,11 @@ def _culprit(pair: tuple[str, str], far: Collection[tuple[str, str]], live: Coll
     return subject
 
 
-def _text(name: str, pairs: list[tuple[str, str]], worst: float) -> str:
+def _warning(name: str, pairs: list[tuple[str, str]], worst: float) -> Notice:
     if all(observer == name for observer, _ in pairs):
-        what = f"what its camera sees of {', '.join(subject for _, subject in pairs)}"
+        what, remedy = f"what its camera sees of {', '.join(subject for _, subject in pairs)}", _SENSOR_REMEDY
     else:
-        what = f"what {' and '.join(observer for observer, _ in pairs)} {'see' if len(pairs) > 1 else 'sees'} of it"
-    return f"{what} contradicts the belief for {_LASTING_NS // 10**9} s: NIS {worst:.0f} per degree of freedom, not 1"
-
-
-def _remedy(name: str, pairs: list[tuple[str, str]]) -> str:
-    return _SENSOR_REMEDY if all(observer == name for observer, _ in pairs) else _SUBJECT_REMEDY
+        sees = "see" if len(pairs) > 1 else "sees"
+        what, remedy = f"what {' and '.join(observer for observer, _ in pairs)} {sees} of it", _SUBJECT_REMEDY
+    lasting = f"{_LASTING_NS // 10**9} s: NIS {worst:.0f} per degree of freedom, not 1"
+    return Notice(Severity.WARNING, f"{what} contradicts the belief for {lasting}", remedy, name)

@@ -20,11 +20,13 @@ class PictureAge:
 
     def __init__(self, field: Mapping[str, Any], clock: str) -> None:
         self._watch, self._clock = LatenessWatch(), clock
-        cameras = {name: f"cameras.{name}.video_delay_ms" for name in field["cameras"]}
-        drones = field["drones"].items()
-        cameras |= {name: f"drones.{name}.camera.video_delay_ms" for name, drone in drones if drone.get("camera")}
-        self._settings = cameras
-        self._delays_ms = {name: _delay_ms(field, name) for name in cameras}
+        cameras = {name: (f"cameras.{name}", camera) for name, camera in field["cameras"].items()}
+        onboard = {name: drone["camera"] for name, drone in field["drones"].items() if drone.get("camera")}
+        cameras |= {name: (f"drones.{name}.camera", camera) for name, camera in onboard.items()}
+        self._settings = {
+            name: (f"{place}.video_delay_ms", float(camera["video_delay_ms"]))
+            for name, (place, camera) in cameras.items()
+        }
         self._told: dict[str, bool] = {}
 
     def take(self, message: Message) -> None:
@@ -58,14 +60,9 @@ class PictureAge:
         return found
 
     def _warning(self, one: Lateness) -> Notice:
-        now_ms = self._delays_ms[one.sensor]
+        key, now_ms = self._settings[one.sensor]
         than = "older" if one.offset_s > 0.0 else "newer"
         text = f"its pictures seem {1e3 * abs(one.offset_s):.0f} +- {1e3 * one.std_s:.0f} ms {than} than configured"
         better = max(0.0, now_ms + 1e3 * one.offset_s)
-        setting = f"{self._settings[one.sensor]}: {better:.0f} (now {now_ms:.0f})"
+        setting = f"{key}: {better:.0f} (now {now_ms:.0f})"
         return Notice(Severity.WARNING, text, f"set {setting}, or run groundstation calibrate delay", one.sensor)
-
-
-def _delay_ms(field: Mapping[str, Any], name: str) -> float:
-    camera = field["cameras"][name] if name in field["cameras"] else field["drones"][name]["camera"]
-    return float(camera["video_delay_ms"])

@@ -4,12 +4,9 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from groundstation.estimation.layout import CORE_SIZE, EntityKind, Layout
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from groundstation.arrays import Array
+from groundstation.estimation.layout import CORE_SIZE, EntityKind, StateLayout
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +15,7 @@ class JointBelief:
 
     mean: Array
     covariance: Array
-    layout: Layout
+    layout: StateLayout
     stamp_ns: int
 
     def __post_init__(self) -> None:
@@ -46,7 +43,7 @@ class JointBelief:
         """
         blocks = [b for b in self.layout.blocks if b.kind is not EntityKind.CAMERA and b.name not in without]
         kept = [block.start + i for block in blocks for i in range(CORE_SIZE)]
-        layout = Layout()
+        layout = StateLayout()
         for block in blocks:
             layout = layout.with_entity(block.name, block.kind, block.labels[:CORE_SIZE])
         return JointBelief(self.mean[kept], self.covariance[np.ix_(kept, kept)], layout, self.stamp_ns)

@@ -6,54 +6,60 @@ measurement.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.kernel import kernel
+from groundstation.arrays import Matrix, Vector
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.linear import cholesky
+from groundstation.estimation.records import EntityRow
+from groundstation.kernel import kernel
 
 
-@kernel(
-    "void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])",
-    inlined=True,
-)
-def project(
-    P: Array, start_a: int, size_a: int, H_a: Array, start_b: int, size_b: int, H_b: Array, rows: int, W: Array
-) -> None:
+class Touched(NamedTuple):
+    """A block of the state and the Jacobian (rows, block) of a measurement by it."""
+
+    start: int
+    size: int
+    H: Matrix
+
+
+@kernel(inlined=True)
+def touched(entity: EntityRow, H: Matrix) -> Touched:
+    """Return an entity's block with the Jacobian by it."""
+    return Touched(entity.start, entity.size, H)
+
+
+@kernel(inlined=True)
+def project(P: Matrix, a: Touched, b: Touched, rows: int, W: Matrix) -> None:
     """Write H P (rows, n) into W, H being zero outside blocks a and b."""
     n = P.shape[0]
     for i in range(rows):
         for j in range(n):
             W[i, j] = 0.0
-        for k in range(size_a):
-            f = H_a[i, k]
+        for k in range(a.size):
+            f = a.H[i, k]
             if f != 0.0:
                 for j in range(n):
-                    W[i, j] += f * P[start_a + k, j]
-        for k in range(size_b):
-            f = H_b[i, k]
+                    W[i, j] += f * P[a.start + k, j]
+        for k in range(b.size):
+            f = b.H[i, k]
             if f != 0.0:
                 for j in range(n):
-                    W[i, j] += f * P[start_b + k, j]
+                    W[i, j] += f * P[b.start + k, j]
 
 
-@kernel(
-    "void(float64[:,::1], int64, int64, float64[:,::1], int64, int64, float64[:,::1], int64, float64[:,::1])",
-    inlined=True,
-)
-def project_columns(
-    A: Array, start_a: int, size_a: int, H_a: Array, start_b: int, size_b: int, H_b: Array, rows: int, B: Array
-) -> None:
+@kernel(inlined=True)
+def project_columns(A: Matrix, a: Touched, b: Touched, rows: int, B: Matrix) -> None:
     """Write H A^T (rows, m) into B for A (m, n): the projection of each row of A."""
     for i in range(rows):
         for j in range(A.shape[0]):
             value = 0.0
-            for k in range(size_a):
-                value += H_a[i, k] * A[j, start_a + k]
-            for k in range(size_b):
-                value += H_b[i, k] * A[j, start_b + k]
+            for k in range(a.size):
+                value += a.H[i, k] * A[j, a.start + k]
+            for k in range(b.size):
+                value += b.H[i, k] * A[j, b.start + k]
             B[i, j] = value
 
 
@@ -61,15 +67,15 @@ def project_columns(
 RESOLUTION = 1e-10
 
 
-@kernel("void(float64[:,::1], float64[:,::1], int64)", inlined=True)
-def bound_precision(HPH: Array, R: Array, rows: int) -> None:
+@kernel(inlined=True)
+def bound_precision(HPH: Matrix, R: Matrix, rows: int) -> None:
     """Raise R to what double precision resolves beside H P H^T, so that P stays positive definite."""
     for i in range(rows):
         R[i, i] += RESOLUTION * abs(HPH[i, i])
 
 
-@kernel("float64(float64[:,::1], float64[:,::1], float64[::1], int64, float64[:,::1])", inlined=True)
-def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
+@kernel(inlined=True)
+def surprise(HPH: Matrix, R: Matrix, y: Vector, rows: int, factor: Matrix) -> float:
     """Return the NIS of a residual and leave the Cholesky factor of S = H P H^T + R; -1 if S is not PD."""
     for i in range(rows):
         for j in range(rows):
@@ -87,8 +93,8 @@ def surprise(HPH: Array, R: Array, y: Array, rows: int, factor: Array) -> float:
     return nis
 
 
-@kernel("float64(float64[:,::1], int64)", inlined=True)
-def log_determinant(factor: Array, rows: int) -> float:
+@kernel(inlined=True)
+def log_determinant(factor: Matrix, rows: int) -> float:
     """Return log det S from its Cholesky factor."""
     product = 1.0
     for i in range(rows):
@@ -96,16 +102,16 @@ def log_determinant(factor: Array, rows: int) -> float:
     return 2.0 * math.log(product)
 
 
-@kernel("void(float64[:,::1], float64[:,::1], int64, float64)")
-def inflate(HPH: Array, R: Array, rows: int, factor: float) -> None:
+@kernel()
+def inflate(HPH: Matrix, R: Matrix, rows: int, factor: float) -> None:
     """Raise R so that S becomes `factor` times what it was: the soft gate."""
     for i in range(rows):
         for j in range(rows):
             R[i, j] = factor * R[i, j] + (factor - 1.0) * 0.5 * (HPH[i, j] + HPH[j, i])
 
 
-@kernel("void(float64[:,::1], float64[:,::1])")
-def subtract_two(P: Array, V: Array) -> None:
+@kernel()
+def subtract_two(P: Matrix, V: Matrix) -> None:
     """Subtract V^T V from P for two rows, in one pass and symmetric to the bit."""
     V_0, V_1 = V[0], V[1]
     for a in range(P.shape[0]):
@@ -114,8 +120,8 @@ def subtract_two(P: Array, V: Array) -> None:
             row[j] -= v_0 * V_0[j] + v_1 * V_1[j]
 
 
-@kernel("void(float64[:,::1], float64[:,::1])", inlined=True)
-def subtract_four(P: Array, V: Array) -> None:
+@kernel(inlined=True)
+def subtract_four(P: Matrix, V: Matrix) -> None:
     """Subtract V^T V from P for the first four rows of V, in one pass and symmetric to the bit.
 
     Four rows of P at a time share what is loaded of V: nearly half of a correction's time is spent here. The fifth row
@@ -142,8 +148,8 @@ def subtract_four(P: Array, V: Array) -> None:
             t[j] -= (h_0 * v_0 + h_1 * v_1) + (h_2 * v_2 + h_3 * v_3)
 
 
-@kernel("void(float64[::1], float64[:,::1], int64, float64[:,::1], float64[:,::1], float64[::1])", inlined=True)
-def apply(mean: Array, P: Array, rows: int, W: Array, factor: Array, y: Array) -> None:
+@kernel(inlined=True)
+def apply(mean: Vector, P: Matrix, rows: int, W: Matrix, factor: Matrix, y: Vector) -> None:
     """Correct mean and P in place, given W = H P (4, n) and the Cholesky factor L of S.
 
     Joseph's form (I - K H) P (I - K H)^T + K R K^T, multiplied out with V = L^-1 W and U = L^T K, is
@@ -171,16 +177,17 @@ def apply(mean: Array, P: Array, rows: int, W: Array, factor: Array, y: Array) -
         subtract_two(P, V)
 
 
-@kernel("boolean(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1])")
-def is_distribution(mean: Array, P: Array, entities: IntArray, aux: Array) -> bool:
+@kernel()
+def is_distribution(belief: Belief) -> bool:
     """Return whether mean and P are finite and P is positive definite over the active entities."""
+    mean, P, entities = belief.mean, belief.P, belief.entities
     n = P.shape[0]
     index = np.empty(n, np.int64)
     size = 0
     for e in range(entities.shape[0]):
-        if aux[e, s.ACTIVE] != 0.0:
-            for k in range(entities[e, s.ENTITY_SIZE]):
-                index[size] = entities[e, s.ENTITY_START] + k
+        if belief.memory[e].active != 0:
+            for k in range(entities[e].size):
+                index[size] = entities[e].start + k
                 size += 1
     work = np.empty((n, n))
     for i in range(size):

@@ -1,31 +1,33 @@
 """Events in order of measurement time, in rows that the compiled filter reads."""
 
 import math
-import struct
 from bisect import bisect_left, insort
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.bus.messages import PoseHypothesis, Verdict
-from groundstation.estimation import slots as s
-from groundstation.estimation.measurement import Correction, Measurement, Reading
+from groundstation.estimation import records as r
+from groundstation.estimation.measurement import Correction, Measurement, SensorReading
 
 _VERDICTS = {
-    s.ACCEPTED: (Verdict.ACCEPTED, ""),
-    s.INFLATED: (Verdict.INFLATED, "beyond the gate"),
-    s.IMPLAUSIBLE: (Verdict.IMPLAUSIBLE, "far beyond the gate"),
-    s.OUT_OF_VIEW: (Verdict.OUT_OF_VIEW, "behind the camera"),
-    s.SINGULAR: (Verdict.SINGULAR, "covariance is not positive definite"),
-    s.OBSERVER_UNKNOWN: (Verdict.UNKNOWN_ENTITY, "the observer has no belief yet"),
-    s.OBSERVER_UNCONFIRMED: (Verdict.UNKNOWN_ENTITY, "the observer was seen only once so far"),
-    s.SUBJECT_GROUNDED: (Verdict.UNKNOWN_ENTITY, "the subject does not fly"),
-    s.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
-    s.MISTAKEN: (Verdict.IMPLAUSIBLE, "far beyond the gate, but fits another entity: is its marker's id right?"),
-    s.OBSERVER_DOUBTED: (Verdict.IMPLAUSIBLE, "far beyond the gate, as is its observer itself"),
-    s.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot tell where its subject is"),
+    r.ACCEPTED: (Verdict.ACCEPTED, ""),
+    r.INFLATED: (Verdict.INFLATED, "beyond the gate"),
+    r.IMPLAUSIBLE: (Verdict.IMPLAUSIBLE, "far beyond the gate"),
+    r.OUT_OF_VIEW: (Verdict.OUT_OF_VIEW, "behind the camera"),
+    r.SINGULAR: (Verdict.SINGULAR, "covariance is not positive definite"),
+    r.OBSERVER_UNKNOWN: (Verdict.UNKNOWN_ENTITY, "the observer has no belief yet"),
+    r.OBSERVER_UNCONFIRMED: (Verdict.UNKNOWN_ENTITY, "the observer was seen only once so far"),
+    r.SUBJECT_GROUNDED: (Verdict.UNKNOWN_ENTITY, "the subject does not fly"),
+    r.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
+    r.MISTAKEN: (Verdict.IMPLAUSIBLE, "far beyond the gate, but fits another entity: is its marker's id right?"),
+    r.OBSERVER_DOUBTED: (Verdict.IMPLAUSIBLE, "far beyond the gate, as is its observer itself"),
+    r.CONTRADICTED: (Verdict.IMPLAUSIBLE, "it would join, but contradicts where its observer is: once is not enough"),
+    r.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot tell where its subject is"),
 }
-_ROW, _REST = struct.Struct(f"{s.EVENT_COLUMNS}d"), (0.0,) * s.EVENT_COLUMNS
+_EVENT, _OUTCOME = r.EventRow.packing(), r.OutcomeRow.packing()
+_REST, _NOTHING = (0,) * (_EVENT.size // 8), bytes(_OUTCOME.size)
 _IDENTITY = tuple(np.eye(4).ravel().tolist())
 
 
@@ -33,18 +35,18 @@ class EventLog:
     """A pool of event rows with their outcomes, listed by (time, tie-breaker) so that arrival order cannot matter."""
 
     def __init__(self, capacity: int = 256) -> None:
-        self.events = np.zeros((capacity, s.EVENT_COLUMNS))
-        self.outcomes = np.zeros((capacity, s.OUT_COLUMNS))
+        self.events, self.outcomes = r.EventRow.rows(capacity), r.OutcomeRow.rows(capacity)
         self._free = list(range(capacity))
         self._order: list[tuple[int, str, int]] = []
+        self._look()
 
-    def add(self, stamp_ns: int, tie: str, columns: list[float]) -> int:
-        """Insert an event whose leading columns are given; returns its row."""
+    def add(self, stamp_ns: int, tie: str, values: Sequence[float]) -> int:
+        """Insert an event of which the first values are given (`event_values`); returns its row."""
         if not self._free:
             self._grow()
         row = self._free.pop()
-        _ROW.pack_into(self.events.data, row * _ROW.size, *columns, *_REST[len(columns) :])
-        self.outcomes[row] = 0.0
+        write_event(self._event_bytes, row, values)
+        self._outcome_bytes[row * _OUTCOME.size : (row + 1) * _OUTCOME.size] = _NOTHING
         insort(self._order, (stamp_ns, tie, row))
         return row
 
@@ -62,60 +64,73 @@ class EventLog:
 
     def verdict_code(self, row: int) -> int:
         """Return what became of an event so far; PENDING before it was reached."""
-        return int(self.outcomes[row, s.OUT_VERDICT])
+        return int(self._verdicts[row])
 
     def correction(self, row: int, observer: str, subject: str, latency_ms: float) -> Correction:
         """Return the outcome of an observation as a value."""
-        out = self.outcomes[row].tolist()
-        verdict, reason = _VERDICTS[int(out[s.OUT_VERDICT])]
-        size = int(out[s.OUT_SIZE])
-        joined = bool(out[s.OUT_JOINED])
+        verdict_code, size, nis, *values, alternative_chosen, joined = _OUTCOME.unpack_from(
+            self._outcome_bytes, row * _OUTCOME.size
+        )
+        verdict, reason = _VERDICTS[verdict_code]
         if joined:
             reason = "joined" if size == 0 else "re-initialised: the belief contradicted several observations in a row"
-        elif out[s.OUT_OTHER_CHOSEN]:
+        elif alternative_chosen:
             reason = (reason + "; " if reason else "") + "the other pose hypothesis is more likely"
         if size == 0:
-            return Correction(observer, subject, verdict, reason, latency_ms=latency_ms, joined=joined)
-        residual = tuple(out[s.OUT_RESIDUAL : s.OUT_RESIDUAL + size])
-        covariance = tuple(out[s.OUT_COVARIANCE : s.OUT_COVARIANCE + size * size])
-        nis = out[s.OUT_NIS]
+            return Correction(observer, subject, verdict, reason, latency_ms=latency_ms, joined=bool(joined))
         if not 0.0 <= nis < math.inf:
             return Correction(observer, subject, verdict, reason, latency_ms=latency_ms)
-        return Correction(observer, subject, verdict, reason, residual, covariance, nis, latency_ms, joined)
+        residual, covariance = tuple(values[:size]), tuple(values[r.MAX_ROWS : r.MAX_ROWS + size * size])
+        return Correction(observer, subject, verdict, reason, residual, covariance, nis, latency_ms, bool(joined))
+
+    def _look(self) -> None:
+        """Keep the tables as bytes, which Python reads and writes in half of numpy's time."""
+        self._event_bytes = np.asarray(self.events).view(np.uint8).data
+        self._outcome_bytes = np.asarray(self.outcomes).view(np.uint8).data
+        self._verdicts = self.outcomes["verdict"]
 
     def _grow(self) -> None:
         size = len(self.events)
-        self.events = np.vstack((self.events, np.zeros_like(self.events)))
-        self.outcomes = np.vstack((self.outcomes, np.zeros_like(self.outcomes)))
+        events, outcomes = r.EventRow.rows(2 * size), r.OutcomeRow.rows(2 * size)
+        np.asarray(events)[:size], np.asarray(outcomes)[:size] = self.events, self.outcomes
+        self.events, self.outcomes = events, outcomes
         self._free.extend(range(size, 2 * size))
+        self._look()
 
 
-def observation_columns(
-    m: Measurement | Reading, at: float, step: int, observer: int, subject: int, sensor: int
+def write_event(rows: memoryview, row: int, values: Sequence[float]) -> None:
+    """Write an event's first values into its row of the table's bytes; the others become zero."""
+    _EVENT.pack_into(rows, row * _EVENT.size, *values, *_REST[len(values) :])
+
+
+def observation_values(
+    m: Measurement | SensorReading, at: float, step: int, observer: int, subject: int, sensor: int
 ) -> list[float]:
-    """Return the columns of an observation event (slots.py); raises ValueError for a reading of the wrong shape."""
+    """Return the first values of an observation's EventRow; raises ValueError for a reading of the wrong shape."""
     other = m.alternative if isinstance(m, Measurement) else None
-    columns = [
+    rows = len(m.z) if isinstance(m, SensorReading) else 3 if m.yaw_rad is None else 4
+    values = [
         at,
-        s.EVENT_OBSERVATION,
+        r.OBSERVATION,
         observer,
         subject,
         sensor,
+        step,
+        rows,
+        int(other is not None),
         m.roll_rad,
         m.pitch_rad,
-        float(other is not None),
-        step,
+        *(_padded(m.z, m.covariance) if isinstance(m, SensorReading) else _pose(m)),
     ]
-    if isinstance(m, Reading):
-        return columns + _padded(m.z, m.covariance) + [float(len(m.z))]
-    columns += _hypothesis(PoseHypothesis(m.position_m, m.yaw_rad, m.covariance))
-    columns.append(3.0 if m.yaw_rad is None else 4.0)
-    if other is not None:
-        columns += _hypothesis(other)
-    return columns
+    return values if other is None else values + _pose(other)
 
 
-def _hypothesis(pose: PoseHypothesis) -> list[float]:
+def change_values(kind: int, at: float, step: int, subject: int, placed: Sequence[float] = ()) -> list[float]:
+    """Return the first values of the EventRow of a change; placed: pose (4) and covariance (16) of a PLACED one."""
+    return [at, kind, 0, subject, 0, step, 0, 0, 0.0, 0.0, *placed]
+
+
+def _pose(pose: Measurement | PoseHypothesis) -> list[float]:
     yaw = () if pose.yaw_rad is None else (pose.yaw_rad,)
     return _padded((*pose.position_m, *yaw), pose.covariance)
 

@@ -1,261 +1,172 @@
 """What happens at one measurement time: an observation, or a change of who is in the state; compiled.
 
-Arrays with a leading axis hold one belief per mode (modes.py): means (m, n), covariances (m, n, n), weights (m),
-entities and parameters (m, entities, columns). What is decided (gate, hypothesis, joining) is decided for all modes.
+There is one belief per mode (modes.py). What is decided (gate, hypothesis, joining) is decided for all modes.
 """
 
 import math
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.blame import blame
-from groundstation.estimation.correction import log_determinant
-from groundstation.estimation.dispatch import HANDLE, call_locate
-from groundstation.estimation.kernel import address_of, kernel
-from groundstation.estimation.linear import copy_matrix
+from groundstation.arrays import IntVector
+from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
+from groundstation.estimation.filter_state import Belief, Hypothesis, State, Tables, belief_of
+from groundstation.estimation.joining import admit
+from groundstation.estimation.model_kernels import handle
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.update import correct, linearise, note_motion, read, write_outcome
+from groundstation.estimation.outliers import blame
+from groundstation.estimation.records import (
+    ACCEPTED,
+    ADMITTED,
+    CONTRADICTED,
+    DISMISSED,
+    EVENT_KINDS,
+    INFLATED,
+    KIND_ROBOT,
+    MAX_ROWS,
+    OBSERVATION,
+    OBSERVER_UNCONFIRMED,
+    OBSERVER_UNKNOWN,
+    PENDING,
+    PLACED,
+    POSE,
+    SINGULAR,
+    SUBJECT_GROUNDED,
+    YAW_MISSING,
+    EventRow,
+    Innovation,
+    OutcomeRow,
+    PriorRow,
+    X,
+    Y,
+)
+from groundstation.estimation.update import correct, note_motion, read, write_outcome
+from groundstation.kernel import address_of, kernel
+
+_INNOVATION = Innovation.dtype
 
 
-@kernel("int64(int64[:,::1], float64[:,::1], float64[::1], int64)", inlined=True)
-def refusal(entities: IntArray, aux: Array, event: Array, rows: int) -> int:
+@kernel(inlined=True)
+def refusal(belief: Belief, event: EventRow, rows: int) -> int:
     """Return why an observation cannot be used whatever it says, or PENDING."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    if aux[observer, s.ACTIVE] == 0.0:
-        return s.OBSERVER_UNKNOWN
-    if aux[observer, s.UNCONFIRMED] != 0.0:
-        return s.OBSERVER_UNCONFIRMED
-    if aux[subject, s.ADMITTED] == 0.0:
-        return s.SUBJECT_GROUNDED
-    if aux[subject, s.ACTIVE] == 0.0 and entities[subject, s.ENTITY_KIND] == s.KIND_ROBOT and rows < 4:
-        return s.YAW_MISSING
-    return s.PENDING
+    observer, subject = belief.memory[event.observer], belief.memory[event.subject]
+    if observer.active == 0:
+        return OBSERVER_UNKNOWN
+    if observer.unconfirmed != 0:
+        return OBSERVER_UNCONFIRMED
+    if subject.admitted == 0:
+        return SUBJECT_GROUNDED
+    if subject.active == 0 and belief.entities[event.subject].kind == KIND_ROBOT and rows < 4:
+        return YAW_MISSING
+    return PENDING
 
 
-@kernel(
-    "float64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
-    " float64[::1], float64[::1], int64, float64[::1], float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1],"
-    " float64[:,::1], float64[::1])"
-)
-def confront(
-    means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
-    sensor: Array, event: Array, rows: int, z: Array, R: Array, work: Array, W: Array, y: Array, nis: Array,
-) -> float:  # fmt: skip
-    """Linearise in all modes; writes the NIS of each (-1: S not PD) and returns the log evidence of the hypothesis."""
-    modes = means.shape[0]
-    scores, best = np.empty(modes), -math.inf
-    for m in range(modes):
-        nis[m] = linearise(
-            means[m], covariances[m], entities[m], parameters[m], kernels, sensor, event, rows, z, R[m], work[m], W[m],
-            y[m],
-        )  # fmt: skip
-        scores[m] = -math.inf
-        if nis[m] >= 0.0:
-            scores[m] = math.log(max(weights[m], 1e-300)) - 0.5 * (nis[m] + log_determinant(work[m, 3], rows))
-        best = max(best, scores[m])
-    if best == -math.inf:
-        return best
-    total = 0.0
-    for m in range(modes):
-        total += math.exp(scores[m] - best)
-    return best + math.log(total)
-
-
-@kernel("void(float64[::1], float64[::1], float64[:,:,:,::1], int64, float64)", inlined=True)
-def weigh(weights: Array, nis: Array, work: Array, rows: int, factor: float) -> None:
-    """Multiply the modes' probabilities by the likelihood of the observation as it was used (S times factor)."""
-    modes = weights.shape[0]
-    if modes == 1:
-        return
-    scores, best = np.empty(modes), -math.inf
-    for m in range(modes):
-        scores[m] = math.log(max(weights[m], 1e-300)) - 0.5 * (nis[m] / factor + log_determinant(work[m, 3], rows))
-        best = max(best, scores[m])
-    total = 0.0
-    for m in range(modes):
-        weights[m] = math.exp(scores[m] - best)
-        total += weights[m]
-    for m in range(modes):
-        weights[m] /= total
-
-
-@kernel(
-    "boolean(float64[:,::1], float64[:,:,::1], float64[:,::1], int64[:,:,::1], float64[:,:,::1], float64[:,:,::1],"
-    " int64[::1], float64[::1], float64[::1], float64[::1])"
-)
-def settle(
-    means: Array, covariances: Array, aux: Array, entities: IntArray, parameters: Array, priors: Array,
-    kernels: IntArray, sensor: Array, event: Array, z: Array,
-) -> bool:  # fmt: skip
-    """Let the subject join (again) where the measurement puts it, diffuse until the correction that follows."""
-    subject, pose = int(event[s.EVENT_SUBJECT]), np.zeros(4)
-    for m in range(means.shape[0]):
-        arguments = (means[m], entities[m], parameters[m], sensor, event, z, pose)
-        if call_locate(kernels[s.SENSOR_LOCATE], arguments) == 0:
-            return False
-        join(means[m], covariances[m], entities[m, subject], priors[subject], pose)
-    aux[subject, s.ACTIVE] = 1.0
-    aux[subject, s.JOINED_AT] = event[s.EVENT_AT]
-    aux[subject, s.STREAK], aux[subject, s.UNCONFIRMED] = 0.0, 1.0
-    return True
-
-
-@kernel("int64(float64[::1], float64[::1])", inlined=True)
-def likeliest(weights: Array, nis: Array) -> int:
-    """Return the most probable mode in which the observation can be used, or -1."""
-    best = -1
-    for m in range(weights.shape[0]):
-        if nis[m] >= 0.0 and (best < 0 or weights[m] > weights[best]):
-            best = m
-    return best
-
-
-@kernel("float64(float64[::1])", inlined=True)
-def least(nis: Array) -> float:
-    """Return the smallest NIS of the modes in which the observation can be used."""
-    value = math.inf
-    for m in range(nis.shape[0]):
-        if 0.0 <= nis[m] < value:
-            value = nis[m]
-    return value
-
-
-@kernel(
-    "int64(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,:,::1], float64[:,:,::1], int64[::1],"
-    " float64[::1], float64, float64[::1], int64, float64[:,::1], float64[:,:,:,::1], float64[:,:,:,:,::1],"
-    " float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
-    inlined=True,
-)
+@kernel(inlined=True)
 def choose(
-    means: Array, covariances: Array, weights: Array, entities: IntArray, parameters: Array, kernels: IntArray,
-    sensor: Array, unused_s: float, event: Array, rows: int, z: Array, R: Array, work: Array, W: Array, y: Array,
-    nis: Array,
-) -> int:  # fmt: skip
-    """Confront the belief with the pose as measured and, if there is one, its alternative; 1 if that is likelier."""
-    evidence = confront(
-        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[0], R[0], work[0], W[0],
-        y[0], nis[0],
-    )  # fmt: skip
-    if event[s.EVENT_HAS_OTHER] == 0.0 or evidence == -math.inf:
-        return 0
-    if read(entities[0], parameters[0], kernels, sensor, unused_s, event, s.EVENT_OTHER, z[1], R[1, 0]) != rows:
-        return 0
-    for m in range(1, means.shape[0]):
-        copy_matrix(R[1, 0], R[1, m])
-    other = confront(
-        means, covariances, weights, entities, parameters, kernels, sensor, event, rows, z[1], R[1], work[1], W[1],
-        y[1], nis[1],
-    )  # fmt: skip
-    return 1 if other > evidence else 0
+    state: State, tables: Tables, event: EventRow, rows: int, unused_s: float, measured: Hypothesis, other: Hypothesis
+) -> bool:
+    """Confront the belief with the pose as measured and, if there is one, its alternative; True if that is likelier."""
+    evidence = confront(state, tables, event, rows, measured)
+    if event.has_alternative == 0 or evidence == -math.inf:
+        return False
+    belief, sensor = belief_of(state, tables, 0), tables.sensors[event.sensor]
+    if read(belief, sensor, event, event.alternative, unused_s, other.z, other.R) != rows:
+        return False
+    set_noise(other.innovations, other.R)
+    return confront(state, tables, event, rows, other) > evidence
 
 
-@kernel(HANDLE)
-def observe(
-    means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
-    priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
-) -> None:  # fmt: skip
+@kernel()
+def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Correct by one observation, or say why not: gate, choice of hypothesis, joining, re-initialisation."""
-    modes, subject, number = means.shape[0], int(event[s.EVENT_SUBJECT]), int(event[s.EVENT_SENSOR])
-    sensor, own, at = sensors[number], kernels[number], event[s.EVENT_AT]
+    modes, sensor, settings = state.means.shape[0], tables.sensors[event.sensor], tables.settings
+    subject, first = state.memory[event.subject], belief_of(state, tables, 0)
     # First axis: the pose as measured, and its alternative.
-    z, R, y, nis = np.zeros((2, 4)), np.zeros((2, modes, 4, 4)), np.zeros((2, modes, 4)), np.zeros((2, modes))
-    work, W = np.zeros((2, modes, 4, 4, s.MAX_BLOCK)), np.empty((2, modes, 4, means.shape[1]))
-    unused_s, use = at - pairs[number, subject], 0
-    note_motion(means[0], aux, entities[0], event)
-    out[s.OUT_JOINED] = out[s.OUT_OTHER_CHOSEN] = 0.0
-    rows = read(entities[0], parameters[0], own, sensor, unused_s, event, s.EVENT_Z, z[0], R[0, 0])
-    out[s.OUT_VERDICT] = -rows if rows < 0 else refusal(entities[0], aux, event, rows)
-    if out[s.OUT_VERDICT] != s.PENDING:
+    z, R, HP = np.zeros((2, MAX_ROWS)), np.zeros((2, MAX_ROWS, MAX_ROWS)), np.empty((2, modes, 4, state.means.shape[1]))
+    innovations = np.zeros((2, modes), _INNOVATION)
+    used, other = Hypothesis(z[0], R[0], innovations[0], HP[0]), Hypothesis(z[1], R[1], innovations[1], HP[1])
+    unused_s = event.at - state.used_at[event.sensor, event.subject]
+    note_motion(first, event)
+    out.joined = out.alternative_chosen = 0
+    rows = read(first, sensor, event, event.measured, unused_s, used.z, used.R)
+    out.verdict = -rows if rows < 0 else refusal(first, event, rows)
+    if out.verdict != PENDING:
         return
-    for m in range(1, modes):
-        copy_matrix(R[0, 0], R[0, m])
-    gate, joined, excess = settings[s.SETTING_GATE + rows], aux[subject, s.ACTIVE] == 0.0, 1.0
-    if not joined:
-        use = choose(
-            means, covariances, weights, entities, parameters, own, sensor, unused_s, event, rows, z, R, work, W, y, nis
-        )
-        out[s.OUT_OTHER_CHOSEN] = use
-        mode = likeliest(weights, nis[use])
+    set_noise(used.innovations, used.R)
+    gate, fresh, excess = settings.gates[rows], subject.active == 0, 1.0
+    joins = fresh
+    if not fresh:
+        if choose(state, tables, event, rows, unused_s, used, other):
+            used, out.alternative_chosen = other, 1
+        mode = likeliest(state.weights, used.innovations)
         if mode < 0:
-            out[s.OUT_VERDICT] = s.SINGULAR
+            out.verdict = SINGULAR
             return
-        write_outcome(out, nis[use, mode], rows, y[use, mode], work[use, mode])
-        excess = least(nis[use]) / gate
-        if excess > settings[s.SETTING_WILD]:
-            out[s.OUT_VERDICT] = blame(
-                means[0], covariances[0], aux, entities[0], parameters[0], own, sensor, settings, event, rows, z[use],
-                R[use, 0],
-            )  # fmt: skip
-            if out[s.OUT_VERDICT] != s.PENDING:
+        write_outcome(out, used.innovations[mode])
+        excess = max(least_nis(used.innovations) / gate, 1.0)
+        if excess > settings.wild_gates:
+            out.verdict = blame(first, sensor, settings, event, rows, used)
+            if out.verdict != PENDING:
                 return
-            joined = True
-        elif excess <= 1.0:
-            aux[subject, s.STREAK] = aux[subject, s.UNCONFIRMED] = 0.0
-    if joined:
-        if not settle(means, covariances, aux, entities, parameters, priors, own, sensor, event, z[use]):
-            out[s.OUT_VERDICT] = s.NOT_LOCATED
+            joins = True
+        elif excess == 1.0:
+            subject.wild.count = subject.refused.count = subject.unconfirmed = 0
+    out.verdict = INFLATED if excess > 1.0 else ACCEPTED
+    if joins:
+        out.verdict = admit(state, tables, event, rows, used)
+        if fresh and out.verdict == CONTRADICTED:
+            write_outcome(out, used.innovations[likeliest(state.weights, used.innovations)])
+        if out.verdict != ACCEPTED and out.verdict != INFLATED:
             return
-        confront(
-            means, covariances, weights, entities, parameters, own, sensor, event, rows, z[use], R[use], work[use],
-            W[use], y[use], nis[use],
-        )  # fmt: skip
-        excess = 1.0
-        out[s.OUT_JOINED] = 1.0
-    excess = max(excess, 1.0)
+        excess, out.joined = 1.0, 1
     for m in range(modes):
-        correct(means[m], covariances[m], entities[m], rows, R[use, m], work[use, m], W[use, m], y[use, m], excess)
-    weigh(weights, nis[use], work[use], rows, excess)
-    aux[subject, s.CORRECTED_AT] = at
-    pairs[number, subject] = at
-    out[s.OUT_VERDICT] = s.INFLATED if excess > 1.0 else s.ACCEPTED
+        if used.innovations[m].nis >= 0.0:
+            correct(belief_of(state, tables, m), used.innovations[m], used.HP[m], excess)
+    weigh(state.weights, used.innovations, rows, excess)
+    subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
 
 
-@kernel("void(float64[::1], float64[:,::1], int64[::1], float64[:,::1], float64[::1])")
-def place(mean: Array, P: Array, entity: IntArray, prior: Array, event: Array) -> None:
+@kernel()
+def place(belief: Belief, e: int, prior: PriorRow, event: EventRow) -> None:
     """Put an entity where the event says (x, y, z, yaw) and as surely, independent of all others."""
-    index, pose = np.empty(4, np.int64), np.empty(4)
-    for i in range(4):
-        pose[i] = event[s.EVENT_Z + i]
-    join(mean, P, entity, prior, pose)
-    at = (s.X, s.Y, entity[s.AT_Z], entity[s.AT_YAW])
-    for i in range(4):
-        index[i] = entity[s.ENTITY_START] + at[i] if at[i] >= 0 else -1
-    for i in range(4):
-        for j in range(4):
+    index, pose, entity = np.empty(POSE, np.int64), np.empty(POSE), belief.entities[e]
+    for i in range(POSE):
+        pose[i] = event.measured.z[i]
+    join(belief, e, prior, pose)
+    at = (X, Y, entity.at_z, entity.at_yaw)
+    for i in range(POSE):
+        index[i] = entity.start + at[i] if at[i] >= 0 else -1
+    for i in range(POSE):
+        for j in range(POSE):
             if index[i] >= 0 and index[j] >= 0:
-                P[index[i], index[j]] = event[s.EVENT_Z + 4 + 4 * i + j]
+                belief.P[index[i], index[j]] = event.measured.R[i, j]
 
 
-@kernel(HANDLE)
-def change(
-    means: Array, covariances: Array, weights: Array, aux: Array, entities: IntArray, parameters: Array,
-    priors: Array, kernels: IntArray, sensors: Array, pairs: Array, settings: Array, event: Array, out: Array,
-) -> None:  # fmt: skip
+@kernel()
+def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Let an entity in, out, or put it somewhere."""
-    kind, subject = int(event[s.EVENT_KIND]), int(event[s.EVENT_SUBJECT])
-    out[s.OUT_VERDICT] = s.ACCEPTED
-    known = aux[subject, s.ACTIVE] != 0.0
-    enters = kind == s.EVENT_PLACED or (kind == s.EVENT_ADMITTED and entities[0, subject, s.ENTITY_PRESENT] != 0)
-    aux[subject, s.ADMITTED] = 0.0 if kind == s.EVENT_DISMISSED else 1.0
-    for m in range(means.shape[0]):
-        if kind == s.EVENT_DISMISSED:
-            clear(means[m], covariances[m], entities[m, subject])
-        elif kind == s.EVENT_PLACED:
-            place(means[m], covariances[m], entities[m, subject], priors[subject], event)
+    kind, memory, prior = event.kind, state.memory[event.subject], tables.priors[event.subject]
+    out.verdict = ACCEPTED
+    known = memory.active != 0
+    enters = kind == PLACED or (kind == ADMITTED and tables.entities[0, event.subject].present != 0)
+    memory.admitted = 0 if kind == DISMISSED else 1
+    for m in range(state.means.shape[0]):
+        belief = belief_of(state, tables, m)
+        if kind == DISMISSED:
+            clear(belief, event.subject)
+        elif kind == PLACED:
+            place(belief, event.subject, prior, event)
         elif enters and not known:
-            enter(means[m], covariances[m], entities[m, subject], priors[subject])
-    if kind == s.EVENT_DISMISSED:
-        aux[subject, s.ACTIVE] = 0.0
+            enter(belief, event.subject, prior)
+    if kind == DISMISSED:
+        memory.active = memory.refused.count = 0
     elif enters:
-        aux[subject, s.ACTIVE] = 1.0
-        aux[subject, s.STREAK] = aux[subject, s.UNCONFIRMED] = 0.0
-        aux[subject, s.JOINED_AT] = aux[subject, s.CORRECTED_AT] = event[s.EVENT_AT]
+        memory.active = 1
+        memory.wild.count = memory.refused.count = memory.unconfirmed = 0
+        memory.corrected_at = event.at
 
 
-def event_kernels() -> IntArray:
+def event_kernels() -> IntVector:
     """Return where the kernel for each kind of event is: `replay` calls it there."""
-    kernels = np.full(s.EVENT_KINDS, address_of(change))
-    kernels[s.EVENT_OBSERVATION] = address_of(observe)
+    kernels = np.full(EVENT_KINDS, address_of(change, handle))
+    kernels[OBSERVATION] = address_of(observe, handle)
     return kernels

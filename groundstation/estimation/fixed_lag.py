@@ -10,19 +10,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from groundstation.bus.messages import Verdict
-from groundstation.estimation import slots as s
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.correction import is_distribution
-from groundstation.estimation.event_log import EventLog, observation_columns
+from groundstation.estimation.event_log import EventLog, change_values, observation_values
 from groundstation.estimation.events import event_kernels
-from groundstation.estimation.layout import EntityKind, Layout
-from groundstation.estimation.measurement import Correction, Measurement, Motion, Reading
+from groundstation.estimation.filter_state import Belief, Inputs, Moments, Span
+from groundstation.estimation.layout import EntityKind, StateLayout
+from groundstation.estimation.measurement import Correction, Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models.protocol import DrivenModel
+from groundstation.estimation.odometry_ring import OdometryRing
 from groundstation.estimation.parameters import EstimatorParameters
+from groundstation.estimation.records import ADMITTED, DISMISSED, PENDING, PLACED
 from groundstation.estimation.replay import replay
-from groundstation.estimation.tables import empty_state, tables_from_parameters
+from groundstation.estimation.tables import checkpoints_of, empty_state, tables_from_parameters
+from groundstation.time_units import NS_PER_S
 
-NS_PER_S = 1_000_000_000
 _FORGOTTEN_NS = 60 * NS_PER_S  # after a pause as long (a suspended host) nothing that was believed is worth predicting
 FUTURE_NS = 100_000_000  # a measurement further ahead of now than this is an error of a clock
 _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `add_*` advances by itself
@@ -57,9 +59,9 @@ class FixedLagFilter:
         # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
         self._ahead = (FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
         self._behind = (self._lag_ns + max(0, *delays, 0)) // self._step_ns + 3
-        self._build_state([float(model.admitted) for model in self._models])
+        self._build_state([model.admitted for model in self._models])
 
-    def add_motion(self, robot: str, motion: Motion, now_ns: int) -> Verdict:
+    def add_motion(self, robot: str, motion: OdometrySample, now_ns: int) -> Verdict:
         """Take one odometry sample; its velocity and height were true one calibrated delay before its stamp."""
         index = self._index.get(robot)
         if index is None or index not in self._delays:
@@ -68,26 +70,14 @@ class FixedLagFilter:
         if verdict is not Verdict.ACCEPTED:
             return verdict
         velocity_delay, height_delay = self._delays[index]
-        vx, vy, vz = motion.velocity_m_s
-        sums, row = self._sums, self._touch(motion.stamp_ns - velocity_delay, index)
-        sums[row + s.SUM_VX] += vx
-        sums[row + s.SUM_VY] += vy
-        sums[row + s.SUM_VZ] += vz
-        sums[row + s.SUM_RATE] += motion.yaw_rate_rad_s
-        sums[row + s.VELOCITY_COUNT] += 1.0
-        row = self._touch(motion.stamp_ns, index)
-        at = float(motion.stamp_ns - self._origin_ns)
-        if at >= sums[row + s.NEWEST_AT]:
-            sums[row + s.NEWEST_YAW], sums[row + s.NEWEST_AT] = motion.yaw_rad, at
-            sums[row + s.NEWEST_RESET] = float(motion.reset)
-            sums[row + s.NEWEST_ROLL], sums[row + s.NEWEST_PITCH] = motion.roll_rad, motion.pitch_rad
+        self._odometry.add_velocity(self._mark(motion.stamp_ns - velocity_delay), index, motion)
+        step = self._mark(motion.stamp_ns)
+        self._odometry.add_attitude(step, index, motion, motion.stamp_ns - self._origin_ns)
         if motion.height_m is not None:
-            row = self._touch(motion.stamp_ns - height_delay, index)
-            sums[row + s.HEIGHT_SUM] += motion.height_m
-            sums[row + s.HEIGHT_COUNT] += 1.0
+            self._odometry.add_height(self._mark(motion.stamp_ns - height_delay), index, motion.height_m)
         return verdict
 
-    def add_observation(self, m: Measurement | Reading, tie: str, now_ns: int) -> Verdict | None:
+    def add_observation(self, m: Measurement | SensorReading, tie: str, now_ns: int) -> Verdict | None:
         """Take one observation; None: `take_corrections` tells what it did after `advance`, else why it was refused.
 
         tie: orders observations of the same instant, so that their arrival cannot.
@@ -106,8 +96,8 @@ class FixedLagFilter:
             return verdict
         step = self._mark(m.stamp_ns)
         observer = self._index[sensor.carrier]
-        columns = observation_columns(m, self._seconds(m.stamp_ns), step, observer, subject, number)
-        row = self._log.add(m.stamp_ns, tie, columns)
+        values = observation_values(m, self._seconds(m.stamp_ns), step, observer, subject, number)
+        row = self._log.add(m.stamp_ns, tie, values)
         self._fresh[row] = (sensor.carrier, m.subject, (now_ns - m.stamp_ns) / 1e6)
         return None
 
@@ -126,17 +116,17 @@ class FixedLagFilter:
 
         Robots and targets join with the next observation that can place them. What leaves takes its correlations along.
         """
-        kind = s.EVENT_ADMITTED if present else s.EVENT_DISMISSED
-        return self._change(name, kind, [], f"{present:d}", stamp_ns, now_ns)
+        kind = ADMITTED if present else DISMISSED
+        return self._change(name, kind, (), f"{present:d}", stamp_ns, now_ns)
 
     def place(
         self, name: str, pose: Sequence[float], variances: Sequence[float], stamp_ns: int, now_ns: int
     ) -> Verdict:
         """Put an entity at a known pose (x, y, z, yaw) with the given variances, independent of all others."""
-        columns = [*map(float, pose), *np.diag(np.asarray(variances, dtype=np.float64)).ravel().tolist()]
-        if len(columns) != 20 or not np.isfinite(columns).all() or min(variances) <= 0.0:
+        placed = [*map(float, pose), *np.diag(np.asarray(variances, dtype=np.float64)).ravel().tolist()]
+        if len(placed) != 20 or not np.isfinite(placed).all() or min(variances) <= 0.0:
             raise ValueError("a pose has 4 finite numbers and 4 positive variances")
-        return self._change(name, s.EVENT_PLACED, columns, "placed", stamp_ns, now_ns)
+        return self._change(name, PLACED, placed, "placed", stamp_ns, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Bring the belief to `now_ns`, through everything that has arrived; time never runs backwards."""
@@ -162,68 +152,66 @@ class FixedLagFilter:
 
     def is_sound(self) -> bool:
         """Return whether the belief is still a distribution: finite, and its covariance positive definite."""
-        return bool(is_distribution(self._mean, self._P, self._tables.entities[0], self._state.aux))
+        return bool(is_distribution(Belief(*self._moments, self._tables.entities[0], self._state.memory)))
 
     def restart(self) -> None:
         """Forget the belief and everything that arrived; who may join is kept, who is where must be seen again."""
         now_ns = self._now_ns
-        self._build_state(self._state.aux[:, s.ADMITTED].tolist())
+        self._build_state(self._state.memory["admitted"].tolist())
         self._start(now_ns)
 
     def belief(self) -> JointBelief:
         """Return the belief over the entities that have joined."""
-        layout = Layout()
+        layout = StateLayout()
         kept: list[int] = []
+        active = self._state.memory["active"]
         for index, (name, model) in enumerate(zip(self.names, self._models, strict=True)):
-            if self._state.aux[index, s.ACTIVE] and model.labels:
+            if active[index] and model.labels:
                 layout = layout.with_entity(name, model.kind, model.labels)
                 part = self._tables.part(index)
                 kept.extend(range(part.start, part.stop))
-        return JointBelief(self._mean[kept], self._P[np.ix_(kept, kept)], layout, self._now_ns)
+        return JointBelief(self._moments.mean[kept], self._moments.P[np.ix_(kept, kept)], layout, self._now_ns)
 
     def age_s(self, name: str) -> float:
         """Return the time since an entity was last corrected by an observation; infinite if it has not joined."""
-        aux = self._state.aux[self._index[name]]
-        return self._seconds(self._now_ns) - float(aux[s.CORRECTED_AT]) if aux[s.ACTIVE] else math.inf
+        memory = self._state.memory[self._index[name]]
+        return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
 
     def airborne(self, robot: str) -> bool:
         """Return whether a robot flies, as far as is known."""
-        return bool(self._state.aux[self._index[robot], s.ADMITTED])
+        return bool(self._state.memory["admitted"][self._index[robot]])
 
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
         """Return a joined robot's velocity [m/s; world] from its last odometry and what is known of its errors."""
         index = self._index[robot]
         model = self._models[index]
         assert isinstance(model, DrivenModel)
-        return model.velocity_m_s(self._mean[self._tables.part(index)], self._state.aux[index])
+        return model.velocity_m_s(self._moments.mean[self._tables.part(index)], self._state.memory[index])
 
     def mode_probabilities(self) -> tuple[float, ...]:
         """Return how likely each combination of modes is; one number where no target switches."""
         return tuple(self._state.weights.tolist())
 
-    def _build_state(self, admitted: list[float]) -> None:
-        ring, allowed = self._behind + self._ahead, np.array(admitted)
-        self._checkpoints = empty_state(self._tables, allowed, (ring,))
-        self._state = empty_state(self._tables, allowed)
-        self._odometry = np.zeros((ring, len(self.names), s.ODOMETRY_COLUMNS))
-        self._odometry[:, :, s.NEWEST_AT] = -1.0
-        # The same numbers in one row: Python reads and writes single ones there in half of numpy's time.
-        self._sums = self._odometry.data.cast("B").cast("d")
+    def _build_state(self, admitted: Sequence[bool]) -> None:
+        ring = self._behind + self._ahead
+        self._state = empty_state(self._tables, admitted)
+        self._checkpoints = checkpoints_of(self._state, ring)
+        self._odometry = OdometryRing(ring, len(self.names))
         self._log = EventLog()
         self._fresh: dict[int, tuple[str, str, float]] = {}
-        self._mean, self._P = self._state.means[0].copy(), self._state.covariances[0].copy()
+        self._moments = Moments(self._state.means[0].copy(), self._state.covariances[0].copy())
         self._started = False
         self._origin_ns = self._now_ns = self._last = self._dirty = 0
 
-    def _change(self, name: str, kind: int, columns: list[float], tie: str, stamp_ns: int, now_ns: int) -> Verdict:
+    def _change(self, name: str, kind: int, placed: Sequence[float], tie: str, stamp_ns: int, now_ns: int) -> Verdict:
         index = self._index.get(name)
         if index is None:
             return Verdict.UNKNOWN_ENTITY
         if self._timing(stamp_ns, now_ns) is not Verdict.ACCEPTED:
             stamp_ns = now_ns
         step = self._mark(stamp_ns)
-        leading = [self._seconds(stamp_ns), kind, 0.0, index, 0.0, 0.0, 0.0, 0.0, step]
-        self._log.add(stamp_ns, f"@{name}/{tie}", leading + columns)
+        values = change_values(kind, self._seconds(stamp_ns), step, index, placed)
+        self._log.add(stamp_ns, f"@{name}/{tie}", values)
         return Verdict.ACCEPTED
 
     def _start(self, now_ns: int) -> None:
@@ -253,43 +241,18 @@ class FixedLagFilter:
         self._dirty = min(self._dirty, step)
         return step
 
-    def _touch(self, stamp_ns: int, robot: int) -> int:
-        """Return where a robot's odometry of the step of a stamp begins in `_sums`."""
-        step = self._mark(stamp_ns) % len(self._odometry)
-        return (step * len(self.names) + robot) * s.ODOMETRY_COLUMNS
-
     def _replay_to(self, now_ns: int) -> None:
         last = self._step_of(now_ns)
-        ring = len(self._odometry)
         for step in range(self._last + self._ahead + 1, last + self._ahead + 1):
-            self._odometry[step % ring] = 0.0
-            self._odometry[step % ring, :, s.NEWEST_AT] = -1.0
-        first = min(self._dirty, self._last)
-        tables, log = self._tables, self._log
-        replay(
-            self._event_kernels,
-            tables.entities,
-            tables.parameters,
-            tables.priors,
-            tables.kernels,
-            tables.sensors,
-            tables.settings,
-            tables.transition,
-            *self._checkpoints.arrays(),
-            self._odometry,
-            log.events,
-            log.rows_from(self._origin_ns + first * self._step_ns),
-            log.outcomes,
-            first,
-            last,
-            self._seconds(now_ns),
-            *self._state.arrays(),
-            self._mean,
-            self._P,
-        )
+            self._odometry.clear(step)
+        first, log = min(self._dirty, self._last), self._log
+        order = log.rows_from(self._origin_ns + first * self._step_ns)
+        inputs = Inputs(self._odometry.rows, log.events, order, log.outcomes)
+        span = Span(first, last, self._seconds(now_ns))
+        replay(self._event_kernels, self._tables, self._checkpoints, inputs, span, self._state, self._moments)
         self._now_ns, self._last, self._dirty = now_ns, last, last
         self._log.forget_before(self._origin_ns + (last - self._behind) * self._step_ns)
 
     def _report(self) -> None:
-        for row in [row for row in self._fresh if self._log.verdict_code(row) != s.PENDING]:
+        for row in [row for row in self._fresh if self._log.verdict_code(row) != PENDING]:
             self._corrections.append(self._log.correction(row, *self._fresh.pop(row)))

@@ -40,7 +40,7 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class StateLayout:
     """Blocks in state order; names are unique."""
 
     blocks: tuple[Block, ...] = ()
@@ -75,8 +75,8 @@ class Layout:
                 return block
         raise KeyError(name)
 
-    def with_entity(self, name: str, kind: EntityKind, labels: tuple[str, ...]) -> "Layout":
+    def with_entity(self, name: str, kind: EntityKind, labels: tuple[str, ...]) -> "StateLayout":
         """Return the layout with one more block at the end; raises ValueError when it is already there."""
         if name in self:
             raise ValueError(f"{name} is already in the state")
-        return Layout((*self.blocks, Block(name, kind, self.dim, labels)))
+        return StateLayout((*self.blocks, Block(name, kind, self.dim, labels)))

@@ -21,7 +21,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class SensorReading:
     """One reading of any sensor: z (1 to 4 rows as its model says) with its covariance (row-major), of one subject.
 
     subject: the carrier itself where the sensor looks at nothing else (a heading). roll, pitch: the carrier's, as
@@ -38,7 +38,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class OdometrySample:
     """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground.
 
     yaw_rate_rad_s: for vehicles that are commanded, or measure, a turn rate and no heading. roll, pitch: how it leans.

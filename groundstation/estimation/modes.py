@@ -6,30 +6,30 @@ matrices and of outer products, so that it is positive definite and its cross-co
 Bar-Shalom, Li, Kirubarajan (2001), section 11.6.6.
 """
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.kernel import kernel
+from groundstation.arrays import Matrix, MatrixStack, Vector
+from groundstation.estimation.filter_state import Moments, State, Tables
 from groundstation.estimation.linear import copy_matrix, wrap
+from groundstation.estimation.records import EntityRow
+from groundstation.kernel import Rows, kernel
 
 
-@kernel("void(float64[::1], float64[::1], int64[:,::1], float64[::1])")
-def difference(a: Array, b: Array, entities: IntArray, out: Array) -> None:
+@kernel()
+def difference(a: Vector, b: Vector, entities: Rows[EntityRow], out: Vector) -> None:
     """Write a - b of two means, headings wrapped."""
     for j in range(a.shape[0]):
         out[j] = a[j] - b[j]
     for e in range(entities.shape[0]):
-        if entities[e, s.AT_YAW] >= 0:
-            index = entities[e, s.ENTITY_START] + entities[e, s.AT_YAW]
+        if entities[e].at_yaw >= 0:
+            index = entities[e].start + entities[e].at_yaw
             out[index] = wrap(out[index])
 
 
-@kernel(
-    "void(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,::1], float64[:,::1], float64[::1], float64[:,::1])"
-)
-def moments(
-    means: Array, covariances: Array, weights: Array, entities: IntArray, work: Array, mean: Array, P: Array
+@kernel()
+def write_moments(
+    means: Matrix, covariances: MatrixStack, weights: Vector, entities: Rows[EntityRow], work: Matrix, out: Moments
 ) -> None:
     """Write mean and covariance of a mixture; weights sum to 1, work (2, n)."""
+    mean, P = out.mean, out.P
     n, heaviest = mean.shape[0], 0
     for m in range(1, weights.shape[0]):
         if weights[m] > weights[heaviest]:
@@ -52,21 +52,21 @@ def moments(
             for j in range(n):
                 P[i, j] += weights[m] * covariances[m, i, j] + f * (d[j] - shift[j])
     for e in range(entities.shape[0]):
-        if entities[e, s.AT_YAW] >= 0:
-            index = entities[e, s.ENTITY_START] + entities[e, s.AT_YAW]
+        if entities[e].at_yaw >= 0:
+            index = entities[e].start + entities[e].at_yaw
             mean[index] = wrap(mean[index])
     for i in range(n):
         for j in range(i):
             P[i, j] = P[j, i]
 
 
-@kernel("void(float64[:,::1], float64[:,:,::1], float64[::1], float64[:,::1], int64[:,::1])")
-def mix(means: Array, covariances: Array, weights: Array, transition: Array, entities: IntArray) -> None:
+@kernel()
+def mix(state: State, tables: Tables) -> None:
     """Let each mode's belief become the mixture of those from which it can have come in one step."""
-    modes = means.shape[0]
+    modes, weights, transition = state.means.shape[0], state.weights, tables.transition
     if modes == 1:
         return
-    old_means, old_P, old = means.copy(), covariances.copy(), weights.copy()
+    old_means, old_P, old = state.means.copy(), state.covariances.copy(), weights.copy()
     share, work = weights.copy(), old_means[:2].copy()
     for to in range(modes):
         weights[to] = 0.0
@@ -74,16 +74,17 @@ def mix(means: Array, covariances: Array, weights: Array, transition: Array, ent
             weights[to] += transition[source, to] * old[source]
         for source in range(modes):
             share[source] = transition[source, to] * old[source] / weights[to]
-        moments(old_means, old_P, share, entities, work, means[to], covariances[to])
+        out = Moments(state.means[to], state.covariances[to])
+        write_moments(old_means, old_P, share, tables.entities[0], work, out)
 
 
-@kernel("void(float64[:,::1], float64[:,:,::1], float64[::1], int64[:,::1], float64[::1], float64[:,::1])")
-def combine(means: Array, covariances: Array, weights: Array, entities: IntArray, mean: Array, P: Array) -> None:
+@kernel()
+def combine(state: State, tables: Tables, out: Moments) -> None:
     """Write the belief over all modes."""
-    if means.shape[0] == 1:
-        for j in range(mean.shape[0]):
-            mean[j] = means[0, j]
-        copy_matrix(covariances[0], P)
+    if state.means.shape[0] == 1:
+        for j in range(out.mean.shape[0]):
+            out.mean[j] = state.means[0, j]
+        copy_matrix(state.covariances[0], out.P)
         return
-    work = means[:2].copy()
-    moments(means, covariances, weights, entities, work, mean, P)
+    work = state.means[:2].copy()
+    write_moments(state.means, state.covariances, state.weights, tables.entities[0], work, out)

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 from groundstation.estimation.models import (
     ConstantVelocityTarget,
@@ -16,7 +15,10 @@ from groundstation.estimation.models import (
     OdometryRobot,
 )
 from groundstation.estimation.models.odometry_robot import AERIAL
-from groundstation.estimation.targets import targets_of
+from groundstation.field.drones import FieldDrone, OnboardCamera
+from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import WorldCamera
+from groundstation.field.targets import Target
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
     base_from_tilted_optical,
@@ -77,91 +79,92 @@ class EstimatorParameters:
     divergence_s: float = 0.6
 
 
-def parameters_from_field(resolved: Mapping[str, Any]) -> EstimatorParameters:
-    """Return the parameters for a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
-    drones = {name: drone for name, drone in resolved["drones"].items() if drone.get("enabled", True)}
-    estimator = resolved["estimator"]
+def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
+    """Return the parameters for a resolved field."""
+    drones, estimator = resolved.drones, resolved.estimator
     entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
-    entities |= {name: _target(target) for name, target in targets_of(resolved).items()}
-    entities |= {name: _mount(camera) for name, camera in resolved["cameras"].items()}
+    entities |= {name: _target(target) for name, target in resolved.tracked.items()}
+    entities |= {name: _mount(camera) for name, camera in resolved.cameras.items()}
     cameras: dict[str, ObservationModel] = {
-        name: _world_camera(name, camera) for name, camera in resolved["cameras"].items()
+        name: _world_camera(name, camera) for name, camera in resolved.cameras.items()
     }
-    cameras |= {name: _onboard_camera(name, drone["camera"]) for name, drone in drones.items()}
+    cameras |= {name: _onboard_camera(name, drone.camera) for name, drone in drones.items()}
     return EstimatorParameters(
         entities,
         cameras,
-        max_lateness_s=estimator["max_lateness_s"],
-        gate_probability=estimator["gate_probability"],
+        max_lateness_s=estimator.max_lateness_s,
+        gate_probability=estimator.gate_probability,
     )
 
 
-def _robot(drone: Mapping[str, Any]) -> OdometryRobot:
-    odometry, habits = drone["odometry"], _HABITS[drone["kind"]]
+def _robot(drone: FieldDrone) -> OdometryRobot:
+    odometry, habits = drone.odometry, _HABITS[drone.kind]
     return OdometryRobot(
-        marker_position_m=tuple(drone["marker"]["position_m"]),
-        velocity_scale=odometry["velocity_scale"],
+        marker_position_m=drone.marker.position_m,
+        velocity_scale=odometry.velocity_scale,
         scale_std=_SCALE_STD,
         scale_drift=_SCALE_DRIFT,
-        velocity_std_m_s=_QUICK_SHARE * odometry["velocity_std_m_s"],
-        velocity_bias_std_m_s=_LASTING_SHARE * odometry["velocity_std_m_s"] / odometry["velocity_scale"],
+        velocity_std_m_s=_QUICK_SHARE * odometry.velocity_std_m_s,
+        velocity_bias_std_m_s=_LASTING_SHARE * odometry.velocity_std_m_s / odometry.velocity_scale,
         velocity_bias_correlation_s=habits.velocity_s,
-        velocity_delay_s=odometry["velocity_delay_ms"] / 1000,
-        yaw_std_rad=math.radians(odometry["yaw_rate_std_deg_s"]),
-        attitude_std_rad=math.radians(odometry["attitude_std_deg"]),
+        velocity_delay_s=odometry.velocity_delay_ms / 1000,
+        yaw_std_rad=math.radians(odometry.yaw_rate_std_deg_s),
+        attitude_std_rad=math.radians(odometry.attitude_std_deg),
         attitude_correlation_s=habits.attitude_s,
-        height_std_m=odometry["height_std_m"],
-        height_delay_s=odometry["height_delay_ms"] / 1000,
-        climb_std_m_s=habits.climb_m_s + habits.climb_share * drone["limits"]["max_climb_m_s"],
+        height_std_m=odometry.height_std_m,
+        height_delay_s=odometry.height_delay_ms / 1000,
+        climb_std_m_s=habits.climb_m_s + habits.climb_share * drone.limits.max_climb_m_s,
         climb_correlation_s=habits.climb_s,
         reports_climb=habits.reports_climb,
         slow_states=AERIAL + _VELOCITY_LABELS,
     )
 
 
-def _target(target: Mapping[str, Any]) -> MotionModel:
-    common = {"marker_height_m": target["marker"]["height_m"], "heading": target.get("heading", False)}
-    acceleration_std = math.sqrt(_MANOEUVRING_SHARE) * target["acceleration_std_m_s2"]
-    model = target.get("model", "constant_velocity")
-    if model == "constant_velocity":
-        return ConstantVelocityTarget(acceleration_std_m_s2=acceleration_std, **common)
-    turns = dict(common)
-    if (rate_deg_s := target.get("turn_rate_std_deg_s")) is not None:
-        turns["turn_rate_std_rad_s"] = math.radians(rate_deg_s)
-    if (correlation_s := target.get("turn_rate_correlation_s")) is not None:
-        turns["turn_rate_correlation_s"] = correlation_s
-    turning = CoordinatedTurnTarget(acceleration_std_m_s2=acceleration_std, **turns)
-    if model == "coordinated_turn":
+def usual_acceleration_m_s2(target: Target) -> float:
+    """Return the rms of one component of a target's acceleration over all the time."""
+    return math.sqrt(_MANOEUVRING_SHARE) * target.acceleration_std_m_s2
+
+
+def _target(target: Target) -> MotionModel:
+    height_m, acceleration_std = target.marker.height_m, usual_acceleration_m_s2(target)
+    if target.model == "constant_velocity":
+        return ConstantVelocityTarget(height_m, acceleration_std, heading=target.heading)
+    usual, rate_deg_s = CoordinatedTurnTarget(), target.turn_rate_std_deg_s
+    turning = CoordinatedTurnTarget(
+        height_m,
+        acceleration_std,
+        turn_rate_std_rad_s=usual.turn_rate_std_rad_s if rate_deg_s is None else math.radians(rate_deg_s),
+        turn_rate_correlation_s=target.turn_rate_correlation_s or usual.turn_rate_correlation_s,
+        heading=target.heading,
+    )
+    if target.model == "coordinated_turn":
         return turning
-    straight = CoordinatedTurnTarget(acceleration_std_m_s2=_STRAIGHT_SHARE * acceleration_std, turning=False, **turns)
-    stays = [target.get(key) for key in ("straight_s", "turning_s")]
-    usual = ManoeuvringTarget().stay_s
-    return ManoeuvringTarget((straight, turning), tuple(own or other for own, other in zip(stays, usual, strict=True)))
+    straight = replace(turning, acceleration_std_m_s2=_STRAIGHT_SHARE * acceleration_std, turning=False)
+    straight_s, turning_s = ManoeuvringTarget().stay_s
+    return ManoeuvringTarget((straight, turning), (target.straight_s or straight_s, target.turning_s or turning_s))
 
 
-def _mount(camera: Mapping[str, Any]) -> FixedMount:
+def _mount(camera: WorldCamera) -> FixedMount:
     return FixedMount(
-        position_m=tuple(camera["position_m"]),
-        attitude_std_rad=math.radians(camera["attitude_std_deg"]),
-        position_std_m=camera["position_std_m"],
+        position_m=camera.position_m,
+        attitude_std_rad=math.radians(camera.attitude_std_deg),
+        position_std_m=camera.position_std_m,
     )
 
 
-def _world_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
+def _world_camera(name: str, camera: WorldCamera) -> MountedCamera:
     return MountedCamera(
         carrier=name,
-        rotation=world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0))),
-        observes_targets="targets" in camera.get("observes", ("robots",)),
+        rotation=world_from_downward_optical(camera.rotation_deg),
+        observes_targets="targets" in camera.observes,
         stamp_std_s=STAMP_STD_S,
     )
 
 
-def _onboard_camera(name: str, camera: Mapping[str, Any]) -> MountedCamera:
+def _onboard_camera(name: str, camera: OnboardCamera) -> MountedCamera:
     return MountedCamera(
         carrier=name,
-        rotation=base_from_tilted_optical(
-            math.radians(camera["tilt_down_deg"]), math.radians(camera.get("pan_left_deg", 0.0))
-        ),
-        translation=tuple(camera["position_m"]),
+        rotation=base_from_tilted_optical(math.radians(camera.tilt_down_deg), math.radians(camera.pan_left_deg)),
+        translation=camera.position_m,
         stamp_std_s=STAMP_STD_S,
     )

@@ -1,61 +1,43 @@
 """From models to the flat tables that the compiled filter works on, and the arrays that hold its state."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
+from groundstation.arrays import Array
+from groundstation.estimation import model_kernels as declared
+from groundstation.estimation.filter_state import Checkpoints, Settings, State, Tables
 from groundstation.estimation.gating import gate
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.models.protocol import MotionModel, ObservationModel, SwitchingModel, place_of
 from groundstation.estimation.parameters import EstimatorParameters
+from groundstation.estimation.records import (
+    KIND_CAMERA,
+    KIND_LANDMARK,
+    KIND_ROBOT,
+    KIND_TARGET,
+    MAX_BLOCK,
+    MAX_ROWS,
+    SHARED_LABELS,
+    EntityMemory,
+    EntityRow,
+    PriorRow,
+    SensorRow,
+)
+from groundstation.kernel import Record, Rows, RowsStack, address_of
 
 MOST_MODES = 8
 _KINDS = {
-    EntityKind.ROBOT: s.KIND_ROBOT,
-    EntityKind.TARGET: s.KIND_TARGET,
-    EntityKind.CAMERA: s.KIND_CAMERA,
-    EntityKind.LANDMARK: s.KIND_LANDMARK,
+    EntityKind.ROBOT: KIND_ROBOT,
+    EntityKind.TARGET: KIND_TARGET,
+    EntityKind.CAMERA: KIND_CAMERA,
+    EntityKind.LANDMARK: KIND_LANDMARK,
 }
 _NEVER_S = -1e9
 # Numbers in one line of the cache. Rows of P that begin on a line spare a quarter of a correction's time.
 _LINE = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Tables:
-    """Everything that stays the same while the filter runs; a leading axis of m where modes differ."""
-
-    entities: IntArray
-    parameters: Array
-    priors: Array
-    kernels: IntArray
-    sensors: Array
-    settings: Array
-    transition: Array
-
-    @property
-    def modes(self) -> int:
-        """Return the number of joint beliefs that are kept."""
-        return len(self.entities)
-
-    @property
-    def dim(self) -> int:
-        """Return the dimension of the state."""
-        return int(self.entities[0, :, s.ENTITY_SIZE].sum())
-
-    @property
-    def width(self) -> int:
-        """Return the length of the arrays that hold the state: `dim` and entries that stay zero, in whole lines."""
-        return -(-self.dim // _LINE) * _LINE
-
-    def part(self, entity: int) -> slice:
-        """Return where an entity's block stands in the state."""
-        start = int(self.entities[0, entity, s.ENTITY_START])
-        return slice(start, start + int(self.entities[0, entity, s.ENTITY_SIZE]))
 
 
 def tables_from_parameters(parameters: EstimatorParameters) -> Tables:
@@ -63,48 +45,72 @@ def tables_from_parameters(parameters: EstimatorParameters) -> Tables:
     models = tuple(parameters.entities.values())
     sensors = tuple(parameters.sensors.values())
     for name, model in parameters.entities.items():
-        if len(model.labels) > s.MAX_BLOCK:
-            raise ValueError(f"{name}: more than {s.MAX_BLOCK} entries in one block")
+        if len(model.labels) > MAX_BLOCK:
+            raise ValueError(f"{name}: more than {MAX_BLOCK} entries in one block")
     teams = list(product(*(m.modes if isinstance(m, SwitchingModel) else (m,) for m in models)))
     if len(teams) > MOST_MODES:
         raise ValueError(f"{len(teams)} joint beliefs are needed for all modes of all targets (at most {MOST_MODES})")
-    scalars = (parameters.step_s, parameters.wild_gates, parameters.divergence_count, parameters.divergence_s)
-    gates = [gate(parameters.gate_probability, rows) for rows in range(1, 5)]
-    kernels = np.array([sensor.kernels for sensor in sensors], dtype=np.int64)
+    gates = np.array([0.0, *(gate(parameters.gate_probability, rows) for rows in range(1, MAX_ROWS + 1))])
     return Tables(
-        entities=np.array([_entities(team) for team in teams], dtype=np.int64),
-        parameters=np.array([[m.row() for m in team] for team in teams]).reshape(
-            len(teams), len(models), s.PARAMETER_COLUMNS
+        entities=_entities(teams, len(models)),
+        priors=_priors(models),
+        sensors=_sensors(sensors),
+        settings=Settings(
+            float(parameters.step_s),
+            float(parameters.wild_gates),
+            int(parameters.divergence_count),
+            float(parameters.divergence_s),
+            gates,
         ),
-        priors=np.array([_prior(m) for m in models]).reshape(len(models), 2, s.MAX_BLOCK),
-        kernels=kernels.reshape(-1, s.SENSOR_KERNELS),
-        sensors=np.array([_sensor(sensor) for sensor in sensors]).reshape(-1, s.SENSOR_COLUMNS),
-        settings=np.array([*map(float, scalars), 0.0, *gates, 0.0]),
         transition=_transition(models, parameters.step_s),
     )
 
 
-def _entities(models: tuple[MotionModel, ...]) -> list[list[int]]:
-    rows, start = [], 0
-    for model in models:
-        shared = [place_of(model.labels, label) for label in s.SHARED_LABELS]
-        rows.append([*model.kernels, start, len(model.labels), _KINDS[model.kind], int(model.present), *shared])
-        start += len(model.labels)
-    return rows
+def _entities(teams: Sequence[tuple[MotionModel, ...]], count: int) -> RowsStack[EntityRow]:
+    table = EntityRow.rows(len(teams), count)
+    for rows, team in enumerate(teams):
+        start = 0
+        for e, model in enumerate(team):
+            _describe(table[rows, e], model, start)
+            start += len(model.labels)
+    return table
 
 
-def _prior(model: MotionModel) -> Array:
-    prior = np.zeros((2, s.MAX_BLOCK))
-    prior[:, : len(model.labels)] = model.prior()
-    return prior
+def _describe(row: EntityRow, model: MotionModel, start: int) -> None:
+    predict, begin = model.kernels
+    row["predict"] = 0 if predict is None else address_of(predict, declared.predict)
+    row["begin"] = 0 if begin is None else address_of(begin, declared.begin)
+    row["start"], row["size"], row["kind"], row["present"] = start, len(model.labels), _KINDS[model.kind], model.present
+    for label in SHARED_LABELS:
+        row[f"at_{label}"] = place_of(model.labels, label)
+    row["place_x"], row["place_y"], row["place_z"] = model.place_m
+    _set_own(row, model.own())
 
 
-def _sensor(sensor: ObservationModel) -> Array:
-    row = sensor.row()
-    for angle in sensor.angles:
-        row[s.SENSOR_ANGLES + angle] = 1.0
-    row[s.SENSOR_REPEAT_S] = sensor.repeats_s
-    return row
+def _set_own(row: EntityRow | SensorRow, own: Record | None) -> None:
+    """Copy a model's own parameters word by word; raises ValueError where they do not fit."""
+    if own is not None:
+        words = np.frombuffer(np.asarray(own).tobytes(), dtype=np.int64)
+        row["own"][: len(words)] = words
+
+
+def _priors(models: Sequence[MotionModel]) -> Rows[PriorRow]:
+    priors = PriorRow.rows(len(models))
+    for row, model in zip(priors, models, strict=True):
+        row["mean"][: len(model.labels)], row["variances"][: len(model.labels)] = model.prior()
+    return priors
+
+
+def _sensors(sensors: Sequence[ObservationModel]) -> Rows[SensorRow]:
+    table = SensorRow.rows(len(sensors))
+    for row, sensor in zip(table, sensors, strict=True):
+        row["measure"] = address_of(sensor.kernels.measure, declared.measure)
+        row["prepare"] = address_of(sensor.kernels.prepare, declared.prepare)
+        row["locate"] = address_of(sensor.kernels.locate, declared.locate)
+        row["is_angle"][list(sensor.angles)] = 1
+        row["repeats_s"], row["stamp_variance_s2"] = sensor.repeats_s, sensor.stamp_std_s**2
+        _set_own(row, sensor.own())
+    return table
 
 
 def _transition(models: tuple[MotionModel, ...], step_s: float) -> Array:
@@ -119,43 +125,43 @@ def _transition(models: tuple[MotionModel, ...], step_s: float) -> Array:
     return chances
 
 
-@dataclass(slots=True)
-class State:
-    """Mean and covariance per mode, the modes' probabilities, and what is remembered of entities and pairs.
-
-    Means and covariances are `Tables.width` wide. With a leading ring axis in checkpoints.
-    Entities with a prior are in it from the start.
-    """
-
-    means: Array
-    covariances: Array
-    weights: Array
-    aux: Array
-    pairs: Array
-
-    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
-        """Return all arrays in the order that the kernels take them."""
-        return self.means, self.covariances, self.weights, self.aux, self.pairs
+def width_of(tables: Tables) -> int:
+    """Return the length of the arrays that hold the state: its dimension and entries that stay zero, in whole lines."""
+    return -(-tables.dim // _LINE) * _LINE
 
 
-def empty_state(tables: Tables, admitted: Array, leading: tuple[int, ...] = ()) -> State:
-    """Return the state before anything was measured; admitted (entities): who may join."""
-    modes, n, entities, sensors = tables.modes, tables.width, len(admitted), len(tables.sensors)
+def empty_state(tables: Tables, admitted: Sequence[bool]) -> State:
+    """Return the state before anything was measured; entities with a prior are in it; admitted: who may join."""
+    modes, n, count = tables.modes, width_of(tables), len(tables.priors)
     state = State(
-        _zeros_on_a_line((*leading, modes, n)),
-        _zeros_on_a_line((*leading, modes, n, n)),
-        np.full((*leading, modes), 1.0 / modes),
-        np.zeros((*leading, entities, s.AUXILIARY_COLUMNS)),
-        np.full((*leading, sensors, entities), _NEVER_S),
+        _zeros_on_a_line((modes, n)),
+        _zeros_on_a_line((modes, n, n)),
+        np.full(modes, 1.0 / modes),
+        EntityMemory.rows(count),
+        np.full((len(tables.sensors), count), _NEVER_S),
     )
-    state.aux[..., s.ADMITTED] = admitted
-    for index in np.flatnonzero(tables.entities[0, :, s.ENTITY_PRESENT]):
-        part = tables.part(int(index))
+    state.memory["admitted"] = admitted
+    for index in np.flatnonzero(tables.entities["present"][0]):
+        part, prior = tables.part(int(index)), tables.priors[int(index)]
         size = part.stop - part.start
-        state.means[..., part] = tables.priors[index, 0, :size]
-        state.covariances[..., part, part] = np.diag(tables.priors[index, 1, :size])
-        state.aux[..., index, s.ACTIVE] = 1.0
+        state.means[:, part] = prior["mean"][:size]
+        state.covariances[:, part, part] = np.diag(prior["variances"][:size])
+        state.memory["active"][index] = 1
     return state
+
+
+def checkpoints_of(state: State, steps: int) -> Checkpoints:
+    """Return a ring of so many copies of a state."""
+    ring = Checkpoints(
+        _zeros_on_a_line((steps, *state.means.shape)),
+        _zeros_on_a_line((steps, *state.covariances.shape)),
+        np.empty((steps, *state.weights.shape)),
+        EntityMemory.rows(steps, len(state.memory)),
+        np.empty((steps, *state.used_at.shape)),
+    )
+    for copies, value in zip(ring, state, strict=True):
+        np.asarray(copies)[:] = value
+    return ring
 
 
 def _zeros_on_a_line(shape: tuple[int, ...]) -> Array:

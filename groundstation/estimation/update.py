@@ -2,143 +2,158 @@
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.correction import apply, bound_precision, inflate, project, project_columns, surprise
-from groundstation.estimation.dispatch import call_measure, call_prepare
-from groundstation.estimation.kernel import kernel
+from groundstation.arrays import Matrix, Vector
+from groundstation.estimation.correction import (
+    apply,
+    bound_precision,
+    inflate,
+    project,
+    project_columns,
+    surprise,
+    touched,
+)
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.linear import cholesky, wrap
+from groundstation.estimation.model_kernels import call_measure, call_prepare
+from groundstation.estimation.records import (
+    KIND_ROBOT,
+    KIND_TARGET,
+    MAX_BLOCK,
+    MAX_ROWS,
+    POSE,
+    SINGULAR,
+    VX,
+    VY,
+    YAW,
+    EventRow,
+    Innovation,
+    OutcomeRow,
+    RawReading,
+    SensorRow,
+    X,
+    Y,
+    Z,
+)
+from groundstation.kernel import kernel
 
 _SHORTEST_S = 1e-3  # between two readings of one pair, as far as repeated errors are concerned
 
 
-@kernel(
-    "int64(int64[:,::1], float64[:,::1], int64[::1], float64[::1], float64, float64[::1], int64, float64[::1],"
-    " float64[:,::1])",
-    inlined=True,
-)
+@kernel(inlined=True)
 def read(
-    entities: IntArray, parameters: Array, kernels: IntArray, sensor: Array, unused_s: float, event: Array,
-    offset: int, z: Array, R: Array,
-) -> int:  # fmt: skip
-    """Write z and R of the hypothesis at an offset of the event; returns its rows, or minus a verdict.
+    belief: Belief, sensor: SensorRow, event: EventRow, raw: RawReading, unused_s: float, z: Vector, R: Matrix
+) -> int:
+    """Write z and R of one hypothesis of the event; returns its rows, or minus a verdict.
 
     unused_s: since the same sensor's last reading of the same subject; a repeated error makes R larger by what that
     falls short of the sensor's `repeats_s`, so that all readings within it share one reading's information.
     """
-    factor = np.empty((4, 4))
-    for i in range(4):
-        z[i] = event[offset + i]
-        for j in range(4):
-            R[i, j] = 0.5 * (event[offset + 4 + 4 * i + j] + event[offset + 4 + 4 * j + i])
+    factor = np.empty((MAX_ROWS, MAX_ROWS))
+    for i in range(MAX_ROWS):
+        z[i] = raw.z[i]
+        for j in range(MAX_ROWS):
+            R[i, j] = 0.5 * (raw.R[i, j] + raw.R[j, i])
             factor[i, j] = R[i, j]
-    rows = call_prepare(kernels[s.SENSOR_PREPARE], (entities, parameters, sensor, event, z, R))
+    rows = int(call_prepare(sensor.prepare, (belief, sensor, event, z, R)))
     if rows < 0:
-        return int(rows)
-    if rows > int(event[s.EVENT_SIZE]) or not cholesky(factor, rows):
-        return -s.SINGULAR
-    repeat = sensor[s.SENSOR_REPEAT_S] / max(unused_s, _SHORTEST_S)
+        return rows
+    if rows > event.size or not cholesky(factor, rows):
+        return -SINGULAR
+    repeat = sensor.repeats_s / max(unused_s, _SHORTEST_S)
     if repeat > 1.0:
         for i in range(rows):
             for j in range(rows):
                 R[i, j] *= repeat
-    return int(rows)
+    return rows
 
 
-@kernel("void(float64[::1], float64[::1], int64[::1], float64[::1], int64)", inlined=True)
-def note_rates(mean: Array, aux: Array, entity: IntArray, event: Array, offset: int) -> None:
-    """Write into the event how fast the first four entries of one entity's block change."""
-    for i in range(4):
-        event[offset + i] = 0.0
-    if entity[s.ENTITY_KIND] == s.KIND_ROBOT:
-        event[offset], event[offset + 1], event[offset + 2] = aux[s.RATE_X], aux[s.RATE_Y], aux[s.RATE_Z]
-        event[offset + s.YAW] = aux[s.YAW_RATE]
-    elif entity[s.ENTITY_KIND] == s.KIND_TARGET:
-        event[offset] = mean[entity[s.ENTITY_START] + s.VX]
-        event[offset + 1] = mean[entity[s.ENTITY_START] + s.VY]
+@kernel(inlined=True)
+def note_rates(belief: Belief, e: int, rates: Vector) -> None:
+    """Write how fast the first four entries of one entity's block change."""
+    entity, memory = belief.entities[e], belief.memory[e]
+    for i in range(POSE):
+        rates[i] = 0.0
+    if entity.kind == KIND_ROBOT:
+        rates[X], rates[Y], rates[Z] = memory.velocity_x, memory.velocity_y, memory.velocity_z
+        rates[YAW] = memory.yaw_rate
+    elif entity.kind == KIND_TARGET:
+        rates[X] = belief.mean[entity.start + VX]
+        rates[Y] = belief.mean[entity.start + VY]
 
 
-@kernel("void(float64[::1], float64[:,::1], int64[:,::1], float64[::1])", inlined=True)
-def note_motion(mean: Array, aux: Array, entities: IntArray, event: Array) -> None:
+@kernel(inlined=True)
+def note_motion(belief: Belief, event: EventRow) -> None:
     """Complete an event by what is known when it is reached: how its subject leans, how fast both move."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    event[s.EVENT_SUBJECT_ROLL], event[s.EVENT_SUBJECT_PITCH] = aux[subject, s.HELD_ROLL], aux[subject, s.HELD_PITCH]
-    note_rates(mean, aux[observer], entities[observer], event, s.EVENT_OBSERVER_RATE)
-    note_rates(mean, aux[subject], entities[subject], event, s.EVENT_SUBJECT_RATE)
+    subject = belief.memory[event.subject]
+    event.subject_roll, event.subject_pitch = subject.held_roll, subject.held_pitch
+    note_rates(belief, event.observer, event.observer_rates)
+    note_rates(belief, event.subject, event.subject_rates)
 
 
-@kernel("void(float64[::1], float64[::1], int64, float64[:,::1], float64[:,::1], float64[:,::1])", inlined=True)
-def add_timing_noise(sensor: Array, event: Array, rows: int, H_observer: Array, H_subject: Array, R: Array) -> None:
+@kernel(inlined=True)
+def add_timing_noise(sensor: SensorRow, event: EventRow, innovation: Innovation) -> None:
     """Add to R what an uncertain time of measurement does while observer and subject move: var(t) h' h'^T."""
-    if sensor[s.SENSOR_TIME_VARIANCE] == 0.0:
+    if sensor.stamp_variance_s2 == 0.0:
         return
+    rows = innovation.prediction.size
     rate = np.zeros(rows)
     for i in range(rows):
-        for j in range(4):
-            rate[i] += H_observer[i, j] * event[s.EVENT_OBSERVER_RATE + j]
-            rate[i] += H_subject[i, j] * event[s.EVENT_SUBJECT_RATE + j]
+        for j in range(POSE):
+            rate[i] += innovation.prediction.H_observer[i, j] * event.observer_rates[j]
+            rate[i] += innovation.prediction.H_subject[i, j] * event.subject_rates[j]
     for i in range(rows):
         for j in range(rows):
-            R[i, j] += sensor[s.SENSOR_TIME_VARIANCE] * rate[i] * rate[j]
+            innovation.R[i, j] += sensor.stamp_variance_s2 * rate[i] * rate[j]
 
 
-@kernel(
-    "float64(float64[::1], float64[:,::1], int64[:,::1], float64[:,::1], int64[::1], float64[::1], float64[::1],"
-    " int64, float64[::1], float64[:,::1], float64[:,:,::1], float64[:,::1], float64[::1])",
-    inlined=True,
-)
+@kernel(inlined=True)
 def linearise(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, kernels: IntArray, sensor: Array, event: Array,
-    rows: int, z: Array, R: Array, work: Array, W: Array, y: Array,
-) -> float:  # fmt: skip
-    """Write y = z - h(x), W = H P and, into work, H of both blocks, H P H^T and the factor of S; the NIS, or -1."""
-    observer, subject = int(event[s.EVENT_OBSERVER]), int(event[s.EVENT_SUBJECT])
-    start, size = entities[subject, s.ENTITY_START], entities[subject, s.ENTITY_SIZE]
-    start_o, size_o = entities[observer, s.ENTITY_START], entities[observer, s.ENTITY_SIZE]
-    h = np.zeros(4)
-    for i in range(4):
-        for j in range(s.MAX_BLOCK):
-            work[0, i, j] = work[1, i, j] = 0.0
-    call_measure(kernels[s.SENSOR_MEASURE], (mean, entities, parameters, sensor, event, rows, h, work[0], work[1]))
-    for i in range(rows):
-        y[i] = z[i] - h[i]
-        if sensor[s.SENSOR_ANGLES + i] != 0.0:
-            y[i] = wrap(y[i])
-    add_timing_noise(sensor, event, rows, work[0], work[1], R)
-    project(P, start_o, size_o, work[0], start, size, work[1], rows, W)
-    project_columns(W[:rows], start_o, size_o, work[0], start, size, work[1], rows, work[2])
-    bound_precision(work[2], R, rows)
-    return surprise(work[2], R, y, rows, work[3])
-
-
-@kernel(
-    "void(float64[::1], float64[:,::1], int64[:,::1], int64, float64[:,::1], float64[:,:,::1], float64[:,::1],"
-    " float64[::1], float64)",
-    inlined=True,
-)
-def correct(
-    mean: Array, P: Array, entities: IntArray, rows: int, R: Array, work: Array, W: Array, y: Array, factor: float
+    belief: Belief, sensor: SensorRow, event: EventRow, rows: int, z: Vector, innovation: Innovation, HP: Matrix
 ) -> None:
-    """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
-    if factor > 1.0:
-        inflate(work[2], R, rows, factor)
-        surprise(work[2], R, y, rows, work[3])
-    apply(mean, P, rows, W, work[3], y)
-    for e in range(entities.shape[0]):
-        if entities[e, s.AT_YAW] >= 0:
-            yaw = entities[e, s.ENTITY_START] + entities[e, s.AT_YAW]
-            mean[yaw] = wrap(mean[yaw])
-
-
-@kernel("void(float64[::1], float64, int64, float64[::1], float64[:,:,::1])", inlined=True)
-def write_outcome(out: Array, nis: float, rows: int, y: Array, work: Array) -> None:
-    """Record residual, S and NIS, so that each correction can explain itself."""
-    out[s.OUT_NIS] = nis
-    out[s.OUT_SIZE] = rows
+    """Write HP = H P and the innovation of z, whose R is given; its R gains what the time of measurement adds."""
+    observer, subject, out = belief.entities[event.observer], belief.entities[event.subject], innovation.prediction
+    out.size = rows
+    for i in range(MAX_ROWS):
+        out.h[i] = 0.0
+        for j in range(MAX_BLOCK):
+            out.H_observer[i, j] = out.H_subject[i, j] = 0.0
+    call_measure(sensor.measure, (belief, sensor, event, out))
     for i in range(rows):
-        out[s.OUT_RESIDUAL + i] = y[i]
+        innovation.y[i] = z[i] - out.h[i]
+        if sensor.is_angle[i] != 0:
+            innovation.y[i] = wrap(innovation.y[i])
+    add_timing_noise(sensor, event, innovation)
+    a, b = touched(observer, out.H_observer), touched(subject, out.H_subject)
+    project(belief.P, a, b, rows, HP)
+    project_columns(HP[:rows], a, b, rows, innovation.HPH)
+    bound_precision(innovation.HPH, innovation.R, rows)
+    innovation.nis = surprise(innovation.HPH, innovation.R, innovation.y, rows, innovation.factor)
+
+
+@kernel(inlined=True)
+def correct(belief: Belief, innovation: Innovation, HP: Matrix, factor: float) -> None:
+    """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
+    rows = innovation.prediction.size
+    if factor > 1.0:
+        inflate(innovation.HPH, innovation.R, rows, factor)
+        surprise(innovation.HPH, innovation.R, innovation.y, rows, innovation.factor)
+    apply(belief.mean, belief.P, rows, HP, innovation.factor, innovation.y)
+    for e in range(belief.entities.shape[0]):
+        if belief.entities[e].at_yaw >= 0:
+            yaw = belief.entities[e].start + belief.entities[e].at_yaw
+            belief.mean[yaw] = wrap(belief.mean[yaw])
+
+
+@kernel(inlined=True)
+def write_outcome(out: OutcomeRow, innovation: Innovation) -> None:
+    """Record residual, S and NIS, so that each correction can explain itself."""
+    rows = innovation.prediction.size
+    out.nis = innovation.nis
+    out.size = rows
+    for i in range(rows):
+        out.residual[i] = innovation.y[i]
         for j in range(rows):
             total = 0.0
             for k in range(min(i, j) + 1):
-                total += work[3, i, k] * work[3, j, k]
-            out[s.OUT_COVARIANCE + rows * i + j] = total
+                total += innovation.factor[i, k] * innovation.factor[j, k]
+            out.covariance[rows * i + j] = total

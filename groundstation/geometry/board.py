@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
 
 SQUARES_X, SQUARES_Y = 5, 4
 CORNERS_X, CORNERS_Y = SQUARES_X - 1, SQUARES_Y - 1
@@ -35,7 +35,7 @@ BLACK, WHITE = 25, 230
 
 # Without it, blank paper and a solid dark strip would be words of the code; with it each is two cells away from four
 # words at once, so neither can be read as an identity. Of all masks and orders of the cells these keep the words
-# farthest apart when small cells run into each other (README of drivers/camera).
+# farthest apart when small cells run into each other (docs/decisions/0051-masked-code-words.md).
 _MASK = np.array([1, 0, 0, 1, 0, 0, 0, 0], dtype=np.int8)
 CODES = 16
 
@@ -56,7 +56,7 @@ VALID_CODES = tuple(range(CODES))
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
+class Checkerboard:
     """One printed marker: its code (0..15) and the side of its squares [mm]."""
 
     code: int

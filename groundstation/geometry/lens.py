@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
 
 # Newton converges quadratically from the distorted point; 12 steps are ample even for k1 = -0.5 at the corners.
 _NEWTON_STEPS = 12

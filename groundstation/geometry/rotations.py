@@ -4,9 +4,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
 
 
 def rotation_x(angle_rad: float) -> Array:

@@ -6,9 +6,8 @@ Marker frame: origin at the centre, z out of the face, x to the right and y up a
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
 
 # Name of the dictionary -> how many tags it holds, and bits along the side of one without its black border.
 DICTIONARIES: dict[str, tuple[int, int]] = {
@@ -25,7 +24,7 @@ QUIET_MODULES = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Tag:
+class SquareTag:
     """One printed tag: dictionary, id in it, and the side of its black square [mm]. Raises ValueError if unknown."""
 
     dictionary: str

@@ -1,96 +1,83 @@
 """Compiled covariance steps of the rollout and their adjoints.
 
-State of the planner: x, y, yaw of each robot (3 each), then x, y, vx, vy of each target (4 each).
-`P` is the covariance, `W` its adjoint (dc/dP), both symmetric (d, d). Mathematics: README.md.
+`P` is the covariance, `W` its adjoint (dc/dP), both symmetric (d, d). Mathematics:
+docs/explanation/planning.md 1, 2.
 """
 
-import numpy as np
-from numba import njit
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from groundstation.arrays import Matrix, Vector
+from groundstation.kernel import kernel
+from groundstation.planning.records import ROBOT_STATES, TARGET_STATES, VX, VY, YAW, Combination, CostOptions, X, Y
 
 
-@njit("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1])", cache=True, nogil=True, error_model="numpy")
-def predict(P: Array, motion: Array, yaw_columns: Array, options: Array) -> None:
+@kernel()
+def predict(P: Matrix, motion: Matrix, yaw_columns: Matrix, options: CostOptions) -> None:
     """P <- F P F^T + Q; motion (n, 3) holds each robot's displacement; keeps F P e_yaw of each robot."""
     n, d = motion.shape[0], P.shape[0]
-    dt, q_xy, q_yaw, q_acc = options[0], options[2], options[3], options[4]
+    dt, q_xy, q_yaw = options.step_s, options.robot_position_noise, options.robot_yaw_noise
+    q_acc = options.target_acceleration_noise
     for r in range(n):
-        x, y, yaw = 3 * r, 3 * r + 1, 3 * r + 2
+        x, y, yaw = ROBOT_STATES * r + X, ROBOT_STATES * r + Y, ROBOT_STATES * r + YAW
         for j in range(d):
-            P[x, j] -= motion[r, 1] * P[yaw, j]
-            P[y, j] += motion[r, 0] * P[yaw, j]
-    for x in range(3 * n, d, 4):
+            P[x, j] -= motion[r, Y] * P[yaw, j]
+            P[y, j] += motion[r, X] * P[yaw, j]
+    for x in range(ROBOT_STATES * n, d, TARGET_STATES):
         for j in range(d):
-            P[x, j] += dt * P[x + 2, j]
-            P[x + 1, j] += dt * P[x + 3, j]
+            P[x, j] += dt * P[x + VX, j]
+            P[x + Y, j] += dt * P[x + VY, j]
     for i in range(d):
         for r in range(n):
-            P[i, 3 * r] -= motion[r, 1] * P[i, 3 * r + 2]
-            P[i, 3 * r + 1] += motion[r, 0] * P[i, 3 * r + 2]
-            yaw_columns[r, i] = P[i, 3 * r + 2]
-        for x in range(3 * n, d, 4):
-            P[i, x] += dt * P[i, x + 2]
-            P[i, x + 1] += dt * P[i, x + 3]
+            x, y, yaw = ROBOT_STATES * r + X, ROBOT_STATES * r + Y, ROBOT_STATES * r + YAW
+            P[i, x] -= motion[r, Y] * P[i, yaw]
+            P[i, y] += motion[r, X] * P[i, yaw]
+            yaw_columns[r, i] = P[i, yaw]
+        for x in range(ROBOT_STATES * n, d, TARGET_STATES):
+            P[i, x] += dt * P[i, x + VX]
+            P[i, x + Y] += dt * P[i, x + VY]
     for r in range(n):
-        P[3 * r, 3 * r] += q_xy * dt
-        P[3 * r + 1, 3 * r + 1] += q_xy * dt
-        P[3 * r + 2, 3 * r + 2] += q_yaw * dt
-    for first in range(3 * n, d, 4):
+        x, y, yaw = ROBOT_STATES * r + X, ROBOT_STATES * r + Y, ROBOT_STATES * r + YAW
+        P[x, x] += q_xy * dt
+        P[y, y] += q_xy * dt
+        P[yaw, yaw] += q_yaw * dt
+    for first in range(ROBOT_STATES * n, d, TARGET_STATES):
         for x in range(first, first + 2):
             P[x, x] += q_acc * dt * dt * dt / 3.0
-            P[x, x + 2] += q_acc * dt * dt / 2.0
-            P[x + 2, x] += q_acc * dt * dt / 2.0
-            P[x + 2, x + 2] += q_acc * dt
+            P[x, x + VX] += q_acc * dt * dt / 2.0
+            P[x + VX, x] += q_acc * dt * dt / 2.0
+            P[x + VX, x + VX] += q_acc * dt
 
 
-@njit(
-    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64, float64[:,::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def predict_adjoint(W: Array, motion: Array, yaw_columns: Array, dt: float, motion_adjoint: Array) -> None:
+@kernel()
+def predict_adjoint(W: Matrix, motion: Matrix, yaw_columns: Matrix, dt: float, motion_adjoint: Matrix) -> None:
     """W <- F^T W F; writes dc/d displacement through F into motion_adjoint (n, 2)."""
     n, d = motion.shape[0], W.shape[0]
     for r in range(n):
         along_x = along_y = 0.0
         for j in range(d):
-            along_x += W[3 * r, j] * yaw_columns[r, j]
-            along_y += W[3 * r + 1, j] * yaw_columns[r, j]
-        motion_adjoint[r, 0] = 2.0 * along_y
-        motion_adjoint[r, 1] = -2.0 * along_x
+            along_x += W[ROBOT_STATES * r + X, j] * yaw_columns[r, j]
+            along_y += W[ROBOT_STATES * r + Y, j] * yaw_columns[r, j]
+        motion_adjoint[r, X] = 2.0 * along_y
+        motion_adjoint[r, Y] = -2.0 * along_x
     for r in range(n):
-        x, y, yaw = 3 * r, 3 * r + 1, 3 * r + 2
+        x, y, yaw = ROBOT_STATES * r + X, ROBOT_STATES * r + Y, ROBOT_STATES * r + YAW
         for j in range(d):
-            W[yaw, j] += motion[r, 0] * W[y, j] - motion[r, 1] * W[x, j]
-    for x in range(3 * n, d, 4):
+            W[yaw, j] += motion[r, X] * W[y, j] - motion[r, Y] * W[x, j]
+    for x in range(ROBOT_STATES * n, d, TARGET_STATES):
         for j in range(d):
-            W[x + 2, j] += dt * W[x, j]
-            W[x + 3, j] += dt * W[x + 1, j]
+            W[x + VX, j] += dt * W[x, j]
+            W[x + VY, j] += dt * W[x + Y, j]
     for i in range(d):
         for r in range(n):
-            x, y, yaw = 3 * r, 3 * r + 1, 3 * r + 2
-            W[i, yaw] += motion[r, 0] * W[i, y] - motion[r, 1] * W[i, x]
-        for x in range(3 * n, d, 4):
-            W[i, x + 2] += dt * W[i, x]
-            W[i, x + 3] += dt * W[i, x + 1]
+            x, y, yaw = ROBOT_STATES * r + X, ROBOT_STATES * r + Y, ROBOT_STATES * r + YAW
+            W[i, yaw] += motion[r, X] * W[i, y] - motion[r, Y] * W[i, x]
+        for x in range(ROBOT_STATES * n, d, TARGET_STATES):
+            W[i, x + VX] += dt * W[i, x]
+            W[i, x + VY] += dt * W[i, x + Y]
 
 
-@njit(
-    "void(float64[:,::1], int64, int64, int64, float64, float64, float64[::1], float64[::1], float64[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def correct(
-    P: Array, to: int, origin: int, yaw: int, lever: float, w: float, g: Array, yaw_row: Array, v: Array
-) -> None:
-    """Fuse the scalar a^T x with information w: a = e_to - e_origin + lever e_yaw (an index < 0 is left out).
-
-    Keeps g = P+ a and row `yaw` of P+ for the adjoint; v is work space.
-    """
+@kernel()
+def correct(P: Matrix, a: Combination, w: float, g: Vector, yaw_row: Vector, v: Vector) -> None:
+    """Fuse the scalar a^T x with information w; keeps g = P+ a and row `yaw` of P+ for the adjoint; v: work space."""
+    to, origin, yaw, lever = a.to, a.origin, a.yaw, a.lever
     d = P.shape[0]
     for j in range(d):
         v[j] = P[to, j]
@@ -117,17 +104,10 @@ def correct(
             yaw_row[j] = P[yaw, j]
 
 
-@njit(
-    "UniTuple(float64, 2)(float64[:,::1], int64, int64, int64, float64, float64, float64[::1], float64[::1], "
-    "float64[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def correct_adjoint(
-    W: Array, to: int, origin: int, yaw: int, lever: float, w: float, g: Array, yaw_row: Array, y: Array
-) -> tuple[float, float]:
+@kernel()
+def correct_adjoint(W: Matrix, a: Combination, w: float, g: Vector, yaw_row: Vector, y: Vector) -> tuple[float, float]:
     """W <- (I - a K^T) W (I - K a^T); returns (dc/dw, dc/d lever); y is work space."""
+    to, origin, yaw, lever = a.to, a.origin, a.yaw, a.lever
     d = W.shape[0]
     gy = lever_adjoint = 0.0
     for i in range(d):

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
-from groundstation.estimation.targets import targets_of
+from groundstation.estimation.parameters import usual_acceleration_m_s2
+from groundstation.field.resolved import ResolvedField
+from groundstation.field.targets import Target, WeightedTarget
 from groundstation.sensing.models import Rectangle
 
 NO_FENCE = Rectangle((-math.inf, math.inf), (-math.inf, math.inf))
@@ -31,7 +33,9 @@ class ProcessNoise:
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """Weights beside the targets' uncertainty [m^2]: see planning/README.md. PAPER: the forms are ours.
+    """Weights beside the targets' uncertainty [m^2]: see docs/explanation/planning.md 2.
+
+    PAPER (docs/explanation/method.md 7): the forms are ours.
 
     robots: share of the robots' own position uncertainty; without it a robot that the target's estimate can spare
     drifts out of every camera's view, and a drone that nobody can place has to land.
@@ -87,42 +91,46 @@ class PlannerParameters:
         return self.level_heights_m[levels - 1] if 0 < levels <= len(self.level_heights_m) else None
 
 
-def limits_from_field(resolved: Mapping[str, Any]) -> dict[str, MotionLimits]:
-    """Return each drone's motion limits of a resolved field (decoded JSON)."""
+def limits_from_field(field: ResolvedField) -> dict[str, MotionLimits]:
+    """Return each drone's motion limits of a resolved field."""
+    limits = {name: drone.limits for name, drone in field.drones.items()}
     return {
-        name: MotionLimits(
-            drone["limits"]["max_speed_m_s"],
-            drone["limits"]["max_climb_m_s"],
-            math.radians(drone["limits"]["max_yaw_rate_deg_s"]),
-        )
-        for name, drone in resolved["drones"].items()
+        name: MotionLimits(own.max_speed_m_s, own.max_climb_m_s, math.radians(own.max_yaw_rate_deg_s))
+        for name, own in limits.items()
     }
 
 
-def parameters_from_field(resolved: Mapping[str, Any]) -> PlannerParameters:
-    """Return the planner's settings of a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
-    planner, fence = resolved["planner"], resolved["room"]["fence"]
+def parameters_from_field(field: ResolvedField) -> PlannerParameters:
+    """Return the planner's settings of a resolved field."""
+    planner, fence = field.planner, field.room.fence
     return PlannerParameters(
-        level_heights_m=tuple(tuple(row) for row in planner["level_heights_m"]),
-        horizon_steps=planner["horizon_steps"],
-        step_s=planner["step_s"],
-        discount=planner["discount"],
-        hysteresis=planner["hysteresis"],
-        separation_m=planner["separation_m"],
-        fence=Rectangle(tuple(fence["x_m"]), tuple(fence["y_m"])),
-        limits=limits_from_field(resolved),
-        noise=_noise(resolved),
-        target_weights={name: target.get("weight", 1.0) for name, target in targets_of(resolved).items()},
-        mode=planner["mode"],
+        level_heights_m=planner.level_heights_m,
+        horizon_steps=planner.horizon_steps,
+        step_s=planner.step_s,
+        discount=planner.discount,
+        hysteresis=planner.hysteresis,
+        separation_m=planner.separation_m,
+        fence=Rectangle(fence.x_m, fence.y_m),
+        limits=limits_from_field(field),
+        noise=_noise(field),
+        target_weights={name: _weight(target) for name, target in field.tracked.items()},
+        mode=planner.mode,
     )
 
 
-def _noise(resolved: Mapping[str, Any]) -> ProcessNoise:
-    """Return densities for the worst of drones and targets; velocity errors last some 0.8 s, manoeuvres 0.5 s."""
-    odometry = [drone["odometry"] for drone in resolved["drones"].values()]
-    briskest = max(target["acceleration_std_m_s2"] for target in targets_of(resolved).values())
+def _weight(target: Target) -> float:
+    return target.weight if isinstance(target, WeightedTarget) else 1.0
+
+
+def _noise(field: ResolvedField) -> ProcessNoise:
+    """Return densities for the worst of drones and targets; velocity errors last some 0.8 s, manoeuvres 0.5 s.
+
+    A plan looks ahead for seconds, over which pushes of 0.12 s (the filter's) add up to manoeuvres.
+    """
+    odometry = [drone.odometry for drone in field.drones.values()]
+    briskest = max(usual_acceleration_m_s2(target) for target in field.tracked.values())
     return ProcessNoise(
-        robot_position=2.0 * max(o["velocity_std_m_s"] for o in odometry) ** 2,
-        robot_yaw=max(math.radians(o["yaw_rate_std_deg_s"]) for o in odometry) ** 2,
+        robot_position=2.0 * max(o.velocity_std_m_s for o in odometry) ** 2,
+        robot_yaw=max(math.radians(o.yaw_rate_std_deg_s) for o in odometry) ** 2,
         target_acceleration=0.5 * briskest**2,
     )

@@ -5,19 +5,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Alternative, Edge, SolverReport
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.planning.parameters import PlannerParameters
-from groundstation.planning.problem import Problem, ProblemBuilder, Scene, Solution, scene_from_belief
-from groundstation.planning.selection import choose
+from groundstation.planning.problem import PlanningProblem, PlanningScene, ProblemBuilder, Solution, scene_from_belief
 from groundstation.planning.starts import starts
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +61,18 @@ class _Search:
             self.solutions[solution.topology] = solution
 
 
+def choose(current: Topology, costs: Mapping[Topology, float], required_gain: float) -> Topology:
+    """Return the cheapest topology if it beats the current one by the required relative gain, else the current one.
+
+    Ties go to the first in the order of `costs`.
+    PAPER (docs/explanation/method.md 7): the cheapest always wins (gain 0).
+    """
+    best = min(costs, key=lambda topology: costs[topology])
+    if current not in costs or costs[best] < (1.0 - required_gain) * costs[current]:
+        return best
+    return current
+
+
 class Planner:
     """Plans on belief snapshots. Its only memory is since when it has been asked about the same current topology."""
 
@@ -100,13 +109,15 @@ class Planner:
         self._optimise(search, scene, problems, warm)
         return self._result(belief.stamp_ns, scene, current, search, problems)
 
-    def _warm(self, scene: Scene, warm_start: Mapping[str, Array] | None) -> Array:
+    def _warm(self, scene: PlanningScene, warm_start: Mapping[str, Array] | None) -> Array:
         held = warm_start if warm_start and self.parameters.mode != "paper" else {}
         scale = self._builder.scale(scene)
         x = np.concatenate([np.asarray(held.get(name, np.zeros(3)), dtype=np.float64) for name in scene.robots]) / scale
         return np.where(np.isfinite(x), np.clip(x, -1.0, 1.0), 0.0)
 
-    def _optimise(self, search: _Search, scene: Scene, problems: dict[Topology, Problem], warm: Array) -> None:
+    def _optimise(
+        self, search: _Search, scene: PlanningScene, problems: dict[Topology, PlanningProblem], warm: Array
+    ) -> None:
         first, *others = problems
         p = self.parameters
         search.add(problems[first].solve(warm, p.evaluation_budget, p.tolerance))
@@ -125,7 +136,9 @@ class Planner:
                 return
             search.add(problem.solve(start, p.evaluation_budget, p.tolerance))
 
-    def _extra_starts(self, search: _Search, scene: Scene, problem: Problem, known: list[Array]) -> list[Array]:
+    def _extra_starts(
+        self, search: _Search, scene: PlanningScene, problem: PlanningProblem, known: list[Array]
+    ) -> list[Array]:
         """Return the most promising starts of a topology; `known` ones of the current topology are not repeated."""
         p = self.parameters
         if p.mode == "paper":
@@ -138,7 +151,12 @@ class Planner:
         return options[: max(p.starts - solved, 0)]
 
     def _result(
-        self, stamp_ns: int, scene: Scene, current: Topology, search: _Search, problems: dict[Topology, Problem]
+        self,
+        stamp_ns: int,
+        scene: PlanningScene,
+        current: Topology,
+        search: _Search,
+        problems: dict[Topology, PlanningProblem],
     ) -> PlanResult:
         costs = {topology: solution.cost for topology, solution in search.solutions.items()}
         best = search.solutions[choose(current, costs, self._required_gain(current, stamp_ns))]

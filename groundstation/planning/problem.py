@@ -3,23 +3,22 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
+from groundstation.kernel import Rows
 from groundstation.planning.gradient import evaluate
 from groundstation.planning.parameters import PlannerParameters
+from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
 from groundstation.planning.search import solve
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import LEAF, ROOT, Topology
-from groundstation.sensing.visibility import row_of_onboard_camera, row_of_world_camera
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from groundstation.sensing.visibility import camera_rows
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class PlanningScene:
     """What all topologies of one planning step share: robots and targets of the belief, in state order.
 
     poses (n, 4) x, y, z, yaw; moving (k, 4) x, y, vx, vy; prior (3 n + 4 k square): x, y, yaw per robot, targets.
@@ -32,7 +31,7 @@ class Scene:
     prior: Array
 
 
-def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> Scene:
+def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> PlanningScene:
     """Return the scene of the given robots and all targets; raises EstimatorFault for an indefinite covariance.
 
     Heights and any calibration entries are marginalised: the planner's noise is isotropic, so that they inform neither
@@ -53,27 +52,31 @@ def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> Scene:
         raise EstimatorFault("the belief's covariance is not positive semidefinite")
     poses = np.array([belief.mean_of(name)[:4] for name in names]).reshape(-1, 4)
     moving = np.array([belief.mean_of(name)[:4] for name in targets]).reshape(-1, 4)
-    return Scene(names, targets, poses, moving, prior)
+    return PlanningScene(names, targets, poses, moving, prior)
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class PlanningProblem:
     """One topology's optimisation: minimise over x in [-1, 1]^(3 n), u = x * scale."""
 
     topology: Topology
-    scale: Array
-    arrays: tuple[Array, Array, Array, Array, Indices, Array, Array, Array]
+    cost: CostProblem
     edge_names: tuple[tuple[str, str], ...]
+
+    @property
+    def scale(self) -> Array:
+        """Return the bounds of the controls (3 n)."""
+        return self.cost.scale
 
     def value(self, x: Array) -> float:
         """Return the cost at x."""
         scratch, report = np.empty(x.size), np.empty(1 + len(self.edge_names))
-        return float(evaluate(x * self.scale, self.scale, *self.arrays, False, scratch, report))
+        return float(evaluate(x * self.scale, self.cost, False, scratch, report))
 
     def solve(self, start: Array, budget: int, tolerance: float) -> "Solution":
         """Return the local minimum that is reached from a start."""
         x, report = np.clip(start, -1.0, 1.0), np.empty(1 + len(self.edge_names))
-        cost, evaluations = solve(x, self.scale, *self.arrays, budget, tolerance, report)
+        cost, evaluations = solve(x, self.cost, budget, tolerance, report)
         return Solution(self.topology, float(cost), x * self.scale, int(evaluations), report)
 
 
@@ -96,37 +99,33 @@ class ProblemBuilder:
         self._sensors = sensors
         self._world = {name: row for row, name in enumerate(sensors.world)}
         self._onboard = {name: row for row, name in enumerate(sensors.onboard, start=len(self._world))}
-        rows = [row_of_world_camera(camera, sensors.softness) for camera in sensors.world.values()]
-        rows += [row_of_onboard_camera(camera, sensors.softness) for camera in sensors.onboard.values()]
-        self._cameras = np.array(rows)
+        self._cameras = camera_rows([*sensors.world.values(), *sensors.onboard.values()], sensors.softness)
         p, low, high = parameters, parameters.fence_margin_m, -parameters.fence_margin_m
-        self._options = np.array(
-            [
-                *(p.step_s, p.discount, p.noise.robot_position, p.noise.robot_yaw, p.noise.target_acceleration),
-                *(p.weights.repulsion, p.separation_m, p.weights.fence),
-                *(p.fence.x_m[0] + low, p.fence.x_m[1] + high, p.fence.y_m[0] + low, p.fence.y_m[1] + high),
-                p.weights.effort,
-                p.weights.robots,
-            ]
-        )
-
-    def build(self, scene: Scene, topology: Topology) -> Problem:
-        """Return the topology's problem; it must have height slots."""
-        indices, names = self._edges(scene, topology)
-        markers = np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets])
-        weights = [self._parameters.target_weights.get(name, 1.0) for name in scene.targets]
-        arrays = (
-            scene.poses, scene.moving, self._heights(scene, topology), scene.prior,
-            indices, self._cameras, markers, np.concatenate((self._options, weights)),
+        self._options = CostOptions(
+            p.step_s, p.discount, p.noise.robot_position, p.noise.robot_yaw, p.noise.target_acceleration,
+            p.weights.repulsion, p.separation_m, p.weights.fence,
+            np.array([[p.fence.x_m[0] + low, p.fence.x_m[1] + high], [p.fence.y_m[0] + low, p.fence.y_m[1] + high]]),
+            p.weights.effort, p.weights.robots,
         )  # fmt: skip
-        return Problem(topology, self.scale(scene), arrays, names)
 
-    def scale(self, scene: Scene) -> Array:
+    def build(self, scene: PlanningScene, topology: Topology) -> PlanningProblem:
+        """Return the topology's problem; it must have height slots."""
+        edges, names = self._edges(scene, topology)
+        cost = CostProblem(
+            scale=self.scale(scene), poses=scene.poses, targets=scene.moving, heights=self._heights(scene, topology),
+            prior=scene.prior, edges=edges, cameras=self._cameras,
+            markers=np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets]),
+            target_weights=np.array([self._parameters.target_weights.get(name, 1.0) for name in scene.targets]),
+            options=self._options,
+        )  # fmt: skip
+        return PlanningProblem(topology, cost, names)
+
+    def scale(self, scene: PlanningScene) -> Array:
         """Return the bounds of the controls: any corner of the box respects the speed limit."""
         limits = [self._parameters.limits_of(name) for name in scene.robots]
         return np.array([v for m in limits for v in (m.max_speed_m_s / 2**0.5,) * 2 + (m.max_yaw_rate_rad_s,)])
 
-    def _heights(self, scene: Scene, topology: Topology) -> Array:
+    def _heights(self, scene: PlanningScene, topology: Topology) -> Array:
         slots = self._parameters.slots(len(topology.levels))
         if slots is None:
             raise ValueError(f"no height slots for {topology}")
@@ -137,7 +136,7 @@ class ProblemBuilder:
         heights: Array = scene.poses[:, 2] + np.clip(way, -climb * ahead, climb * ahead)
         return heights
 
-    def _edges(self, scene: Scene, topology: Topology) -> tuple[Indices, tuple[tuple[str, str], ...]]:
+    def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Rows[EdgeRow], tuple[tuple[str, str], ...]]:
         number = {name: index for index, name in enumerate(scene.robots + scene.targets)}
         rows: list[tuple[int, int, int]] = []
         names: list[tuple[str, str]] = []
@@ -146,7 +145,10 @@ class ProblemBuilder:
             for row, index, name in self._eyes(observer, number):
                 rows += [(row, index, number[s]) for s in subjects]
                 names += [(name, s) for s in subjects]
-        return np.array(rows, dtype=np.int64).reshape(-1, 3), tuple(names)
+        edges = EdgeRow.rows(len(rows))
+        for column, values in zip(("camera", "observer", "subject"), zip(*rows, strict=True), strict=False):
+            edges[column] = values
+        return edges, tuple(names)
 
     def _eyes(self, observer: str, number: dict[str, int]) -> list[tuple[int, int, str]]:
         if observer == ROOT:

@@ -1,127 +1,126 @@
-"""Compiled rollout of the joint covariance under held controls: the value, and a tape for the adjoint.
-
-Arrays that describe one topology's problem (built by problem.py):
-poses (n, 4) x, y, z, yaw; targets (k, 4) x, y, vx, vy; heights (h, n) predicted z; prior (d, d);
-edges (m, 3) camera row, observer (-1: fixed in the world), subject (robots first, then targets);
-cameras (c, ROW); markers (n + k) heights above the robot's centre or above the floor; options: see OPTIONS.
-"""
+"""Compiled rollout of the joint covariance under held controls: the value, and a tape for the adjoint."""
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
+from groundstation.arrays import Matrix, Vector
+from groundstation.kernel import kernel
 from groundstation.planning.covariance import correct, predict
-from groundstation.sensing.visibility import observe
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
-OPTIONS = (
-    "step_s",
-    "discount",
-    "robot_position_noise",  # [m^2/s]
-    "robot_yaw_noise",  # [rad^2/s]
-    "target_acceleration_noise",  # [m^2/s^3]
-    "repulsion_weight",
-    "separation_m",
-    "fence_weight",
-    "fence_x0",
-    "fence_x1",
-    "fence_y0",
-    "fence_y1",
-    "effort_weight",
-    "robot_weight",
+from groundstation.planning.records import (
+    POSE_YAW,
+    ROBOT_STATES,
+    TARGET_STATES,
+    VX,
+    VY,
+    YAW,
+    Combination,
+    CostOptions,
+    CostProblem,
+    EdgeRow,
+    EdgeTape,
+    Tape,
+    X,
+    Y,
 )
-TARGET_WEIGHTS = len(OPTIONS)
-"""From here on the options hold one weight per target, in state order."""
+from groundstation.sensing.visibility import CameraRow, observe
 
-# Columns of a tape's edge entry: w, v and their derivatives by the relative position and by the observer's yaw.
-W, W_X, W_Y, W_YAW, V, V_X, V_Y, V_YAW, RELATIVE_X, RELATIVE_Y = range(10)
+_EDGE_TAPE = EdgeTape.dtype
 
 
-@njit(
-    "void(float64[::1], float64[:,::1], float64, float64[:,::1], float64[:,::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def move(u: Array, before: Array, dt: float, after: Array, motion: Array) -> None:
-    """Advance (x, y, yaw) of all robots by held body velocities; motion = (displacement x, y, direction)."""
+@kernel(inlined=True)
+def empty_tape(n: int, h: int, m: int, d: int) -> Tape:
+    """Return a tape for n robots, h steps, m edges and d entries of the state."""
+    sightings: Any = np.empty(h * m, _EDGE_TAPE)
+    return Tape(
+        np.empty((h + 1, n, ROBOT_STATES)), np.empty((h, n, ROBOT_STATES)), np.empty((h, n, d)), sightings,
+        np.empty((h, 3 * m, d)), np.empty((h, 3 * m, d)), np.empty((h, n, ROBOT_STATES)),
+    )  # fmt: skip
+
+
+@kernel()
+def move(u: Vector, before: Matrix, dt: float, after: Matrix, motion: Matrix) -> None:
+    """Advance (x, y, yaw) of all robots by held body velocities; motion: displacement x, y and its direction."""
     for r in range(before.shape[0]):
-        yaw = before[r, 2] + 0.5 * dt * u[3 * r + 2]
+        vx, vy, rate = u[ROBOT_STATES * r + X], u[ROBOT_STATES * r + Y], u[ROBOT_STATES * r + YAW]
+        yaw = before[r, YAW] + 0.5 * dt * rate
         c, s = math.cos(yaw), math.sin(yaw)
-        motion[r, 0] = dt * (c * u[3 * r] - s * u[3 * r + 1])
-        motion[r, 1] = dt * (s * u[3 * r] + c * u[3 * r + 1])
-        motion[r, 2] = yaw
-        after[r, 0] = before[r, 0] + motion[r, 0]
-        after[r, 1] = before[r, 1] + motion[r, 1]
-        after[r, 2] = before[r, 2] + dt * u[3 * r + 2]
+        motion[r, X] = dt * (c * vx - s * vy)
+        motion[r, Y] = dt * (s * vx + c * vy)
+        motion[r, YAW] = yaw
+        after[r, X] = before[r, X] + motion[r, X]
+        after[r, Y] = before[r, Y] + motion[r, Y]
+        after[r, YAW] = before[r, YAW] + dt * rate
 
 
-@njit(
-    "void(float64[::1], int64, float64, float64, float64, float64, float64[::1], float64[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def look(camera: Array, onboard: int, x: float, y: float, z: float, yaw: float, buffer: Array, entry: Array) -> None:
-    """Fill a tape entry for a subject at (x, y, z) from the observer (or from the world's origin if fixed)."""
+@kernel(inlined=True)
+def look(camera: CameraRow, onboard: bool, x: float, y: float, z: float, yaw: float, tape: EdgeTape) -> None:
+    """Record what a camera sees of a subject at (x, y, z) from its observer (or from the world's origin if fixed)."""
     c, s = 1.0, 0.0
     if onboard:
         c, s = math.cos(yaw), math.sin(yaw)
     bx, by = c * x + s * y, -s * x + c * y
-    rx, ry, rz = bx - camera[0], by - camera[1], z - camera[2]
-    observe(
+    rx, ry, rz = bx - camera.position[0], by - camera.position[1], z - camera.position[2]
+    R = camera.rotation
+    seen = observe(
         camera,
-        camera[3] * rx + camera[4] * ry + camera[5] * rz,
-        camera[6] * rx + camera[7] * ry + camera[8] * rz,
-        camera[9] * rx + camera[10] * ry + camera[11] * rz,
-        buffer,
+        R[0, 0] * rx + R[0, 1] * ry + R[0, 2] * rz,
+        R[1, 0] * rx + R[1, 1] * ry + R[1, 2] * rz,
+        R[2, 0] * rx + R[2, 1] * ry + R[2, 2] * rz,
     )
-    for part in range(2):
-        at = 4 * part
-        gx = camera[3] * buffer[at + 1] + camera[6] * buffer[at + 2] + camera[9] * buffer[at + 3]
-        gy = camera[4] * buffer[at + 1] + camera[7] * buffer[at + 2] + camera[10] * buffer[at + 3]
-        entry[at] = buffer[at]
-        entry[at + 1] = c * gx - s * gy
-        entry[at + 2] = s * gx + c * gy
-        entry[at + 3] = gx * by - gy * bx if onboard else 0.0
-    entry[RELATIVE_X], entry[RELATIVE_Y] = x, y
+    gx = R[0, 0] * seen.w_x + R[1, 0] * seen.w_y + R[2, 0] * seen.w_z
+    gy = R[0, 1] * seen.w_x + R[1, 1] * seen.w_y + R[2, 1] * seen.w_z
+    tape.w, tape.w_x, tape.w_y = seen.w, c * gx - s * gy, s * gx + c * gy
+    tape.w_yaw = gx * by - gy * bx if onboard else 0.0
+    gx = R[0, 0] * seen.v_x + R[1, 0] * seen.v_y + R[2, 0] * seen.v_z
+    gy = R[0, 1] * seen.v_x + R[1, 1] * seen.v_y + R[2, 1] * seen.v_z
+    tape.v, tape.v_x, tape.v_y = seen.v, c * gx - s * gy, s * gx + c * gy
+    tape.v_yaw = gx * by - gy * bx if onboard else 0.0
+    tape.x, tape.y = x, y
 
 
-@njit("int64(int64, int64)", cache=True, nogil=True)
+@kernel(inlined=True)
 def first_index(entity: int, n: int) -> int:
     """Return where an entity's x stands in the planner's state."""
-    return 3 * entity if entity < n else 3 * n + 4 * (entity - n)
+    return ROBOT_STATES * entity if entity < n else ROBOT_STATES * n + TARGET_STATES * (entity - n)
 
 
-@njit(
-    "float64(float64[:,::1], float64[::1], float64[:,::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def penalty(path: Array, options: Array, gradient: Array) -> float:
+@kernel(inlined=True)
+def combinations(edge: EdgeRow, n: int, x: float, y: float) -> tuple[Combination, Combination, Combination]:
+    """Return what an edge measures: the subject's x and y in the observer's turned frame, and its heading.
+
+    (x, y): relative position [world]; the heading is measured of robots alone.
+    """
+    a, to = edge.observer, first_index(edge.subject, n)
+    origin, below, turn = -1, -1, -1
+    if a >= 0:
+        origin, below, turn = ROBOT_STATES * a + X, ROBOT_STATES * a + Y, ROBOT_STATES * a + YAW
+    return (
+        Combination(to + X, origin, turn, y), Combination(to + Y, below, turn, -x), Combination(to + YAW, turn, -1, 0.0)
+    )  # fmt: skip
+
+
+@kernel()
+def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
     """Return repulsion between robots and soft fence at one step; adds d/d(x, y) to gradient (n, 3)."""
     n, cost = path.shape[0], 0.0
-    weight, reach, wall = options[5], options[6], options[7]
+    weight, reach, wall = options.repulsion_weight, options.separation_m, options.fence_weight
     for a in range(n):
         for b in range(a):
-            dx, dy = path[a, 0] - path[b, 0], path[a, 1] - path[b, 1]
+            dx, dy = path[a, X] - path[b, X], path[a, Y] - path[b, Y]
             d2 = dx * dx + dy * dy + 1e-3
             d = math.sqrt(d2)
             if d < reach:
                 over = reach / d - 1.0
                 cost += weight * over * over
                 slope = -2.0 * weight * over * reach / (d2 * d)
-                gradient[a, 0] += slope * dx
-                gradient[a, 1] += slope * dy
-                gradient[b, 0] -= slope * dx
-                gradient[b, 1] -= slope * dy
+                gradient[a, X] += slope * dx
+                gradient[a, Y] += slope * dy
+                gradient[b, X] -= slope * dx
+                gradient[b, Y] -= slope * dy
         for axis in range(2):
-            low, high = options[8 + 2 * axis] - path[a, axis], path[a, axis] - options[9 + 2 * axis]
+            low, high = options.fence[axis, 0] - path[a, axis], path[a, axis] - options.fence[axis, 1]
             out = max(low, high)
             if out > 0.0:
                 cost += wall * out * out
@@ -129,68 +128,57 @@ def penalty(path: Array, options: Array, gradient: Array) -> float:
     return cost
 
 
-@njit(
-    "UniTuple(float64, 2)(float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], "
-    "int64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,:,::1], float64[:,:,::1], float64[:,:,::1], "
-    "float64[:,:,::1], float64[:,:,::1], float64[:,:,::1], float64[:,:,::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def roll_out(
-    u: Array,
-    poses: Array,
-    targets: Array,
-    heights: Array,
-    prior: Array,
-    edges: Indices,
-    cameras: Array,
-    markers: Array,
-    options: Array,
-    path: Array,
-    motion: Array,
-    yaw_columns: Array,
-    entries: Array,
-    gains: Array,
-    yaw_rows: Array,
-    penalties: Array,
-) -> tuple[float, float]:
+@kernel(inlined=True)
+def fuse(P: Matrix, problem: CostProblem, tape: Tape, i: int, work: Vector) -> None:
+    """Look along all edges in one step, and correct P by what they see.
+
+    Arrays are taken out of their tuples once: doing so for every edge counts references for a tenth of the time.
+    """
+    edges, cameras, targets, heights, markers = (
+        problem.edges, problem.cameras, problem.targets, problem.heights, problem.markers
+    )  # fmt: skip
+    path, sightings, gains, yaw_rows = tape.path, tape.sightings, tape.gains, tape.yaw_rows
+    n, m, ahead = path.shape[1], edges.shape[0], (i + 1) * problem.options.step_s
+    for e in range(m):
+        edge, seen, row = edges[e], sightings[i * m + e], 3 * e
+        a, b, yaw = edge.observer, edge.subject, 0.0
+        if b < n:
+            x, y, z = path[i + 1, b, X], path[i + 1, b, Y], heights[i, b] + markers[b]
+        else:
+            t = b - n
+            x, y, z = targets[t, X] + ahead * targets[t, VX], targets[t, Y] + ahead * targets[t, VY], markers[b]
+        if a >= 0:
+            x, y, z, yaw = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - heights[i, a], path[i + 1, a, YAW]
+        look(cameras[edge.camera], a >= 0, x, y, z, yaw, seen)
+        along_x, along_y, heading = combinations(edge, n, x, y)
+        correct(P, along_x, seen.w, gains[i, row], yaw_rows[i, row], work)
+        correct(P, along_y, seen.w, gains[i, row + 1], yaw_rows[i, row + 1], work)
+        if b < n:
+            correct(P, heading, seen.v, gains[i, row + 2], yaw_rows[i, row + 2], work)
+
+
+@kernel()
+def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]:
     """Return (expected uncertainty of the targets, all other costs) of held controls u (3 n) and fill the tape."""
-    n, k, h, m = poses.shape[0], targets.shape[0], heights.shape[0], edges.shape[0]
-    P, work, buffer = prior.copy(), np.empty(prior.shape[0]), np.empty(8)
+    n, k, h = problem.poses.shape[0], problem.targets.shape[0], problem.heights.shape[0]
+    options, P = problem.options, problem.prior.copy()
+    work, path, motion, penalties = np.empty(P.shape[0]), tape.path, tape.motion, tape.penalties
+    yaw_columns, weights = tape.yaw_columns, problem.target_weights
     for r in range(n):
-        path[0, r, 0], path[0, r, 1], path[0, r, 2] = poses[r, 0], poses[r, 1], poses[r, 3]
+        path[0, r, X], path[0, r, Y] = problem.poses[r, X], problem.poses[r, Y]
+        path[0, r, YAW] = problem.poses[r, POSE_YAW]
     uncertainty = extra = 0.0
     discount = 1.0
     for i in range(h):
-        move(u, path[i], options[0], path[i + 1], motion[i])
+        move(u, path[i], options.step_s, path[i + 1], motion[i])
         predict(P, motion[i], yaw_columns[i], options)
-        for e in range(m):
-            a, b = edges[e, 1], edges[e, 2]
-            if b < n:
-                x, y, z = path[i + 1, b, 0], path[i + 1, b, 1], heights[i, b] + markers[b]
-            else:
-                ahead = (i + 1) * options[0]
-                x, y = targets[b - n, 0] + ahead * targets[b - n, 2], targets[b - n, 1] + ahead * targets[b - n, 3]
-                z = markers[b]
-            yaw = 0.0
-            if a >= 0:
-                x, y, z, yaw = x - path[i + 1, a, 0], y - path[i + 1, a, 1], z - heights[i, a], path[i + 1, a, 2]
-            entry = entries[i, e]
-            look(cameras[edges[e, 0]], a >= 0, x, y, z, yaw, buffer, entry)
-            to, origin, turn = first_index(b, n), 3 * a if a >= 0 else -1, 3 * a + 2 if a >= 0 else -1
-            row = 3 * e
-            correct(P, to, origin, turn, y, entry[W], gains[i, row], yaw_rows[i, row], work)
-            below = origin + 1 if a >= 0 else -1
-            correct(P, to + 1, below, turn, -x, entry[W], gains[i, row + 1], yaw_rows[i, row + 1], work)
-            if b < n:
-                correct(P, to + 2, turn, -1, 0.0, entry[V], gains[i, row + 2], yaw_rows[i, row + 2], work)
-        discount *= options[1]
+        fuse(P, problem, tape, i, work)
+        discount *= options.discount
         for t in range(k):
-            x = 3 * n + 4 * t
-            uncertainty += discount * options[TARGET_WEIGHTS + t] * (P[x, x] + P[x + 1, x + 1])
-        for x in range(0, 3 * n, 3):
-            extra += discount * options[13] * (P[x, x] + P[x + 1, x + 1])
+            x = ROBOT_STATES * n + TARGET_STATES * t
+            uncertainty += discount * weights[t] * (P[x, x] + P[x + 1, x + 1])
+        for x in range(0, ROBOT_STATES * n, ROBOT_STATES):
+            extra += discount * options.robot_weight * (P[x, x] + P[x + 1, x + 1])
         penalties[i, :, :] = 0.0
         extra += discount * penalty(path[i + 1], options, penalties[i])
     return uncertainty, extra

@@ -1,24 +1,17 @@
 """Compiled projected L-BFGS on the box of admissible controls."""
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
+from groundstation.arrays import BoolVector, Matrix, Vector
+from groundstation.kernel import kernel
 from groundstation.planning.gradient import evaluate
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from groundstation.planning.records import CostProblem
 
 MEMORY = 6
 
 
-@njit(
-    "void(float64[::1], float64[::1], float64[:,::1], float64[:,::1], int64, boolean[::1], float64[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def direction(x: Array, g: Array, S: Array, Y: Array, stored: int, free: NDArray[np.bool_], out: Array) -> None:
+@kernel()
+def direction(x: Vector, g: Vector, S: Matrix, Y: Matrix, stored: int, free: BoolVector, out: Vector) -> None:
     """Write the L-BFGS descent direction over the variables that are not held by their bound."""
     alphas = np.zeros(MEMORY)
     n = x.shape[0]
@@ -58,8 +51,8 @@ def direction(x: Array, g: Array, S: Array, Y: Array, stored: int, free: NDArray
                 out[j] += (alphas[back] - yq / sy) * s[j]
 
 
-@njit("float64(float64[::1], float64[::1])", cache=True, nogil=True)
-def projected_gradient(x: Array, g: Array) -> float:
+@kernel()
+def projected_gradient(x: Vector, g: Vector) -> float:
     """Return the largest entry of clip(x - g) - x: zero at a stationary point of the box [-1, 1]."""
     worst = 0.0
     for j in range(x.shape[0]):
@@ -67,15 +60,15 @@ def projected_gradient(x: Array, g: Array) -> float:
     return worst
 
 
-@njit("void(float64[::1], float64[::1])", cache=True, nogil=True)
-def copy_into(to: Array, source: Array) -> None:
+@kernel()
+def copy_into(to: Vector, source: Vector) -> None:
     """Copy a vector. (Assigning slices compiles numba's broadcasting errors: 1.5 s for each use.)"""
     for j in range(to.shape[0]):
         to[j] = source[j]
 
 
-@njit("void(float64[:,::1], float64[::1], float64[::1])", cache=True, nogil=True)
-def push(history: Array, newest: Array, before: Array) -> None:
+@kernel()
+def push(history: Matrix, newest: Vector, before: Vector) -> None:
     """Shift a history by one and put newest - before in front."""
     for row in range(history.shape[0] - 1, 0, -1):
         copy_into(history[row], history[row - 1])
@@ -83,13 +76,8 @@ def push(history: Array, newest: Array, before: Array) -> None:
         history[0, j] = newest[j] - before[j]
 
 
-@njit(
-    "int64(float64[::1], float64[::1], float64[:,::1], float64[:,::1], int64, boolean[::1], float64[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def head(x: Array, g: Array, S: Array, Y: Array, stored: int, free: NDArray[np.bool_], out: Array) -> int:
+@kernel()
+def head(x: Vector, g: Vector, S: Matrix, Y: Matrix, stored: int, free: BoolVector, out: Vector) -> int:
     """Write where to go next: the L-BFGS direction, or a bounded step downhill; returns how much history is of use."""
     direction(x, g, S, Y, stored, free, out)
     slope = largest = 0.0
@@ -105,8 +93,8 @@ def head(x: Array, g: Array, S: Array, Y: Array, stored: int, free: NDArray[np.b
     return 0
 
 
-@njit("float64(float64[::1], float64[::1], float64[::1], float64, float64[::1])", cache=True, nogil=True)
-def advance(x: Array, g: Array, out: Array, step: float, trial: Array) -> float:
+@kernel()
+def advance(x: Vector, g: Vector, out: Vector, step: float, trial: Vector) -> float:
     """Write the projection of x + step out onto the box; returns the linear prediction g . (trial - x)."""
     expected = 0.0
     for j in range(x.shape[0]):
@@ -115,32 +103,13 @@ def advance(x: Array, g: Array, out: Array, step: float, trial: Array) -> float:
     return expected
 
 
-@njit(
-    "Tuple((float64, int64))(float64[::1], float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], "
-    "float64[:,::1], int64[:,::1], float64[:,::1], float64[::1], float64[::1], int64, float64, float64[::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def solve(
-    x: Array,
-    scale: Array,
-    poses: Array,
-    targets: Array,
-    heights: Array,
-    prior: Array,
-    edges: Indices,
-    cameras: Array,
-    markers: Array,
-    options: Array,
-    budget: int,
-    tolerance: float,
-    report: Array,
-) -> tuple[float, int]:
+@kernel()
+def solve(x: Vector, problem: CostProblem, budget: int, tolerance: float, report: Vector) -> tuple[float, int]:
     """Minimise from x in [-1, 1]^(3 n), u = x * scale, in place; returns (cost, evaluations).
 
     Stops when the projected gradient of cost / first cost is below the tolerance, when no step improves, or after
-    `budget` evaluations; x is always the best point seen. report: see gradient.evaluate.
+    `budget` evaluations; x is always the best point seen. A first cost that is not finite has no direction to go in:
+    x stays, and the cost returned is infinite. report: see gradient.evaluate.
     """
     n, m = x.shape[0], report.shape[0]
     g, g_new, out, trial, u, latest = np.empty(n), np.empty(n), np.empty(n), x.copy(), np.empty(n), np.empty(m)
@@ -148,15 +117,16 @@ def solve(
     f, size, expected, step, stored, used = np.inf, 1.0, 0.0, 1.0, 0, 0
     while True:
         for j in range(n):
-            u[j] = trial[j] * scale[j]
-        f_new = evaluate(
-            u, scale, poses, targets, heights, prior, edges, cameras, markers, options, True, g_new, latest
-        )
+            u[j] = trial[j] * problem.scale[j]
+        f_new = evaluate(u, problem, True, g_new, latest)
         used += 1
         if used == 1:
             size = max(f_new, 1e-12)
+            if not np.isfinite(f_new):
+                copy_into(report, latest)
+                break
         for j in range(n):
-            g_new[j] *= scale[j] / size
+            g_new[j] *= problem.scale[j] / size
         if f_new < f and (used == 1 or f_new <= f + 1e-4 * size * expected):
             if used > 1:
                 push(S, trial, x)

@@ -3,20 +3,19 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
 from groundstation.planning.parameters import PlannerParameters
-from groundstation.planning.problem import Scene
+from groundstation.planning.problem import PlanningScene
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
-Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 
 def starts(
-    scene: Scene, topology: Topology, parameters: PlannerParameters, sensors: SensorSuite, scale: Array
+    scene: PlanningScene, topology: Topology, parameters: PlannerParameters, sensors: SensorSuite, scale: Array
 ) -> list[Array]:
     """Return starts in [-1, 1]^(3 n): stand still, go to the best stand (in the root's view, or not), only turn."""
     found = [np.zeros(scale.size)]
@@ -29,7 +28,7 @@ def starts(
 
 
 def _stands(
-    scene: Scene, topology: Topology, parameters: PlannerParameters, sensors: SensorSuite, keep_root: bool
+    scene: PlanningScene, topology: Topology, parameters: PlannerParameters, sensors: SensorSuite, keep_root: bool
 ) -> dict[str, tuple[float, float, float]]:
     """Return (x, y, yaw) from which each robot would look at the middle of the level below, from the bottom up."""
     slots = parameters.slots(len(topology.levels)) or ()
@@ -65,7 +64,9 @@ def _stand(pose: Array, subject: Point, height: float, name: str, sensors: Senso
     return subject[0] + behind * dx / d, subject[1] + behind * dy / d
 
 
-def _controls(scene: Scene, stands: dict[str, tuple[float, float, float]], horizon_s: float, scale: Array) -> Array:
+def _controls(
+    scene: PlanningScene, stands: dict[str, tuple[float, float, float]], horizon_s: float, scale: Array
+) -> Array:
     x = np.zeros(scale.size)
     for i, name in enumerate(scene.robots):
         px, py, yaw = stands[name]

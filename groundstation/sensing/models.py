@@ -5,11 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z
-
-Array = NDArray[np.float64]
 
 OPTICAL_FROM_WORLD_LOOKING_DOWN: Array = np.diag([1.0, -1.0, -1.0])
 OPTICAL_FROM_WORLD_LOOKING_DOWN.setflags(write=False)
@@ -59,7 +57,7 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Softness:
-    """Shape of the smooth availability: see sensing/README.md."""
+    """Shape of the smooth availability: docs/explanation/planning.md 3."""
 
     width_m: float = 0.08
     tail_share: float = 2e-3
@@ -67,7 +65,7 @@ class Softness:
 
 
 @dataclass(frozen=True, slots=True)
-class WorldCamera:
+class WorldCameraModel:
     """A camera fixed in the world: position [m; world], optical_from_world (3, 3), what it sees and how well."""
 
     position_m: tuple[float, float, float]
@@ -81,7 +79,7 @@ class WorldCamera:
 
 
 @dataclass(frozen=True, slots=True)
-class OnboardCamera:
+class OnboardCameraModel:
     """A robot's forward camera: position [m; base], tilted down and panned left, what it sees and how well."""
 
     position_m: tuple[float, float, float]
@@ -113,6 +111,11 @@ class Rectangle:
         """Return the middle."""
         return (sum(self.x_m) / 2, sum(self.y_m) / 2)
 
+    @property
+    def corners(self) -> tuple[tuple[float, float], ...]:
+        """Return the four corners."""
+        return tuple((x, y) for x in self.x_m for y in self.y_m)
+
     def shrunk(self, by_m: float) -> "Rectangle":
         """Return the rectangle with each side moved inwards, at most to the middle."""
         (x0, x1), (y0, y1) = self.x_m, self.y_m
@@ -131,8 +134,8 @@ class SensorSuite:
     marker_height_m: of robots above their centre, of targets above the floor.
     """
 
-    world: Mapping[str, WorldCamera]
-    onboard: Mapping[str, OnboardCamera]
+    world: Mapping[str, WorldCameraModel]
+    onboard: Mapping[str, OnboardCameraModel]
     marker_height_m: Mapping[str, float]
     softness: Softness = Softness()
 

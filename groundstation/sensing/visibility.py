@@ -1,54 +1,74 @@
-"""Compiled smooth availability and noise of a camera, with exact derivatives; formulas in README.md."""
+"""Compiled smooth availability and noise of a camera, with exact derivatives (docs/explanation/planning.md 3)."""
 
 import math
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
 
-import numpy as np
-from numba import njit
-from numpy.typing import NDArray
-
-from groundstation.sensing.models import Frustum, Noise, OnboardCamera, Softness, WorldCamera
-
-Array = NDArray[np.float64]
-
-# Columns of a camera row.
-POSITION = 0  # 3: world (fixed) or base (onboard)
-ROTATION = 3  # 9: optical from world or from base_stabilized, row-major
-VIEW = 12  # tangents of half width and half height, range, border
-NOISE = 16  # base, per m, per m2, yaw
-SOFT = 20  # width, tail share, tail length
-ROW = 23
+from groundstation.arrays import Array
+from groundstation.kernel import Record, Rows, kernel
+from groundstation.sensing.models import OnboardCameraModel, Softness, WorldCameraModel
 
 
-def _row(position: tuple[float, ...], rotation: Array, view: Frustum, noise: Noise, soft: Softness) -> Array:
-    return np.array(
-        [
-            *position,
-            *rotation.ravel(),
-            *(view.half_width_tan, view.half_height_tan, view.range_m, view.border_m),
-            *(noise.base_m, noise.per_m, noise.per_m2, noise.yaw_rad),
-            *(soft.width_m, soft.tail_share, soft.tail_m),
-        ]
-    )
+class CameraRow(Record):
+    """A camera as the kernels read it, fixed in the world or on a robot.
 
-
-def row_of_world_camera(camera: WorldCamera, soft: Softness) -> Array:
-    """Return a world-fixed camera as the kernels read it (ROW)."""
-    return _row(camera.position_m, camera.optical_from_world, camera.view, camera.noise, soft)
-
-
-def row_of_onboard_camera(camera: OnboardCamera, soft: Softness) -> Array:
-    """Return a robot's camera as the kernels read it (ROW)."""
-    return _row(camera.position_m, camera.optical_from_base, camera.view, camera.noise, soft)
-
-
-@njit("void(float64[::1], float64, float64, float64, float64[::1])", cache=True, nogil=True, error_model="numpy")
-def observe(camera: Array, x: float, y: float, z: float, out: Array) -> None:
-    """Write informations at an optical point: out = (w, dw/dx, dw/dy, dw/dz, v, dv/dx, dv/dy, dv/dz).
-
-    w = availability / position variance [1/m^2], v = availability / heading variance [1/rad^2].
+    position [m; world or base]; rotation: optical from world or from base_stabilized; tangents of half width and half
+    height, range and border [m] of the view; standard deviation of a position: base_m, per_m and per_m2 (by distance);
+    of a heading [rad]; softness of the view's edge: width, share and length of its tail.
     """
-    tx, ty, reach, border = camera[VIEW], camera[VIEW + 1], camera[VIEW + 2], camera[VIEW + 3]
-    width, share, tail = camera[SOFT], camera[SOFT + 1], camera[SOFT + 2]
+
+    position: Annotated[Array, (3,)]
+    rotation: Annotated[Array, (3, 3)]
+    half_width_tan: float
+    half_height_tan: float
+    range_m: float
+    border_m: float
+    base_m: float
+    per_m: float
+    per_m2: float
+    yaw_rad: float
+    width_m: float
+    tail_share: float
+    tail_m: float
+
+
+class Information(NamedTuple):
+    """Expected information of one sighting, and its derivatives by the subject's optical position.
+
+    w: of each position axis [1/m^2]; v: of the heading [1/rad^2].
+    """
+
+    w: float
+    w_x: float
+    w_y: float
+    w_z: float
+    v: float
+    v_x: float
+    v_y: float
+    v_z: float
+
+
+def camera_rows(cameras: Sequence[WorldCameraModel | OnboardCameraModel], soft: Softness) -> Rows[CameraRow]:
+    """Return the table of cameras, in the order given."""
+    rows = CameraRow.rows(len(cameras))
+    for index, camera in enumerate(cameras):
+        row = rows[index]
+        row["position"] = camera.position_m
+        row["rotation"] = (
+            camera.optical_from_world if isinstance(camera, WorldCameraModel) else camera.optical_from_base
+        )
+        for part in (camera.view, camera.noise, soft):
+            for name in CameraRow.dtype.names or ():
+                if hasattr(part, name):
+                    row[name] = getattr(part, name)
+    return rows
+
+
+@kernel()
+def observe(camera: CameraRow, x: float, y: float, z: float) -> Information:
+    """Return the expected information of a sighting at an optical point [m]: availability over variance."""
+    tx, ty, reach, border = camera.half_width_tan, camera.half_height_tan, camera.range_m, camera.border_m
+    width, share, tail = camera.width_m, camera.tail_share, camera.tail_m
     nx, ny = 1.0 / math.sqrt(1.0 + tx * tx), 1.0 / math.sqrt(1.0 + ty * ty)
     d2 = x * x + y * y + z * z + 1e-6
     d = math.sqrt(d2)
@@ -76,14 +96,12 @@ def observe(camera: Array, x: float, y: float, z: float, out: Array) -> None:
         slope = -2.0 * ratio / tail * flat * flat
     a = (1.0 - share) * logistic + share * flat
     da = (1.0 - share) * logistic * (1.0 - logistic) / width + share * slope
-    per1, per2 = camera[NOISE + 1] * camera[NOISE + 1], camera[NOISE + 2] * camera[NOISE + 2]
-    variance = camera[NOISE] * camera[NOISE] + per1 * d2 + per2 * d2 * d2
+    per1, per2 = camera.per_m * camera.per_m, camera.per_m2 * camera.per_m2
+    variance = camera.base_m * camera.base_m + per1 * d2 + per2 * d2 * d2
     dv = 2.0 * per1 + 4.0 * per2 * d2  # d variance = dv * (x, y, z)
     w = a / variance
-    out[0] = w
-    out[1] = (da * fx - w * dv * x) / variance
-    out[2] = (da * fy - w * dv * y) / variance
-    out[3] = (da * fz - w * dv * z) / variance
-    heading = 1.0 / (camera[NOISE + 3] * camera[NOISE + 3])
-    out[4] = a * heading
-    out[5], out[6], out[7] = da * fx * heading, da * fy * heading, da * fz * heading
+    heading = 1.0 / (camera.yaw_rad * camera.yaw_rad)
+    return Information(
+        w, (da * fx - w * dv * x) / variance, (da * fy - w * dv * y) / variance, (da * fz - w * dv * z) / variance,
+        a * heading, da * fx * heading, da * fy * heading, da * fz * heading,
+    )  # fmt: skip

@@ -7,138 +7,157 @@ states.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import LOCATE, MEASURE, PREPARE
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Array, Matrix, Vector
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.linear import wrap
-from groundstation.estimation.models.protocol import Vector3
+from groundstation.estimation.model_kernels import SensorKernels
+from groundstation.estimation.models.protocol import SensorDefaults, Vector3
 from groundstation.estimation.models.subject import chain_subject, marker_offset, marker_point
+from groundstation.estimation.records import (
+    OUT_OF_VIEW,
+    YAW,
+    EntityRow,
+    EventRow,
+    Prediction,
+    SensorRow,
+    X,
+    Y,
+    Z,
+    own_parameters,
+)
+from groundstation.kernel import Record, kernel
 
-# Rotation (9) and translation (3) carrier_from_camera, mounting variances.
-ROTATION = s.FIRST_SENSOR_OWN
-TRANSLATION, ATTITUDE_VARIANCE, POSITION_VARIANCE = ROTATION + 9, ROTATION + 12, ROTATION + 13
-
-
-@kernel("void(float64[::1], int64[::1], float64[::1], float64[::1])", inlined=True)
-def observer_angles(mean: Array, entity: IntArray, event: Array, out: Array) -> None:
-    """Write (cos, sin) of yaw, of pitch and of roll, the latter two as reported plus the error state."""
-    start = entity[s.ENTITY_START]
-    roll, pitch = event[s.EVENT_ROLL], event[s.EVENT_PITCH]
-    if entity[s.AT_ROLL_ERROR] >= 0:
-        roll += mean[start + entity[s.AT_ROLL_ERROR]]
-        pitch += mean[start + entity[s.AT_PITCH_ERROR]]
-    angles = (mean[start + s.YAW], pitch, roll)
-    for i in range(3):
-        out[2 * i] = math.cos(angles[i])
-        out[2 * i + 1] = math.sin(angles[i])
+BY_YAW, BY_PITCH, BY_ROLL = 3, 4, 5  # columns of derivatives after those by x, y, z
 
 
-@kernel("void(float64[::1], float64[::1], float64[:,::1], float64[::1])", inlined=True)
-def point_in_base(d: Array, cs: Array, D: Array, b: Array) -> None:
+class CameraParameters(Record):
+    """carrier_from_camera [m], and the variances of its mounting [rad^2, m^2]."""
+
+    rotation: Annotated[Array, (3, 3)]
+    translation: Annotated[Array, (3,)]
+    attitude_variance: float
+    position_variance: float
+
+
+_own = own_parameters(CameraParameters)
+
+
+class Attitude(NamedTuple):
+    """Cosines and sines of yaw, pitch and roll."""
+
+    cos_yaw: float
+    sin_yaw: float
+    cos_pitch: float
+    sin_pitch: float
+    cos_roll: float
+    sin_roll: float
+
+
+@kernel(inlined=True)
+def observer_attitude(mean: Vector, entity: EntityRow, event: EventRow) -> Attitude:
+    """Return the observer's attitude: roll and pitch as reported plus the error states."""
+    start, roll, pitch = entity.start, event.roll, event.pitch
+    if entity.at_roll_error >= 0:
+        roll += mean[start + entity.at_roll_error]
+        pitch += mean[start + entity.at_pitch_error]
+    yaw = mean[start + YAW]
+    return Attitude(math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch), math.cos(roll), math.sin(roll))
+
+
+@kernel(inlined=True)
+def point_in_base(d: Vector, attitude: Attitude, D: Matrix, b: Vector) -> None:
     """Rotate d [world's axes] into [base], with the derivatives D (3, 6) by d, yaw, pitch, roll."""
-    cy, sy, cp, sp, cr, sr = cs[0], cs[1], cs[2], cs[3], cs[4], cs[5]
-    ex, ey, ez = cy * d[0] + sy * d[1], -sy * d[0] + cy * d[1], d[2]
+    cy, sy, cp, sp, cr, sr = attitude
+    ex, ey, ez = cy * d[X] + sy * d[Y], -sy * d[X] + cy * d[Y], d[Z]
     fx, fz = cp * ex - sp * ez, sp * ex + cp * ez
-    b[0], b[1], b[2] = fx, cr * ey + sr * fz, -sr * ey + cr * fz
-    D[0, 0], D[0, 1], D[0, 2] = cp * cy, cp * sy, -sp
-    D[1, 0], D[1, 1], D[1, 2] = sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp
-    D[2, 0], D[2, 1], D[2, 2] = cr * sp * cy + sr * sy, cr * sp * sy - sr * cy, cr * cp
-    D[0, 3], D[1, 3], D[2, 3] = cp * ey, -cr * ex + sr * sp * ey, sr * ex + cr * sp * ey
-    D[0, 4], D[1, 4], D[2, 4] = -fz, sr * fx, cr * fx
-    D[0, 5], D[1, 5], D[2, 5] = 0.0, b[2], -b[1]
+    b[X], b[Y], b[Z] = fx, cr * ey + sr * fz, -sr * ey + cr * fz
+    D[X, X], D[X, Y], D[X, Z] = cp * cy, cp * sy, -sp
+    D[Y, X], D[Y, Y], D[Y, Z] = sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp
+    D[Z, X], D[Z, Y], D[Z, Z] = cr * sp * cy + sr * sy, cr * sp * sy - sr * cy, cr * cp
+    D[X, BY_YAW], D[Y, BY_YAW], D[Z, BY_YAW] = cp * ey, -cr * ex + sr * sp * ey, sr * ex + cr * sp * ey
+    D[X, BY_PITCH], D[Y, BY_PITCH], D[Z, BY_PITCH] = -fz, sr * fx, cr * fx
+    D[X, BY_ROLL], D[Y, BY_ROLL], D[Z, BY_ROLL] = 0.0, b[Z], -b[Y]
 
 
-@kernel(MEASURE)
-def measure_relative_pose(
-    mean: Array, entities: IntArray, parameters: Array, sensor: Array, event: Array, rows: int, h: Array,
-    H_observer: Array, H_subject: Array,
-) -> None:  # fmt: skip
+@kernel()
+def measure_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction) -> None:
     """Write h(x) and its Jacobians by the observer's and the subject's block."""
-    observer, subject = entities[int(event[s.EVENT_OBSERVER])], entities[int(event[s.EVENT_SUBJECT])]
-    work, cs, D = np.empty((5, 3)), np.empty(6), np.empty((3, 6))
+    mean, observer, subject = belief.mean, belief.entities[event.observer], belief.entities[event.subject]
+    p, h, H_observer, H_subject = _own(sensor), out.h, out.H_observer, out.H_subject
+    work, D = np.empty((5, 3)), np.empty((3, 6))
     point, slope, d, b, by_point = work[0], work[1], work[2], work[3], work[4]
-    marker_point(mean, subject, parameters[int(event[s.EVENT_SUBJECT])], event, point, slope)
-    observer_angles(mean, observer, event, cs)
+    marker_point(belief, event, point, slope)
     for i in range(3):
-        d[i] = point[i] - mean[observer[s.ENTITY_START] + i]
-    point_in_base(d, cs, D, b)
+        d[i] = point[i] - mean[observer.start + i]
+    point_in_base(d, observer_attitude(mean, observer, event), D, b)
     for i in range(3):
-        by_angle_0 = by_angle_1 = by_angle_2 = 0.0
-        h[i] = by_point[0] = by_point[1] = by_point[2] = 0.0
+        by_yaw = by_pitch = by_roll = 0.0
+        h[i] = by_point[X] = by_point[Y] = by_point[Z] = 0.0
         for k in range(3):
-            c = sensor[ROTATION + 3 * k + i]
-            h[i] += c * (b[k] - sensor[TRANSLATION + k])
+            c = p.rotation[k, i]
+            h[i] += c * (b[k] - p.translation[k])
             for j in range(3):
                 by_point[j] += c * D[k, j]
-            by_angle_0 += c * D[k, 3]
-            by_angle_1 += c * D[k, 4]
-            by_angle_2 += c * D[k, 5]
+            by_yaw += c * D[k, BY_YAW]
+            by_pitch += c * D[k, BY_PITCH]
+            by_roll += c * D[k, BY_ROLL]
         for j in range(3):
             H_observer[i, j] = -by_point[j]
-        H_observer[i, s.YAW] = by_angle_0
-        if observer[s.AT_ROLL_ERROR] >= 0:
-            H_observer[i, observer[s.AT_PITCH_ERROR]] = by_angle_1
-            H_observer[i, observer[s.AT_ROLL_ERROR]] = by_angle_2
+        H_observer[i, YAW] = by_yaw
+        if observer.at_roll_error >= 0:
+            H_observer[i, observer.at_pitch_error] = by_pitch
+            H_observer[i, observer.at_roll_error] = by_roll
         chain_subject(subject, slope, by_point, H_subject, i)
-    if rows == 4:
-        yaw = subject[s.AT_YAW]
-        h[3] = wrap(mean[subject[s.ENTITY_START] + yaw] - mean[observer[s.ENTITY_START] + s.YAW])
-        H_observer[3, s.YAW] = -1.0
-        H_subject[3, yaw] = 1.0
+    if out.size > YAW:
+        h[YAW] = wrap(mean[subject.start + subject.at_yaw] - mean[observer.start + YAW])
+        H_observer[YAW, YAW] = -1.0
+        H_subject[YAW, subject.at_yaw] = 1.0
 
 
-@kernel(PREPARE)
-def prepare_relative_pose(
-    entities: IntArray, parameters: Array, sensor: Array, event: Array, z: Array, R: Array
-) -> int:
+@kernel()
+def prepare_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
     """Add the uncertainty of the camera's mounting to R: a turn moves a point at z sideways, a shift moves it as is."""
-    if z[2] <= 0.0:
-        return -s.OUT_OF_VIEW
-    rows = 4 if event[s.EVENT_SIZE] > 3.0 and entities[int(event[s.EVENT_SUBJECT]), s.AT_YAW] >= 0 else 3
-    turn, shift = sensor[ATTITUDE_VARIANCE], sensor[POSITION_VARIANCE]
-    square = z[0] * z[0] + z[1] * z[1] + z[2] * z[2]
+    if z[Z] <= 0.0:
+        return -OUT_OF_VIEW
+    rows = 4 if event.size > 3 and belief.entities[event.subject].at_yaw >= 0 else 3
+    turn, shift = _own(sensor).attitude_variance, _own(sensor).position_variance
+    square = z[X] * z[X] + z[Y] * z[Y] + z[Z] * z[Z]
     for i in range(3):
         R[i, i] += turn * square + shift
         for j in range(3):
             R[i, j] -= turn * z[i] * z[j]
     if rows == 4:
-        R[3, 3] += turn
+        R[YAW, YAW] += turn
     return rows
 
 
-@kernel(LOCATE)
-def locate_relative_pose(
-    mean: Array, entities: IntArray, parameters: Array, sensor: Array, event: Array, z: Array, pose: Array
-) -> int:
+@kernel()
+def locate_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
     """Write the subject's (x, y, z, yaw) [world] that would produce the measurement without noise."""
-    subject = int(event[s.EVENT_SUBJECT])
-    observer = entities[int(event[s.EVENT_OBSERVER])]
-    start = observer[s.ENTITY_START]
-    cs, b, offset = np.empty(6), np.empty(3), np.empty(3)
-    observer_angles(mean, observer, event, cs)
+    mean, observer, p = belief.mean, belief.entities[event.observer], _own(sensor)
+    start, b, offset = observer.start, np.empty(3), np.empty(3)
+    cy, sy, cp, sp, cr, sr = observer_attitude(mean, observer, event)
     for k in range(3):
-        b[k] = sensor[TRANSLATION + k]
+        b[k] = p.translation[k]
         for i in range(3):
-            b[k] += sensor[ROTATION + 3 * k + i] * z[i]
-    cp, sp, cr, sr = cs[2], cs[3], cs[4], cs[5]
-    fy, fz = cr * b[1] - sr * b[2], sr * b[1] + cr * b[2]
-    ex, ez = cp * b[0] + sp * fz, -sp * b[0] + cp * fz
-    yaw = wrap(mean[start + s.YAW] + z[3])
-    marker_offset(entities[subject], parameters[subject], event, yaw, offset)
-    pose[0] = mean[start] + cs[0] * ex - cs[1] * fy - offset[0]
-    pose[1] = mean[start + 1] + cs[1] * ex + cs[0] * fy - offset[1]
-    pose[2] = mean[start + 2] + ez - offset[2]
-    pose[3] = yaw
-    return 1
+            b[k] += p.rotation[k, i] * z[i]
+    fy, fz = cr * b[Y] - sr * b[Z], sr * b[Y] + cr * b[Z]
+    ex, ez = cp * b[X] + sp * fz, -sp * b[X] + cp * fz
+    yaw = wrap(mean[start + YAW] + z[YAW])
+    marker_offset(belief.entities[event.subject], event, yaw, offset)
+    pose[X] = mean[start + X] + cy * ex - sy * fy - offset[X]
+    pose[Y] = mean[start + Y] + sy * ex + cy * fy - offset[Y]
+    pose[Z] = mean[start + Z] + ez - offset[Z]
+    pose[YAW] = yaw
+    return True
 
 
 @dataclass(frozen=True, slots=True)
-class MountedCamera:
+class MountedCamera(SensorDefaults):
     """A camera on a carrier (a robot or a fixed mount): extrinsics, and how well they are known on the carrier.
 
     rotation (3, 3), translation (3): carrier_from_camera [m]. A mounting error is the same in every picture, so it
@@ -146,12 +165,8 @@ class MountedCamera:
     delay; while observer or subject moves it displaces what is seen.
     """
 
-    kernels: ClassVar[tuple[int, int, int]] = (
-        address_of(measure_relative_pose),
-        address_of(prepare_relative_pose),
-        address_of(locate_relative_pose),
-    )
-    angles: ClassVar[tuple[int, ...]] = (3,)
+    kernels: ClassVar[SensorKernels] = SensorKernels(measure_relative_pose, prepare_relative_pose, locate_relative_pose)
+    angles = (YAW,)
 
     carrier: str
     rotation: Array
@@ -163,12 +178,11 @@ class MountedCamera:
     stamp_std_s: float = 0.0
     repeats_s: float = 0.0
 
-    def row(self) -> Array:
-        """Return the extrinsics in the columns that the kernels read."""
-        row = np.zeros(s.SENSOR_COLUMNS)
-        row[ROTATION : ROTATION + 9] = np.asarray(self.rotation, dtype=np.float64).ravel()
-        row[TRANSLATION : TRANSLATION + 3] = self.translation
-        row[ATTITUDE_VARIANCE] = self.repeats * self.attitude_std_rad**2
-        row[s.SENSOR_TIME_VARIANCE] = self.stamp_std_s**2
-        row[POSITION_VARIANCE] = self.repeats * self.position_std_m**2
-        return row
+    def own(self) -> CameraParameters:
+        """Return the parameters that the kernels read."""
+        return CameraParameters.row(
+            rotation=self.rotation,
+            translation=self.translation,
+            attitude_variance=self.repeats * self.attitude_std_rad**2,
+            position_variance=self.repeats * self.position_std_m**2,
+        )

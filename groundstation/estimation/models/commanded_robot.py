@@ -11,113 +11,122 @@ from typing import ClassVar
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import BEGIN, PREDICT
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Array, Matrix
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
+from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.driven import hold_velocity, position_density, world_velocity
 from groundstation.estimation.models.protocol import Vector3
 from groundstation.estimation.motion import depend, fade, mirror
+from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, X, Y, own_parameters
+from groundstation.kernel import Record, kernel
 
-(
-    SPEED_DENSITY,
-    SLIP_DENSITY,
-    RATE_DENSITY,
-    SPEED_NOISE,
-    TURN_NOISE,
-    SCALE_STD,
-    SCALE_TAU,
-    TURN_SCALE_STD,
-    OFFSET_STD,
-    OFFSET_TAU,
-    RANGE_STD,
-    RANGE_TAU,
-    BEARING_STD,
-    BEARING_TAU,
-    HOLD_S,
-    LAG_S,
-    DRAG_MEAN,
-    DRAG_STD,
-    RANGE_SCALE_STD,
-    SWAY_NOISE,
-) = range(s.FIRST_OWN, s.FIRST_OWN + 20)
 FORWARD_SCALE, TURN_DRAG, TURN_SCALE, TURN_OFFSET, RANGE_BIAS, RANGE_SCALE, BEARING_BIAS = range(4, 11)
 STANDS = 1e-3  # commands below are none [m/s, rad/s]
 
 
-@kernel("void(float64[:,::1], int64, float64[::1], float64[::1], float64, float64, float64, float64)")
+class DriveParameters(Record):
+    """Noise of driving, and deviations and correlation times of the errors that are states.
+
+    speed_density [m^2/s] at any speed, speed_noise and slip_density [m] per metre driven, along and across;
+    rate_density [rad^2/s], turn_noise [rad] per radian turned, sway_noise [rad^2/m] of the heading; hold_s: how long a
+    command holds in silence; lag_s: within which the robot follows; drag_mean: speed lost per rate of turn [m].
+    """
+
+    speed_density: float
+    speed_noise: float
+    slip_density: float
+    rate_density: float
+    turn_noise: float
+    sway_noise: float
+    scale_std: float
+    scale_tau_s: float
+    turn_scale_std: float
+    offset_std: float
+    offset_tau_s: float
+    range_std: float
+    range_scale_std: float
+    range_tau_s: float
+    bearing_std: float
+    bearing_tau_s: float
+    drag_mean: float
+    drag_std: float
+    hold_s: float
+    lag_s: float
+
+
+_own = own_parameters(DriveParameters)
+
+
+@kernel()
 def add_drive_noise(
-    P: Array, start: int, p: Array, aux: Array, heading: float, forward: float, rate: float, dt: float
+    P: Matrix, start: int, p: DriveParameters, age_s: float, heading: float, forward: float, rate: float, dt: float
 ) -> None:
     """Add the noise of driving: along the heading with the speed, across by slip, and of the heading with both."""
-    idle = position_density(0.0, aux[s.ODOMETRY_AGE], p[HOLD_S])
-    along = (p[SPEED_DENSITY] + p[SPEED_NOISE] * abs(forward) + idle) * dt
-    across = (p[SLIP_DENSITY] * abs(forward) + idle) * dt + 1e-8 * dt
+    idle = position_density(0.0, age_s, p.hold_s)
+    along = (p.speed_density + p.speed_noise * abs(forward) + idle) * dt
+    across = (p.slip_density * abs(forward) + idle) * dt + 1e-8 * dt
     c, n = math.cos(heading), math.sin(heading)
     P[start, start] += c * c * along + n * n * across
     P[start + 1, start + 1] += n * n * along + c * c * across
     P[start, start + 1] += c * n * (along - across)
     P[start + 1, start] += c * n * (along - across)
-    P[start + s.YAW, start + s.YAW] += (p[RATE_DENSITY] + p[TURN_NOISE] * abs(rate) + p[SWAY_NOISE] * abs(forward)) * dt
+    P[start + YAW, start + YAW] += (p.rate_density + p.turn_noise * abs(rate) + p.sway_noise * abs(forward)) * dt
 
 
-@kernel(PREDICT)
-def predict_commanded_robot(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, e: int, dt: float
-) -> None:
+@kernel()
+def predict_commanded_robot(belief: Belief, e: int, dt: float) -> None:
     """Drive an arc at the commanded speeds, scaled; scales and offsets fade back to what the type is known for."""
-    start, size, p = entities[e, s.ENTITY_START], entities[e, s.ENTITY_SIZE], parameters[e]
-    v, w = aux[e, s.HELD_VX], aux[e, s.YAW_RATE]
+    mean, P, entity, memory = belief.mean, belief.P, belief.entities[e], belief.memory[e]
+    start, size, p = entity.start, entity.size, _own(entity)
+    v, w = memory.held_vx, memory.yaw_rate
     # A robot that is told to stand stands.
     moving = 1.0 if abs(v) > STANDS or abs(w) > STANDS else 0.0
     rate = (1.0 + mean[start + TURN_SCALE]) * w + moving * mean[start + TURN_OFFSET]
-    drag = (p[DRAG_MEAN] + mean[start + TURN_DRAG]) * abs(w)
+    drag = (p.drag_mean + mean[start + TURN_DRAG]) * abs(w)
     forward = (1.0 + mean[start + FORWARD_SCALE]) * v - drag
-    heading = mean[start + s.YAW] + 0.5 * rate * dt
+    heading = mean[start + YAW] + 0.5 * rate * dt
     c, n = math.cos(heading) * dt, math.sin(heading) * dt
     mean[start] += c * forward
     mean[start + 1] += n * forward
-    mean[start + s.YAW] = wrap(mean[start + s.YAW] + rate * dt)
-    depend(P, start, size, s.X, s.YAW, -n * forward)
-    depend(P, start, size, s.Y, s.YAW, c * forward)
-    depend(P, start, size, s.X, FORWARD_SCALE, c * v)
-    depend(P, start, size, s.Y, FORWARD_SCALE, n * v)
-    depend(P, start, size, s.X, TURN_DRAG, -c * abs(w))
-    depend(P, start, size, s.Y, TURN_DRAG, -n * abs(w))
-    depend(P, start, size, s.X, TURN_SCALE, -0.5 * dt * w * n * forward)
-    depend(P, start, size, s.Y, TURN_SCALE, 0.5 * dt * w * c * forward)
-    depend(P, start, size, s.X, TURN_OFFSET, -0.5 * dt * n * forward * moving)
-    depend(P, start, size, s.Y, TURN_OFFSET, 0.5 * dt * c * forward * moving)
-    depend(P, start, size, s.YAW, TURN_SCALE, dt * w)
-    depend(P, start, size, s.YAW, TURN_OFFSET, dt * moving)
-    fade(mean, P, start, size, FORWARD_SCALE, p[SCALE_STD], dt / p[SCALE_TAU])
-    fade(mean, P, start, size, TURN_DRAG, p[DRAG_STD], dt / p[SCALE_TAU])
-    fade(mean, P, start, size, TURN_SCALE, p[TURN_SCALE_STD], dt / p[SCALE_TAU])
-    fade(mean, P, start, size, TURN_OFFSET, p[OFFSET_STD], dt / p[OFFSET_TAU])
-    fade(mean, P, start, size, RANGE_BIAS, p[RANGE_STD], dt / p[RANGE_TAU])
-    fade(mean, P, start, size, RANGE_SCALE, p[RANGE_SCALE_STD], dt / p[RANGE_TAU])
-    fade(mean, P, start, size, BEARING_BIAS, p[BEARING_STD], dt / p[BEARING_TAU])
-    add_drive_noise(P, start, p, aux[e], heading, forward, rate, dt)
+    mean[start + YAW] = wrap(mean[start + YAW] + rate * dt)
+    depend(P, start, size, X, YAW, -n * forward)
+    depend(P, start, size, Y, YAW, c * forward)
+    depend(P, start, size, X, FORWARD_SCALE, c * v)
+    depend(P, start, size, Y, FORWARD_SCALE, n * v)
+    depend(P, start, size, X, TURN_DRAG, -c * abs(w))
+    depend(P, start, size, Y, TURN_DRAG, -n * abs(w))
+    depend(P, start, size, X, TURN_SCALE, -0.5 * dt * w * n * forward)
+    depend(P, start, size, Y, TURN_SCALE, 0.5 * dt * w * c * forward)
+    depend(P, start, size, X, TURN_OFFSET, -0.5 * dt * n * forward * moving)
+    depend(P, start, size, Y, TURN_OFFSET, 0.5 * dt * c * forward * moving)
+    depend(P, start, size, YAW, TURN_SCALE, dt * w)
+    depend(P, start, size, YAW, TURN_OFFSET, dt * moving)
+    fade(mean, P, start, size, FORWARD_SCALE, p.scale_std, dt / p.scale_tau_s)
+    fade(mean, P, start, size, TURN_DRAG, p.drag_std, dt / p.scale_tau_s)
+    fade(mean, P, start, size, TURN_SCALE, p.turn_scale_std, dt / p.scale_tau_s)
+    fade(mean, P, start, size, TURN_OFFSET, p.offset_std, dt / p.offset_tau_s)
+    fade(mean, P, start, size, RANGE_BIAS, p.range_std, dt / p.range_tau_s)
+    fade(mean, P, start, size, RANGE_SCALE, p.range_scale_std, dt / p.range_tau_s)
+    fade(mean, P, start, size, BEARING_BIAS, p.bearing_std, dt / p.bearing_tau_s)
+    add_drive_noise(P, start, p, memory.odometry_age_s, heading, forward, rate, dt)
     mirror(P, start, size, size)
 
 
-@kernel(BEGIN)
-def begin_commanded_robot(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, odometry: Array, e: int, step: float,
-    gate: float,
-) -> None:  # fmt: skip
+@kernel()
+def begin_commanded_robot(belief: Belief, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
     """Let the robot's speeds approach those that were commanded for this step."""
-    forward, rate = aux[e, s.HELD_VX], aux[e, s.YAW_RATE]
-    hold_velocity(odometry[e], aux[e], parameters[e, HOLD_S], step)
-    if odometry[e, s.VELOCITY_COUNT] > 0.0:
-        aux[e, s.LAST_VX], aux[e, s.LAST_RATE] = aux[e, s.HELD_VX], aux[e, s.YAW_RATE]
-    elif aux[e, s.ODOMETRY_AGE] > parameters[e, HOLD_S]:
-        aux[e, s.LAST_VX] = aux[e, s.LAST_RATE] = 0.0
-    share = 1.0 - math.exp(-step / parameters[e, LAG_S])
-    aux[e, s.HELD_VX] = forward + share * (aux[e, s.LAST_VX] - forward)
-    aux[e, s.YAW_RATE] = rate + share * (aux[e, s.LAST_RATE] - rate)
+    memory, p = belief.memory[e], _own(belief.entities[e])
+    forward, rate = memory.held_vx, memory.yaw_rate
+    hold_velocity(odometry, memory, p.hold_s, step_s)
+    if odometry.velocity_count > 0.0:
+        memory.commanded_vx, memory.commanded_rate = memory.held_vx, memory.yaw_rate
+    elif memory.odometry_age_s > p.hold_s:
+        memory.commanded_vx = memory.commanded_rate = 0.0
+    share = 1.0 - math.exp(-step_s / p.lag_s)
+    memory.held_vx = forward + share * (memory.commanded_vx - forward)
+    memory.yaw_rate = rate + share * (memory.commanded_rate - rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +149,7 @@ class CommandedRobot:
         "range_scale",
         "bearing_bias",
     )
-    kernels: ClassVar[tuple[int, int]] = (address_of(predict_commanded_robot), address_of(begin_commanded_robot))
+    kernels: ClassVar[MotionKernels] = MotionKernels(predict_commanded_robot, begin_commanded_robot)
     present: ClassVar[bool] = False
     admitted: ClassVar[bool] = True
 
@@ -177,29 +186,35 @@ class CommandedRobot:
         """Return nothing: there is no height sensor."""
         return 0.0
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernels read."""
-        row = np.zeros(s.PARAMETER_COLUMNS)
-        row[:3] = self.marker_position_m
-        row[SPEED_DENSITY], row[RATE_DENSITY] = self.speed_density, self.rate_density
-        row[SPEED_NOISE], row[SLIP_DENSITY], row[TURN_NOISE] = (
-            self.speed_noise_m,
-            self.slip_noise_m,
-            self.turn_noise_rad,
+    @property
+    def place_m(self) -> Vector3:
+        """Return where the marker is."""
+        return self.marker_position_m
+
+    def own(self) -> DriveParameters:
+        """Return the parameters that the kernels read."""
+        return DriveParameters.row(
+            speed_density=self.speed_density,
+            speed_noise=self.speed_noise_m,
+            slip_density=self.slip_noise_m,
+            rate_density=self.rate_density,
+            turn_noise=self.turn_noise_rad,
+            sway_noise=self.sway_noise,
+            scale_std=self.scale_std,
+            scale_tau_s=self.scale_correlation_s,
+            turn_scale_std=self.turn_scale_std,
+            offset_std=self.offset_std_rad_s,
+            offset_tau_s=self.offset_correlation_s,
+            range_std=self.range_bias_std_m,
+            range_scale_std=self.range_scale_std,
+            range_tau_s=self.range_bias_correlation_s,
+            bearing_std=self.bearing_bias_std_rad,
+            bearing_tau_s=self.bearing_bias_correlation_s,
+            drag_mean=self.turn_drag_m,
+            drag_std=self.turn_drag_std_m,
+            hold_s=self.hold_s,
+            lag_s=self.lag_s,
         )
-        row[SCALE_STD], row[SCALE_TAU], row[TURN_SCALE_STD] = (
-            self.scale_std,
-            self.scale_correlation_s,
-            self.turn_scale_std,
-        )
-        row[OFFSET_STD], row[OFFSET_TAU] = self.offset_std_rad_s, self.offset_correlation_s
-        row[SWAY_NOISE] = self.sway_noise
-        row[RANGE_SCALE_STD] = self.range_scale_std
-        row[RANGE_STD], row[RANGE_TAU] = self.range_bias_std_m, self.range_bias_correlation_s
-        row[BEARING_STD], row[BEARING_TAU] = self.bearing_bias_std_rad, self.bearing_bias_correlation_s
-        row[HOLD_S], row[LAG_S] = self.hold_s, self.lag_s
-        row[DRAG_MEAN], row[DRAG_STD] = self.turn_drag_m, self.turn_drag_std_m
-        return row
 
     def prior(self) -> Array:
         """Return mean and variances (2, size) of what joins."""
@@ -214,6 +229,6 @@ class CommandedRobot:
         )
         return np.array([[0.0] * 11, [0.0] * 4 + [d * d for d in deviations]])
 
-    def velocity_m_s(self, block: Array, aux: Array) -> Vector3:
+    def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
         """Return the velocity [world] from the block's mean and the held command."""
-        return world_velocity(block[s.YAW], (1.0 + block[FORWARD_SCALE]) * aux[s.HELD_VX], 0.0, 0.0)
+        return world_velocity(block[YAW], (1.0 + block[FORWARD_SCALE]) * memory["held_vx"], 0.0, 0.0)

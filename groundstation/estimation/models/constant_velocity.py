@@ -6,40 +6,49 @@ from typing import ClassVar
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import PREDICT
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Array, Matrix
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import TARGET_CORE, EntityKind
+from groundstation.estimation.model_kernels import MotionKernels
+from groundstation.estimation.models.protocol import Vector3
 from groundstation.estimation.motion import add_row, mirror, wander
+from groundstation.estimation.records import VX, VY, X, Y, own_parameters
+from groundstation.kernel import Record, kernel
 
-ACCELERATION_DENSITY, YAW_DENSITY = s.FIRST_OWN, s.FIRST_OWN + 1
+
+class ConstantVelocityParameters(Record):
+    """Densities of the noise of acceleration [m^2/s^3] and of heading [rad^2/s]."""
+
+    acceleration_density: float
+    yaw_density: float
 
 
-@kernel("void(float64[:,::1], int64, int64, float64, float64)")
-def add_acceleration_noise(P: Array, start: int, axis: int, q: float, dt: float) -> None:
+_own = own_parameters(ConstantVelocityParameters)
+
+
+@kernel()
+def add_acceleration_noise(P: Matrix, start: int, axis: int, q: float, dt: float) -> None:
     """Add Q of one axis for white acceleration of density q [m^2/s^3]."""
-    position, velocity = start + axis, start + s.VX + axis
+    position, velocity = start + axis, start + VX + axis
     P[position, position] += q * dt**3 / 3.0
     P[position, velocity] += 0.5 * q * dt * dt
     P[velocity, position] += 0.5 * q * dt * dt
     P[velocity, velocity] += q * dt
 
 
-@kernel(PREDICT)
-def predict_constant_velocity(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, e: int, dt: float
-) -> None:
+@kernel()
+def predict_constant_velocity(belief: Belief, e: int, dt: float) -> None:
     """Move a target at constant velocity; its heading wanders."""
-    start, size = entities[e, s.ENTITY_START], entities[e, s.ENTITY_SIZE]
-    for axis in range(2):
-        mean[start + axis] += dt * mean[start + s.VX + axis]
-        add_row(P, start + axis, start + s.VX + axis, dt)
-    for axis in range(2):
+    mean, P, entity = belief.mean, belief.P, belief.entities[e]
+    start, size, p = entity.start, entity.size, _own(entity)
+    for axis in (X, Y):
+        mean[start + axis] += dt * mean[start + VX + axis]
+        add_row(P, start + axis, start + VX + axis, dt)
+    for axis in (X, Y):
         for i in range(start, start + size):
-            P[i, start + axis] += dt * P[i, start + s.VX + axis]
-        add_acceleration_noise(P, start, axis, parameters[e, ACCELERATION_DENSITY], dt)
-    wander(P, start, entities[e, s.AT_YAW], parameters[e, YAW_DENSITY] * dt)
+            P[i, start + axis] += dt * P[i, start + VX + axis]
+        add_acceleration_noise(P, start, axis, p.acceleration_density, dt)
+    wander(P, start, entity.at_yaw, p.yaw_density * dt)
     mirror(P, start, size, size)
 
 
@@ -52,7 +61,7 @@ class ConstantVelocityTarget:
     """
 
     kind: ClassVar[EntityKind] = EntityKind.TARGET
-    kernels: ClassVar[tuple[int, int]] = (address_of(predict_constant_velocity), 0)
+    kernels: ClassVar[MotionKernels] = MotionKernels(predict_constant_velocity)
     present: ClassVar[bool] = False
     admitted: ClassVar[bool] = True
 
@@ -68,16 +77,19 @@ class ConstantVelocityTarget:
         """Return the entries of the block."""
         return (*TARGET_CORE, "yaw") if self.heading else TARGET_CORE
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernel reads."""
-        row = np.zeros(s.PARAMETER_COLUMNS)
-        row[s.PLACE_Z] = self.marker_height_m
-        row[ACCELERATION_DENSITY] = self.acceleration_std_m_s2**2 * self.correlation_s
-        row[YAW_DENSITY] = self.turn_std_rad**2
-        return row
+    @property
+    def place_m(self) -> Vector3:
+        """Return where the marker is."""
+        return 0.0, 0.0, self.marker_height_m
+
+    def own(self) -> ConstantVelocityParameters:
+        """Return the parameters that the kernel reads."""
+        return ConstantVelocityParameters.row(
+            acceleration_density=self.acceleration_std_m_s2**2 * self.correlation_s, yaw_density=self.turn_std_rad**2
+        )
 
     def prior(self) -> Array:
         """Return mean and variances (2, size) of what joins."""
         prior = np.zeros((2, len(self.labels)))
-        prior[1, s.VX] = prior[1, s.VY] = self.speed_std_m_s**2
+        prior[1, VX] = prior[1, VY] = self.speed_std_m_s**2
         return prior

@@ -5,43 +5,70 @@ Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Naviga
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import PREDICT
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Array, Matrix
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import TARGET_CORE, EntityKind
 from groundstation.estimation.linear import wrap
+from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.constant_velocity import add_acceleration_noise
+from groundstation.estimation.models.protocol import Vector3
 from groundstation.estimation.motion import depend, fade, mirror, wander
+from groundstation.estimation.records import VX, VY, X, Y, own_parameters
+from groundstation.kernel import Record, kernel
 
-ACCELERATION_DENSITY, RATE_STD, RATE_TAU, RATE_GAIN, YAW_DENSITY = range(s.FIRST_OWN, s.FIRST_OWN + 5)
-TURN_RATE = 4
+TURN_RATE = 4  # after x, y, vx, vy
 _SMALL_RAD = 1e-3  # below, series are more exact than quotients
 
 
-@kernel("void(float64, float64, float64[::1])")
-def arc(w: float, dt: float, out: Array) -> None:
-    """Write a = sin(wT)/w, b = (1 - cos(wT))/w, and their derivatives by w."""
+class TurnParameters(Record):
+    """Densities of the noise of acceleration [m^2/s^3] and of heading [rad^2/s]; of the turn rate, deviation and time.
+
+    rate_std [rad/s], rate_tau_s: of the Gauss-Markov turn rate; rate_gain: 1, or 0 for a target that goes straight on.
+    """
+
+    acceleration_density: float
+    yaw_density: float
+    rate_std: float
+    rate_tau_s: float
+    rate_gain: float
+
+
+_own = own_parameters(TurnParameters)
+
+
+class Arc(NamedTuple):
+    """a = sin(wT)/w, b = (1 - cos(wT))/w, and their derivatives by w."""
+
+    a: float
+    b: float
+    a_w: float
+    b_w: float
+
+
+@kernel()
+def arc(w: float, dt: float) -> Arc:
+    """Return how a turn at rate w over dt maps velocity to displacement."""
     angle = w * dt
     if abs(angle) < _SMALL_RAD:
-        out[0] = dt * (1.0 - angle * angle / 6.0)
-        out[1] = dt * angle * (0.5 - angle * angle / 24.0)
-        out[2] = dt * dt * angle * (-1.0 / 3.0 + angle * angle / 30.0)
-        out[3] = dt * dt * (0.5 - angle * angle / 8.0)
-        return
+        return Arc(
+            dt * (1.0 - angle * angle / 6.0),
+            dt * angle * (0.5 - angle * angle / 24.0),
+            dt * dt * angle * (-1.0 / 3.0 + angle * angle / 30.0),
+            dt * dt * (0.5 - angle * angle / 8.0),
+        )
     c, n = math.cos(angle), math.sin(angle)
-    out[0], out[1] = n / w, (1.0 - c) / w
-    out[2], out[3] = (dt * c - out[0]) / w, (dt * n - out[1]) / w
+    a, b = n / w, (1.0 - c) / w
+    return Arc(a, b, (dt * c - a) / w, (dt * n - b) / w)
 
 
-@kernel("void(float64[:,::1], int64, int64, float64, float64)")
-def rotate_velocity(P: Array, start: int, size: int, c: float, n: float) -> None:
+@kernel()
+def rotate_velocity(P: Matrix, start: int, size: int, c: float, n: float) -> None:
     """Rotate the velocity's rows and, within the block, columns."""
-    vx, vy = start + s.VX, start + s.VY
+    vx, vy = start + VX, start + VY
     for j in range(P.shape[0]):
         x, y = P[vx, j], P[vy, j]
         P[vx, j], P[vy, j] = c * x - n * y, n * x + c * y
@@ -50,37 +77,35 @@ def rotate_velocity(P: Array, start: int, size: int, c: float, n: float) -> None
         P[i, vx], P[i, vy] = c * x - n * y, n * x + c * y
 
 
-@kernel(PREDICT)
-def predict_coordinated_turn(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, e: int, dt: float
-) -> None:
+@kernel()
+def predict_coordinated_turn(belief: Belief, e: int, dt: float) -> None:
     """Turn the velocity by its rate; with a gain of zero it goes straight on and the rate says nothing."""
-    start, size, p = entities[e, s.ENTITY_START], entities[e, s.ENTITY_SIZE], parameters[e]
-    gain, yaw = p[RATE_GAIN], entities[e, s.AT_YAW]
-    vx, vy, w = mean[start + s.VX], mean[start + s.VY], gain * mean[start + TURN_RATE]
-    turned = np.empty(4)
-    arc(w, dt, turned)
-    a, b, a_w, b_w = turned[0], turned[1], gain * turned[2], gain * turned[3]
+    mean, P, entity = belief.mean, belief.P, belief.entities[e]
+    start, size, yaw, p = entity.start, entity.size, entity.at_yaw, _own(entity)
+    gain = p.rate_gain
+    vx, vy, w = mean[start + VX], mean[start + VY], gain * mean[start + TURN_RATE]
+    turned = arc(w, dt)
+    a, b, a_w, b_w = turned.a, turned.b, gain * turned.a_w, gain * turned.b_w
     c, n = math.cos(w * dt), math.sin(w * dt)
     mean[start] += a * vx - b * vy
     mean[start + 1] += b * vx + a * vy
-    mean[start + s.VX], mean[start + s.VY] = c * vx - n * vy, n * vx + c * vy
-    depend(P, start, size, s.X, s.VX, a)
-    depend(P, start, size, s.X, s.VY, -b)
-    depend(P, start, size, s.X, TURN_RATE, a_w * vx - b_w * vy)
-    depend(P, start, size, s.Y, s.VX, b)
-    depend(P, start, size, s.Y, s.VY, a)
-    depend(P, start, size, s.Y, TURN_RATE, b_w * vx + a_w * vy)
+    mean[start + VX], mean[start + VY] = c * vx - n * vy, n * vx + c * vy
+    depend(P, start, size, X, VX, a)
+    depend(P, start, size, X, VY, -b)
+    depend(P, start, size, X, TURN_RATE, a_w * vx - b_w * vy)
+    depend(P, start, size, Y, VX, b)
+    depend(P, start, size, Y, VY, a)
+    depend(P, start, size, Y, TURN_RATE, b_w * vx + a_w * vy)
     rotate_velocity(P, start, size, c, n)
-    depend(P, start, size, s.VX, TURN_RATE, -gain * dt * mean[start + s.VY])
-    depend(P, start, size, s.VY, TURN_RATE, gain * dt * mean[start + s.VX])
+    depend(P, start, size, VX, TURN_RATE, -gain * dt * mean[start + VY])
+    depend(P, start, size, VY, TURN_RATE, gain * dt * mean[start + VX])
     if yaw >= 0:
         mean[start + yaw] = wrap(mean[start + yaw] + w * dt)
         depend(P, start, size, yaw, TURN_RATE, gain * dt)
-    fade(mean, P, start, size, TURN_RATE, p[RATE_STD], dt / p[RATE_TAU])
-    add_acceleration_noise(P, start, 0, p[ACCELERATION_DENSITY], dt)
-    add_acceleration_noise(P, start, 1, p[ACCELERATION_DENSITY], dt)
-    wander(P, start, yaw, p[YAW_DENSITY] * dt)
+    fade(mean, P, start, size, TURN_RATE, p.rate_std, dt / p.rate_tau_s)
+    add_acceleration_noise(P, start, 0, p.acceleration_density, dt)
+    add_acceleration_noise(P, start, 1, p.acceleration_density, dt)
+    wander(P, start, yaw, p.yaw_density * dt)
     mirror(P, start, size, size)
 
 
@@ -92,7 +117,7 @@ class CoordinatedTurnTarget:
     """
 
     kind: ClassVar[EntityKind] = EntityKind.TARGET
-    kernels: ClassVar[tuple[int, int]] = (address_of(predict_coordinated_turn), 0)
+    kernels: ClassVar[MotionKernels] = MotionKernels(predict_coordinated_turn)
     present: ClassVar[bool] = False
     admitted: ClassVar[bool] = True
 
@@ -111,20 +136,25 @@ class CoordinatedTurnTarget:
         """Return the entries of the block."""
         return (*TARGET_CORE, "turn_rate", "yaw") if self.heading else (*TARGET_CORE, "turn_rate")
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernel reads."""
-        row = np.zeros(s.PARAMETER_COLUMNS)
-        row[s.PLACE_Z] = self.marker_height_m
-        row[ACCELERATION_DENSITY] = self.acceleration_std_m_s2**2 * self.correlation_s
-        row[RATE_STD], row[RATE_GAIN] = self.turn_rate_std_rad_s, float(self.turning)
-        # A mode that goes straight on knows nothing of the rate that the next turn will have.
-        row[RATE_TAU] = self.turn_rate_correlation_s if self.turning else 0.3
-        row[YAW_DENSITY] = self.turn_std_rad**2
-        return row
+    @property
+    def place_m(self) -> Vector3:
+        """Return where the marker is."""
+        return 0.0, 0.0, self.marker_height_m
+
+    def own(self) -> TurnParameters:
+        """Return the parameters that the kernel reads."""
+        return TurnParameters.row(
+            acceleration_density=self.acceleration_std_m_s2**2 * self.correlation_s,
+            yaw_density=self.turn_std_rad**2,
+            rate_std=self.turn_rate_std_rad_s,
+            # A mode that goes straight on knows nothing of the rate that the next turn will have.
+            rate_tau_s=self.turn_rate_correlation_s if self.turning else 0.3,
+            rate_gain=float(self.turning),
+        )
 
     def prior(self) -> Array:
         """Return mean and variances (2, size) of what joins."""
         prior = np.zeros((2, len(self.labels)))
-        prior[1, s.VX] = prior[1, s.VY] = self.speed_std_m_s**2
+        prior[1, VX] = prior[1, VY] = self.speed_std_m_s**2
         prior[1, TURN_RATE] = self.turn_rate_std_rad_s**2
         return prior

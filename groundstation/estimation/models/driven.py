@@ -2,10 +2,9 @@
 
 import math
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array
-from groundstation.estimation.kernel import kernel
 from groundstation.estimation.linear import wrap
+from groundstation.estimation.records import CondensedOdometry, EntityMemory
+from groundstation.kernel import kernel
 
 # Nothing is known of the speed of a vehicle that is silent: 0.3 m/s, constant over some 0.5 s [m^2/s].
 SILENT_DENSITY = 0.09
@@ -13,41 +12,41 @@ SILENT_DENSITY = 0.09
 SLOW_S = 1.0
 
 
-@kernel("void(float64[::1], float64[::1], float64, float64)")
-def hold_velocity(condensed: Array, aux: Array, hold_s: float, step: float) -> None:
+@kernel()
+def hold_velocity(odometry: CondensedOdometry, memory: EntityMemory, hold_s: float, step: float) -> None:
     """Hold the mean velocity and commanded turn rate of one step; zero after `hold_s` of silence."""
-    aux[s.ODOMETRY_AGE] += step
-    count = condensed[s.VELOCITY_COUNT]
+    memory.odometry_age_s += step
+    count = odometry.velocity_count
     if count > 0.0:
-        aux[s.HELD_VX] = condensed[s.SUM_VX] / count
-        aux[s.HELD_VY] = condensed[s.SUM_VY] / count
-        aux[s.HELD_VZ] = condensed[s.SUM_VZ] / count
-        aux[s.YAW_RATE] = condensed[s.SUM_RATE] / count
-        aux[s.ODOMETRY_AGE] = 0.0
+        memory.held_vx = odometry.sum_vx / count
+        memory.held_vy = odometry.sum_vy / count
+        memory.held_vz = odometry.sum_vz / count
+        memory.yaw_rate = odometry.sum_rate / count
+        memory.odometry_age_s = 0.0
         share = step / (SLOW_S + step)
-        aux[s.SLOW_VX] += share * (aux[s.HELD_VX] - aux[s.SLOW_VX])
-        aux[s.SLOW_VY] += share * (aux[s.HELD_VY] - aux[s.SLOW_VY])
-    elif aux[s.ODOMETRY_AGE] > hold_s:
-        aux[s.HELD_VX] = aux[s.HELD_VY] = aux[s.HELD_VZ] = aux[s.YAW_RATE] = 0.0
+        memory.slow_vx += share * (memory.held_vx - memory.slow_vx)
+        memory.slow_vy += share * (memory.held_vy - memory.slow_vy)
+    elif memory.odometry_age_s > hold_s:
+        memory.held_vx = memory.held_vy = memory.held_vz = memory.yaw_rate = 0.0
 
 
-@kernel("void(float64[::1], float64[::1], float64)")
-def take_heading(condensed: Array, aux: Array, step: float) -> None:
+@kernel()
+def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float) -> None:
     """Turn the vehicle's own heading into the yaw rate of this step (and hold how it leans); an increment across a
     reset is void.
 
     The heading jumped then, the vehicle did not.
     """
-    aux[s.YAW_RATE] = 0.0
-    if condensed[s.NEWEST_AT] < 0.0:
+    memory.yaw_rate = 0.0
+    if odometry.newest_at < 0.0:
         return
-    if aux[s.HAS_YAW] != 0.0 and aux[s.LAST_RESET] == condensed[s.NEWEST_RESET]:
-        aux[s.YAW_RATE] = wrap(condensed[s.NEWEST_YAW] - aux[s.LAST_YAW]) / step
-    aux[s.HELD_ROLL], aux[s.HELD_PITCH] = condensed[s.NEWEST_ROLL], condensed[s.NEWEST_PITCH]
-    aux[s.LAST_YAW], aux[s.LAST_RESET], aux[s.HAS_YAW] = condensed[s.NEWEST_YAW], condensed[s.NEWEST_RESET], 1.0
+    if memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset:
+        memory.yaw_rate = wrap(odometry.newest_yaw - memory.last_yaw) / step
+    memory.held_roll, memory.held_pitch = odometry.newest_roll, odometry.newest_pitch
+    memory.last_yaw, memory.last_reset, memory.has_yaw = odometry.newest_yaw, odometry.newest_reset, 1
 
 
-@kernel("float64(float64, float64, float64)", inlined=True)
+@kernel(inlined=True)
 def position_density(density: float, age_s: float, hold_s: float) -> float:
     """Return the density of the position's noise [m^2/s], larger while the odometry is silent."""
     return density + (SILENT_DENSITY if age_s > hold_s else 0.0)

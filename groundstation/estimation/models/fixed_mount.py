@@ -5,25 +5,35 @@ from typing import ClassVar
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import PREDICT
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Array
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import CARRIER_LABELS, EntityKind
+from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.protocol import Vector3
+from groundstation.estimation.records import own_parameters
+from groundstation.kernel import Record, kernel
 
-POSITION_DRIFT, ANGLE_DRIFT = s.FIRST_OWN, s.FIRST_OWN + 1
+_AXES = 3
 
 
-@kernel(PREDICT)
-def predict_fixed_mount(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, e: int, dt: float
-) -> None:
+class MountParameters(Record):
+    """Drift of the position [m^2/s] and of each angle [rad^2/s]."""
+
+    position_drift: float
+    angle_drift: float
+
+
+_own = own_parameters(MountParameters)
+
+
+@kernel()
+def predict_fixed_mount(belief: Belief, e: int, dt: float) -> None:
     """Let what is known of a mounting fade very slowly: mountings creep."""
-    start = entities[e, s.ENTITY_START]
-    for i in range(3):
-        P[start + i, start + i] += parameters[e, POSITION_DRIFT] * dt
-        P[start + 3 + i, start + 3 + i] += parameters[e, ANGLE_DRIFT] * dt
+    entity = belief.entities[e]
+    P, p = belief.P, _own(entity)
+    for i in range(entity.start, entity.start + _AXES):
+        P[i, i] += p.position_drift * dt
+        P[i + _AXES, i + _AXES] += p.angle_drift * dt
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +46,8 @@ class FixedMount:
 
     kind: ClassVar[EntityKind] = EntityKind.CAMERA
     labels: ClassVar[tuple[str, ...]] = CARRIER_LABELS
-    kernels: ClassVar[tuple[int, int]] = (address_of(predict_fixed_mount), 0)
+    kernels: ClassVar[MotionKernels] = MotionKernels(predict_fixed_mount)
+    place_m: ClassVar[Vector3] = (0.0, 0.0, 0.0)
     present: ClassVar[bool] = True
     admitted: ClassVar[bool] = True
 
@@ -45,12 +56,11 @@ class FixedMount:
     position_std_m: float
     creep_s: float = 3600.0
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernel reads."""
-        row = np.zeros(s.PARAMETER_COLUMNS)
-        row[POSITION_DRIFT] = self.position_std_m**2 / self.creep_s
-        row[ANGLE_DRIFT] = self.attitude_std_rad**2 / self.creep_s
-        return row
+    def own(self) -> MountParameters:
+        """Return the parameters that the kernel reads."""
+        return MountParameters.row(
+            position_drift=self.position_std_m**2 / self.creep_s, angle_drift=self.attitude_std_rad**2 / self.creep_s
+        )
 
     def prior(self) -> Array:
         """Return mean and variances (2, 6) of its states."""

@@ -3,60 +3,40 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import LOCATE, MEASURE, PREPARE
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Matrix, Vector
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.linear import wrap
+from groundstation.estimation.model_kernels import SensorKernels
+from groundstation.estimation.models.protocol import SensorDefaults
+from groundstation.estimation.records import YAW, EventRow, Prediction, SensorRow
+from groundstation.kernel import kernel
 
 
-@kernel(MEASURE)
-def measure_heading(
-    mean: Array, entities: IntArray, parameters: Array, sensor: Array, event: Array, rows: int, h: Array,
-    H_observer: Array, H_subject: Array,
-) -> None:  # fmt: skip
+@kernel()
+def measure_heading(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction) -> None:
     """Write h(x) and its Jacobian; observer and subject are the same entity."""
-    entity = entities[int(event[s.EVENT_OBSERVER])]
-    start = entity[s.ENTITY_START]
-    h[0] = mean[start + s.YAW]
-    H_observer[0, s.YAW] = 1.0
-    if entity[s.AT_YAW_OFFSET] >= 0:
-        h[0] += mean[start + entity[s.AT_YAW_OFFSET]]
-        H_observer[0, entity[s.AT_YAW_OFFSET]] = 1.0
-    h[0] = wrap(h[0])
+    mean, entity = belief.mean, belief.entities[event.observer]
+    out.h[0] = mean[entity.start + YAW]
+    out.H_observer[0, YAW] = 1.0
+    if entity.at_yaw_offset >= 0:
+        out.h[0] += mean[entity.start + entity.at_yaw_offset]
+        out.H_observer[0, entity.at_yaw_offset] = 1.0
+    out.h[0] = wrap(out.h[0])
 
 
-@kernel(PREPARE)
-def prepare_heading(entities: IntArray, parameters: Array, sensor: Array, event: Array, z: Array, R: Array) -> int:
+@kernel()
+def prepare_heading(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
     """Nothing to add: one row."""
     return 1
 
 
-@kernel(LOCATE)
-def locate_heading(
-    mean: Array, entities: IntArray, parameters: Array, sensor: Array, event: Array, z: Array, pose: Array
-) -> int:
-    """A heading places nothing."""
-    return 0
-
-
 @dataclass(frozen=True, slots=True)
-class HeadingSensor:
+class HeadingSensor(SensorDefaults):
     """The heading that a vehicle reports itself, as an absolute measurement with its own offset."""
 
-    kernels: ClassVar[tuple[int, int, int]] = (
-        address_of(measure_heading),
-        address_of(prepare_heading),
-        address_of(locate_heading),
-    )
-    angles: ClassVar[tuple[int, ...]] = (0,)
-    observes_targets: ClassVar[bool] = False
+    kernels: ClassVar[SensorKernels] = SensorKernels(measure_heading, prepare_heading)
+    angles = (0,)
+    observes_targets = False
 
     carrier: str
     repeats_s: float = 0.0
-
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernels read: none."""
-        return np.zeros(s.SENSOR_COLUMNS)

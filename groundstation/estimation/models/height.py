@@ -5,11 +5,12 @@ belief cannot explain is the floor's: the floor entry forgets what it knew and t
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.estimation.belief import Array
-from groundstation.estimation.kernel import kernel
+from groundstation.arrays import Matrix, Vector
+from groundstation.kernel import kernel
 
 # Deviations of the floor under the vehicle: even floor, an object of unknown height on it; and the least object [m].
 EVEN_M = 0.005
@@ -17,8 +18,16 @@ OBJECT_M = 0.5
 LEAST_OBJECT_M = 0.1
 
 
-@kernel("void(float64[::1], float64[:,::1], int64, float64)")
-def forget(mean: Array, P: Array, index: int, deviation: float) -> None:
+class HeightEntries(NamedTuple):
+    """Where in the state z, the sensor's slow error and the floor stand; -1: the block lacks it (z it has)."""
+
+    z: int
+    error: int
+    floor: int
+
+
+@kernel()
+def forget(mean: Vector, P: Matrix, index: int, deviation: float) -> None:
     """Replace what is known of one entry: zero mean, the given deviation, independent of all others."""
     mean[index] = 0.0
     for j in range(P.shape[0]):
@@ -27,64 +36,64 @@ def forget(mean: Array, P: Array, index: int, deviation: float) -> None:
     P[index, index] = deviation * deviation
 
 
-@kernel("float64(float64[::1], float64[:,::1], int64, int64, int64, float64[::1])")
-def project_height(mean: Array, P: Array, z: int, error: int, floor: int, W: Array) -> float:
-    """Write H P into W for H x = z + error - floor (entries of index < 0 left out) and return H P H^T."""
+@kernel()
+def project_height(P: Matrix, at: HeightEntries, W: Vector) -> float:
+    """Write H P into W for H x = z + error - floor (entries that the block lacks left out) and return H P H^T."""
     for j in range(P.shape[0]):
-        W[j] = P[z, j]
-    if error >= 0:
+        W[j] = P[at.z, j]
+    if at.error >= 0:
         for j in range(P.shape[0]):
-            W[j] += P[error, j]
-    if floor >= 0:
+            W[j] += P[at.error, j]
+    if at.floor >= 0:
         for j in range(P.shape[0]):
-            W[j] -= P[floor, j]
-    variance = float(W[z])
-    if error >= 0:
-        variance += W[error]
-    if floor >= 0:
-        variance -= W[floor]
+            W[j] -= P[at.floor, j]
+    variance = float(W[at.z])
+    if at.error >= 0:
+        variance += W[at.error]
+    if at.floor >= 0:
+        variance -= W[at.floor]
     return variance
 
 
-@kernel("float64(float64[::1], int64, int64, int64)")
-def height_of(mean: Array, z: int, error: int, floor: int) -> float:
+@kernel()
+def height_of(mean: Vector, at: HeightEntries) -> float:
     """Return h(x)."""
-    value = float(mean[z])
-    if error >= 0:
-        value += mean[error]
-    if floor >= 0:
-        value -= mean[floor]
+    value = float(mean[at.z])
+    if at.error >= 0:
+        value += mean[at.error]
+    if at.floor >= 0:
+        value -= mean[at.floor]
     return value
 
 
-@kernel("float64(float64[::1], float64[:,::1], int64, int64, int64, float64, float64, float64, float64[::1])")
+@kernel()
 def attribute_jump(
-    mean: Array, P: Array, z: int, error: int, floor: int, height: float, R: float, gate: float, W: Array
+    mean: Vector, P: Matrix, at: HeightEntries, height: float, R: float, gate: float, W: Vector
 ) -> float:
     """Let the floor take up a height that is beyond the gate: the even floor again, else an object; returns H P H^T."""
-    variance = project_height(mean, P, z, error, floor, W)
-    y = height - height_of(mean, z, error, floor)
-    if floor < 0 or y * y <= max(gate * (variance + R), LEAST_OBJECT_M * LEAST_OBJECT_M):
+    variance = project_height(P, at, W)
+    y = height - height_of(mean, at)
+    if at.floor < 0 or y * y <= max(gate * (variance + R), LEAST_OBJECT_M * LEAST_OBJECT_M):
         return variance
-    forget(mean, P, floor, EVEN_M)
-    variance = project_height(mean, P, z, error, floor, W)
-    y = height - height_of(mean, z, error, floor)
+    forget(mean, P, at.floor, EVEN_M)
+    variance = project_height(P, at, W)
+    y = height - height_of(mean, at)
     if y * y > gate * (variance + R):
-        forget(mean, P, floor, OBJECT_M)
-        variance = project_height(mean, P, z, error, floor, W)
+        forget(mean, P, at.floor, OBJECT_M)
+        variance = project_height(P, at, W)
     return variance
 
 
-@kernel("void(float64[::1], float64[:,::1], int64, int64, int64, float64, float64, float64)")
-def correct_height(mean: Array, P: Array, z: int, error: int, floor: int, height: float, R: float, gate: float) -> None:
-    """Correct by one height, softly gated; indices into the state, -1 for entries that the block lacks.
+@kernel()
+def correct_height(mean: Vector, P: Matrix, at: HeightEntries, height: float, R: float, gate: float) -> None:
+    """Correct by one height, softly gated.
 
     As in correction.apply: P - W^T W / S.
     """
     n = P.shape[0]
     W = np.empty(n)
-    S = attribute_jump(mean, P, z, error, floor, height, R, gate, W) + R
-    y = height - height_of(mean, z, error, floor)
+    S = attribute_jump(mean, P, at, height, R, gate, W) + R
+    y = height - height_of(mean, at)
     if y * y > gate * S:
         S = y * y / gate
     root = math.sqrt(S)

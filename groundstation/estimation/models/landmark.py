@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array
+from groundstation.arrays import Array
 from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.protocol import Vector3
 
 
@@ -17,17 +17,19 @@ class Landmark:
 
     kind: ClassVar[EntityKind] = EntityKind.LANDMARK
     labels: ClassVar[tuple[str, ...]] = ()
-    kernels: ClassVar[tuple[int, int]] = (0, 0)
+    kernels: ClassVar[MotionKernels] = MotionKernels()
     present: ClassVar[bool] = True
     admitted: ClassVar[bool] = True
 
     position_m: Vector3
 
-    def row(self) -> Array:
-        """Return the place in the columns that sensors read."""
-        row = np.zeros(s.PARAMETER_COLUMNS)
-        row[:3] = self.position_m
-        return row
+    @property
+    def place_m(self) -> Vector3:
+        """Return where it stands."""
+        return self.position_m
+
+    def own(self) -> None:
+        """Return nothing: there is no kernel."""
 
     def prior(self) -> Array:
         """Return nothing: there is no block."""

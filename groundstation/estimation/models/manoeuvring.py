@@ -3,10 +3,12 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from groundstation.estimation.belief import Array
+from groundstation.arrays import Array
 from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.coordinated_turn import CoordinatedTurnTarget
-from groundstation.estimation.models.protocol import MotionModel
+from groundstation.estimation.models.protocol import MotionModel, Vector3
+from groundstation.kernel import Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +44,18 @@ class ManoeuvringTarget:
         return self.modes[0].labels
 
     @property
-    def kernels(self) -> tuple[int, int]:
+    def kernels(self) -> MotionKernels:
         """Return the kernels of the first mode."""
         return self.modes[0].kernels
 
-    def row(self) -> Array:
+    @property
+    def place_m(self) -> Vector3:
+        """Return the marker's place, alike in all modes."""
+        return self.modes[0].place_m
+
+    def own(self) -> Record | None:
         """Return the parameters of the first mode."""
-        return self.modes[0].row()
+        return self.modes[0].own()
 
     def prior(self) -> Array:
         """Return what joins, alike in all modes."""

@@ -6,42 +6,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.dispatch import BEGIN, PREDICT
-from groundstation.estimation.kernel import address_of, kernel
+from groundstation.arrays import Array, Matrix, Vector
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
+from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.driven import hold_velocity, position_density, take_heading, world_velocity
-from groundstation.estimation.models.height import EVEN_M, correct_height
+from groundstation.estimation.models.height import EVEN_M, HeightEntries, correct_height
 from groundstation.estimation.models.protocol import Vector3, place_of
 from groundstation.estimation.motion import add_column, depend, fade, mirror, wander
-
-(
-    VELOCITY_GAIN,
-    VELOCITY_DENSITY,
-    YAW_DENSITY,
-    SCALE_DENSITY,
-    CLIMB_STD,
-    CLIMB_TAU,
-    ATTITUDE_STD,
-    ATTITUDE_TAU,
-    HAS_CLIMB_RATE,
-    HEIGHT_VARIANCE,
-    HEIGHT_STD,
-    HEIGHT_TAU,
-    HOLD_S,
-    BIAS_STD,
-    BIAS_TAU,
-    FLOOR_DENSITY,
-    YAW_OFFSET_DENSITY,
-    AT_CLIMB,
-    AT_SCALE,
-    AT_HEIGHT_ERROR,
-    AT_FLOOR,
-    AT_BIAS_X,
-    AT_BIAS_Y,
-) = range(s.FIRST_OWN, s.FIRST_OWN + 23)
+from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, EntityRow, X, Y, Z, own_parameters
+from groundstation.kernel import Record, kernel
 
 SLOW_STATES = (
     "roll_error",
@@ -58,110 +33,143 @@ AERIAL = SLOW_STATES[:6]
 _TURN_SHARE = 0.02  # of each turn is in error
 
 
-@kernel("void(float64[:,::1], int64[::1], float64[::1], float64[::1], float64, float64)", inlined=True)
-def add_robot_noise(P: Array, entity: IntArray, p: Array, aux: Array, dt: float, turn: float) -> None:
+class RobotParameters(Record):
+    """Densities, deviations and correlation times of the errors, and where in the block the states of them stand.
+
+    velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
+    scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
+    the vehicle reports one; height_variance [m^2]: of one step's height; hold_s: how long a velocity holds in silence;
+    at_*: entries (-1: the block has none).
+    """
+
+    velocity_gain: float
+    velocity_density: float
+    yaw_density: float
+    yaw_offset_density: float
+    scale_density: float
+    floor_density: float
+    climb_std: float
+    climb_tau_s: float
+    attitude_std: float
+    attitude_tau_s: float
+    height_std: float
+    height_tau_s: float
+    bias_std: float
+    bias_tau_s: float
+    has_climb_rate: float
+    height_variance: float
+    hold_s: float
+    at_climb: int
+    at_velocity_scale: int
+    at_height_error: int
+    at_floor: int
+    at_velocity_bias_x: int
+    at_velocity_bias_y: int
+
+
+_OWN_STATES = ("climb", "velocity_scale", "height_error", "floor", "velocity_bias_x", "velocity_bias_y")
+_own = own_parameters(RobotParameters)
+
+
+@kernel(inlined=True)
+def add_robot_noise(P: Matrix, entity: EntityRow, p: RobotParameters, age_s: float, dt: float, turn: float) -> None:
     """Add the process noise of an odometry-driven robot over dt, in which it turned by `turn`."""
-    start = entity[s.ENTITY_START]
-    density = position_density(p[VELOCITY_DENSITY], aux[s.ODOMETRY_AGE], p[HOLD_S])
-    climbing = 1e-6 if p[AT_CLIMB] >= 0.0 or p[HAS_CLIMB_RATE] != 0.0 else p[CLIMB_STD] * p[CLIMB_STD] * p[CLIMB_TAU]
+    start = entity.start
+    density = position_density(p.velocity_density, age_s, p.hold_s)
+    climbing = 1e-6 if p.at_climb >= 0 or p.has_climb_rate != 0.0 else p.climb_std * p.climb_std * p.climb_tau_s
     P[start, start] += density * dt
     P[start + 1, start + 1] += density * dt
-    wander(P, start, s.Z, climbing * dt)
-    wander(P, start, s.YAW, p[YAW_DENSITY] * dt + _TURN_SHARE * _TURN_SHARE * turn * turn)
-    wander(P, start, int(p[AT_SCALE]), p[SCALE_DENSITY] * dt)
-    wander(P, start, int(p[AT_FLOOR]), p[FLOOR_DENSITY] * dt)
-    wander(P, start, entity[s.AT_YAW_OFFSET], p[YAW_OFFSET_DENSITY] * dt)
+    wander(P, start, Z, climbing * dt)
+    wander(P, start, YAW, p.yaw_density * dt + _TURN_SHARE * _TURN_SHARE * turn * turn)
+    wander(P, start, p.at_velocity_scale, p.scale_density * dt)
+    wander(P, start, p.at_floor, p.floor_density * dt)
+    wander(P, start, entity.at_yaw_offset, p.yaw_offset_density * dt)
 
 
-@kernel("void(float64[:,::1], int64, int64, float64, float64)", inlined=True)
-def turn_with_heading(P: Array, start: int, size: int, dx: float, dy: float) -> None:
+@kernel(inlined=True)
+def turn_with_heading(P: Matrix, start: int, size: int, dx: float, dy: float) -> None:
     """Couple the position to the yaw by which a displacement was rotated."""
     for j in range(P.shape[0]):
-        yaw = P[start + s.YAW, j]
+        yaw = P[start + YAW, j]
         P[start, j] -= dy * yaw
         P[start + 1, j] += dx * yaw
-    add_column(P, start, size, start, start + s.YAW, -dy)
-    add_column(P, start, size, start + 1, start + s.YAW, dx)
+    add_column(P, start, size, start, start + YAW, -dy)
+    add_column(P, start, size, start + 1, start + YAW, dx)
 
 
-@kernel("void(float64[::1], float64[:,::1], int64[::1], float64[::1], float64)")
-def fade_errors(mean: Array, P: Array, entity: IntArray, p: Array, dt: float) -> None:
+@kernel()
+def fade_errors(mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, dt: float) -> None:
     """Let all Gauss-Markov entries that the block has decay over dt."""
-    start, size = entity[s.ENTITY_START], entity[s.ENTITY_SIZE]
-    fade(mean, P, start, size, int(p[AT_CLIMB]), p[CLIMB_STD], dt / p[CLIMB_TAU])
-    fade(mean, P, start, size, entity[s.AT_ROLL_ERROR], p[ATTITUDE_STD], dt / p[ATTITUDE_TAU])
-    fade(mean, P, start, size, entity[s.AT_PITCH_ERROR], p[ATTITUDE_STD], dt / p[ATTITUDE_TAU])
-    fade(mean, P, start, size, int(p[AT_HEIGHT_ERROR]), p[HEIGHT_STD], dt / p[HEIGHT_TAU])
-    fade(mean, P, start, size, int(p[AT_BIAS_X]), p[BIAS_STD], dt / p[BIAS_TAU])
-    fade(mean, P, start, size, int(p[AT_BIAS_Y]), p[BIAS_STD], dt / p[BIAS_TAU])
+    start, size = entity.start, entity.size
+    fade(mean, P, start, size, p.at_climb, p.climb_std, dt / p.climb_tau_s)
+    fade(mean, P, start, size, entity.at_roll_error, p.attitude_std, dt / p.attitude_tau_s)
+    fade(mean, P, start, size, entity.at_pitch_error, p.attitude_std, dt / p.attitude_tau_s)
+    fade(mean, P, start, size, p.at_height_error, p.height_std, dt / p.height_tau_s)
+    fade(mean, P, start, size, p.at_velocity_bias_x, p.bias_std, dt / p.bias_tau_s)
+    fade(mean, P, start, size, p.at_velocity_bias_y, p.bias_std, dt / p.bias_tau_s)
 
 
-@kernel(PREDICT)
-def predict_odometry_robot(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, e: int, dt: float
-) -> None:
+@kernel()
+def predict_odometry_robot(belief: Belief, e: int, dt: float) -> None:
     """Move a robot by its held odometry: velocity [base_stabilized] less bias, times gain, and its yaw rate.
 
     The scale state acts on the smoothed velocity: reported velocities are noisy, and a noisy regressor draws its
     factor down (by 0.2 here, were it the instantaneous one: what explains quick differences is mostly noise).
 
-    PAPER: departs from the authors' program, which leaves out the derivative of the rotated velocity by yaw.
+    PAPER (docs/explanation/method.md 7): the authors' program leaves out the derivative of the rotated velocity by yaw.
     """
-    entity, p, inputs = entities[e], parameters[e], aux[e]
-    start, size = entity[s.ENTITY_START], entity[s.ENTITY_SIZE]
-    climb, scale, bias_x, bias_y = int(p[AT_CLIMB]), int(p[AT_SCALE]), int(p[AT_BIAS_X]), int(p[AT_BIAS_Y])
-    turn = inputs[s.YAW_RATE] * dt
-    heading = mean[start + s.YAW] + 0.5 * turn
-    c, n = math.cos(heading) * p[VELOCITY_GAIN] * dt, math.sin(heading) * p[VELOCITY_GAIN] * dt
-    vx, vy = inputs[s.HELD_VX], inputs[s.HELD_VY]
+    mean, P, entity, inputs = belief.mean, belief.P, belief.entities[e], belief.memory[e]
+    start, size, p = entity.start, entity.size, _own(entity)
+    climb, scale, bias_x, bias_y = p.at_climb, p.at_velocity_scale, p.at_velocity_bias_x, p.at_velocity_bias_y
+    turn = inputs.yaw_rate * dt
+    heading = mean[start + YAW] + 0.5 * turn
+    c, n = math.cos(heading) * p.velocity_gain * dt, math.sin(heading) * p.velocity_gain * dt
+    vx, vy = inputs.held_vx, inputs.held_vy
     if bias_x >= 0:
         vx, vy = vx - mean[start + bias_x], vy - mean[start + bias_y]
-    slow_x, slow_y = inputs[s.SLOW_VX], inputs[s.SLOW_VY]
+    slow_x, slow_y = inputs.slow_vx, inputs.slow_vy
     if scale >= 0:
         vx, vy = vx + (mean[start + scale] - 1.0) * slow_x, vy + (mean[start + scale] - 1.0) * slow_y
     dx, dy = c * vx - n * vy, n * vx + c * vy
-    climb_rate = p[HAS_CLIMB_RATE] * inputs[s.HELD_VZ]
+    climb_rate = p.has_climb_rate * inputs.held_vz
     if climb >= 0:
         climb_rate += mean[start + climb]
     rate = 1.0 / dt
-    inputs[s.RATE_X], inputs[s.RATE_Y], inputs[s.RATE_Z] = dx * rate, dy * rate, climb_rate
+    inputs.velocity_x, inputs.velocity_y, inputs.velocity_z = dx * rate, dy * rate, climb_rate
     mean[start] += dx
     mean[start + 1] += dy
-    mean[start + s.Z] += climb_rate * dt
-    mean[start + s.YAW] = wrap(mean[start + s.YAW] + turn)
+    mean[start + Z] += climb_rate * dt
+    mean[start + YAW] = wrap(mean[start + YAW] + turn)
     turn_with_heading(P, start, size, dx, dy)
     if scale >= 0:
-        depend(P, start, size, s.X, scale, c * slow_x - n * slow_y)
-        depend(P, start, size, s.Y, scale, n * slow_x + c * slow_y)
+        depend(P, start, size, X, scale, c * slow_x - n * slow_y)
+        depend(P, start, size, Y, scale, n * slow_x + c * slow_y)
     if bias_x >= 0:
-        depend(P, start, size, s.X, bias_x, -c)
-        depend(P, start, size, s.X, bias_y, n)
-        depend(P, start, size, s.Y, bias_x, -n)
-        depend(P, start, size, s.Y, bias_y, -c)
+        depend(P, start, size, X, bias_x, -c)
+        depend(P, start, size, X, bias_y, n)
+        depend(P, start, size, Y, bias_x, -n)
+        depend(P, start, size, Y, bias_y, -c)
     if climb >= 0:
-        depend(P, start, size, s.Z, climb, dt)
+        depend(P, start, size, Z, climb, dt)
     if size > len(ROBOT_CORE):
         fade_errors(mean, P, entity, p, dt)
-    add_robot_noise(P, entity, p, inputs, dt, turn)
+    add_robot_noise(P, entity, p, inputs.odometry_age_s, dt, turn)
     mirror(P, start, size, 2 if size == 4 else size)
 
 
-@kernel(BEGIN)
-def begin_odometry_robot(
-    mean: Array, P: Array, entities: IntArray, parameters: Array, aux: Array, odometry: Array, e: int, step: float,
-    gate: float,
-) -> None:  # fmt: skip
+@kernel()
+def begin_odometry_robot(belief: Belief, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
     """Take the odometry of one step and, where the robot is in the state, correct by its height."""
-    p, condensed = parameters[e], odometry[e]
-    hold_velocity(condensed, aux[e], p[HOLD_S], step)
-    take_heading(condensed, aux[e], step)
-    if aux[e, s.ACTIVE] == 0.0 or aux[e, s.UNCONFIRMED] != 0.0 or condensed[s.HEIGHT_COUNT] == 0.0:
+    entity, memory = belief.entities[e], belief.memory[e]
+    start, p = entity.start, _own(entity)
+    hold_velocity(odometry, memory, p.hold_s, step_s)
+    take_heading(odometry, memory, step_s)
+    if memory.active == 0 or memory.unconfirmed != 0 or odometry.height_count == 0.0:
         return
-    start = entities[e, s.ENTITY_START]
-    error = start + int(p[AT_HEIGHT_ERROR]) if p[AT_HEIGHT_ERROR] >= 0.0 else -1
-    floor = start + int(p[AT_FLOOR]) if p[AT_FLOOR] >= 0.0 else -1
-    height = condensed[s.HEIGHT_SUM] / condensed[s.HEIGHT_COUNT]
-    correct_height(mean, P, start + s.Z, error, floor, height, p[HEIGHT_VARIANCE], gate)
+    error = start + p.at_height_error if p.at_height_error >= 0 else -1
+    floor = start + p.at_floor if p.at_floor >= 0 else -1
+    height = odometry.height_sum / odometry.height_count
+    correct_height(belief.mean, belief.P, HeightEntries(start + Z, error, floor), height, p.height_variance, gate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +184,7 @@ class OdometryRobot:
     """
 
     kind: ClassVar[EntityKind] = EntityKind.ROBOT
-    kernels: ClassVar[tuple[int, int]] = (address_of(predict_odometry_robot), address_of(begin_odometry_robot))
+    kernels: ClassVar[MotionKernels] = MotionKernels(predict_odometry_robot, begin_odometry_robot)
     present: ClassVar[bool] = False
 
     marker_position_m: Vector3 = (0.0, 0.0, 0.08)
@@ -208,25 +216,34 @@ class OdometryRobot:
         """Return the entries of the block."""
         return (*ROBOT_CORE, *(label for label in SLOW_STATES if label in self.slow_states))
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernels read."""
-        row = np.zeros(s.PARAMETER_COLUMNS)
-        row[:3] = self.marker_position_m
-        row[VELOCITY_GAIN] = self.velocity_scale
-        row[VELOCITY_DENSITY] = self.velocity_std_m_s**2 * self.velocity_correlation_s
-        row[YAW_DENSITY], row[YAW_OFFSET_DENSITY] = self.yaw_std_rad**2, self.yaw_offset_drift_rad**2
-        row[SCALE_DENSITY] = self.scale_drift**2
-        row[CLIMB_STD], row[CLIMB_TAU] = self.climb_std_m_s, self.climb_correlation_s
-        row[ATTITUDE_STD], row[ATTITUDE_TAU] = self.attitude_std_rad, self.attitude_correlation_s
-        row[HEIGHT_STD], row[HEIGHT_TAU] = self.height_std_m, self.height_correlation_s
-        row[BIAS_STD], row[BIAS_TAU] = self.velocity_bias_std_m_s, self.velocity_bias_correlation_s
-        # The slow part of the error is a state; what is left is quick, and alike in neighbouring samples.
-        row[HEIGHT_VARIANCE] = (0.5 * self.height_std_m) ** 2
-        row[FLOOR_DENSITY] = EVEN_M**2 / 3600.0
-        row[HAS_CLIMB_RATE], row[HOLD_S] = float(self.reports_climb), self.hold_s
-        labels = ("climb", "velocity_scale", "height_error", "floor", "velocity_bias_x", "velocity_bias_y")
-        row[AT_CLIMB : AT_BIAS_Y + 1] = [place_of(self.labels, label) for label in labels]
-        return row
+    @property
+    def place_m(self) -> Vector3:
+        """Return where the marker is."""
+        return self.marker_position_m
+
+    def own(self) -> RobotParameters:
+        """Return the parameters that the kernels read."""
+        return RobotParameters.row(
+            velocity_gain=self.velocity_scale,
+            velocity_density=self.velocity_std_m_s**2 * self.velocity_correlation_s,
+            yaw_density=self.yaw_std_rad**2,
+            yaw_offset_density=self.yaw_offset_drift_rad**2,
+            scale_density=self.scale_drift**2,
+            floor_density=EVEN_M**2 / 3600.0,
+            climb_std=self.climb_std_m_s,
+            climb_tau_s=self.climb_correlation_s,
+            attitude_std=self.attitude_std_rad,
+            attitude_tau_s=self.attitude_correlation_s,
+            height_std=self.height_std_m,
+            height_tau_s=self.height_correlation_s,
+            bias_std=self.velocity_bias_std_m_s,
+            bias_tau_s=self.velocity_bias_correlation_s,
+            has_climb_rate=float(self.reports_climb),
+            # The slow part of the error is a state; what is left is quick, and alike in neighbouring samples.
+            height_variance=(0.5 * self.height_std_m) ** 2,
+            hold_s=self.hold_s,
+            **{f"at_{label}": place_of(self.labels, label) for label in _OWN_STATES},
+        )
 
     def prior(self) -> Array:
         """Return mean and variances (2, size) of the slow states when it joins."""
@@ -244,12 +261,12 @@ class OdometryRobot:
         means = [float(label == "velocity_scale") for label in self.labels]
         return np.array([means, [deviations.get(label, 0.0) ** 2 for label in self.labels]])
 
-    def velocity_m_s(self, block: Array, aux: Array) -> Vector3:
+    def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
         """Return the velocity [world] from the block's mean and the held odometry."""
         state = dict(zip(self.labels, block, strict=True))
         rest = state.get("velocity_scale", 1.0) - 1.0
-        vx = aux[s.HELD_VX] + rest * aux[s.SLOW_VX] - state.get("velocity_bias_x", 0.0)
-        vy = aux[s.HELD_VY] + rest * aux[s.SLOW_VY] - state.get("velocity_bias_y", 0.0)
+        vx = memory["held_vx"] + rest * memory["slow_vx"] - state.get("velocity_bias_x", 0.0)
+        vy = memory["held_vy"] + rest * memory["slow_vy"] - state.get("velocity_bias_y", 0.0)
         forward, left = self.velocity_scale * vx, self.velocity_scale * vy
-        climb = state.get("climb", 0.0) + float(self.reports_climb) * aux[s.HELD_VZ]
-        return world_velocity(block[s.YAW], forward, left, climb)
+        climb = state.get("climb", 0.0) + float(self.reports_climb) * memory["held_vz"]
+        return world_velocity(block[YAW], forward, left, climb)

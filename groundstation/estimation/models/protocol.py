@@ -1,13 +1,16 @@
-"""What a model is: the figures that Python holds, and the addresses of the kernels that do the work.
+"""What a model is: the figures that Python holds, and the kernels that do the work.
 
-A new model is one file: a frozen dataclass of its figures with these members, and its kernels, declared with the
-signatures of dispatch.py. Nothing else has to know it.
+A new model is one file: a frozen dataclass of its figures with these members, its kernels as model_kernels.py declares
+them, and a Record of what they read. Nothing else has to know it (docs/how-to/add-a-sensor-model.md 1).
 """
 
 from typing import Protocol, runtime_checkable
 
-from groundstation.estimation.belief import Array
+from groundstation.arrays import Array
 from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.model_kernels import MotionKernels, SensorKernels
+from groundstation.estimation.records import EntityMemory
+from groundstation.kernel import Record
 
 Vector3 = tuple[float, float, float]
 
@@ -24,8 +27,8 @@ class MotionModel(Protocol):
         """Entries of the block, which begins as layout.py says."""
 
     @property
-    def kernels(self) -> tuple[int, int]:
-        """Addresses of PREDICT and BEGIN (dispatch.py); 0 where the model does nothing."""
+    def kernels(self) -> MotionKernels:
+        """The kernels."""
 
     @property
     def present(self) -> bool:
@@ -35,8 +38,12 @@ class MotionModel(Protocol):
     def admitted(self) -> bool:
         """Whether it may be in the state before anybody says so (a vehicle that must fly may not)."""
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernels read."""
+    @property
+    def place_m(self) -> Vector3:
+        """The centre of its marker [base] or, without a block, where it stands [world]."""
+
+    def own(self) -> Record | None:
+        """Return the parameters that its kernels read (`own_parameters`)."""
 
     def prior(self) -> Array:
         """Return mean and variances (2, size) of what joins; pose entries are overwritten where a pose was measured."""
@@ -54,8 +61,8 @@ class DrivenModel(MotionModel, Protocol):
     def height_delay_s(self) -> float:
         """How long before its stamp a height was true."""
 
-    def velocity_m_s(self, block: Array, aux: Array) -> Vector3:
-        """Return the velocity [world] from the block's mean and the inputs held in its auxiliary row."""
+    def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
+        """Return the velocity [world] from the block's mean and the inputs that are held."""
 
 
 @runtime_checkable
@@ -87,15 +94,47 @@ class ObservationModel(Protocol):
         """For how long an error of one pair repeats: readings within it share one reading's information."""
 
     @property
-    def kernels(self) -> tuple[int, int, int]:
-        """Addresses of MEASURE, PREPARE and LOCATE (dispatch.py)."""
+    def stamp_std_s(self) -> float:
+        """Standard deviation of the time of measurement."""
+
+    @property
+    def kernels(self) -> SensorKernels:
+        """The kernels."""
 
     @property
     def angles(self) -> tuple[int, ...]:
         """Rows of z that are angles."""
 
-    def row(self) -> Array:
-        """Return the parameters in the columns that the kernels read, from FIRST_SENSOR_OWN on."""
+    def own(self) -> Record | None:
+        """Return the parameters that its kernels read (`own_parameters`)."""
+
+
+class SensorDefaults:
+    """What most sensors have in common; a model that is different says so."""
+
+    @property
+    def observes_targets(self) -> bool:
+        """Return that it may be used for targets."""
+        return True
+
+    @property
+    def repeats_s(self) -> float:
+        """Return that errors do not repeat."""
+        return 0.0
+
+    @property
+    def stamp_std_s(self) -> float:
+        """Return that the time of measurement is exact."""
+        return 0.0
+
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Return that no row is an angle."""
+        return ()
+
+    def own(self) -> Record | None:
+        """Return nothing: there are no parameters."""
+        return None
 
 
 def place_of(labels: tuple[str, ...], wanted: str) -> int:

@@ -2,60 +2,63 @@
 
 import math
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array, IntArray
-from groundstation.estimation.kernel import kernel
+from groundstation.arrays import Matrix, Vector
+from groundstation.estimation.filter_state import Belief
+from groundstation.estimation.records import EntityRow, EventRow, X, Y, Z
+from groundstation.kernel import kernel
 
 
-@kernel("void(float64[::1], float64[::1], float64[::1])", inlined=True)
-def lean(p: Array, event: Array, offset: Array) -> None:
+@kernel(inlined=True)
+def lean(entity: EntityRow, event: EventRow, offset: Vector) -> None:
     """Write where the marker is from the entity's centre [base_stabilized]: what accelerates leans, and it with it."""
-    roll, pitch = event[s.EVENT_SUBJECT_ROLL], event[s.EVENT_SUBJECT_PITCH]
+    roll, pitch = event.subject_roll, event.subject_pitch
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    offset[1], up = cr * p[s.PLACE_Y] - sr * p[s.PLACE_Z], sr * p[s.PLACE_Y] + cr * p[s.PLACE_Z]
-    offset[0], offset[2] = cp * p[s.PLACE_X] + sp * up, cp * up - sp * p[s.PLACE_X]
+    x, y, z = entity.place_x, entity.place_y, entity.place_z
+    offset[Y], up = cr * y - sr * z, sr * y + cr * z
+    offset[X], offset[Z] = cp * x + sp * up, cp * up - sp * x
 
 
-@kernel("void(int64[::1], float64[::1], float64[::1], float64, float64[::1])", inlined=True)
-def marker_offset(entity: IntArray, p: Array, event: Array, yaw: float, offset: Array) -> None:
+@kernel(inlined=True)
+def marker_offset(entity: EntityRow, event: EventRow, yaw: float, offset: Vector) -> None:
     """Write where the marker is from the entity's centre [world's axes] for a given heading."""
-    offset[0], offset[1], offset[2] = p[s.PLACE_X], p[s.PLACE_Y], p[s.PLACE_Z]
-    if entity[s.AT_YAW] < 0:
+    offset[X], offset[Y], offset[Z] = entity.place_x, entity.place_y, entity.place_z
+    if entity.at_yaw < 0:
         return
-    lean(p, event, offset)
+    lean(entity, event, offset)
     c, n = math.cos(yaw), math.sin(yaw)
-    offset[0], offset[1] = c * offset[0] - n * offset[1], n * offset[0] + c * offset[1]
+    offset[X], offset[Y] = c * offset[X] - n * offset[Y], n * offset[X] + c * offset[Y]
 
 
-@kernel("void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1], float64[::1])", inlined=True)
-def marker_point(mean: Array, entity: IntArray, p: Array, event: Array, point: Array, slope: Array) -> None:
-    """Write the marker's centre [world] and its derivative (x, y) by the subject's yaw.
+@kernel(inlined=True)
+def marker_point(belief: Belief, event: EventRow, point: Vector, slope: Vector) -> None:
+    """Write the subject's marker's centre [world] and its derivative (x, y) by the subject's yaw.
 
     Without z in the block the marker is at a known height; without yaw it is over the centre; without a block the
     entity stands where its parameters say.
     """
-    start = entity[s.ENTITY_START]
-    slope[0] = slope[1] = 0.0
-    point[0], point[1], point[2] = p[s.PLACE_X], p[s.PLACE_Y], p[s.PLACE_Z]
-    if entity[s.ENTITY_SIZE] == 0:
+    mean, entity = belief.mean, belief.entities[event.subject]
+    start = entity.start
+    slope[X] = slope[Y] = 0.0
+    point[X], point[Y], point[Z] = entity.place_x, entity.place_y, entity.place_z
+    if entity.size == 0:
         return
-    if entity[s.AT_YAW] >= 0:
-        yaw = mean[start + entity[s.AT_YAW]]
-        marker_offset(entity, p, event, yaw, point)
-        slope[0], slope[1] = -point[1], point[0]
-    point[0] += mean[start]
-    point[1] += mean[start + 1]
-    if entity[s.AT_Z] >= 0:
-        point[2] += mean[start + entity[s.AT_Z]]
+    if entity.at_yaw >= 0:
+        yaw = mean[start + entity.at_yaw]
+        marker_offset(entity, event, yaw, point)
+        slope[X], slope[Y] = -point[Y], point[X]
+    point[X] += mean[start + X]
+    point[Y] += mean[start + Y]
+    if entity.at_z >= 0:
+        point[Z] += mean[start + entity.at_z]
 
 
-@kernel("void(int64[::1], float64[::1], float64[::1], float64[:,::1], int64)", inlined=True)
-def chain_subject(entity: IntArray, slope: Array, by_point: Array, H: Array, row: int) -> None:
+@kernel(inlined=True)
+def chain_subject(entity: EntityRow, slope: Vector, by_point: Vector, H: Matrix, row: int) -> None:
     """Write one row of H for the subject's block from the derivative by its marker's point (3)."""
-    if entity[s.ENTITY_SIZE] == 0:
+    if entity.size == 0:
         return
-    H[row, s.X], H[row, s.Y] = by_point[0], by_point[1]
-    if entity[s.AT_Z] >= 0:
-        H[row, entity[s.AT_Z]] = by_point[2]
-    if entity[s.AT_YAW] >= 0:
-        H[row, entity[s.AT_YAW]] += by_point[0] * slope[0] + by_point[1] * slope[1]
+    H[row, X], H[row, Y] = by_point[X], by_point[Y]
+    if entity.at_z >= 0:
+        H[row, entity.at_z] = by_point[Z]
+    if entity.at_yaw >= 0:
+        H[row, entity.at_yaw] += by_point[X] * slope[X] + by_point[Y] * slope[Y]

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from groundstation.estimation.belief import Array
-from groundstation.estimation.parabola import least
+from groundstation.arrays import Array
+from groundstation.geometry.parabola import least
+from groundstation.time_units import NS_PER_S
 
 # Lateness that is tried out [s], and about how far apart the two sightings are that are compared [s].
 _TRIED_S = np.arange(-0.10, 0.2001, 0.02)
@@ -25,7 +26,6 @@ _COARSE_STD_RAD, _WILD = 0.03, 8.0
 _LEAST_PAIRS, _UNTOLD_S = 60.0, 0.025
 # Subjects of one camera that are followed: more are not worth the time. One unseen for so long [s] makes room.
 _FOLLOWED, _GONE_S = 4, 5.0
-NS_PER_S = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)

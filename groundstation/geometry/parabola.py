@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.estimation.belief import Array
+from groundstation.arrays import Array
 
 
 class Least(NamedTuple):

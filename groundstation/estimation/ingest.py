@@ -15,8 +15,8 @@ from groundstation.bus.messages import (
     Verdict,
 )
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
-from groundstation.estimation.measurement import Measurement, Motion
-from groundstation.estimation.repetition import FreezeWatch
+from groundstation.estimation.frozen_sensor import FreezeWatch
+from groundstation.estimation.measurement import Measurement, OdometrySample
 
 _AIRBORNE = {
     FlightState.FLYING: True,
@@ -102,7 +102,7 @@ class Intake:
         values = (message.velocity_m_s, *attitude, message.height_m)
         if self._odometry_watch.is_frozen(message.header.entity, values, stamp_ns):
             return Verdict.FROZEN
-        motion = Motion(
+        motion = OdometrySample(
             stamp_ns,
             message.velocity_m_s,
             message.yaw_rad,

@@ -1,0 +1,89 @@
+"""Whom to blame for an observation far beyond the gate: marker, observer, outlier, or the belief of the subject."""
+
+import numpy as np
+
+from groundstation.estimation.filter_state import Belief, Hypothesis, Settings
+from groundstation.estimation.linear import copy_matrix
+from groundstation.estimation.records import (
+    IMPLAUSIBLE,
+    KIND_ROBOT,
+    KIND_TARGET,
+    MISTAKEN,
+    OBSERVER_DOUBTED,
+    PENDING,
+    EntityMemory,
+    EventRow,
+    Innovation,
+    SensorRow,
+    Streak,
+)
+from groundstation.estimation.update import linearise
+from groundstation.kernel import kernel
+
+_INNOVATION = Innovation.dtype
+
+
+@kernel()
+def fits_another(
+    belief: Belief, sensor: SensorRow, settings: Settings, event: EventRow, rows: int, hypothesis: Hypothesis
+) -> bool:
+    """Return whether what was seen is where the belief has another robot or target: its marker was misread."""
+    subject = event.subject
+    work, HP = np.empty(1, _INNOVATION), np.empty((4, belief.mean.shape[0]))
+    found = False
+    for other in range(belief.entities.shape[0]):
+        entity = belief.entities[other]
+        if other in (subject, event.observer) or belief.memory[other].active == 0:
+            continue
+        if entity.kind != KIND_ROBOT and entity.kind != KIND_TARGET:
+            continue
+        shared = rows if rows < 4 or entity.at_yaw >= 0 else 3
+        event.subject = other
+        copy_matrix(hypothesis.innovations[0].R, work[0].R)
+        linearise(belief, sensor, event, shared, hypothesis.z, work[0], HP)
+        found = found or 0.0 <= work[0].nis <= settings.wild_gates * settings.gates[shared]
+    event.subject = subject
+    return found
+
+
+@kernel()
+def is_doubted(memory: EntityMemory, settings: Settings, at: float) -> bool:
+    """Return whether an entity was itself seen far from its place, more than once and until just now."""
+    return memory.wild.count >= 2 and at - memory.wild_at <= settings.divergence_s
+
+
+@kernel()
+def insists(streak: Streak, settings: Settings, at: float) -> bool:
+    """Count one more contradiction in a row; True when they are enough, and last long enough, to be believed."""
+    if streak.count == 0:
+        streak.since = at
+    streak.count += 1
+    return at - streak.since >= settings.divergence_s and streak.count >= settings.divergence_count
+
+
+@kernel()
+def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
+    """Count a wild innovation of one entity; True when they last long enough to blame the belief.
+
+    `observe` ends the count when the entity is seen within the gate. What has joined by one observation and was never
+    confirmed since has nothing to set against another.
+    """
+    if memory.unconfirmed != 0:
+        return True
+    memory.wild_at = at
+    return insists(memory.wild, settings, at)
+
+
+@kernel()
+def blame(
+    belief: Belief, sensor: SensorRow, settings: Settings, event: EventRow, rows: int, hypothesis: Hypothesis
+) -> int:
+    """Return why a wild observation is refused, or PENDING when the subject's belief is to be given up for it.
+
+    belief: of the first mode, as is the noise of the hypothesis that counts.
+    """
+    if is_doubted(belief.memory[event.observer], settings, event.at):
+        return OBSERVER_DOUBTED
+    if fits_another(belief, sensor, settings, event, rows, hypothesis):
+        return MISTAKEN
+    return PENDING if has_diverged(belief.memory[event.subject], settings, event.at) else IMPLAUSIBLE

@@ -1,0 +1,232 @@
+"""The rows of the compiled filter's tables, and the numbers that stand for kinds and verdicts.
+
+Times are in seconds since the filter's origin. Nothing here belongs to one model: a model's own parameters are a record
+in its file, which the kernels find by `own_parameters`.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, TypeVar
+
+from groundstation.arrays import Array, IntArray
+from groundstation.kernel import Record, viewed_as
+
+Own = TypeVar("Own", bound=Record)
+
+MAX_BLOCK = 16
+MAX_ROWS = 4  # of a measurement
+OWN_WORDS = 30  # numbers that a model's own parameters may have
+
+KIND_ROBOT, KIND_TARGET, KIND_CAMERA, KIND_LANDMARK = range(4)
+
+# Entries of every block that has any: a robot or camera begins with x, y, z, yaw; a target with x, y, vx, vy.
+X, Y, Z, YAW = range(4)
+VX, VY = 2, 3
+POSE = 4  # entries of a pose
+
+# What an event is. ADMITTED: the subject may join, and does at once if it has a prior; DISMISSED: it leaves; PLACED: it
+# is put where the event says.
+OBSERVATION, ADMITTED, DISMISSED, PLACED = range(4)
+EVENT_KINDS = 4
+
+# Verdicts of the compiled filter (names in event_log.py).
+(PENDING, ACCEPTED, INFLATED, IMPLAUSIBLE, OUT_OF_VIEW, SINGULAR, OBSERVER_UNKNOWN, SUBJECT_GROUNDED, YAW_MISSING) = (
+    range(9)
+)
+NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED = 9, 10, 11, 12, 13
+
+# Entries of a block that the models of other entities may ask for: EntityRow has their places.
+SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
+
+
+class EntityRow(Record):
+    """An entity: addresses of its model's kernels (0: none), its block, its place, and what only its model reads.
+
+    start, size: of the block in the state; kind: KIND_ROBOT and so on; present: 1 if its prior alone puts it into the
+    state; at_*: where in the block an entry stands (-1: the block has none); place_*: the centre of its marker [m;
+    base] or, without a block, where it stands [m; world]; own: see `own_parameters`.
+    """
+
+    predict: int
+    begin: int
+    start: int
+    size: int
+    kind: int
+    present: int
+    at_z: int
+    at_yaw: int
+    at_roll_error: int
+    at_pitch_error: int
+    at_yaw_offset: int
+    at_range_bias: int
+    at_range_scale: int
+    at_bearing_bias: int
+    place_x: float
+    place_y: float
+    place_z: float
+    own: Annotated[IntArray, (OWN_WORDS,)]
+
+
+class PriorRow(Record):
+    """Mean and variances of an entity that joins, in the order of its block."""
+
+    mean: Annotated[Array, (MAX_BLOCK,)]
+    variances: Annotated[Array, (MAX_BLOCK,)]
+
+
+class SensorRow(Record):
+    """A sensor: addresses of its model's kernels, and what only its model reads.
+
+    is_angle: 1 for each row of a measurement that is an angle; repeats_s: for how long an error of one pair repeats;
+    stamp_variance_s2: of the time of measurement; own: see `own_parameters`.
+    """
+
+    measure: int
+    prepare: int
+    locate: int
+    is_angle: Annotated[IntArray, (MAX_ROWS,)]
+    repeats_s: float
+    stamp_variance_s2: float
+    own: Annotated[IntArray, (OWN_WORDS,)]
+
+
+def own_parameters(record: type[Own]) -> Callable[[EntityRow | SensorRow], Own]:
+    """Return a function for use inside kernels: the parameters of a row's own model, as the model's record."""
+    return viewed_as(record, "own")
+
+
+class Streak(Record):
+    """Contradictions in a row: their number, and the time of the first."""
+
+    count: int
+    since: float
+
+
+class EntityMemory(Record):
+    """What is remembered of an entity beside mean and covariance; part of every checkpoint.
+
+    active: 1 if it is in the state; admitted: 1 if it may be; unconfirmed: 1 until a second observation agrees.
+    held_*, yaw_rate: inputs held during a step: velocity [m/s; base_stabilized], turn rate [rad/s], roll and pitch
+    [rad]; slow_v*: the velocity smoothed; commanded_*: what a CommandedRobot was last told; odometry_age_s: since the
+    last velocity; last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before.
+    velocity_*: how fast x, y, z change [m/s; world], as last predicted.
+    wild: observations far beyond the gate, the last of them at wild_at; refused: observations by which it would have
+    joined, had they not contradicted their observer; corrected_at: last use of an observation.
+    """
+
+    active: int
+    admitted: int
+    unconfirmed: int
+    held_vx: float
+    held_vy: float
+    held_vz: float
+    held_roll: float
+    held_pitch: float
+    yaw_rate: float
+    slow_vx: float
+    slow_vy: float
+    commanded_vx: float
+    commanded_rate: float
+    odometry_age_s: float
+    last_yaw: float
+    last_reset: float
+    has_yaw: int
+    velocity_x: float
+    velocity_y: float
+    velocity_z: float
+    wild: Streak
+    wild_at: float
+    refused: Streak
+    corrected_at: float
+
+
+class CondensedOdometry(Record):
+    """Odometry of one robot in one step: sums with their counts, and the newest attitude.
+
+    Velocities [m/s; base_stabilized], rate [rad/s], height [m]; newest_at: time of the newest attitude [ns since the
+    filter's origin; -1: none], reset: the number of its heading's resets. All are floats: Python adds to them.
+    """
+
+    sum_vx: float
+    sum_vy: float
+    sum_vz: float
+    sum_rate: float
+    velocity_count: float
+    newest_at: float
+    newest_yaw: float
+    newest_reset: float
+    newest_roll: float
+    newest_pitch: float
+    height_sum: float
+    height_count: float
+
+
+class RawReading(Record):
+    """A measurement as it came; rows that it lacks are zero, in R those of an identity."""
+
+    z: Annotated[Array, (MAX_ROWS,)]
+    R: Annotated[Array, (MAX_ROWS, MAX_ROWS)]
+
+
+class EventRow(Record):
+    """One event at its time of measurement: an observation, or a change of who may be in the state.
+
+    at [s]; kind: OBSERVATION and so on; observer, subject, sensor: numbers in the tables; step: in which `at` lies;
+    size: rows of the measurement; has_alternative: 1 if there is a second hypothesis; roll, pitch: the observer's as
+    reported [rad]. A PLACED event has its pose and covariance in `measured`. The rest is written when the event is
+    reached: how the subject leans [rad], how fast the first entries of both blocks change.
+    """
+
+    at: float
+    kind: int
+    observer: int
+    subject: int
+    sensor: int
+    step: int
+    size: int
+    has_alternative: int
+    roll: float
+    pitch: float
+    measured: RawReading
+    alternative: RawReading
+    subject_roll: float
+    subject_pitch: float
+    observer_rates: Annotated[Array, (POSE,)]
+    subject_rates: Annotated[Array, (POSE,)]
+
+
+class OutcomeRow(Record):
+    """What became of an event: verdict, and residual with its covariance (row-major) and NIS; size: their rows."""
+
+    verdict: int
+    size: int
+    nis: float
+    residual: Annotated[Array, (MAX_ROWS,)]
+    covariance: Annotated[Array, (MAX_ROWS * MAX_ROWS,)]
+    alternative_chosen: int
+    joined: int
+
+
+class Prediction(Record):
+    """What a sensor's model expects: h(x) and its Jacobians by the blocks of observer and subject.
+
+    size: rows that are wanted. All the rest is zero when the model is asked: it writes what is not.
+    """
+
+    size: int
+    h: Annotated[Array, (MAX_ROWS,)]
+    H_observer: Annotated[Array, (MAX_ROWS, MAX_BLOCK)]
+    H_subject: Annotated[Array, (MAX_ROWS, MAX_BLOCK)]
+
+
+class Innovation(Record):
+    """An observation against one belief: y = z - h(x), R, H P H^T, the Cholesky factor of S, and the NIS.
+
+    A NIS of -1 says that S is not positive definite: such a belief cannot use the observation.
+    """
+
+    prediction: Prediction
+    y: Annotated[Array, (MAX_ROWS,)]
+    R: Annotated[Array, (MAX_ROWS, MAX_ROWS)]
+    HPH: Annotated[Array, (MAX_ROWS, MAX_ROWS)]
+    factor: Annotated[Array, (MAX_ROWS, MAX_ROWS)]
+    nis: float

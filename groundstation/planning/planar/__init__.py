@@ -1,1 +1,0 @@
-"""Planner for point robots in the plane: the method's own setting, with exact gradients and certified pruning."""

@@ -1,4 +1,4 @@
-"""How the team estimates, plans, stays safe, and what is kept of a run."""
+"""Settings of the estimator, the planner, safety, the recording and the console."""
 
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -6,18 +6,23 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from groundstation.settings.values import Section
+from groundstation.settings.values import SettingsSection
 
 Height = Annotated[float, Field(ge=0.3, le=20)]
 
 
-class Estimator(Section):
-    """The joint EKF: its rate, how late a measurement may be, its gate, and when a target counts as lost."""
+class EstimatorSettings(SettingsSection):
+    """The joint EKF: its rate, its gate, and when a measurement is too late or a target lost."""
 
     rate_hz: Annotated[int, Field(ge=10, le=200)] = 50
+    """Ticks of the tracker per second: the belief is advanced and setpoints are sent at this rate."""
     max_lateness_s: Annotated[float, Field(gt=0, le=5)] = 0.5
+    """Age [s] up to which a late measurement is still fused in its place; an older one is refused as LATE."""
     gate_probability: Annotated[float, Field(ge=0.5, lt=1)] = 0.997
+    """Share of good measurements that the chi-square gate lets pass (0.997: 3 sigma of one axis). Larger accepts
+    more outliers; smaller discards more good measurements."""
     lost_after_s: Annotated[float, Field(gt=0, le=60)] = 3.0
+    """Time [s] without an observation of a target after which the team searches for it."""
 
 
 def _falling(levels: tuple[float, ...]) -> tuple[float, ...]:
@@ -42,47 +47,81 @@ LevelHeights = Annotated[
 ]
 
 
-class Planner(Section):
-    """The search over sensing topologies and velocities.
-
-    level_heights_m: row n holds the height slots of a topology with n levels, top level first.
-    """
+class PlannerSettings(SettingsSection):
+    """The search over sensing topologies and velocities."""
 
     rate_hz: Annotated[int, Field(ge=1, le=50)] = 10
+    """Plans per second; at most the estimator's rate."""
     mode: Literal["certified", "paper"] = "certified"
+    """certified: several starting points per topology, a proof for each topology that is dropped, hysteresis and a
+    minimum stay. paper: as in the method's paper, each topology solved once, from rest, and the cheapest wins."""
     horizon_steps: Annotated[int, Field(ge=1, le=50)] = 10
+    """Number of steps that a plan looks ahead. A change of topology must pay within horizon_steps x step_s."""
     step_s: Annotated[float, Field(gt=0, le=2)] = 0.2
+    """Length [s] of one step of the horizon."""
     discount: Annotated[float, Field(gt=0, le=1)] = 0.9
+    """Weight of each further step of the horizon relative to the one before it; 1: all count alike."""
     hysteresis: Annotated[float, Field(ge=0, lt=1)] = 0.05
+    """Share of the cost by which a new topology must be cheaper than the current one before the team changes."""
     initial_topology: Literal["flat", "string"] = "flat"
+    """Topology after take-off. flat: all drones in one level; string: one drone per level."""
     level_heights_m: LevelHeights
+    """Flying heights [m above the floor] of the levels. Row n holds n heights, top level first, for a topology with n
+    levels; one row per drone at least. All must lie above the target and inside the fence."""
     planned_range_m: Annotated[float, Field(gt=0, le=20)] = 1.9
+    """Distance [m] up to which the planner expects a drone's camera to detect a marker."""
     separation_m: Annotated[float, Field(gt=0, le=10)] = 1.0
+    """Horizontal distance [m] below which the cost drives drones apart; at least safety.min_separation_m."""
 
 
-class Safety(Section):
-    """Limits of the last word, and how long silence is borne before a drone lands."""
+class SafetySettings(SettingsSection):
+    """Safety limits and communication time-outs."""
 
     min_separation_m: Annotated[float, Field(ge=0.3, le=10)] = 0.6
+    """Least distance [m] between the centres of two drones; the velocity that would close it is cut before."""
     setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
+    """Time [ms] after which a setpoint expires; a drone without a fresh one hovers."""
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
+    """Time [s] without a fresh setpoint after which a drone lands. It then stays down until a new take-off."""
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
+    """Time [s] in flight without being seen by any camera after which a drone lands."""
     max_position_std_m: Annotated[float, Field(gt=0, le=5)] = 0.6
+    """Largest standard deviation [m] of a drone's own position; a drone whose position is known less well hovers."""
 
 
-class Recording(Section):
-    """What is written of a run, and where (relative to the working directory)."""
+class RecordingSettings(SettingsSection):
+    """What is recorded of a run, and where."""
 
     enabled: bool = True
+    """Whether the run is recorded. Reports and replays need the recording."""
     directory: Annotated[str, Field(min_length=1)] = "runs"
+    """Folder for the runs, relative to the working directory; each run makes a folder in it."""
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
+    """Images per second and camera that are shown in the console and recorded; 0: none. The H.264 video of a camera is
+    recorded in full besides, unless this is 0."""
     raw_datagrams: bool = True
+    """Whether every datagram of the vehicle links is recorded, byte by byte."""
     rotate_mb: Annotated[float, Field(ge=0, le=100_000)] = 1000.0
+    """Size [MB] at which a recording starts a new part (state-2.mcap, ...), at most once a second; 0: never."""
     rotate_minutes: Annotated[float, Field(ge=0, le=1440)] = 60.0
+    """Time [min] after which a recording starts a new part; 0: never."""
 
 
-class Console(Section):
-    """The web page, on loopback."""
+class Console(SettingsSection):
+    """The operator's web page, on loopback."""
 
     enabled: bool = True
+    """Whether the run serves the operator's web page."""
     port: Annotated[int, Field(ge=1024, le=65535)] = 8765
+    """TCP port of the page, on loopback only. If it is taken, the next free one is used and printed."""
+
+
+class Bus(SettingsSection):
+    """The router that all processes of a run talk through, on loopback.
+
+    4717 is nobody's: IANA has not assigned it; it lies apart from Zenoh (7446, 7447, 8000), DDS (7400 and up), MAVLink
+    and autopilots in simulation (14550, 4560, 5760), web servers, and the ports that Linux gives to clients (32768 up).
+    """
+
+    port: Annotated[int, Field(ge=1024, le=65535)] = 4717
+    """TCP port of the router, on loopback only. A simulated run takes the next free one if it is taken."""

@@ -10,19 +10,19 @@ from pydantic import TypeAdapter, ValidationError
 from groundstation.errors import SettingsError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.settings.document import read
-from groundstation.settings.room import Calibration
+from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.wording import ordered, problem_of_error
 
 
-def load_calibration(path: Path) -> Calibration:
+def load_calibration(path: Path) -> CalibrationSettings:
     """Return a calibration file's content; raises SettingsError with all problems, each with its line."""
     tree = read(path)
     text = json.dumps(tree.plain())
     try:
-        return TypeAdapter(Calibration).validate_json(text)
+        return TypeAdapter(CalibrationSettings).validate_json(text)
     except ValidationError as error:
         found = error.errors(include_url=False)
-        raise SettingsError(ordered([problem_of_error(one, tree, Calibration) for one in found])) from None
+        raise SettingsError(ordered([problem_of_error(one, tree, CalibrationSettings) for one in found])) from None
 
 
 def calibration_text(

@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from drivers.camera.settings import SourceKind, parse_source
-from groundstation.settings.behaviour import Estimator, Planner, Safety
+from groundstation.errors import without_password
+from groundstation.settings.behaviour import EstimatorSettings, PlannerSettings, SafetySettings
 from groundstation.settings.document import KeyPath
-from groundstation.settings.drones import Drone
-from groundstation.settings.marker import Marker
-from groundstation.settings.room import Calibration, Room, WorldCamera
-from groundstation.settings.target import OneOfTargets, Target, TrackedBody
+from groundstation.settings.drones import Drone, Mavlink
+from groundstation.settings.marker import MarkerSettings
+from groundstation.settings.room import CalibrationSettings, RoomSettings, WorldCameraSettings
+from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
 
 Finding = tuple[KeyPath, str]
 
@@ -25,14 +26,14 @@ _ROBOT_HEIGHT_M = 0.3
 class Parts:
     """The sections that are sound in themselves; a check is left out where one that it needs is missing."""
 
-    room: Room | None = None
-    cameras: dict[str, WorldCamera] = field(default_factory=dict)
+    room: RoomSettings | None = None
+    cameras: dict[str, WorldCameraSettings] = field(default_factory=dict)
     drones: dict[str, Drone] = field(default_factory=dict)
-    target: Target | None = None
+    target: TargetSettings | None = None
     targets: dict[str, OneOfTargets] = field(default_factory=dict)
-    estimator: Estimator | None = None
-    planner: Planner | None = None
-    safety: Safety | None = None
+    estimator: EstimatorSettings | None = None
+    planner: PlannerSettings | None = None
+    safety: SafetySettings | None = None
 
     @property
     def tracked(self) -> dict[KeyPath, tuple[str, TrackedBody]]:
@@ -107,7 +108,7 @@ def _unique(values: Iterable[tuple[KeyPath, object, str]], what: str) -> Iterato
             holders[value] = holder
 
 
-def _key_of(marker: Marker) -> str:
+def _key_of(marker: MarkerSettings) -> str:
     return "code" if marker.kind == "checkerboard" else "id"
 
 
@@ -117,33 +118,44 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
         for name, drone in parts.drones.items()
     ]
     sources: list[tuple[KeyPath, object, str]] = [
-        (("cameras", name, "source"), camera.source, name) for name, camera in parts.cameras.items()
+        (("cameras", name, "source"), without_password(camera.source), name) for name, camera in parts.cameras.items()
     ]
     for path, (name, target) in parts.tracked.items():
         codes.append(((*path, "marker", _key_of(target.marker)), target.marker.identity, name))
-    sources += [(("drones", name, "camera", "source"), d.camera.source, name) for name, d in parts.drones.items()]
+    sources += [
+        (("drones", name, "camera", "source"), without_password(drone.camera.source), name)
+        for name, drone in parts.drones.items()
+    ]
     yield from _unique(codes, "marker code")
     yield from _unique(sources, "camera source")
     yield from _unique(((("drones", n, "address"), d.address, n) for n, d in parts.drones.items()), "address")
 
 
 def _mavlink(parts: Parts) -> Iterator[Finding]:
+    flown: dict[str, Mavlink] = {}
     for name, drone in parts.drones.items():
         path: KeyPath = ("drones", name, "mavlink")
-        if (drone.kind == "mavlink") != (drone.mavlink is not None):
-            needs = "must be given for kind: mavlink" if drone.mavlink is None else f"has no meaning for {drone.kind}"
-            yield path, needs
-        elif drone.mavlink is not None and drone.mavlink.key_file and drone.mavlink.link == "mavsdk":
-            yield (*path, "link"), "must be pymavlink for a signed link: MAVSDK cannot sign"
-        elif drone.mavlink is not None and drone.mavlink.serial and drone.mavlink.listen:
-            yield (*path, "listen"), "has no meaning on a serial line"
-    flown = {name: drone.mavlink for name, drone in parts.drones.items() if drone.mavlink is not None}
+        if drone.kind != "mavlink":
+            if drone.mavlink is not None:
+                yield path, f"has no meaning for {drone.kind}"
+        elif drone.mavlink is None:
+            yield path, "must be given for kind: mavlink"
+        else:
+            flown[name] = drone.mavlink
+            yield from _mavlink_way(path, drone.mavlink)
     yield from _unique(((("drones", n, "mavlink", "system_id"), m.system_id, n) for n, m in flown.items()), "system id")
     shared: dict[int, tuple[str, tuple[str, str, str]]] = {}
     for name, m in flown.items():
         how = (m.link, m.key_file, m.local_address)
         if m.listen and shared.setdefault(m.port, (name, how))[1] != how:
             yield ("drones", name, "mavlink", "port"), f"is shared with {shared[m.port][0]}, which is reached otherwise"
+
+
+def _mavlink_way(path: KeyPath, mavlink: Mavlink) -> Iterator[Finding]:
+    if mavlink.key_file and mavlink.link == "mavsdk":
+        yield (*path, "link"), "must be pymavlink for a signed link: MAVSDK cannot sign"
+    elif mavlink.serial and mavlink.listen:
+        yield (*path, "listen"), "has no meaning on a serial line"
 
 
 _VIDEO_WIDTHS = {"h264_360p": 640, "h264_720p": 1280}
@@ -163,7 +175,8 @@ def _own_video(parts: Parts) -> Iterator[Finding]:
         if drone.kind != "ardrone":
             yield path, f"must not be an AR.Drone's video for kind: {drone.kind}"
         elif source.host != drone.address:
-            yield path, f"must be this drone's own address, ardrone://{drone.address} (got {drone.camera.source})"
+            got = without_password(drone.camera.source)
+            yield path, f"must be this drone's own address, ardrone://{drone.address} (got {got})"
         codec = drone.video.codec if drone.video is not None else "h264_360p"
         wanted, found = _VIDEO_WIDTHS[codec], drone.camera.calibration.width_px
         if found != wanted:
@@ -224,7 +237,7 @@ def _rates_and_times(parts: Parts) -> Iterator[Finding]:
 
 
 def _calibrations(parts: Parts) -> Iterator[Finding]:
-    held: list[tuple[KeyPath, Calibration]] = [
+    held: list[tuple[KeyPath, CalibrationSettings]] = [
         (("cameras", name, "calibration"), camera.calibration) for name, camera in parts.cameras.items()
     ]
     held += [(("drones", name, "camera", "calibration"), d.camera.calibration) for name, d in parts.drones.items()]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from groundstation.errors import SettingsError
+from groundstation.errors import SettingsError, without_password
 
 _MAX_BYTES = 1_000_000
 _MAX_NODES = 20_000  # an alias may be expanded many times over: bounded, so that a small file cannot fill memory
@@ -16,7 +16,7 @@ KeyPath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class SourceLine:
     """Where something was written: a file and line (or an option, then line is 0), and its path there."""
 
     place: str
@@ -26,9 +26,9 @@ class Origin:
     def __str__(self) -> str:
         return f"{self.place}:{self.line}" if self.line else self.place
 
-    def below(self, key: str | int) -> "Origin":
+    def below(self, key: str | int) -> "SourceLine":
         """Return the origin of something that is missing below this."""
-        return Origin(self.place, self.line, (*self.path, key))
+        return SourceLine(self.place, self.line, (*self.path, key))
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Node:
     """A mapping or list of nodes, or a scalar, with where it came from."""
 
     value: Any
-    origin: Origin
+    origin: SourceLine
 
     def plain(self) -> Any:
         """Return the value without origins."""
@@ -57,7 +57,7 @@ class Node:
             node = _entry(node.value, key) if node is not None else None
         return node
 
-    def origin_of(self, path: KeyPath) -> Origin:
+    def origin_of(self, path: KeyPath) -> SourceLine:
         """Return where the value at a path was written; for one that is missing, where its parent was."""
         node = self
         for depth, key in enumerate(path):
@@ -171,10 +171,10 @@ class _Reader:
             return Node([self.node(item, (*path, index)) for index, item in enumerate(source.value)], origin)
         return Node(self._scalar(source, origin), origin)
 
-    def _origin(self, source: Any, path: KeyPath, line: int | None = None) -> Origin:
+    def _origin(self, source: Any, path: KeyPath, line: int | None = None) -> SourceLine:
         if self._line is not None:
-            return Origin(self._place, self._line, path)
-        return Origin(self._place, (source.start_mark.line if line is None else line) + 1, path)
+            return SourceLine(self._place, self._line, path)
+        return SourceLine(self._place, (source.start_mark.line if line is None else line) + 1, path)
 
     def _entries(self, source: Any, path: KeyPath) -> Iterator[tuple[str, Node]]:
         seen: dict[str, int] = {}
@@ -193,7 +193,7 @@ class _Reader:
                 seen[name] = line
                 yield name, self.node(value, (*path, name), line)
 
-    def _scalar(self, source: Any, origin: Origin) -> Any:
+    def _scalar(self, source: Any, origin: SourceLine) -> Any:
         kind = source.tag.rsplit(":", 1)[-1]
         if kind not in _KINDS:
             self.problems.append(f"{origin}: {dotted(origin.path)}: tag {source.tag} is not understood here")
@@ -205,5 +205,7 @@ class _Reader:
         try:
             return self._constructor.construct_object(source)
         except ValueError:
-            self.problems.append(f"{origin}: {dotted(origin.path)}: {source.value[:40]!r} is not a number")
+            self.problems.append(
+                f"{origin}: {dotted(origin.path)}: {without_password(source.value)[:40]!r} is not a number"
+            )
             return None

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from groundstation.settings.room import WorldCamera
+from groundstation.settings.room import WorldCameraSettings
 from groundstation.settings.schema import Field
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def slots(field: Field) -> list[float]:
     return sorted({height for row in rows for height in row}, reverse=True)
 
 
-def footprint(camera: WorldCamera, height_m: float) -> tuple[float, float]:
+def footprint(camera: WorldCameraSettings, height_m: float) -> tuple[float, float]:
     """Return half the length (x) and width (y) of what a camera that looks down sees at a height, undistorted [m]."""
     distance = max(0.0, camera.position_m[2] - height_m)
     lens = camera.calibration

@@ -9,24 +9,30 @@ from pydantic import Field, TypeAdapter, ValidationError
 from groundstation.errors import SettingsError
 from groundstation.settings.document import read
 from groundstation.settings.room import Angle
-from groundstation.settings.values import MarkerCode, Section, SquareSize, Vector3
+from groundstation.settings.values import MarkerCode, SettingsSection, SquareSize, Vector3
 from groundstation.settings.wording import ordered, problem_of_error
 
 
-class FloorMarker(Section):
-    """Its code, its centre, and which way its bar points (none: any)."""
+class FloorMarker(SettingsSection):
+    """One marker of a layout."""
 
     code: MarkerCode
+    """Number of the marker."""
     position_m: Vector3
+    """Centre of the marker [m; world]."""
     yaw_deg: Angle | None = None
+    """Direction of its bar [deg; world], counter-clockwise; none: unknown."""
 
 
-class FloorMarkers(Section):
-    """A layout; position_std_m: how well the markers were put in their places."""
+class FloorMarkers(SettingsSection):
+    """Markers at measured places, of one size."""
 
     square_mm: SquareSize = 44.0
+    """Side of one square [mm]."""
     position_std_m: Annotated[float, Field(gt=0, le=0.2)] = 0.005
+    """Standard deviation of the measured positions [m]."""
     markers: tuple[FloorMarker, ...]
+    """The markers."""
 
 
 def load_floor_markers(path: Path) -> FloorMarkers:

@@ -2,31 +2,40 @@
 
 from typing import Any
 
+from groundstation.settings.drones import Drone, OnboardCameraSettings
+from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_CALIBRATION = CalibrationSettings.__name__
 
 
 def field_file_schema() -> dict[str, Any]:
     """Return the schema: that of the resolved field, plus `defaults`, `types` and names of calibration files."""
     schema = Field.model_json_schema(mode="validation")
     definitions: dict[str, Any] = schema["$defs"]
-    for owner in ("WorldCamera", "OnboardCamera"):
-        definitions[owner]["properties"]["calibration"] = {
+    for owner in (WorldCameraSettings, OnboardCameraSettings):
+        definitions[owner.__name__]["properties"]["calibration"] = {
             "description": "Name of a calibration file beside the field file, or its content.",
-            "anyOf": [{"type": "string"}, {"$ref": "#/$defs/Calibration"}],
+            "anyOf": [{"type": "string"}, {"$ref": f"#/$defs/{_CALIBRATION}"}],
         }
     # Any part of a drone may stand at any level, so nothing is required of one level alone.
-    for name in _parts_of_drone(definitions, "Drone"):
+    for name in _parts_of_drone(definitions, Drone.__name__):
         definitions[name].pop("required", None)
-    drone = definitions["Drone"]
-    level = {**drone, "title": "Level", "description": "What drones share; a robot's own entry wins."}
+    drone = definitions[Drone.__name__]
+    level = {**drone, "title": "Level", "description": "What several drones share; a drone's own entry wins."}
     definitions["Level"] = level
-    drone["properties"] = {"type": {"type": "string", "description": "An entry of `types`."}} | drone["properties"]
+    drone["properties"] = {
+        "type": {"type": "string", "description": "Entry of `types` whose settings this drone starts from."}
+    } | drone["properties"]
     reference = {"$ref": "#/$defs/Level"}
     schema["properties"] |= {
-        "defaults": reference,
-        "types": {"type": "object", "additionalProperties": reference},
+        "defaults": {**reference, "description": "Settings of every drone, unless its type or its own entry differs."},
+        "types": {
+            "type": "object",
+            "additionalProperties": reference,
+            "description": "Settings of a type of drone, by the name that drones give as their type.",
+        },
     }
     schema["required"] = sorted({*schema["required"], "schema_version"})
     schema["anyOf"] = [{"required": ["target"]}, {"required": ["targets"]}]
@@ -37,7 +46,7 @@ def _parts_of_drone(definitions: dict[str, Any], name: str) -> set[str]:
     """Return the definitions that stand below one, but for Calibration, which is a file of its own."""
     found = {name}
     for inner in _references(definitions[name]):
-        if inner not in ("Calibration", *found):
+        if inner not in (_CALIBRATION, *found):
             found |= _parts_of_drone(definitions, inner)
     return found
 

@@ -5,8 +5,8 @@ from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 
-from groundstation.errors import SettingsError
-from groundstation.settings.document import KeyPath, Node, Origin, dotted, parse, read
+from groundstation.errors import SettingsError, without_password
+from groundstation.settings.document import KeyPath, Node, SourceLine, dotted, parse, read
 from groundstation.settings.wording import problem
 
 NAMED = ("drones", "cameras", "targets", "types")
@@ -17,12 +17,12 @@ def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:
 
     named: top-level mappings of names, in which an option may change an entry, but not invent one.
     """
-    place = f"--set {' '.join(option.split())}"
     name, equals, text = option.partition("=")
+    place = f"--set {' '.join(f'{name}{equals}{without_password(text)}'.split())}"
     path = tuple(part.strip() for part in name.split("."))
     if not equals or not all(path):
         raise SettingsError([f"{place}: must look like path.to.key=value"])
-    value = parse(text, place, line=0) if text.strip() else Node("", Origin(place, 0))
+    value = parse(text, place, line=0) if text.strip() else Node("", SourceLine(place, 0))
     if len(path) > 1 and path[0] in named:
         _require_entry(tree, path[0], path[1], place)
     return _placed(tree, path, value, (), place)
@@ -45,20 +45,20 @@ def _placed(tree: Node, path: KeyPath, value: Node, done: KeyPath, place: str) -
             raise SettingsError([f"{place}: {dotted(done)} is a list of {len(tree.value)}, {key!r} is not in it"])
         items = list(tree.value)
         items[int(key)] = _placed(items[int(key)], rest, value, (*done, int(key)), place)
-        return Node(items, Origin(place, 0, done))
+        return Node(items, SourceLine(place, 0, done))
     if not isinstance(tree.value, dict):
         raise SettingsError([f"{place}: {dotted(done)} is a single value, nothing lies below it"])
     entries = dict(tree.value)
     if not rest and value.value is None:
         entries.pop(str(key), None)
         return Node(entries, tree.origin)
-    below = entries.get(str(key)) or Node({}, Origin(place, 0, (*done, key)))
+    below = entries.get(str(key)) or Node({}, SourceLine(place, 0, (*done, key)))
     entries[str(key)] = _placed(below, rest, value, (*done, key), place)
     return Node(entries, tree.origin)
 
 
 def _moved(node: Node, base: KeyPath) -> Node:
-    origin = Origin(node.origin.place, node.origin.line, (*base, *node.origin.path))
+    origin = SourceLine(node.origin.place, node.origin.line, (*base, *node.origin.path))
     if isinstance(node.value, dict):
         return Node({key: _moved(inner, base) for key, inner in node.value.items()}, origin)
     if isinstance(node.value, list):
@@ -84,7 +84,7 @@ class Calibrations:
         self._name = name
         self._known: dict[str, Node | None] = {}
         self.problems: list[str] = []
-        self.failed: set[Origin] = set()
+        self.failed: set[SourceLine] = set()
 
     def inlined(self, holder: Node) -> Node:
         """Return a mapping (a camera, or a drone with one) with the name of a calibration replaced by its content."""

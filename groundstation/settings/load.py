@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from groundstation.errors import SettingsError
 from groundstation.settings.checks import Parts, findings
-from groundstation.settings.document import KeyPath, Node, Origin, read
+from groundstation.settings.document import KeyPath, Node, SourceLine, read
 from groundstation.settings.drones import Drone
 from groundstation.settings.levels import NAMED, Calibrations, Levels, with_option
 from groundstation.settings.schema import SCHEMA_VERSION, Field
@@ -93,7 +93,7 @@ def _partial_errors(fragment: Node) -> list[Any]:
 
 
 def _worded(
-    errors: Iterable[Any], tree: Node, model: type[Any], failed: Collection[Origin], untyped: Collection[str] = ()
+    errors: Iterable[Any], tree: Node, model: type[Any], failed: Collection[SourceLine], untyped: Collection[str] = ()
 ) -> list[str]:
     """Return a line for each error but those that only follow from a missing calibration or an unknown type."""
 

@@ -1,4 +1,4 @@
-"""What a robot or target is known by: a checkerboard with its code, or a tag of an ArUco or AprilTag dictionary."""
+"""Settings of a marker: a checkerboard with its code, or a tag of an ArUco or AprilTag dictionary."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -6,21 +6,28 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from groundstation.geometry.tag import DICTIONARIES, tag_fault
-from groundstation.settings.values import MarkerCode, Section, SquareSize
+from groundstation.settings.values import MarkerCode, SettingsSection, SquareSize
 
 TagId = Annotated[int, Field(ge=0)]
 TagSize = Annotated[float, Field(ge=10, le=1000)]
 
 
-class Marker(Section):
+class MarkerSettings(SettingsSection):
     """A flat marker: `code` and `square_mm` of a checkerboard, or `dictionary`, `id` and `size_mm` of a tag."""
 
     kind: Literal["checkerboard", "aruco"] = "checkerboard"
+    """checkerboard: Skein's own marker, whose pose is ten times more accurate; aruco: a tag of an ArUco or AprilTag
+    dictionary."""
     code: MarkerCode | None = None
+    """Checkerboard: its number; each marker of a field its own."""
     square_mm: SquareSize = 44.0
+    """Checkerboard: side [mm] of one square."""
     dictionary: str | None = None
+    """Tag: OpenCV's name of its dictionary, such as DICT_APRILTAG_36H11."""
     id: TagId | None = None
+    """Tag: its number in the dictionary."""
     size_mm: TagSize | None = None
+    """Tag: side [mm] of its black square."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -2,6 +2,10 @@
 
 import io
 
+import msgspec
+
+from groundstation.errors import without_password
+from groundstation.field.resolved import ResolvedField
 from groundstation.settings.drones import Drone
 from groundstation.settings.schema import Field
 from groundstation.settings.target import OneOfTargets, TrackedBody
@@ -10,8 +14,13 @@ from groundstation.settings.target import OneOfTargets, TrackedBody
 STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > set-point > TAKEOFF"
 
 
+def resolved_field(field: Field) -> ResolvedField:
+    """Return the field as the values that all other packages read, without passwords."""
+    return msgspec.convert(field.model_dump(mode="json"), ResolvedField)
+
+
 def yaml_of(field: Field) -> str:
-    """Return the field as YAML: itself a valid field file, with nothing left to merge or to look up."""
+    """Return the field as YAML: a valid field file with nothing left to merge or to look up, but without passwords."""
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)
@@ -33,7 +42,9 @@ def summary_of(field: Field) -> str:
         "",
     ]
     for name, camera in field.cameras.items():
-        lines.append(f"camera {name}: {camera.source}, {camera.position_m[2]:g} m up, looks {camera.looking},")
+        lines.append(
+            f"camera {name}: {without_password(camera.source)}, {camera.position_m[2]:g} m up, looks {camera.looking},"
+        )
         lines.append(f"  observes {' and '.join(camera.observes)}")
     lines += [line for name, drone in field.drones.items() for line in _drone_lines(name, drone)]
     lines += [_target_line(name, target) for name, target in field.tracked.items()]
@@ -49,7 +60,7 @@ def _drone_lines(name: str, drone: Drone) -> list[str]:
     limits = drone.limits
     return [
         f"drone {name}: {drone.kind} at {drone.address}, pad {_pair(drone.pad_m)} m, marker {drone.marker.identity}",
-        f"  camera {drone.camera.source}, {drone.camera.tilt_down_deg:g} deg down",
+        f"  camera {without_password(drone.camera.source)}, {drone.camera.tilt_down_deg:g} deg down",
         f"  at most {limits.max_speed_m_s:g} m/s, climb {limits.max_climb_m_s:g} m/s,"
         f" turn {limits.max_yaw_rate_deg_s:g} deg/s; lands below {limits.battery_min:.0%} battery"
         f" held {limits.battery_hold_s:g} s",

@@ -1,4 +1,4 @@
-"""The room: its size, its fence, the cameras fixed in it, and what a lens calibration says."""
+"""Settings of the room, its fence, the cameras fixed in it, and lens calibrations."""
 
 import datetime
 import math
@@ -6,68 +6,92 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from groundstation.settings.values import Interval, Section, Source, Vector3, VideoDelay, of_length
+from groundstation.settings.values import Interval, SettingsSection, Source, Vector3, VideoDelay, of_length
 
 Length = Annotated[float, Field(gt=0, le=100)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 
 
-class Fence(Section):
-    """Box that drones are stopped in before they leave it [m; world]."""
+class FenceSettings(SettingsSection):
+    """Box that drones are stopped before they leave [m; world]."""
 
     x_m: Interval
+    """Lower and upper limit along x [m; world]."""
     y_m: Interval
+    """Lower and upper limit along y [m; world]."""
     z_m: Interval
+    """Lower and upper limit of the height [m; world]."""
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Return whether a point of the floor lies inside."""
         return self.x_m[0] <= x_m <= self.x_m[1] and self.y_m[0] <= y_m <= self.y_m[1]
 
 
-class Room(Section):
-    """Size along x, y, z (origin on the floor, in the middle) and the fence in it."""
+class RoomSettings(SettingsSection):
+    """The room: its size, and the fence in it."""
 
     size_m: Annotated[tuple[Length, Length, Length], of_length(3)]
-    fence: Fence
+    """Size of the room along x, y and z [m]. The origin is on the floor, in the middle."""
+    fence: FenceSettings
+    """Box inside the room that drones are not allowed to leave."""
 
 
 Rotation = Annotated[tuple[Angle, Angle, Angle], of_length(3)]
 LensStd = Annotated[float, Field(ge=0)]
 
 
-class CalibrationStd(Section):
-    """One sigma of each figure of a calibration, as its least squares have it."""
+class CalibrationStd(SettingsSection):
+    """Standard deviations of a calibration, from its least-squares fit."""
 
     fx_px: LensStd
+    """Standard deviation of fx_px [px]."""
     fy_px: LensStd
+    """Standard deviation of fy_px [px]."""
     cx_px: LensStd
+    """Standard deviation of cx_px [px]."""
     cy_px: LensStd
+    """Standard deviation of cy_px [px]."""
     k1: LensStd
+    """Standard deviation of k1."""
     k2: LensStd
+    """Standard deviation of k2."""
     p1: LensStd
+    """Standard deviation of p1."""
     p2: LensStd
+    """Standard deviation of p2."""
     k3: LensStd
+    """Standard deviation of k3."""
 
 
-class Calibration(Section):
-    """Pinhole with radial and tangential distortion (OpenCV's plumb bob), as measured on one camera.
-
-    views: pictures that it was measured with.
-    """
+class CalibrationSettings(SettingsSection):
+    """A lens calibration: pinhole with radial and tangential distortion (OpenCV's plumb bob)."""
 
     schema_version: Literal[1] = 1
+    """Version of the file format."""
     model: Literal["plumb_bob"]
+    """Lens model: pinhole with radial and tangential distortion."""
     width_px: Annotated[int, Field(ge=16, le=8192)]
+    """Width [px] of the images that the calibration belongs to."""
     height_px: Annotated[int, Field(ge=16, le=8192)]
+    """Height [px] of the images that the calibration belongs to."""
     fx_px: Annotated[float, Field(gt=0, le=100_000)]
+    """Focal length along the image's x axis [px]."""
     fy_px: Annotated[float, Field(gt=0, le=100_000)]
+    """Focal length along the image's y axis [px]; nearly fx_px."""
     cx_px: float
+    """Principal point, x [px]; the centre of the first pixel is 0."""
     cy_px: float
+    """Principal point, y [px]; the centre of the first pixel is 0."""
     distortion: tuple[float, float, float, float, float]
+    """Distortion k1, k2, p1, p2, k3, as OpenCV's calibrateCamera orders them."""
     residual_px: Annotated[float, Field(gt=0, le=5)] = 0.2
+    """RMS residual [px] of the calibration; no corner is assumed to be more accurate."""
     date: datetime.date | None = None
+    """Day of the measurement (YYYY-MM-DD)."""
     views: Annotated[int, Field(gt=0)] | None = None
+    """Number of images that the calibration was made from."""
     std: CalibrationStd | None = None
+    """Standard deviations of the figures, from the least-squares fit."""
 
     @property
     def horizontal_view_rad(self) -> float:
@@ -80,21 +104,29 @@ class Calibration(Section):
         return 2 * math.atan(self.height_px / (2 * self.fy_px))
 
 
-class WorldCamera(Section):
-    """A camera fixed in the world. `looking: down`: picture right is world x, picture down is world -y.
-
-    rotation_deg: how it is turned from there, roll, pitch, yaw about the world's axes, as it was measured.
-    """
+class WorldCameraSettings(SettingsSection):
+    """A camera fixed in the world."""
 
     source: Source
-    calibration: Calibration
+    """Where the images come from: http:// or rtsp:// address, /dev/videoN, video file or folder of images."""
+    calibration: CalibrationSettings
+    """Lens calibration: the name of a file beside the field file, or its content."""
     position_m: Vector3
+    """Optical centre [m; world], inside the room and above the fence."""
     looking: Literal["down"] = "down"
+    """Orientation before rotation_deg. down: the image's right is world x, the image's bottom is world -y."""
     rotation_deg: Rotation = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw [deg] about the world's axes from that orientation. groundstation calibrate extrinsics measures
+    them."""
     video_delay_ms: VideoDelay = 120.0
+    """Median time [ms] from the exposure of an image to its arrival. Measure it: groundstation calibrate delay."""
     attitude_std_deg: Annotated[float, Field(gt=0, le=10)] = 0.2
+    """Standard deviation [deg] of the mounting angles."""
     position_std_m: Annotated[float, Field(gt=0, le=0.5)] = 0.01
+    """Standard deviation [m] of the position."""
     observes: Annotated[tuple[Literal["robots", "targets"], ...], Field(min_length=1)] = ("robots",)
+    """What the camera may report. Fixed cameras observe robots only unless this says otherwise: tracking the target is
+    the team's task."""
 
     @property
     def attitude_std_rad(self) -> float:

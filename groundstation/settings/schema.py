@@ -1,36 +1,58 @@
-"""The resolved field: what every process may know of the room, the team and how it is to behave."""
+"""The resolved field: room, team, target and behaviour, as every process gets them."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field as Constraint
 
-from groundstation.settings.behaviour import Console, Estimator, Planner, Recording, Safety
+from groundstation.settings.behaviour import (
+    Bus,
+    Console,
+    EstimatorSettings,
+    PlannerSettings,
+    RecordingSettings,
+    SafetySettings,
+)
 from groundstation.settings.drones import Drone
-from groundstation.settings.room import Room, WorldCamera
-from groundstation.settings.target import OneOfTargets, Target, TrackedBody
-from groundstation.settings.values import Name, Section
+from groundstation.settings.room import RoomSettings, WorldCameraSettings
+from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
+from groundstation.settings.values import Name, SettingsSection
 
 SCHEMA_VERSION: Literal[1] = 1
 
 
-class Field(Section):
+class Field(SettingsSection):
     """A field file after its three levels are merged and its calibrations read in; it has a `target` or `targets`.
 
-    Travels to other processes as JSON: `Field.model_validate_json(field.model_dump_json())` is the same field.
+    Travels to other processes as JSON: `Field.model_validate_json(field.model_dump_json())` is the same field, but for
+    the passwords of camera sources, which are in no dump.
     """
 
     schema_version: Literal[1] = SCHEMA_VERSION
+    """Version of the file format."""
     site: Name
-    room: Room
-    cameras: Annotated[dict[Name, WorldCamera], Constraint(min_length=1)]
+    """Name of the place. It is part of every key on the bus and of every run folder."""
+    room: RoomSettings
+    """The room and its fence."""
+    cameras: Annotated[dict[Name, WorldCameraSettings], Constraint(min_length=1)]
+    """Cameras fixed in the world, by name; one at least, because every sensing topology starts from them."""
     drones: Annotated[dict[Name, Drone], Constraint(min_length=1)]
-    target: Target | None = None
+    """The drones, by name."""
+    target: TargetSettings | None = None
+    """The one target; for several, targets."""
     targets: dict[Name, OneOfTargets] = Constraint(default_factory=dict)
-    estimator: Estimator = Estimator()
-    planner: Planner
-    safety: Safety = Safety()
-    recording: Recording = Recording()
+    """Several targets by name, in place of target."""
+    estimator: EstimatorSettings = EstimatorSettings()
+    """The joint estimator."""
+    planner: PlannerSettings
+    """How the planner searches for the topology and the velocities."""
+    safety: SafetySettings = SafetySettings()
+    """Least distances, and how long a drone flies on without setpoints or sightings."""
+    recording: RecordingSettings = RecordingSettings()
+    """What is recorded of a run."""
     console: Console = Console()
+    """The operator's web page."""
+    bus: Bus = Bus()
+    """The router of the run's messages."""
 
     @property
     def tracked(self) -> dict[str, TrackedBody]:

@@ -9,8 +9,8 @@ from typing import Any
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.camera.settings import CameraDriverSettings, SourceKind, parse_source
 from drivers.mavlink.settings import MavlinkDriverSettings
-from groundstation.settings.drones import Drone, Mavlink
-from groundstation.settings.room import Calibration, WorldCamera
+from groundstation.settings.drones import Drone, Mavlink, unknown_kind
+from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 
 _SEARCH_RATE_HZ = 2.0
@@ -63,11 +63,15 @@ def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, t
 def _place(drone: Drone, address: str | None) -> dict[str, Any]:
     if address is None:
         return {}
-    if drone.mavlink is None:
-        return {"address": address}
-    # Vehicles that call us do so within the simulated network; there are no serial lines in it.
-    local = address.rpartition(".")[0] + ".1"
-    return {"address": address, "mavlink": drone.mavlink.model_copy(update={"local_address": local, "serial": ""})}
+    match drone.kind:
+        case "ardrone":
+            return {"address": address}
+        case "mavlink":
+            # Vehicles that call us do so within the simulated network; there are no serial lines in it.
+            way = {"local_address": address.rpartition(".")[0] + ".1", "serial": ""}
+            return {"address": address, "mavlink": drone.require_mavlink().model_copy(update=way)}
+        case other:
+            raise unknown_kind(other)
 
 
 def _source(source: str, stream: tuple[str, int] | None) -> dict[str, str]:
@@ -84,18 +88,12 @@ def core_section(field: Field, run_dir: str, epoch: int) -> str:
 
 
 def driver_sections(field: Field) -> list[DriverSection]:
-    """Return all driver processes of a field: vehicles, then cameras; full searches of cameras are staggered."""
+    """Return all driver processes of a field: vehicles, then cameras; full searches of cameras are staggered.
+
+    Raises SettingsError for a kind of vehicle that is not known.
+    """
     count = len(field.cameras) + len(field.drones)
     phases = [index / (count * _SEARCH_RATE_HZ) for index in range(count)]
-    vehicles = [
-        DriverSection(name, DriverKind.ARDRONE, name, _ardrone(field, name, index).model_dump_json())
-        for index, (name, drone) in enumerate(field.drones.items())
-        if drone.mavlink is None
-    ]
-    vehicles += [
-        DriverSection(names[0], DriverKind.MAVLINK, names[0], _mavlink(field, names).model_dump_json())
-        for names in _mavlink_links(field)
-    ]
     fixed = [
         DriverSection(name, DriverKind.CAMERA, name, _world_camera(field, name, camera, phase).model_dump_json())
         for (name, camera), phase in zip(field.cameras.items(), phases, strict=False)
@@ -106,7 +104,26 @@ def driver_sections(field: Field) -> list[DriverSection]:
         )
         for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
     ]
-    return vehicles + fixed + carried
+    return _vehicles(field) + fixed + carried
+
+
+def _vehicles(field: Field) -> list[DriverSection]:
+    alone: list[DriverSection] = []
+    links: dict[object, list[str]] = {}  # MAVLink vehicles by driver process: those that call the same port share one
+    for index, (name, drone) in enumerate(field.drones.items()):
+        match drone.kind:
+            case "ardrone":
+                settings = _ardrone(field, name, index).model_dump_json()
+                alone.append(DriverSection(name, DriverKind.ARDRONE, name, settings))
+            case "mavlink":
+                mavlink = drone.require_mavlink()
+                links.setdefault(mavlink.port if mavlink.listen else name, []).append(name)
+            case other:
+                raise unknown_kind(other)
+    return alone + [
+        DriverSection(names[0], DriverKind.MAVLINK, names[0], _mavlink(field, names).model_dump_json())
+        for names in links.values()
+    ]
 
 
 def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
@@ -126,15 +143,6 @@ def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
     )
 
 
-def _mavlink_links(field: Field) -> list[tuple[str, ...]]:
-    """Return the MAVLink vehicles by driver process: those that call the same port, the others alone."""
-    links: dict[object, list[str]] = {}
-    for name, drone in field.drones.items():
-        if drone.mavlink is not None:
-            links.setdefault(drone.mavlink.port if drone.mavlink.listen else name, []).append(name)
-    return [tuple(names) for names in links.values()]
-
-
 def _target(drone: Drone, mavlink: Mavlink) -> str:
     if mavlink.serial:
         return f"serial:{mavlink.serial}"
@@ -143,39 +151,39 @@ def _target(drone: Drone, mavlink: Mavlink) -> str:
     return f"udpout:{drone.address}:{mavlink.port}"
 
 
-def _mavlink(field: Field, names: tuple[str, ...]) -> MavlinkDriverSettings:
+def _mavlink(field: Field, names: list[str]) -> MavlinkDriverSettings:
     first = field.drones[names[0]]
-    assert first.mavlink is not None
+    mavlink = first.require_mavlink()
     return MavlinkDriverSettings.model_validate(
         {
             "link": {
-                "kind": first.mavlink.link,
-                "target": _target(first, first.mavlink),
-                "key_file": first.mavlink.key_file,
+                "kind": mavlink.link,
+                "target": _target(first, mavlink),
+                "key_file": mavlink.key_file,
             },
             "vehicles": [_mavlink_vehicle(name, field.drones[name]) for name in names],
             "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
-            "vision": {"rate_hz": first.mavlink.vision_hz},
+            "vision": {"rate_hz": mavlink.vision_hz},
             "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
         }
     )
 
 
 def _mavlink_vehicle(name: str, drone: Drone) -> dict[str, Any]:
-    assert drone.mavlink is not None
+    mavlink = drone.require_mavlink()
     return {
         "name": name,
-        "system_id": drone.mavlink.system_id,
-        "flavour": drone.mavlink.flavour,
+        "system_id": mavlink.system_id,
+        "flavour": mavlink.flavour,
         "pad_m": drone.pad_m,
         "pad_yaw_rad": drone.pad_yaw_rad,
         "limits": drone.limits.model_dump(exclude={"max_tilt_deg"}),
-        "take_off_m": drone.mavlink.take_off_m,
+        "take_off_m": mavlink.take_off_m,
         "velocity_std_m_s": drone.odometry.velocity_std_m_s,
     }
 
 
-def _world_camera(field: Field, name: str, camera: WorldCamera, phase_s: float) -> CameraDriverSettings:
+def _world_camera(field: Field, name: str, camera: WorldCameraSettings, phase_s: float) -> CameraDriverSettings:
     mount = {
         "parent": "world",
         "position_m": camera.position_m,
@@ -200,7 +208,7 @@ def _onboard_camera(field: Field, name: str, drone: Drone, phase_s: float) -> Ca
     return CameraDriverSettings.model_validate({"name": camera_name(name), "mount": mount, **common})
 
 
-def _camera(field: Field, source: str, lens: Calibration, delay_ms: float, phase_s: float) -> dict[str, Any]:
+def _camera(field: Field, source: str, lens: CalibrationSettings, delay_ms: float, phase_s: float) -> dict[str, Any]:
     calibration = lens.model_dump(mode="json", exclude_none=True, exclude={"views", "std"})
     return {
         "source": source,

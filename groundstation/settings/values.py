@@ -3,18 +3,21 @@
 import ipaddress
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
 from pydantic_core import PydanticCustomError
 
 from drivers.camera.settings import parse_source
+from groundstation.errors import without_password
 
 NAME_PATTERN = r"^[a-z][a-z0-9_]{0,47}$"
 
 
-class Section(BaseModel):
-    """Base of all settings: frozen, strict, finite, and without room for unknown keys."""
+class SettingsSection(BaseModel):
+    """Base of all settings: frozen, strict, finite, without unknown keys; the text below a key is its description."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 def of_length(length: int) -> BeforeValidator:
@@ -59,5 +62,6 @@ Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
-Source = Annotated[str, AfterValidator(_is_source)]
+# Only the driver gets the password, from the attribute: a field that is written, recorded or shown is a dump.
+Source = Annotated[str, AfterValidator(_is_source), PlainSerializer(without_password)]
 Address = Annotated[str, AfterValidator(_is_address)]

@@ -7,7 +7,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from groundstation.settings.document import Node, Origin, dotted
+from groundstation.errors import without_password
+from groundstation.settings.document import Node, SourceLine, dotted
 
 _PLAIN = {
     "missing": "is required",
@@ -40,7 +41,7 @@ _BOUNDS = {
 }
 
 
-def problem(origin: Origin, text: str) -> str:
+def problem(origin: SourceLine, text: str) -> str:
     """Return one line: `lab.yaml:37: drones.drone_1.pad_m: must ...`."""
     return f"{origin}: {dotted(origin.path)}: {text}" if origin.path else f"{origin}: {text}"
 
@@ -51,7 +52,7 @@ def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel
     origin = tree.origin_of(path)
     if error["type"] == "missing" and origin.path[:1] != path[:1]:
         # Missing from what three levels gave together: it is the robot's entry that lacks it.
-        origin = Origin(tree.origin_of(path[:2]).place, tree.origin_of(path[:2]).line, path)
+        origin = SourceLine(tree.origin_of(path[:2]).place, tree.origin_of(path[:2]).line, path)
     if error["type"] == "extra_forbidden":
         return problem(origin, f"unknown key{_meant(str(path[-1]), model, path[:-1])}")
     return problem(origin, text_of_error(error))
@@ -85,6 +86,8 @@ def _count(context: Mapping[str, Any]) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, dict | BaseModel):
         return "a mapping"
+    if isinstance(value, str):
+        value = without_password(value)
     text = json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

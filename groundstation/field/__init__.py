@@ -1,0 +1,1 @@
+"""The resolved field as typed values, for every process that reads one."""

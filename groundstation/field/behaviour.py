@@ -1,0 +1,63 @@
+"""What the estimator, the planner, safety, the recorder, the console and the bus are set to."""
+
+from typing import Literal
+
+import msgspec
+
+
+class EstimatorValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The joint estimator."""
+
+    rate_hz: int = 50
+    max_lateness_s: float = 0.5
+    gate_probability: float = 0.997
+    lost_after_s: float = 3.0
+
+
+class PlannerValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The search over topologies; row n of level_heights_m holds the n heights of a topology with n levels [m]."""
+
+    rate_hz: int = 10
+    mode: Literal["certified", "paper"] = "certified"
+    horizon_steps: int = 10
+    step_s: float = 0.2
+    discount: float = 0.9
+    hysteresis: float = 0.05
+    initial_topology: Literal["flat", "string"] = "flat"
+    level_heights_m: tuple[tuple[float, ...], ...]
+    planned_range_m: float = 1.9
+    separation_m: float = 1.0
+
+
+class SafetyValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Safety limits and communication time-outs."""
+
+    min_separation_m: float = 0.6
+    setpoint_lifetime_ms: int = 300
+    land_after_s: float = 3.0
+    unseen_land_after_s: float = 10.0
+    max_position_std_m: float = 0.6
+
+
+class RecordingValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is recorded of a run, and where."""
+
+    enabled: bool = True
+    directory: str = "runs"
+    image_fps: float = 5.0
+    raw_datagrams: bool = True
+    rotate_mb: float = 1000.0
+    rotate_minutes: float = 60.0
+
+
+class ConsoleValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The operator's web page."""
+
+    enabled: bool = True
+    port: int = 8765
+
+
+class BusValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The router of the run's messages."""
+
+    port: int = 4717

@@ -1,0 +1,49 @@
+"""The resolved field: room, team, targets and behaviour."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import msgspec
+
+from groundstation.field.behaviour import (
+    BusValues,
+    ConsoleValues,
+    EstimatorValues,
+    PlannerValues,
+    RecordingValues,
+    SafetyValues,
+)
+from groundstation.field.drones import FieldDrone
+from groundstation.field.room import Room, WorldCamera
+from groundstation.field.targets import SingleTarget, Target, WeightedTarget
+
+
+class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A field with nothing left to merge or to look up: all its drones fly; it has a `target` or `targets`."""
+
+    schema_version: Literal[1] = 1
+    site: str
+    room: Room
+    cameras: dict[str, WorldCamera]
+    drones: dict[str, FieldDrone]
+    target: SingleTarget | None = None
+    targets: dict[str, WeightedTarget] = {}
+    estimator: EstimatorValues = EstimatorValues()
+    planner: PlannerValues
+    safety: SafetyValues = SafetyValues()
+    recording: RecordingValues = RecordingValues()
+    console: ConsoleValues = ConsoleValues()
+    bus: BusValues = BusValues()
+
+    @property
+    def tracked(self) -> Mapping[str, Target]:
+        """Return the targets by name, in the file's order."""
+        return self.targets if self.target is None else {self.target.name: self.target}
+
+
+def field_from_json(content: bytes) -> ResolvedField:
+    """Return a resolved field from JSON; keys that are younger than the text have their defaults.
+
+    Raises msgspec.DecodeError that names the key at fault.
+    """
+    return msgspec.json.decode(content, type=ResolvedField)

@@ -1,0 +1,71 @@
+"""The room, its fence, the cameras fixed in it, and lens calibrations."""
+
+import datetime
+from typing import Literal
+
+import msgspec
+
+Interval = tuple[float, float]
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+
+
+class Fence(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Box that drones are stopped before they leave [m; world]."""
+
+    x_m: Interval
+    y_m: Interval
+    z_m: Interval
+
+
+class Room(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Size along x, y, z, the origin on the floor in the middle, and the fence."""
+
+    size_m: Vector3
+    fence: Fence
+
+
+class LensStd(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Standard deviations of a calibration's figures."""
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    k1: float
+    k2: float
+    p1: float
+    p2: float
+    k3: float
+
+
+class LensCalibration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A pinhole with distortion k1, k2, p1, p2, k3."""
+
+    schema_version: Literal[1] = 1
+    model: Literal["plumb_bob"]
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float]
+    residual_px: float = 0.2
+    date: datetime.date | None = None
+    views: int | None = None
+    std: LensStd | None = None
+
+
+class WorldCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A camera fixed in the world [m; world]; rotation_deg turns it about the world's axes from looking down."""
+
+    source: str
+    calibration: LensCalibration
+    position_m: Vector3
+    looking: Literal["down"] = "down"
+    rotation_deg: Vector3 = (0.0, 0.0, 0.0)
+    video_delay_ms: float = 120.0
+    attitude_std_deg: float = 0.2
+    position_std_m: float = 0.01
+    observes: tuple[Literal["robots", "targets"], ...] = ("robots",)

@@ -4,9 +4,6 @@ import time
 from functools import cache
 from pathlib import Path
 
-NS_PER_S = 1_000_000_000
-NS_PER_MS = 1_000_000
-
 
 def now_ns() -> int:
     """Return the monotonic time of this host [ns since boot]."""

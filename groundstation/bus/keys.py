@@ -33,7 +33,7 @@ def parse(text: str) -> Key:
     """Return the parts of a concrete key.
 
     Raises MessageError for wildcards, keys outside the table and names that are none: any peer may put on a wildcard
-    (zenoh.md 1.2), and a name may end on the operator's terminal.
+    (docs/reference/zenoh.md 3), and a name may end on the operator's terminal.
     """
     if "*" in text:
         raise MessageError("wildcard_key", text)

@@ -10,17 +10,24 @@ class Quality(StrEnum):
     """Delivery classes; all of them drop rather than block."""
 
     CONTROL = "control"
+    """Setpoints and commands: first in every queue, delivered at once."""
     SENSOR = "sensor"
+    """Measurements: high priority, delivered at once."""
     STATE = "state"
+    """What the tracker and the processes report."""
     BULK = "bulk"
+    """Images, datagrams, journal: last in every queue."""
 
 
 class Plane(StrEnum):
     """Which key space a topic lives in; production wildcards match neither `@truth` nor `@sim`."""
 
     PRODUCTION = ""
+    """Everything that flies."""
     TRUTH = "@truth"
+    """Ground truth, for judging and showing a run."""
     SIM = "@sim"
+    """Control of the simulator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,29 +43,53 @@ class Topic:
 
 
 IMU = Topic("imu", m.ImuSample, 200, Quality.SENSOR)
+"""Driver: body rates and specific force of a vehicle."""
 ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR)
+"""Driver to tracker: velocity, attitude and height as the vehicle measured them."""
 OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR)
+"""Camera driver to tracker: one marker that a camera saw."""
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE)
+"""Driver: flight state, battery, link."""
 CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE)
+"""Camera driver: whether images arrive, and how many were used."""
 ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE)
+"""Tracker: mean and covariance of each robot and target, predicted to now."""
 BELIEF = Topic("belief", m.Belief, 5, Quality.STATE)
+"""Tracker: the whole joint belief."""
 SETPOINT = Topic("setpoint", m.VelocitySetpoint, 50, Quality.CONTROL)
+"""Tracker to driver: velocity of one drone."""
 COMMAND = Topic("command", m.Command, 0, Quality.CONTROL)
+"""Operator, any shell or tracker to drivers: a discrete request."""
 COMMAND_ACK = Topic("command_ack", m.CommandAck, 0, Quality.CONTROL)
+"""Driver: how far a command has come."""
 LEASE = Topic("lease", m.Lease, 2, Quality.CONTROL)
+"""Operator to drivers: who may start and resume."""
 PLAN = Topic("plan", m.Plan, 10, Quality.STATE)
+"""Tracker: the plan that was adopted, with its alternatives."""
 INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE)
+"""Tracker: what became of each observation."""
 EVENT = Topic("event", m.Event, 0, Quality.STATE)
+"""Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE)
+"""Every process and the supervisor: lifecycle, CPU, deadlines."""
 CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE)
+"""Offset between the clocks of two hosts. Nothing publishes it yet: all processes run on one host."""
 JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK)
+"""Tracker: what each tick ingested and adopted."""
 IMAGE = Topic("image", None, 5, Quality.BULK, encoding="image/jpeg")
+"""Camera driver: single images for the console."""
 VIDEO = Topic("video", None, 30, Quality.BULK, encoding="video/h264")
+"""Camera driver: every access unit of an H.264 camera, as received."""
 RAW_RX = Topic("raw_rx", None, 200, Quality.BULK, encoding="application/octet-stream")
+"""Driver: datagrams received, with their times."""
 RAW_TX = Topic("raw_tx", None, 30, Quality.BULK, encoding="application/octet-stream")
+"""Driver: datagrams sent, with their times."""
 TRUTH = Topic("state", m.TruthState, 50, Quality.STATE, Plane.TRUTH)
+"""Simulator: true state of one body."""
 SIM_COMMAND = Topic("drive", m.SimCommand, 0, Quality.CONTROL, Plane.SIM)
+"""Console or shell to simulator: steer a target."""
 SIM_STATUS = Topic("status", m.SimStatus, 1, Quality.STATE, Plane.SIM)
+"""Simulator: whether it keeps real time."""
 
 TOPICS: dict[tuple[Plane, str], Topic] = {
     (topic.plane, topic.name): topic

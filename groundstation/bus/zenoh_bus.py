@@ -19,7 +19,7 @@ from groundstation.errors import GroundStationError
 
 _log = logging.getLogger(__name__)
 
-# Setpoints and sensor samples are small and late when batched; express sends each at once (zenoh.md 5).
+# Setpoints and sensor samples are small and late when batched; express sends each at once (docs/reference/zenoh.md 3).
 _PRIORITY = {
     Quality.CONTROL: ("REAL_TIME", True),
     Quality.SENSOR: ("DATA_HIGH", True),
@@ -79,7 +79,7 @@ class ZenohBus(Sender):
         self._subscribers: list[Any] = []
 
     def put(self, topic: Topic, entity: str, payload: bytes, attachment: bytes) -> None:
-        """Hand bytes to Zenoh; DROP everywhere, since a blocking put can hang for seconds (zenoh.md 0.5)."""
+        """Hand bytes to Zenoh, with DROP: a blocking put can hang for seconds (docs/reference/zenoh.md 3)."""
         key = self.key(topic, entity)
         publisher = self._publishers.get(key) or self._declare(key, topic)
         try:
@@ -110,7 +110,7 @@ class ZenohBus(Sender):
         return subscription
 
     def close(self) -> None:
-        """Undeclare and leave; a session left open would keep the interpreter from exiting (zenoh.md 1.9)."""
+        """Undeclare and close; an open session keeps the interpreter from exiting (docs/reference/zenoh.md 8)."""
         for subscriber in self._subscribers:
             subscriber.undeclare()
         self._subscribers.clear()

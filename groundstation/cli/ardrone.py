@@ -10,7 +10,7 @@ from groundstation.cli.exits import ExitCode
 from groundstation.errors import DriverError
 
 if TYPE_CHECKING:
-    from drivers.ardrone.probe import Report
+    from drivers.ardrone.probe import ProbeReport
 
 
 @click.group(epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1")
@@ -49,7 +49,7 @@ def probe(address: str, as_json: bool) -> int:
     return ExitCode.OK
 
 
-def _facts(report: "Report") -> dict[str, Any]:
+def _facts(report: "ProbeReport") -> dict[str, Any]:
     identity = report.identity
     return {
         "address": report.address,
@@ -68,7 +68,7 @@ def _facts(report: "Report") -> dict[str, Any]:
     }
 
 
-def _text(report: "Report") -> str:
+def _text(report: "ProbeReport") -> str:
     battery = "unknown" if report.battery is None else f"{report.battery:.0%}"
     lines = [
         f"{report.address}: {report.identity.text}",

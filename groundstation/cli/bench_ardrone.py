@@ -108,7 +108,7 @@ def measure(count: int, rounds: int) -> dict[str, Any]:
     """Return the figures of everything that is timed."""
     packet = full_packet()
     decoded = navdata.decode(packet)
-    motion = at.Motion(1, 0.1, -0.2, 0.3, -0.4)
+    motion = at.ProgressiveMotion(1, 0.1, -0.2, 0.3, -0.4)
     datagram = at.encode_datagram([at.ref(True), at.pcmd(motion)], 4711)
     times: dict[str, dict[str, float] | None] = {
         "navdata: packet and all options": microseconds(lambda: read_everything(packet), count, rounds),

@@ -23,7 +23,7 @@ def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int
     The server's cost is CPU time. Delays are medians of wall time: a busy machine shows in them, so its load is
     printed. Exit code 0 when all limits are kept, 1 when one is not.
     """
-    from groundstation.console.bench import load_average, measure
+    from groundstation.bench.console import load_average, measure
 
     browser = "" if no_browser else shutil.which(_CHROMIUM) or ""
     figures: dict[str, Any] = {"drones": drones, "seconds": seconds, **measure(seconds, drones, _pictures(), browser)}

@@ -37,7 +37,7 @@ _COLUMNS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class DemoOutcome:
     """One demo: its exit code, its report (None when it left none that can be read), and how long it took."""
 
     seed: int
@@ -84,15 +84,15 @@ def demo(seeds: int, first: int, duration: float | None, out: Path | None, as_js
     if as_json:
         click.echo(json.dumps(as_builtins(outcomes), indent=2))
     else:
-        from rich.console import Console
+        from groundstation.cli.show import show
 
-        terminal = Console()
-        # In a file or a pipe rich assumes 80 columns, too few for the figures.
-        Console(width=terminal.width if terminal.is_terminal else 140).print(table(outcomes))
+        show(table(outcomes))
     return ExitCode.OK if len(outcomes) == seeds and all(outcome.passed for outcome in outcomes) else ExitCode.FAILED
 
 
-def fly_all(seeds: range, duration_s: float | None, folder: Path, say: Callable[[str], object]) -> Iterator[Outcome]:
+def fly_all(
+    seeds: range, duration_s: float | None, folder: Path, say: Callable[[str], object]
+) -> Iterator[DemoOutcome]:
     """Yield the outcome of each seed; after Ctrl-C the flight in progress lands and nothing follows."""
     for number, seed in enumerate(seeds, start=1):
         outcome, interrupted = fly_one(seed, duration_s, folder / f"seed-{seed}")
@@ -111,7 +111,7 @@ def demo_command(seed: int, duration_s: float | None, folder: Path) -> list[str]
     return [*command, "--report", str(folder)]
 
 
-def fly_one(seed: int, duration_s: float | None, folder: Path) -> tuple[Outcome, bool]:
+def fly_one(seed: int, duration_s: float | None, folder: Path) -> tuple[DemoOutcome, bool]:
     """Run one demo to its end; returns its outcome, and whether the operator interrupted."""
     folder.mkdir(parents=True, exist_ok=True)
     for stale in folder.rglob("report.json"):
@@ -127,7 +127,7 @@ def fly_one(seed: int, duration_s: float | None, folder: Path) -> tuple[Outcome,
         )
         interrupted = _wait(process, (duration_s or _DEFAULT_DURATION_S) + _OVERHEAD_S)
     seconds = time.monotonic() - began
-    return Outcome(seed, process.returncode, seconds, folder, _report_in(folder)), interrupted
+    return DemoOutcome(seed, process.returncode, seconds, folder, _report_in(folder)), interrupted
 
 
 def _wait(process: subprocess.Popen[bytes], limit_s: float) -> bool:
@@ -169,7 +169,7 @@ def _value(report: dict[str, Any] | None, path: str) -> Any:
     return value
 
 
-def as_builtins(outcomes: list[Outcome]) -> dict[str, Any]:
+def as_builtins(outcomes: list[DemoOutcome]) -> dict[str, Any]:
     """Return what --json prints."""
     runs = [
         {
@@ -186,7 +186,7 @@ def as_builtins(outcomes: list[Outcome]) -> dict[str, Any]:
     return {"runs": runs, "passed": sum(outcome.passed for outcome in outcomes), "flown": len(outcomes)}
 
 
-def table(outcomes: list[Outcome]) -> Any:
+def table(outcomes: list[DemoOutcome]) -> Any:
     """Return the outcomes as a rich table."""
     from rich.table import Table
     from rich.text import Text

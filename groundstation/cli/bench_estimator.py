@@ -34,12 +34,13 @@ def estimator(robots: str, rounds: int, duration_ms: int, field_name: str, seed:
         os.environ.setdefault(variable, "1")
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import resolved_field
 
-    resolved = json.loads(load_field(find_field(field_name), ()).model_dump_json())
-    if not resolved["drones"] or not resolved["cameras"]:
+    resolved = resolved_field(load_field(find_field(field_name), ()))
+    if not resolved.drones or not resolved.cameras:
         raise click.UsageError(f"--field: {field_name} has no drone or no camera to copy")
     use_kernel_cache()
-    from groundstation.experiments.estimator_bench import SAME_BELIEF, run_bench
+    from groundstation.bench.estimator import SAME_BELIEF, run_bench
 
     terminal = sys.stderr.isatty()
 

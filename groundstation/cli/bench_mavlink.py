@@ -14,7 +14,13 @@ _LIMITS = {"discovery_s": 2.0, "cores": 0.6, "telemetry_to_bus_ms": 3.0, "setpoi
 @click.command(epilog="Example: groundstation bench mavlink --link mavsdk --json")
 @click.option("--vehicles", type=click.IntRange(1, 50), default=10, show_default=True, help="How many.")
 @click.option("--seconds", type=FiniteRange(1, 600), default=10.0, show_default=True, help="How long.")
-@click.option("--link", type=click.Choice(["pymavlink", "mavsdk"]), default="pymavlink", show_default=True)
+@click.option(
+    "--link",
+    type=click.Choice(["pymavlink", "mavsdk"]),
+    default="pymavlink",
+    show_default=True,
+    help="Library of the link.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def mavlink(vehicles: int, seconds: float, link: str, as_json: bool) -> int:
     """Drive talking vehicles (each 50 Hz odometry, 100 Hz IMU, on one port) in TRACK with set-points at 20 Hz.
@@ -22,7 +28,7 @@ def mavlink(vehicles: int, seconds: float, link: str, as_json: bool) -> int:
     Cores are CPU time of the driver alone. Delays are wall time: a busy machine shows in them, so its load is printed.
     Exit code 0 when all limits are kept, 1 when one is not.
     """
-    from drivers.mavlink.bench import measure, peer
+    from groundstation.bench.mavlink import measure, peer
 
     figures: dict[str, Any] = {"vehicles": vehicles, "link": link, **measure(link, vehicles, seconds)}
     theirs = peer(vehicles, seconds)

@@ -56,7 +56,7 @@ def planner(robots: str, layout: str, peer: str, repeats: int, seed: int, limit_
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     use_kernel_cache()
-    from groundstation.experiments.planner_bench import run_bench
+    from groundstation.bench.planner import run_bench
 
     terminal = sys.stderr.isatty()
 

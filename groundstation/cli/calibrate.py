@@ -12,7 +12,7 @@ from groundstation.cli.calibrate_extrinsics import extrinsics
     epilog="\b\nExamples:\n"
     "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
     "  groundstation calibrate check lab.yaml\n\n"
-    "The order of work for a new lab is in config/README.md, section Calibrate."
+    'The order of work for a new lab: "Calibrate lenses, mountings and delays" in docs/how-to.'
 )
 def calibrate() -> None:
     """Measure what the field file and its calibrations say of cameras and sensors."""

@@ -15,10 +15,10 @@ from groundstation.cli.sources import require_folder, source_of, until_interrupt
 from groundstation.errors import OperatorMistake
 
 if TYPE_CHECKING:
-    from drivers.camera.calibration.feed import Shot
-    from drivers.camera.calibration.judge import Flaw, Judge
+    from drivers.camera.calibration.feed import SourcePicture
     from drivers.camera.calibration.lens_fit import LensFit
     from drivers.camera.calibration.pattern import Pattern
+    from drivers.camera.calibration.view_quality import Flaw, Judge
 
 _NAME = r"[a-z][a-z0-9_]{0,47}"
 _FOLDER = Path("config/cameras")
@@ -65,7 +65,7 @@ def camera(source: str, board: str, square_mm: float, recipe: str, **options: An
         pattern = pattern_of(board, square_mm, as_opencv=recipe == "opencv")
     except ValueError as error:
         raise click.UsageError(f"--board: {error}") from None
-    session = Session(pattern, options["views"], options["preview"])
+    session = CalibrationSession(pattern, options["views"], options["preview"])
     session.watch(source)
     fit = session.fit(as_opencv=recipe == "opencv")
     _write(output, source, session, fit)
@@ -81,14 +81,14 @@ def _require_output(path: Path, force: bool) -> Path:
     return path
 
 
-class Session:
+class CalibrationSession:
     """Looking at pictures of one source until they suffice; tells the operator what is still missing."""
 
     def __init__(self, pattern: "Pattern", enough: int, preview: Path | None) -> None:
         self._pattern, self._enough, self._preview = pattern, enough, preview
         self._judge: Judge | None = None
         self._size = (0, 0)
-        self._screen = Screen()
+        self._screen = ProgressLine()
 
     def watch(self, source: str) -> None:
         """Look until the views suffice, the source ends, or Ctrl-C."""
@@ -119,8 +119,8 @@ class Session:
     def _is_enough(self) -> bool:
         return len(self.judge.views) >= self._enough and not self.missing
 
-    def _take(self, shot: "Shot") -> None:
-        from drivers.camera.calibration.judge import Judge
+    def _take(self, shot: "SourcePicture") -> None:
+        from drivers.camera.calibration.view_quality import Judge
 
         if self._judge is None:
             self._judge, self._size = Judge(self._pattern, shot.size), shot.size
@@ -132,7 +132,7 @@ class Session:
         if self._preview is not None:
             self._save(shot, flaw, corners)
 
-    def _save(self, shot: "Shot", flaw: "Flaw | None", corners: Any) -> None:
+    def _save(self, shot: "SourcePicture", flaw: "Flaw | None", corners: Any) -> None:
         from drivers.camera.calibration import annotate
 
         assert self._preview is not None
@@ -187,7 +187,7 @@ class Session:
         click.echo("\n".join(lines))
 
 
-class Screen:
+class ProgressLine:
     """Tells of every picture on stderr: on a terminal one line that changes, else one line each that was kept."""
 
     def __init__(self) -> None:
@@ -216,8 +216,8 @@ class Screen:
             click.echo("", err=True)
 
 
-def _write(output: Path, source: str, session: Session, fit: "LensFit") -> None:
-    from drivers.camera.settings import without_password
+def _write(output: Path, source: str, session: CalibrationSession, fit: "LensFit") -> None:
+    from groundstation.errors import without_password
     from groundstation.settings.calibration_file import calibration_text
 
     missing = session.missing

@@ -16,7 +16,7 @@ from groundstation.cli.sources import lens_of, require_size, source_of, until_in
 from groundstation.errors import GroundStationError, OperatorMistake
 
 if TYPE_CHECKING:
-    from drivers.camera.calibration.marks import Steady
+    from drivers.camera.calibration.static_markers import Steady
     from groundstation.geometry.lens import CameraIntrinsics
     from groundstation.settings.schema import Field
 
@@ -25,7 +25,7 @@ _PLACE_SIGMAS, _SAME_PLACE_M = 4.0, 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class CheckFinding:
     """One thing that was looked at: what, whether it holds (None: could not be told), and what to do if it does not."""
 
     what: str
@@ -82,7 +82,7 @@ def _seen(
     source: str, lens: "CameraIntrinsics", calibration: str, frames: int
 ) -> tuple["CameraIntrinsics", dict[int, "Steady"]]:
     from drivers.camera.calibration.feed import shots
-    from drivers.camera.calibration.marks import Gathering
+    from drivers.camera.calibration.static_markers import Gathering
 
     gathering = Gathering(lens)
     with until_interrupted():
@@ -96,12 +96,12 @@ def _seen(
 
 def _lens_findings(
     name: str, lens: "CameraIntrinsics", seen: "dict[int, Steady]", square_mm: float
-) -> Iterator[Finding]:
-    from drivers.camera.calibration.marks import flat_points
+) -> Iterator[CheckFinding]:
+    from drivers.camera.calibration.static_markers import flat_points
     from drivers.camera.pose import planar_poses
 
     if not seen:
-        yield Finding(f"{name}: no marker in view", None, "lay out two or three, also near the picture's corners")
+        yield CheckFinding(f"{name}: no marker in view", None, "lay out two or three, also near the picture's corners")
         return
     limit = max(_LEAST_LIMIT_PX, _RESIDUAL_RATIO * lens.residual_px)
     for code, steady in seen.items():
@@ -109,11 +109,13 @@ def _lens_findings(
         squared = min((pose.squared_error for pose in poses), default=math.inf)
         rms = math.sqrt(squared / (2 * len(steady.corners) - 6))
         remedy = "is the marker flat? else groundstation calibrate camera: lens or focus were changed"
-        yield Finding(f"{name}: marker {code} fits the lens to {rms:.2f} px (limit {limit:.2f})", rms <= limit, remedy)
+        yield CheckFinding(
+            f"{name}: marker {code} fits the lens to {rms:.2f} px (limit {limit:.2f})", rms <= limit, remedy
+        )
 
 
-def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, frames: int) -> Iterator[Finding]:
-    from groundstation.geometry.calibration import intrinsics_from_mapping
+def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, frames: int) -> Iterator[CheckFinding]:
+    from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
 
     places: dict[int, dict[str, tuple[Any, float]]] = {}
     for name, camera in field.cameras.items():
@@ -121,10 +123,10 @@ def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, fra
         try:
             _, seen = _seen(camera.source, lens, f"of {name}", frames)
         except OperatorMistake as error:
-            yield Finding(f"{name}: {error}", False)
+            yield CheckFinding(f"{name}: {error}", False)
             continue
         except GroundStationError as error:
-            yield Finding(f"{name}: {error}", False, "check the camera and its address")
+            yield CheckFinding(f"{name}: {error}", False, "check the camera and its address")
             continue
         yield from _lens_findings(name, lens, seen, square_mm)
         for code, steady in seen.items():
@@ -137,7 +139,7 @@ def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, fra
 
 def _placed(camera: Any, lens: "CameraIntrinsics", steady: "Steady", square_mm: float) -> tuple[Any, float] | None:
     """Return where a camera has a marker [m; world], and one sigma of that by its mounting and its corners."""
-    from drivers.camera.calibration.marks import flat_points
+    from drivers.camera.calibration.static_markers import flat_points
     from drivers.camera.pose import planar_poses, pose_covariance
     from groundstation.geometry.rotations import world_from_downward_optical
 
@@ -153,17 +155,17 @@ def _placed(camera: Any, lens: "CameraIntrinsics", steady: "Steady", square_mm: 
     return rotation @ best.translation + np.array(camera.position_m), std
 
 
-def _place_findings(code: int, by_camera: dict[str, tuple[Any, float]], said: Any) -> Iterator[Finding]:
+def _place_findings(code: int, by_camera: dict[str, tuple[Any, float]], said: Any) -> Iterator[CheckFinding]:
     remedy = "a camera was moved: groundstation calibrate extrinsics"
     for name, (place, std) in by_camera.items():
         if said is not None:
             gap = float(np.linalg.norm(place - said))
             limit = max(_SAME_PLACE_M, _PLACE_SIGMAS * std)
             text = f"{name}: has marker {code} {gap * 100:.1f} cm from where it lies (limit {limit * 100:.1f})"
-            yield Finding(text, gap <= limit, remedy)
+            yield CheckFinding(text, gap <= limit, remedy)
     names = list(by_camera)
     for first, second in pairwise(names):
         (a, std_a), (b, std_b) = by_camera[first], by_camera[second]
         gap, limit = float(np.linalg.norm(a - b)), max(_SAME_PLACE_M, _PLACE_SIGMAS * math.hypot(std_a, std_b))
         text = f"{first} and {second} have marker {code} {gap * 100:.1f} cm apart (limit {limit * 100:.1f})"
-        yield Finding(text, gap <= limit, remedy)
+        yield CheckFinding(text, gap <= limit, remedy)

@@ -32,15 +32,16 @@ def delay(recording: tuple[Path, ...], as_json: bool) -> int:
     from groundstation.process import numba_cache
     from groundstation.recording.reader import RecordingError
     from groundstation.settings.recorded import recorded_field
+    from groundstation.settings.resolved import resolved_field
 
     numba_cache.activate()
     from groundstation.calibration.delay import delays
-    from groundstation.calibration.flown import flown_of
+    from groundstation.calibration.recorded_likelihood import flown_of
     from groundstation.replay.source import open_source
 
     try:
         source = open_source(recording)
-        field = recorded_field(source.field).model_dump(mode="json")
+        field = resolved_field(recorded_field(source.field))
         flown = flown_of(source)
     except RecordingError as error:
         raise click.UsageError(str(error)) from error

@@ -13,8 +13,8 @@ from groundstation.cli.sources import lens_of, require_folder, require_size, sou
 from groundstation.errors import OperatorMistake
 
 if TYPE_CHECKING:
-    from drivers.camera.calibration.marks import Gathering
-    from drivers.camera.calibration.placing import Placing
+    from drivers.camera.calibration.extrinsics import Placing
+    from drivers.camera.calibration.static_markers import Gathering
     from groundstation.geometry.lens import CameraIntrinsics
     from groundstation.settings.floor_markers import FloorMarkers
 
@@ -51,7 +51,7 @@ _ROLLED_DEG = 1.0
 @click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write the last picture, annotated.")
 def extrinsics(source: str, calibration: Path, **options: Any) -> int:
     """Measure where the camera at SOURCE is and how it is turned; prints the lines for the field file."""
-    from drivers.camera.calibration.placing import Mark, place_camera
+    from drivers.camera.calibration.extrinsics import Mark, place_camera
 
     layout = _layout_of(options)
     lens = lens_of(calibration)
@@ -97,7 +97,7 @@ def _layout_of(options: dict[str, Any]) -> "FloorMarkers":
 def _gather(source: str, lens: "CameraIntrinsics", calibration: str, frames: int, preview: Path | None) -> "Gathering":
     from drivers.camera.calibration import annotate
     from drivers.camera.calibration.feed import shots
-    from drivers.camera.calibration.marks import Gathering
+    from drivers.camera.calibration.static_markers import Gathering
 
     gathering = Gathering(lens)
     with until_interrupted():

@@ -10,7 +10,7 @@ from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.sources import lens_of, require_folder, require_size, source_of, until_interrupted
 
 if TYPE_CHECKING:
-    from drivers.camera.calibration.looking import Look
+    from drivers.camera.calibration.preview import Look
 
 _PORT = 8770
 
@@ -52,22 +52,22 @@ def view(
     """
     from drivers.camera.calibration.annotate import jpeg_of, save
     from drivers.camera.calibration.feed import shots
-    from drivers.camera.calibration.looking import Viewer
-    from drivers.camera.calibration.stream import Stream
+    from drivers.camera.calibration.preview import DetectorPreview
+    from drivers.camera.calibration.stream import PictureServer
 
     lens = lens_of(calibration) if calibration is not None else None
     if output is not None:
         require_folder(output)
-    served = Stream(port) if stream else None
+    served = PictureServer(port) if stream else None
     if served is not None:
         click.echo(f"{served.url} (Ctrl-C ends it)")
-    viewer, seen = None, Tally()
+    viewer, seen = None, PictureCounter()
     try:
         with until_interrupted():
             for shot in shots(source, None if lens is None else (lens.width_px, lens.height_px)):
                 if lens is not None:
                     require_size(shot, lens, str(calibration))
-                viewer = viewer or Viewer(shot.size, lens, square_mm)
+                viewer = viewer or DetectorPreview(shot.size, lens, square_mm)
                 look = viewer.look(shot)
                 seen.add(look)
                 if output is not None:
@@ -83,7 +83,7 @@ def view(
     return ExitCode.OK
 
 
-class Tally:
+class PictureCounter:
     """Says each picture in a line, and counts."""
 
     def __init__(self) -> None:

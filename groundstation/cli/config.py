@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from groundstation.cli.exits import ExitCode
 from groundstation.errors import OperatorMistake, SettingsError
 
 _OPTION = click.option(
@@ -40,7 +41,7 @@ def check(field: str, options: tuple[str, ...], scenario: str | None, as_json: b
         problems = error.problems
     if as_json:
         click.echo(json.dumps({"ok": not problems, "problems": problems}))
-    return 2 if problems else 0
+    return ExitCode.SETTINGS if problems else ExitCode.OK
 
 
 def _targets(names: tuple[str, ...]) -> str:

@@ -2,13 +2,14 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from groundstation.cli.monitor import cast_of, choose
 
 if TYPE_CHECKING:
+    from groundstation.field.resolved import ResolvedField
     from groundstation.supervisor.runtime_file import RuntimeRecord
 
 
@@ -20,19 +21,21 @@ def console(name: str | None, port: int | None) -> None:
     import asyncio
 
     from groundstation.bus.zenoh_bus import open_bus
-    from groundstation.console.scene import bare_scene, scene_from_field
+    from groundstation.console.room import bare_scene, scene_from_field
+    from groundstation.console.section import run_id
     from groundstation.console.server import ConsoleServer, claim_port
+    from groundstation.field.behaviour import ConsoleValues
 
     record = choose(name)
     cast, field = cast_of(record), _field_of(record)
     truth = record.simulated
     scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
-    listener = claim_port(port or field.get("console", {}).get("port", 8765))
+    listener = claim_port(port or (field.console if field else ConsoleValues()).port)
     bus = open_bus(record.endpoint, record.site, f"console_{os.getpid()}", timeout_s=2.0)
     try:
-        server = ConsoleServer(bus, cast, scene, field, listener)
+        server = ConsoleServer(bus, cast, scene, field, listener, run_id(record.run_dir))
         click.echo(f"console of {record.name} at {server.url} (Ctrl-C leaves it; the flight goes on)")
-        asyncio.run(server.serve(lambda turns, _late: turns % 20 != 0 or record.alive))
+        asyncio.run(server.serve(lambda turns, _late: not server.ended and (turns % 20 != 0 or record.alive)))
         click.echo("the run has ended")
     except KeyboardInterrupt:
         pass
@@ -40,14 +43,12 @@ def console(name: str | None, port: int | None) -> None:
         bus.close()
 
 
-def _field_of(record: "RuntimeRecord") -> dict[str, Any]:
-    """Return the resolved field from the recording that is being written, or {}."""
-    import msgspec
-
+def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":
+    """Return the resolved field from the recording that is being written, or None."""
+    from groundstation.field.resolved import field_from_json
     from groundstation.recording.reader import attached_field
 
     try:
-        field: dict[str, Any] = msgspec.json.decode(attached_field(Path(record.run_dir)), type=dict)
+        return field_from_json(attached_field(Path(record.run_dir)))
     except ValueError:
-        return {}
-    return field
+        return None

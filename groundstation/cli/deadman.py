@@ -20,9 +20,10 @@ from groundstation.bus.topics import COMMAND_ACK
 from groundstation.bus.zenoh_bus import open_bus
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.stop import choose_run
+from groundstation.console.commands import OrderDesk
 from groundstation.console.dead_man import DeadMan, Grip
-from groundstation.console.orders import OrderDesk
 from groundstation.errors import GroundStationError, OperatorMistake
+from groundstation.time_units import NS_PER_MS
 
 if TYPE_CHECKING:
     from groundstation.bus.api import Bus
@@ -30,8 +31,7 @@ if TYPE_CHECKING:
 _ME = "deadman"
 _TURN_S = 0.02
 _FAREWELL_NS = 2_000_000_000
-_NS_PER_MS = 1_000_000
-_KEYBOARD_PATIENCE_NS = 900 * _NS_PER_MS
+_KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
 _GAMEPAD_PATIENCE_NS = 1 << 62  # it says itself when it is let go
 # WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
 _EVENT = struct.Struct("<IhBB")

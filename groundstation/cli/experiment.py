@@ -119,7 +119,13 @@ def sensors(robots: int, seeds: int, **world: Any) -> None:
 
 
 @experiment.command()
-@_option("--experiment", "name", type=click.Choice(["figure1", "teams", "figure-eight"]), default="teams")
+@_option(
+    "--experiment",
+    "name",
+    type=click.Choice(["figure1", "teams", "figure-eight"]),
+    default="teams",
+    help="Which experiment.",
+)
 @_option("--robots", default="2,5,10,20", help="Team sizes.")
 @_option("--strategies", default="paper,certified", help=f"Of {', '.join(_STRATEGIES)}.")
 @_option("--starts", default="string,two-level,random", help=f"First topologies, of {', '.join(_STARTS)}.")

@@ -10,7 +10,7 @@ import click
 from groundstation.cli.bench_planner import use_kernel_cache
 
 if TYPE_CHECKING:
-    from groundstation.experiments.mrclam.run import Result
+    from groundstation.experiments.mrclam.run import ScenarioErrors
 
 _FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
@@ -44,7 +44,7 @@ def mrclam(folder: Path, seed: int, span: tuple[float, float], as_json: bool) ->
         click.echo(json.dumps({"experiment": "mrclam", "folder": str(folder), "results": rows}, indent=1))
 
 
-def _line(result: "Result") -> str:
+def _line(result: "ScenarioErrors") -> str:
     readings = "with" if result.robot_readings else "without"
     return (
         f"{result.scenario:33} {readings:>7} readings between robots: {result.rmse_m:.3f} m {result.rmse_deg:4.1f} deg,"

@@ -85,8 +85,10 @@ def _tlog(run: "RecordedRun", recording: Path, output: Path | None) -> None:
     from groundstation.cli.tlog import write_tlogs
 
     folder = output or (recording if recording.is_dir() else recording.parent)
-    for path, count in write_tlogs(run, folder).items():
-        click.echo(f"{path}: {count} datagrams")
+    for path, log in write_tlogs(run, folder).items():
+        if log.frames:
+            click.echo(f"{path}: {len(log.frames)} frames")
+        _tell(f"{path.stem}: left out", (f"{n} x {reason.replace('_', ' ')}" for reason, n in log.refused.items()))
 
 
 _WRITERS: "dict[str, Callable[[RecordedRun, Path, Path | None], None]]" = {

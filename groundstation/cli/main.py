@@ -14,7 +14,7 @@ from groundstation.errors import GroundStationError, SettingsError
 
 
 @dataclass(frozen=True, slots=True)
-class Verb:
+class CommandRow:
     """One row of the table: where the command is (`module:function`), and its line in the help."""
 
     family: str
@@ -22,39 +22,53 @@ class Verb:
     summary: str
 
 
-VERBS: dict[str, Verb] = {
-    "demo": Verb("Fly", "groundstation.cli.demo:demo", "Two emulated drones track a TurtleBot; needs no hardware."),
-    "sitl": Verb("Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras."),
-    "fly": Verb("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones."),
-    "takeoff": Verb("Command", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
-    "track": Verb("Command", "groundstation.cli.stop:track", "Let the tracker move the drones."),
-    "resume": Verb("Command", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),
-    "hold": Verb("Stop", "groundstation.cli.stop:hold", "Hover where they are."),
-    "land": Verb("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones."),
-    "cut-motors": Verb("Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall."),
-    "deadman": Verb("Stop", "groundstation.cli.deadman:deadman", "Hold a key or button; let go: they hold, then land."),
-    "monitor": Verb("Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station."),
-    "console": Verb(
+VERBS: dict[str, CommandRow] = {
+    "demo": CommandRow(
+        "Fly", "groundstation.cli.demo:demo", "Two emulated drones track a TurtleBot; needs no hardware."
+    ),
+    "sitl": CommandRow("Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras."),
+    "fly": CommandRow("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones."),
+    "takeoff": CommandRow("Command", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
+    "track": CommandRow("Command", "groundstation.cli.stop:track", "Let the tracker move the drones."),
+    "resume": CommandRow("Command", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),
+    "hold": CommandRow("Stop", "groundstation.cli.stop:hold", "Hover where they are."),
+    "land": CommandRow("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones."),
+    "cut-motors": CommandRow("Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall."),
+    "deadman": CommandRow(
+        "Stop", "groundstation.cli.deadman:deadman", "Hold a key or button; let go: they hold, then land."
+    ),
+    "monitor": CommandRow("Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station."),
+    "console": CommandRow(
         "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."
     ),
-    "view": Verb("Look", "groundstation.cli.view:view", "Live engineering view in Rerun or Foxglove."),
-    "report": Verb("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
-    "replay": Verb("Look", "groundstation.cli.replay:replay", "A recorded run in the console, or once more computed."),
-    "recording": Verb(
+    "view": CommandRow("Look", "groundstation.cli.view:view", "Live engineering view in Rerun or Foxglove."),
+    "report": CommandRow("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
+    "replay": CommandRow(
+        "Look", "groundstation.cli.replay:replay", "A recorded run in the console, or once more computed."
+    ),
+    "recording": CommandRow(
         "Look", "groundstation.cli.recording:recording", "Look into, repair, cut and convert recordings."
     ),
-    "export": Verb("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
-    "bench": Verb("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
-    "experiment": Verb(
+    "export": CommandRow("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
+    "bench": CommandRow("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
+    "experiment": CommandRow(
         "Look", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."
     ),
-    "config": Verb("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
-    "ardrone": Verb("Settings", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
-    "calibrate": Verb("Settings", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."),
-    "camera": Verb("Settings", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."),
-    "markers": Verb("Settings", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
-    "mavlink": Verb("Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."),
-    "version": Verb("Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."),
+    "config": CommandRow("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
+    "ardrone": CommandRow("Settings", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
+    "calibrate": CommandRow(
+        "Settings", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."
+    ),
+    "camera": CommandRow(
+        "Settings", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."
+    ),
+    "markers": CommandRow("Settings", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
+    "mavlink": CommandRow(
+        "Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."
+    ),
+    "version": CommandRow(
+        "Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."
+    ),
 }
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
 from groundstation.printing import pdf, sheets
 
 _SQUARE_MM, _TAG_MM = 44.0, 168.0
@@ -79,7 +79,7 @@ def paper_size(text: str) -> tuple[float, float]:
     return float(sides[1]), float(sides[2])
 
 
-def _item(number: int, dictionary: str | None, size: float) -> sheets.Print:
+def _item(number: int, dictionary: str | None, size: float) -> sheets.Sheet:
     if not 1.0 <= size <= 2000.0:
         raise click.UsageError(f"a size of {size:g} mm: must be in 1..2000")
     try:
@@ -87,7 +87,7 @@ def _item(number: int, dictionary: str | None, size: float) -> sheets.Print:
             return sheets.checkerboard(number, size)
         from drivers.camera.dictionaries import black_cells
 
-        marker = Tag(dictionary, number, size)
+        marker = SquareTag(dictionary, number, size)
         return sheets.tag(marker, black_cells(marker))
     except ValueError as error:
         raise click.UsageError(f"marker {number}: {error}") from None

@@ -39,7 +39,7 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
     LINK: udpin:ADDRESS:PORT waits for vehicles that call this computer, udpout:ADDRESS:PORT calls one,
     serial:DEVICE:BAUD is a radio.
     """
-    from drivers.mavlink.link import open_link
+    from drivers.mavlink.links.opening import open_link
     from drivers.mavlink.probe import probe as look
 
     opened = open_link(_link_settings(link, key_file, "mavsdk" if with_mavsdk else "pymavlink"))
@@ -74,8 +74,8 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
 @click.option("--address", help="Where it is, if not where the field file says: ADDRESS:PORT.")
 def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
     """Compare the parameters of DRONE in FIELD with what indoor flight needs; with --apply, write what differs."""
-    from drivers.mavlink.link import open_link
-    from drivers.mavlink.setup import Setup
+    from drivers.mavlink.links.opening import open_link
+    from drivers.mavlink.setup import ParameterSetup
     from drivers.mavlink.wire.names import Flavour
 
     settings, vehicle = _vehicle(field, drone)
@@ -85,7 +85,7 @@ def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
     opened = open_link(link)
     left = 0
     try:
-        work = Setup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id)
+        work = ParameterSetup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id)
         work.connect()
         for found in work.differences():
             taken = not check and work.apply(found.wanted)
@@ -122,5 +122,5 @@ def _vehicle(path: Path, name: str) -> tuple[Any, Any]:
             for vehicle in settings.vehicles:
                 if vehicle.name == name:
                     return settings, vehicle
-    known = [n for n, drone in field.drones.items() if drone.mavlink is not None]
+    known = [n for n, drone in field.drones.items() if drone.kind == "mavlink"]
     raise OperatorMistake(f"{name} is no MAVLink vehicle of {path}; there are: {', '.join(known) or 'none'}")

@@ -51,11 +51,12 @@ def choose(name: str | None) -> "RuntimeRecord":
 
 def cast_of(record: "RuntimeRecord") -> "Cast":
     """Return who takes part, as far as the recording that is being written says it."""
+    from groundstation.field.resolved import field_from_json
     from groundstation.monitor.state import Cast, cast_from_field
     from groundstation.recording.reader import attached_field
 
     try:
-        return cast_from_field(attached_field(Path(record.run_dir)))
+        return cast_from_field(field_from_json(attached_field(Path(record.run_dir))))
     except ValueError:
         return Cast(record.site, dict.fromkeys(record.drones, 0.15))
 
@@ -83,8 +84,7 @@ def _print_once(bus: "Bus", cast: "Cast", as_json: bool) -> None:
     if as_json:
         click.echo(screen.state.as_json(time.monotonic_ns()))
         return
-    from rich.console import Console
-
+    from groundstation.cli.show import show
     from groundstation.monitor.table import render
 
-    Console().print(render(screen.state, time.monotonic_ns()))
+    show(render(screen.state, time.monotonic_ns()))

@@ -93,7 +93,7 @@ def recover(recording: Path, output: Path | None) -> int:
 @click.option("--output", type=click.Path(path_type=Path), help="New folder, or file for a file (default: beside it).")
 def cut(recording: Path, from_s: float, to_s: float | None, output: Path | None) -> int:
     """Write a stretch of a recording to a new one, with all attachments and with what was known when it begins."""
-    from groundstation.recording.stretch import cut_run
+    from groundstation.recording.cut import cut_run
 
     for path, count in cut_run(recording, from_s, to_s, output).items():
         click.echo(f"{path}: {count} messages")

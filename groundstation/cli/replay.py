@@ -75,8 +75,10 @@ def _play(
 ) -> int:
     import asyncio
 
+    from groundstation.console.server import HOST
+    from groundstation.process.ports import holder_of
     from groundstation.replay.playback import Playback
-    from groundstation.replay.show import serve
+    from groundstation.replay.playback_server import serve
 
     playback = Playback(source, speed or 1.0, from_s or 0.0, playing=not paused or headless)
     click.echo(f"replay of {source.name}: {playback.reel.duration_s:.1f} s")
@@ -85,7 +87,7 @@ def _play(
 
     def announce(url: str) -> None:
         if port and f":{port}/" not in url:
-            click.echo(f"port {port} is in use")
+            click.echo(f"port {port} is taken by {holder_of(HOST, port)}")
         click.echo(f"{url} (Ctrl-C leaves it)")
 
     with suppress(KeyboardInterrupt):
@@ -104,16 +106,17 @@ def _run_again(
 ) -> int:
     from groundstation.process import numba_cache
     from groundstation.settings.recorded import recorded_field
+    from groundstation.settings.resolved import resolved_field
 
     given = [f"--{name.removesuffix('_s')}" for name, value in playing.items() if value]
     if given:
         raise click.UsageError(f"{', '.join(given)} belongs to playing in the console, not to a re-run")
-    field = recorded_field(source.field).model_dump(mode="json")
-    changed = recorded_field(source.field, options, estimator).model_dump(mode="json")
+    field = resolved_field(recorded_field(source.field))
+    changed = resolved_field(recorded_field(source.field, options, estimator))
     if json_file is not None:
         _require_writable(json_file)
     numba_cache.activate()
-    from groundstation.replay.again import Again
+    from groundstation.replay.rerun_report import Again
 
     changes = [*([f"estimator of {estimator}"] if estimator else []), *options]
     again = Again(source, field, changed, changes, output)

@@ -10,7 +10,7 @@ from groundstation.cli.exits import ExitCode
 from groundstation.errors import GroundStationError, OperatorMistake
 
 if TYPE_CHECKING:
-    from groundstation.report.judge import Report
+    from groundstation.report.judge import RunReport
 
 _RUNS = Path("runs")
 
@@ -26,7 +26,8 @@ _RUNS = Path("runs")
 def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None) -> int:
     """Rebuild report.html, report.json and trajectories.png of a run folder (default: the newest in ./runs).
 
-    Exit code 0 when the run passed, 1 when it did not. A comparison judges nothing: 0 when it could be made.
+    Exit code 0 when the run passed, 1 when it did not. A comparison, and the report of a re-run (`replay --output`),
+    judge nothing: 0 when they could be made.
     """
     from groundstation.report.build import build_report
 
@@ -36,10 +37,10 @@ def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | N
         return ExitCode.OK
     built = _writing(lambda: build_report(run_dir, plot=not no_plot))
     _show(built, as_json)
-    return ExitCode.OK if built.passed else ExitCode.FAILED
+    return ExitCode.FAILED if built.passed is False else ExitCode.OK
 
 
-def _writing(build: Callable[[], "Report"]) -> "Report":
+def _writing(build: Callable[[], "RunReport"]) -> "RunReport":
     try:
         return build()
     except OSError as error:
@@ -47,15 +48,14 @@ def _writing(build: Callable[[], "Report"]) -> "Report":
         raise GroundStationError(f"{where}: {error.strerror}; nothing of the recording is lost") from error
 
 
-def _show(built: "Report", as_json: bool) -> None:
+def _show(built: "RunReport", as_json: bool) -> None:
     if as_json:
         click.echo(built.as_json())
         return
-    from rich.console import Console
-
+    from groundstation.cli.show import show
     from groundstation.report.summary import summary
 
-    Console().print(summary(built))
+    show(summary(built))
 
 
 def _compare(first: Path, second: Path, as_json: bool) -> None:
@@ -73,11 +73,10 @@ def _compare(first: Path, second: Path, as_json: bool) -> None:
         write_comparison(((left, reports[0]), (right, reports[1])), first / NAME)
     except OSError as error:
         raise GroundStationError(f"{first / NAME}: {error.strerror}") from error
-    from rich.console import Console
-
+    from groundstation.cli.show import show
     from groundstation.report.summary import comparison
 
-    Console().print(comparison(*reports))
+    show(comparison(*reports))
     click.echo(f"  {first / NAME}")
 
 

@@ -3,7 +3,6 @@
 import os
 import shutil
 import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -71,17 +70,17 @@ def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
 
     Ctrl-C lands; a second one stops at once.
     """
-    from groundstation.cli.composition import FLY_ENDPOINT
-    from groundstation.cli.flight import FlightPlan
+    from groundstation.flight.composition import fly_endpoint
+    from groundstation.flight.plan import plan_of
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.supervisor.network import require_free
 
     path = find_field(field)
     loaded = load_field(path, options)
-    limits = _limits(loaded)
-    require_free(FLY_ENDPOINT)
-    return _run("fly", path, loaded, FlightPlan(None, asks=True, limits=limits), headless=headless)
+    plan = plan_of(loaded, None, asks=True)
+    require_free(fly_endpoint(loaded))
+    return _run("fly", path, loaded, plan, headless=headless)
 
 
 def run_simulated(
@@ -96,8 +95,8 @@ def run_simulated(
     options: tuple[str, ...],
 ) -> int:
     """Fly a field in the simulator, judge the run, and return the exit code."""
-    from groundstation.cli.composition import Simulation, simulated
-    from groundstation.cli.flight import FlightPlan
+    from groundstation.flight.composition import Simulation, simulated
+    from groundstation.flight.plan import plan_of
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
@@ -106,27 +105,20 @@ def run_simulated(
 
     path = find_field(field)
     loaded = load_field(path, options)
-    limits = _limits(loaded)
+    plan = plan_of(loaded, duration, asks=False)
     chosen = load_scenario(find_scenario(scenario, path))
     if seed is None:
         seed = int(chosen.get("seed", 1))
     for sentence in drawing.beyond_walls(loaded, drawing.paths_of(chosen, loaded.tracked)):
         click.echo(f"scenario {scenario}: {sentence}", err=True)
-    net = network.claim(runtime_file.folder())
+    net = network.claim(runtime_file.folder(), loaded.bus.port)
     try:
-        plan = FlightPlan(duration, asks=False, limits=limits)
         simulation = Simulation(net, chosen, seed)
         facts = {"scenario": scenario, "seed": seed, "tracking_s": duration}
         field_there = simulated(loaded, net)
         return _run(mode, path, field_there, plan, headless=headless, simulation=simulation, report=report, facts=facts)
     finally:
         net.release()
-
-
-def _limits(field: Any) -> Any:
-    from groundstation.runtime.take_off import TakeOffLimits
-
-    return TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
 
 
 def _run(
@@ -140,17 +132,18 @@ def _run(
     report: Path | None = None,
     facts: dict[str, Any] | None = None,
 ) -> int:
-    from groundstation.cli.composition import FLY_ENDPOINT, make_run_dir, process_table
-    from groundstation.cli.flight import Flight, require_outcome
+    from groundstation.flight.composition import fly_endpoint, process_table
+    from groundstation.flight.loop import Flight, require_outcome
+    from groundstation.flight.run_folder import log_to, make_run_dir, write_facts
     from groundstation.settings.resolved import yaml_of
     from groundstation.supervisor.supervisor import Run, Supervisor
     from groundstation.supervisor.terminal import Terminal
 
     run_dir = make_run_dir(report or Path(field.recording.directory), path.stem)
     (run_dir / "resolved.yaml").write_text(yaml_of(field))
-    _write_facts(run_dir, mode, path, facts or {})
-    _log_to(run_dir)
-    endpoint = simulation.network.endpoint if simulation else FLY_ENDPOINT
+    write_facts(run_dir, mode, path, facts or {})
+    log_to(run_dir)
+    endpoint = simulation.network.endpoint if simulation else fly_endpoint(field)
     monitor = not headless and sys.stdout.isatty()
     table = process_table(field, endpoint, run_dir, simulation=simulation, monitor=monitor)
     terminal = Terminal()
@@ -167,32 +160,6 @@ def _run(
     if mode == "fly" or plan.duration_s is None:
         return ExitCode.OK if outcome.landed else ExitCode.FAILED
     return ExitCode.OK if passed else ExitCode.FAILED
-
-
-def _write_facts(run_dir: Path, mode: str, path: Path, facts: dict[str, Any]) -> None:
-    from groundstation.report import run_facts
-
-    command_ns = time.time_ns() - _age_ns()
-    run_facts.write(run_dir, run_facts.RunFacts(mode=mode, field=str(path), command_unix_ns=command_ns, **facts))
-
-
-def _age_ns() -> int:
-    """Return how long ago this process was started: the operator waits from then on."""
-    from groundstation.supervisor.runtime_file import start_time
-
-    started_s = (start_time(os.getpid()) or 0) / os.sysconf("SC_CLK_TCK")
-    return max(0, time.clock_gettime_ns(time.CLOCK_BOOTTIME) - int(started_s * 1e9))
-
-
-def _log_to(run_dir: Path) -> None:
-    import logging
-
-    (run_dir / "log").mkdir(exist_ok=True)
-    handler = logging.FileHandler(run_dir / "log" / "supervisor.log")
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
-    logging.getLogger().addHandler(handler)
-    logging.getLogger().setLevel(logging.INFO)
-    logging.raiseExceptions = False  # a full disk must not fill the terminal with tracebacks
 
 
 def _build(run_dir: Path) -> Any:
@@ -221,11 +188,10 @@ def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
         with suppress(OSError):
             shutil.copy(run_dir / name, copy_to or run_dir)
     try:
-        from rich.console import Console
-
+        from groundstation.cli.show import show
         from groundstation.report.summary import summary
 
-        Console().print(summary(built))
+        show(summary(built))
     except OSError:
         # The terminal was closed; the interpreter would fail once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

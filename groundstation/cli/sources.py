@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from groundstation.errors import OperatorMistake
+from groundstation.errors import OperatorMistake, without_password
 
 if TYPE_CHECKING:
-    from drivers.camera.calibration.feed import Shot
+    from drivers.camera.calibration.feed import SourcePicture
     from groundstation.geometry.lens import CameraIntrinsics
 
 SOURCES = "http://..., rtsp://..., ardrone://..., /dev/video0, a video file, or a folder of pictures"
@@ -24,24 +24,24 @@ def source_of(_context: click.Context, _parameter: click.Parameter, value: str) 
     path = Path(value)
     if "://" not in value and not value.startswith("/dev/"):
         if not path.exists():
-            raise click.BadParameter(f"{value!r} is no file or folder here, nor {SOURCES}.")
+            raise click.BadParameter(f"{without_password(value)!r} is no file or folder here, nor {SOURCES}.")
         return str(path.resolve())
     try:
         parse_source(value)
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} {error}") from None
+        raise click.BadParameter(f"{without_password(value)!r} {error}") from None
     return value
 
 
 def lens_of(path: Path) -> "CameraIntrinsics":
     """Return the lens of a calibration file; raises SettingsError with what is wrong in it."""
-    from groundstation.geometry.calibration import intrinsics_from_mapping
+    from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
     from groundstation.settings.calibration_file import load_calibration
 
     return intrinsics_from_mapping(load_calibration(path).model_dump())
 
 
-def require_size(shot: "Shot", lens: "CameraIntrinsics", calibration: str) -> None:
+def require_size(shot: "SourcePicture", lens: "CameraIntrinsics", calibration: str) -> None:
     """Raise OperatorMistake when a picture is not of the size that a calibration is for."""
     if shot.size != (lens.width_px, lens.height_px):
         width, height = shot.size

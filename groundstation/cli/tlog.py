@@ -1,52 +1,82 @@
 """MAVLink telemetry logs from recorded datagrams, for MAVProxy, Mission Planner or QGroundControl."""
 
 import struct
+from collections import Counter
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.datagrams import unpack
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.frames import split
+from drivers.mavlink.wire.verification import MAGIC, Verifier
 from groundstation.bus.topics import RAW_RX, RAW_TX
 from groundstation.errors import MessageError
-from groundstation.recording.origin import RecordingError
+from groundstation.recording.compatibility import RecordingError
 from groundstation.recording.outputs import new_file, require_absent
 from groundstation.recording.reader import payload
 from groundstation.recording.run import RecordedRun
 
-_MAGIC = 0xFD
 _STAMP = struct.Struct(">Q")
-_Frames = list[tuple[int, bytes]]
 
 
-def write_tlogs(run: RecordedRun, folder: Path) -> dict[Path, int]:
-    """Write one new .tlog for each MAVLink vehicle of a run; returns the files and how many datagrams each holds.
+@dataclass(slots=True)
+class Log:
+    """The verified frames of one vehicle with their UNIX times [ns]; refused: what else was recorded, by reason."""
 
+    frames: list[tuple[int, bytes]] = field(default_factory=list)
+    refused: Counter[str] = field(default_factory=Counter)
+
+    def add(self, stamp_ns: int, datagram: bytes, verifier: Verifier) -> None:
+        """Take the frames of a datagram; what cannot be verified is counted."""
+        try:
+            for frame in split(datagram):
+                try:
+                    verifier.verify(frame)
+                    self.frames.append((stamp_ns, frame))
+                except WireError as error:
+                    self.refused[error.reason] += 1
+        except WireError as error:
+            self.refused[error.reason] += 1
+
+
+def write_tlogs(run: RecordedRun, folder: Path) -> dict[Path, Log]:
+    """Write one new .tlog for each MAVLink vehicle of a run; returns the files, and what each holds, or would hold.
+
+    Only frames with the right checksum are written; signatures are not checked, because keys are not recorded.
     Raises RecordingError when there is nothing to write, or a file exists.
     WIRE (.tlog, as pymavlink reads it): UNIX time [us], 8 bytes, big-endian, before each frame.
     """
-    frames = _frames(run)
-    if not frames:
-        raise RecordingError(
-            f"{run.paths[0].parent}: no MAVLink datagrams are recorded there (recording.raw_datagrams)"
-        )
-    targets = {entity: folder / f"{entity}.tlog" for entity in sorted(frames)}
-    for path in targets.values():
+    logs = _logs(run)
+    if not any(log.frames for log in logs.values()):
+        raise RecordingError(f"{run.paths[0].parent}: no MAVLink frames are recorded there (recording.raw_datagrams)")
+    targets = {folder / f"{entity}.tlog": log for entity, log in sorted(logs.items())}
+    for path in targets:
         require_absent(path)
-    for entity, path in targets.items():
-        with new_file(path) as partial, partial.open("wb") as file:
-            for stamp_ns, data in sorted(frames[entity], key=lambda pair: pair[0]):
-                file.write(_STAMP.pack(max(0, stamp_ns) // 1000) + data)
-    return {path: len(frames[entity]) for entity, path in targets.items()}
+    for path, log in targets.items():
+        if log.frames:
+            _write(path, log)
+    return targets
 
 
-def _frames(run: RecordedRun) -> dict[str, _Frames]:
-    frames: dict[str, _Frames] = {}
+def _write(path: Path, log: Log) -> None:
+    with new_file(path) as partial, partial.open("wb") as file:
+        for stamp_ns, frame in sorted(log.frames, key=lambda pair: pair[0]):
+            file.write(_STAMP.pack(max(0, stamp_ns) // 1000) + frame)
+
+
+def _logs(run: RecordedRun) -> dict[str, Log]:
+    logs: dict[str, Log] = {}
+    verifier = Verifier()
     for record in run.records_from(run.start_ns, lambda topic: topic in (RAW_RX, RAW_TX)):
         try:
             batch = unpack(payload(record)[1])
         except (MessageError, ValueError):
             continue  # damaged inside: nothing of it can be told from noise
-        if not batch or not batch[0][1] or batch[0][1][0] != _MAGIC:
-            continue
+        if not any(datagram[:1] == bytes([MAGIC]) for _, datagram in batch):
+            continue  # another kind of vehicle
         # The message is stamped as its first datagram; the others follow on the same boot clock.
         offset_ns = record.log_time_ns - batch[0][0]
-        frames.setdefault(record.key.entity, []).extend((stamp + offset_ns, data) for stamp, data in batch)
-    return frames
+        log = logs.setdefault(record.key.entity, Log())
+        for stamp_ns, datagram in batch:
+            log.add(stamp_ns + offset_ns, datagram, verifier)
+    return logs

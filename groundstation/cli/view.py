@@ -3,7 +3,7 @@
 import os
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,7 +11,8 @@ from groundstation.cli.exits import ExitCode
 from groundstation.cli.monitor import choose
 
 if TYPE_CHECKING:
-    from groundstation.engineering_views.watch import View
+    from groundstation.engineering_views.watch import LiveView
+    from groundstation.field.resolved import ResolvedField
     from groundstation.supervisor.runtime_file import RuntimeRecord
 
 _FOXGLOVE_PORT = 8766
@@ -44,7 +45,7 @@ def view(viewer: str | None, name: str | None, port: int | None, page_port: int,
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
     record = choose(name)
     bus = open_bus(record.endpoint, record.site, f"view_{os.getpid()}", timeout_s=2.0)
-    shown: View | None = None
+    shown: LiveView | None = None
     try:
         shown = _open(viewer, record, port, page_port, save)
         dropped = watch(bus, shown, lambda: record.alive)
@@ -66,7 +67,7 @@ def _require(viewer: str) -> None:
     {"rerun": require_rerun, "foxglove": require_foxglove}[viewer]()
 
 
-def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int, save: Path | None) -> "View":
+def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int, save: Path | None) -> "LiveView":
     from groundstation.bus import clock
     from groundstation.recording.timeline import Timeline
 
@@ -88,8 +89,8 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
     return RerunView(record.name, field, timeline, now_ns, server, save)
 
 
-def _field_of(record: "RuntimeRecord") -> dict[str, Any]:
-    """Return the resolved field from the recording that is being written, or {}."""
+def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":
+    """Return the resolved field from the recording that is being written, or None."""
     from groundstation.engineering_views.field import field_of
     from groundstation.recording.preamble import FIELD_NAME
     from groundstation.recording.reader import attached_field

@@ -13,10 +13,10 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-FLIGHT = ("estimation", "estimation/models", "geometry", "planning", "sensing")
+FLIGHT = (".", "estimation", "estimation/models", "geometry", "planning", "sensing")
 """Packages whose kernels fly."""
 
-EVERYTHING = (*FLIGHT, "planning/planar", "experiments")
+EVERYTHING = (*FLIGHT, "experiments", "experiments/planar", "bench", "bench/planner_peers")
 
 _KEPT = 12  # directories of older states that are not deleted
 _COMPILE_LIMIT_S = 180.0

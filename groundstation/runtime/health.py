@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-NS_PER_S = 1_000_000_000
+from groundstation.time_units import NS_PER_S
+
 LATE_NS = 10_000_000
 _REPEAT_NS = NS_PER_S
 

@@ -6,19 +6,20 @@ Started as `groundstation.runtime.monitor:run`. `groundstation monitor` draws th
 import msgspec
 
 from groundstation.bus import clock
-from groundstation.bus.clock import NS_PER_MS
+from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.screen import Screen
 from groundstation.monitor.state import cast_from_field
 from groundstation.process.child import Child
+from groundstation.time_units import NS_PER_MS
 
 # A third of the drawing period: the heartbeat wants 10 turns a second, the eye four pictures.
 _PERIOD_NS = 84 * NS_PER_MS
 
 
 class MonitorSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the monitor: the resolved field as JSON (and what the recorder needs)."""
+    """What the supervisor hands to the monitor: the resolved field (and what the recorder needs)."""
 
-    field: msgspec.Raw
+    field: ResolvedField
     run_dir: str = ""
     epoch: int = 0
 

@@ -17,8 +17,9 @@ from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
+from groundstation.runtime.compile_kernels import compile_kernels
 from groundstation.runtime.health import Deadlines
-from groundstation.runtime.kernels import compile_kernels
+from groundstation.time_units import NS_PER_S
 
 if TYPE_CHECKING:
     from groundstation.runtime.tracking import Tracking
@@ -54,7 +55,7 @@ def run(child: Child) -> int:
 
 
 def _loop(child: Child, tracking: Tracking) -> None:
-    period_ns = clock.NS_PER_S // tracking.rate_hz
+    period_ns = NS_PER_S // tracking.rate_hz
     deadlines = Deadlines(period_ns, clock.now_ns())
     child.ready()
     go_first()

@@ -1,16 +1,18 @@
 """The operator's hands: holds the lease, gives orders, and follows each of them until it is confirmed or is not."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 from groundstation.bus.api import Bus
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.messages import AckStage, Command, CommandAck, Event, Lease, Severity, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AckBook
-from groundstation.runtime.take_off import Order, TakeOff, TakeOffLimits
-from groundstation.runtime.team import Team
+from groundstation.runtime.lift_off import Mistake
+from groundstation.runtime.marker_height import FixedCamera
+from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
+from groundstation.runtime.team import TeamStatus
+from groundstation.time_units import NS_PER_S
 
 OPERATOR = "operator"
 _TEAM = "team"
@@ -22,7 +24,7 @@ _CONFIRM_DEFAULT_NS = 6_000_000_000
 _STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
 
 
-class Phase(StrEnum):
+class TeamPhase(StrEnum):
     """What the team is asked to do."""
 
     GROUND = "GROUND"
@@ -44,14 +46,25 @@ class _Dialogue:
 
 
 class Operator:
-    """Call `step` 10 times a second or more. `say` gets lines for the person."""
+    """Call `step` 10 times a second or more. `say` gets lines for the person.
 
-    def __init__(self, bus: Bus, drones: tuple[str, ...], limits: TakeOffLimits, say: Callable[[str], None]) -> None:
+    cameras: those fixed in the world; mistake: why the last take-off was stopped, if it was.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        drones: tuple[str, ...],
+        cameras: Mapping[str, FixedCamera],
+        limits: TakeOffLimits,
+        say: Callable[[str], None],
+    ) -> None:
         self._bus = bus
         self._say = say
         self._limits = limits
-        self.team = Team(bus, drones)
-        self.phase = Phase.GROUND
+        self.team = TeamStatus(bus, drones, cameras)
+        self.phase = TeamPhase.GROUND
+        self.mistake: Mistake | None = None
         self.tracking_since_ns = 0
         self._inbox = bus.subscribe([COMMAND, COMMAND_ACK])
         self._dialogues: list[_Dialogue] = []
@@ -69,19 +82,20 @@ class Operator:
         """Begin the take-off sequence of the given drones (none given: all)."""
         self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns)
         self._then_track = then_track
-        self.phase = Phase.TAKING_OFF
+        self.mistake = None
+        self.phase = TeamPhase.TAKING_OFF
 
     def track(self, now_ns: int, drones: tuple[str, ...] = (), request: Command | None = None) -> None:
         """Let the tracker move the given drones (none given: all that are up)."""
         up = tuple(name for name, member in self.team.members.items() if member.up)
         self._give(Verb.TRACK, drones or up, now_ns, request)
-        self.phase = Phase.TRACKING
+        self.phase = TeamPhase.TRACKING
 
     def land(self, now_ns: int) -> None:
         """Land everybody; whatever else was going on ends."""
         self._abandon()
-        if self.phase is not Phase.LANDING:
-            self.phase = Phase.LANDING
+        if self.phase is not TeamPhase.LANDING:
+            self.phase = TeamPhase.LANDING
             self._give(Verb.LAND, (), now_ns)
 
     def landed(self, now_ns: int) -> bool:
@@ -139,9 +153,9 @@ class Operator:
         if OPERATOR in command.scope:
             self._serve(command, now_ns)
         elif command.verb in _STOPS and not self._is_partial(command):
-            if self.phase is not Phase.LANDING:
+            if self.phase is not TeamPhase.LANDING:
                 self._abandon()
-                self.phase = Phase.HELD if command.verb is Verb.HOLD else Phase.LANDING
+                self.phase = TeamPhase.HELD if command.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{command.verb} by {command.issuer}")
         elif command.verb in _STOPS and self._sequence is not None:
             for name in command.scope:
@@ -179,7 +193,7 @@ class Operator:
             case verb:
                 self._give(verb, names, now_ns, request)
                 if verb is Verb.RESUME:
-                    self.phase = Phase.TRACKING
+                    self.phase = TeamPhase.TRACKING
 
     def _answer(self, request: Command, stage: AckStage, reason: str = "") -> None:
         header = self._bus.header(OPERATOR)
@@ -217,37 +231,40 @@ class Operator:
 
     def _go_on(self, sequence: TakeOff, now_ns: int) -> None:
         progress = self._take_off_book.progress.get(sequence.current) if self._take_off_book else None
-        before = (len(sequence.up), len(sequence.left_out))
+        up, left_out = len(sequence.up), len(sequence.left_out)
         order = sequence.step(now_ns, self.team, progress)
         if order is not None:
             self._order(order, now_ns)
-        if (len(sequence.up), len(sequence.left_out)) != before:
-            self._report_member(sequence, before[0])
+        for name in sequence.up[up:]:
+            self._say(f"{name}: in the air, seen by a camera")
+        if sequence.mistake is not None:
+            self._say(f"TAKE-OFF STOPPED: {sequence.mistake}")
+        for name, reason in list(sequence.left_out.items())[left_out:]:
+            self._report_left_out(name, reason, sequence.mistake)
         if sequence.finished:
             self._finish(sequence, now_ns)
 
-    def _order(self, order: Order, now_ns: int) -> None:
+    def _order(self, order: TakeOffCommand, now_ns: int) -> None:
         book = self._give(order.verb, (order.drone,), now_ns)
         if order.verb is Verb.TAKEOFF:
             self._take_off_book = book
 
-    def _report_member(self, sequence: TakeOff, up_before: int) -> None:
-        if len(sequence.up) > up_before:
-            self._say(f"{sequence.up[-1]}: in the air, seen by a camera")
-            return
-        name, reason = list(sequence.left_out.items())[-1]
-        self._say(f"{name}: left out, {reason}")
-        header = self._bus.header(name)
-        event = Event(
-            header=header, severity=Severity.ERROR, text=f"{name} does not fly: {reason}", remedy="see its log"
+    def _report_left_out(self, name: str, reason: str, mistake: Mistake | None) -> None:
+        text, remedy = f"{name} does not fly: {reason}", "see its log"
+        if mistake is not None and reason == mistake.text:
+            text, remedy = f"take-off stopped: {reason}", mistake.remedy
+        else:
+            self._say(f"{name}: left out, {reason}")
+        self._bus.publish(
+            EVENT, Event(header=self._bus.header(name), severity=Severity.ERROR, text=text, remedy=remedy)
         )
-        self._bus.publish(EVENT, event)
 
     def _finish(self, sequence: TakeOff, now_ns: int) -> None:
         request, self._sequence, self._sequence_request = self._sequence_request, None, None
-        self.phase = Phase.UP if sequence.up else Phase.GROUND
+        self.phase = TeamPhase.UP if sequence.up else TeamPhase.GROUND
+        self.mistake = sequence.mistake
         if request is not None:
             missing = "; ".join(f"{name}: {reason}" for name, reason in sequence.left_out.items())
             self._answer(request, AckStage.REFUSED if missing else AckStage.EFFECTIVE, missing)
-        if self._then_track and sequence.up:
+        if self._then_track and sequence.up and sequence.mistake is None:
             self.track(now_ns, tuple(sequence.up))

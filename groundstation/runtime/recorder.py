@@ -8,14 +8,16 @@ from pathlib import Path
 import msgspec
 
 from groundstation.bus import clock
-from groundstation.bus.clock import NS_PER_MS, NS_PER_S
 from groundstation.bus.messages import Severity
+from groundstation.field.behaviour import RecordingValues
+from groundstation.field.resolved import field_from_json
 from groundstation.process.child import Child
-from groundstation.recording.selection import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
-from groundstation.recording.series import FileSeries, Rotation
-from groundstation.recording.space import Space, assess, free_bytes
+from groundstation.recording.disk_space import Space, assess, free_bytes
+from groundstation.recording.file_topics import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
+from groundstation.recording.rotating_file import FileSeries, Rotation
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # 15 turns a second: the heartbeat needs 10, and each turn costs a wake-up of the interpreter.
 _PERIOD_NS = 66 * NS_PER_MS
@@ -27,29 +29,17 @@ _CONSEQUENCE = {
 }
 
 
-class RecordingSettings(msgspec.Struct, frozen=True):
-    """The part of the field's `recording` section that matters here."""
-
-    raw_datagrams: bool = True
-    rotate_mb: float = 0.0
-    rotate_minutes: float = 0.0
-
-    @property
-    def rotation(self) -> Rotation:
-        """Return when a part is full."""
-        return Rotation(round(self.rotate_mb * 1e6), round(self.rotate_minutes * 60 * NS_PER_S))
-
-
-class _FieldPart(msgspec.Struct, frozen=True):
-    recording: RecordingSettings = RecordingSettings()
-
-
 class RecorderSection(msgspec.Struct, frozen=True):
     """What the supervisor hands to the recorder: the resolved field as JSON, the run folder, the tracker's epoch."""
 
     field: msgspec.Raw
     run_dir: str
     epoch: int = 0
+
+
+def _rotation(settings: RecordingValues) -> Rotation:
+    """Return when a part is full."""
+    return Rotation(round(settings.rotate_mb * 1e6), round(settings.rotate_minutes * 60 * NS_PER_S))
 
 
 class Recorder:
@@ -59,12 +49,12 @@ class Recorder:
         self._child = child
         self._folder = Path(section.run_dir)
         self._folder.mkdir(parents=True, exist_ok=True)
-        settings = msgspec.json.decode(section.field, type=_FieldPart).recording
+        settings = field_from_json(section.field).recording
         timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
         self._space = Space.AMPLE
         self._space_ns = 0
         self._writer = RunWriter(
-            self._folder, bytes(section.field), section.epoch, timeline, self._has_room, settings.rotation
+            self._folder, bytes(section.field), section.epoch, timeline, self._has_room, _rotation(settings)
         )
         self._series = (self._writer.state, self._writer.raw)
         # Bounded in bytes as well as in number: a picture is a hundred times a state message.

@@ -1,4 +1,4 @@
-"""Take-off one by one: the next drone after the former flies and is seen by a camera.
+"""Take-off one by one: the next drone after the former is seen in flight; nobody else after a likely mix-up.
 
 A state machine without clock or bus: `step` gets the time and returns what to order.
 """
@@ -8,9 +8,9 @@ from enum import Enum, auto
 
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.runtime.acknowledgements import Progress
-from groundstation.runtime.team import Team
-
-_NS_PER_S = 1_000_000_000
+from groundstation.runtime.lift_off import LiftOffWatch, Mistake, is_seen_in_flight, why_unseen
+from groundstation.runtime.team import Member, TeamStatus
+from groundstation.time_units import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class TakeOffLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class TakeOffCommand:
     """What the sequence wants said to one drone, and why if it is a landing."""
 
     verb: Verb
@@ -39,7 +39,10 @@ class _Step(Enum):
 
 
 class TakeOff:
-    """One sequence over the given drones; finished when nobody is left waiting."""
+    """One sequence over the given drones; finished when nobody is left waiting.
+
+    up: who was seen in flight; left_out: who was not, and why; mistake: what ended the sequence before its time.
+    """
 
     def __init__(self, drones: tuple[str, ...], limits: TakeOffLimits, now_ns: int) -> None:
         self._waiting = list(drones)
@@ -48,8 +51,10 @@ class TakeOff:
         self._step = _Step.CONNECT
         self._ordered_ns = 0
         self._refusal = ""
+        self._watch = LiftOffWatch()
         self.up: list[str] = []
         self.left_out: dict[str, str] = {}
+        self.mistake: Mistake | None = None
 
     @property
     def finished(self) -> bool:
@@ -73,32 +78,36 @@ class TakeOff:
             self.up.remove(drone)
             self.left_out[drone] = reason
 
-    def step(self, now_ns: int, team: Team, progress: Progress | None) -> Order | None:
+    def step(self, now_ns: int, team: TeamStatus, progress: Progress | None) -> TakeOffCommand | None:
         """Return what to order now; progress: the answers to the last TAKEOFF of the current drone."""
         if self.finished:
             return None
         member = team.members[self.current]
+        mistake = self._watch.step(now_ns, self.current, team.members)
+        if mistake is not None:
+            return self._stop(mistake)
         if member.up and self._step is not _Step.BE_SEEN:
             self._go_to(_Step.BE_SEEN, now_ns)
         match self._step:
             case _Step.CONNECT:
+                team.note_floor(now_ns)
                 return self._connect(now_ns, member.connected(now_ns), member.detail)
             case _Step.LIFT_OFF:
                 return self._lift_off(now_ns, progress)
             case _Step.BE_SEEN:
-                return self._be_seen(now_ns, member.seen_in_flight)
+                return self._be_seen(now_ns, member)
 
-    def _connect(self, now_ns: int, connected: bool, detail: str) -> Order | None:
-        if connected and now_ns - self._ordered_ns >= self._limits.retry_s * _NS_PER_S:
+    def _connect(self, now_ns: int, connected: bool, detail: str) -> TakeOffCommand | None:
+        if connected and now_ns - self._ordered_ns >= self._limits.retry_s * NS_PER_S:
             self._ordered_ns = now_ns
-            order = Order(Verb.TAKEOFF, self.current)
+            order = TakeOffCommand(Verb.TAKEOFF, self.current)
             self._go_to(_Step.LIFT_OFF, now_ns, keep_time=bool(self._refusal))
             return order
         if self._late(now_ns, self._limits.connect_s):
             return self._leave_out(self._refusal or detail or "its driver has no connection to it", now_ns)
         return None
 
-    def _lift_off(self, now_ns: int, progress: Progress | None) -> Order | None:
+    def _lift_off(self, now_ns: int, progress: Progress | None) -> TakeOffCommand | None:
         if progress is not None and progress.stage is AckStage.REFUSED:
             # Some reasons pass (lease not heard yet, trim not done): ask again for a while.
             self._refusal = f"refused: {progress.reason}"
@@ -108,20 +117,26 @@ class TakeOff:
             return self._leave_out("did not lift off", now_ns, land=True)
         return None
 
-    def _be_seen(self, now_ns: int, seen: bool) -> Order | None:
-        if seen:
+    def _be_seen(self, now_ns: int, member: Member) -> TakeOffCommand | None:
+        if is_seen_in_flight(member, now_ns):
             self.up.append(self._waiting.pop(0))
             self._next(now_ns)
         elif self._late(now_ns, self._limits.unseen_s):
-            reason = f"not seen by any camera for {self._limits.unseen_s:g} s"
-            return self._leave_out(reason, now_ns, land=True)
+            return self._leave_out(why_unseen(member, now_ns, self._limits.unseen_s), now_ns, land=True)
         return None
 
-    def _leave_out(self, reason: str, now_ns: int, land: bool = False) -> Order | None:
+    def _stop(self, mistake: Mistake) -> TakeOffCommand:
+        self.mistake = mistake
+        flying, *others = self._waiting
+        self.left_out |= {flying: mistake.text} | dict.fromkeys(others, "the take-off was stopped")
+        self._waiting.clear()
+        return TakeOffCommand(Verb.LAND, flying, mistake.text)
+
+    def _leave_out(self, reason: str, now_ns: int, land: bool = False) -> TakeOffCommand | None:
         name = self._waiting.pop(0)
         self.left_out[name] = reason
         self._next(now_ns)
-        return Order(Verb.LAND, name, reason) if land else None
+        return TakeOffCommand(Verb.LAND, name, reason) if land else None
 
     def _next(self, now_ns: int) -> None:
         self._refusal, self._ordered_ns = "", 0
@@ -133,4 +148,4 @@ class TakeOff:
             self._step_ns = now_ns
 
     def _late(self, now_ns: int, limit_s: float) -> bool:
-        return now_ns - self._step_ns >= limit_s * _NS_PER_S
+        return now_ns - self._step_ns >= limit_s * NS_PER_S

@@ -1,26 +1,36 @@
-"""What the operator knows of each drone: what it says of itself, and when a camera last saw it."""
+"""What the operator knows of each drone: what it says of itself, and how high the fixed cameras see its marker."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Estimate, FlightState, RelativeObservation, VehicleStatus
-from groundstation.bus.topics import ESTIMATE, OBSERVATION, VEHICLE_STATUS
+from groundstation.bus.messages import FlightState, Odometry, RelativeObservation, VehicleStatus
+from groundstation.bus.topics import OBSERVATION, ODOMETRY, VEHICLE_STATUS
+from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
 
 _FRESH_NS = 1_500_000_000
 _ON_GROUND = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 _UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
+# The marker of a standing drone that no camera saw there.
+_STANDING_M = 0.1
 
 
 @dataclass(slots=True)
 class Member:
-    """One drone; times are when this process learned of it [ns], 0 = never."""
+    """One drone; times are when this process learned of it [ns], 0 = never.
+
+    marker: its height above the floor; floor_m: the same, before the last take-off of anyone began; height_m: above the
+    ground, as the drone itself measured it, or None.
+    """
 
     state: FlightState = FlightState.UNKNOWN
     mode: str = ""
     detail: str = ""
     heard_ns: int = 0
-    seen_ns: int = 0
-    up_since_ns: int = 0
+    marker: MarkerHeight = field(default_factory=MarkerHeight)
+    floor_m: float = _STANDING_M
+    height_m: float | None = None
+    measured_ns: int = 0
 
     def connected(self, now_ns: int) -> bool:
         """Whether its driver speaks and hears the drone."""
@@ -41,45 +51,74 @@ class Member:
         return self.state in _ON_GROUND
 
     @property
-    def seen_in_flight(self) -> bool:
-        """Whether a camera saw it since it is up."""
-        return self.up and self.seen_ns >= self.up_since_ns > 0
+    def standing(self) -> bool:
+        """Whether it says that it stands, or never said anything."""
+        return self.on_ground or self.state is FlightState.UNKNOWN
+
+    @property
+    def lifting(self) -> bool:
+        """Whether it takes off or flies."""
+        return self.up or self.state is FlightState.TAKING_OFF
+
+    def reported_m(self, now_ns: int) -> float | None:
+        """Return the height above the ground that the drone itself measures now [m]."""
+        return self.height_m if now_ns - self.measured_ns < _FRESH_NS else None
+
+    def rise_m(self, now_ns: int) -> float | None:
+        """Return by how much its marker has risen since the take-off began [m], or None if it is out of view."""
+        marker_m = self.marker.at(now_ns)
+        return None if marker_m is None else marker_m - self.floor_m
+
+    def note_floor(self, now_ns: int) -> None:
+        """Measure rises from where the marker of a standing drone is now."""
+        marker_m = self.marker.at(now_ns)
+        if self.standing and marker_m is not None:
+            self.floor_m = marker_m
 
 
-class Team:
-    """All drones of a run, kept up to date from the bus."""
+class TeamStatus:
+    """All drones of a run, kept up to date from the bus; cameras: those fixed in the world, by name."""
 
-    def __init__(self, bus: Bus, drones: tuple[str, ...]) -> None:
+    def __init__(self, bus: Bus, drones: tuple[str, ...], cameras: Mapping[str, FixedCamera]) -> None:
         self.members = {name: Member() for name in drones}
+        self._cameras = cameras
         self._events = bus.subscribe([VEHICLE_STATUS, OBSERVATION])
-        self._estimates = bus.subscribe([ESTIMATE], newest=True)
+        self._odometry = bus.subscribe([ODOMETRY], newest=True)
 
     def update(self, now_ns: int) -> None:
         """Take in what has arrived."""
-        for received in (*self._events.drain(), *self._estimates.drain()):
+        for received in (*self._events.drain(), *self._odometry.drain()):
             match received.message:
                 case VehicleStatus() as status:
                     self._hear(status, now_ns)
-                case RelativeObservation(subject=name):
-                    self._see(name, now_ns)
-                case Estimate(entities=entities):
-                    for entity in entities:
-                        self._see(entity.name, now_ns)
+                case RelativeObservation() as sighting:
+                    self._see(sighting, now_ns)
+                case Odometry() as odometry:
+                    self._measure(odometry, now_ns)
 
     def _hear(self, status: VehicleStatus, now_ns: int) -> None:
         member = self.members.get(status.header.entity)
-        if member is None:
-            return
-        member.state, member.mode, member.detail = status.flight_state, status.mode, status.detail
-        member.heard_ns = now_ns
-        if not member.up:
-            member.up_since_ns = 0
-        elif not member.up_since_ns:
-            member.up_since_ns = now_ns
+        if member is not None:
+            if not member.standing and status.flight_state in _ON_GROUND:
+                member.marker.forget()  # it was seen in the air until now
+            member.state, member.mode, member.detail = status.flight_state, status.mode, status.detail
+            member.heard_ns = now_ns
 
-    def _see(self, name: str, now_ns: int) -> None:
-        if name in self.members:
-            self.members[name].seen_ns = now_ns
+    def _see(self, sighting: RelativeObservation, now_ns: int) -> None:
+        # Only fixed cameras know how high they are themselves, whatever is wrong with the drones.
+        camera, member = self._cameras.get(sighting.observer), self.members.get(sighting.subject)
+        if camera is not None and member is not None:
+            member.marker.see(now_ns, camera.height_of(sighting.position_m))
+
+    def _measure(self, odometry: Odometry, now_ns: int) -> None:
+        member = self.members.get(odometry.header.entity)
+        if member is not None:
+            member.height_m, member.measured_ns = odometry.height_m, now_ns
+
+    def note_floor(self, now_ns: int) -> None:
+        """Measure rises from where the markers of all standing drones are now."""
+        for member in self.members.values():
+            member.note_floor(now_ns)
 
     def airborne(self, now_ns: int) -> tuple[str, ...]:
         """Return who is not known to stand: a drone that was heard once and then lost counts as flying."""

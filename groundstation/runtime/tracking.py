@@ -3,22 +3,24 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import msgspec
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Message, Severity
+from groundstation.bus.notice import Notice
+from groundstation.field.resolved import ResolvedField
 from groundstation.planning.plan import Planner
 from groundstation.runtime.announcer import TEAM, Announcer
-from groundstation.runtime.consistency import ConsistencyWatch
+from groundstation.runtime.consistency_watch import ConsistencyWatch
 from groundstation.runtime.health import UnseenWatch
 from groundstation.runtime.inbox import Inbox
 from groundstation.runtime.journal import FAULT, Adoption, entry_of
-from groundstation.runtime.picture_age import PictureAge
+from groundstation.runtime.latency_watch import PictureAge
 from groundstation.runtime.plan_worker import PlanWorker
-from groundstation.tracker import Notice, PlanRequest, Tracker, tracker_from_field
+from groundstation.tracker import PlanRequest, Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
 _PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
@@ -26,9 +28,9 @@ EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief 
 
 
 class TrackerSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the tracker: the resolved field as JSON, the run folder, the life's number."""
+    """What the supervisor hands to the tracker: the resolved field, the run folder, the life's number."""
 
-    field: dict[str, Any]
+    field: ResolvedField
     run_dir: str = ""
     epoch: int = 0
 
@@ -64,7 +66,7 @@ class Worker(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Feed:
+class TrackerFeed:
     """Where a tracker's messages and plans come from, and whose clock it reads: live ones, or those of a journal."""
 
     arrivals: Arrivals
@@ -73,28 +75,28 @@ class Feed:
     first_tick: int = 0
 
 
-def live_feed(bus: Bus, plan_hz: float) -> Feed:
+def live_feed(bus: Bus, plan_hz: float) -> TrackerFeed:
     """Return what arrives on a bus, planned on a thread of its own."""
     budget_s = _PLAN_BUDGET_SHARE / plan_hz
-    return Feed(Inbox(bus), lambda planner: PlanWorker(planner, budget_s), clock.clock_id())
+    return TrackerFeed(Inbox(bus), lambda planner: PlanWorker(planner, budget_s), clock.clock_id())
 
 
 class Tracking:
     """One tracker on one bus. Call `tick` at the estimator's rate; notices are left in `notices` for the process."""
 
-    def __init__(self, bus: Bus, section: TrackerSection, feed: Feed | None = None) -> None:
+    def __init__(self, bus: Bus, section: TrackerSection, feed: TrackerFeed | None = None) -> None:
         field = section.field
-        plan_hz = field["planner"]["rate_hz"]
+        plan_hz = field.planner.rate_hz
         feed = feed or live_feed(bus, plan_hz)
-        self.rate_hz: int = field["estimator"]["rate_hz"]
+        self.rate_hz: int = field.estimator.rate_hz
         self.tracker: Tracker = tracker_from_field(field, feed.clock, section.epoch * EPOCHS_PER_LIFE)
         self.inbox = feed.arrivals
         self.notices: list[Notice] = []
         self._bus = bus
-        self._announcer = Announcer(bus, field["safety"]["setpoint_lifetime_ms"])
+        self._announcer = Announcer(bus, field.safety.setpoint_lifetime_ms)
         self._contradictions = ConsistencyWatch(self.tracker.parameters.estimator.entities)
         self._picture_age = PictureAge(field, feed.clock)
-        self._unseen = UnseenWatch(field["safety"]["unseen_land_after_s"])
+        self._unseen = UnseenWatch(field.safety.unseen_land_after_s)
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
         self._worker = feed.worker_of(self.tracker.planner)

@@ -1,10 +1,7 @@
 """Runs every compiled kernel once before the tracker is READY, on a made-up second of a flight."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from groundstation.bus.messages import FlightState, Header, Odometry, RelativeObservation, VehicleStatus
-from groundstation.estimation.targets import targets_of
+from groundstation.field.resolved import ResolvedField
 from groundstation.tracker import tracker_from_field
 
 _START_NS = 1_000_000_000_000
@@ -12,7 +9,7 @@ _MS = 1_000_000
 _CLOCK = "warm-up"
 
 
-def warm_up(field: Mapping[str, Any]) -> None:
+def warm_up(field: ResolvedField) -> None:
     """Fly a tracker of its own through take-off, localisation and one plan; nothing of it is kept."""
     tracker = tracker_from_field(field, _CLOCK, 0)
     now_ns = _START_NS
@@ -22,10 +19,10 @@ def warm_up(field: Mapping[str, Any]) -> None:
             header = Header(now_ns, _CLOCK, robot, robot, step)
             tracker.ingest(robot, VehicleStatus(header=header, flight_state=FlightState.FLYING, mode=""), now_ns)
             tracker.ingest(f"{robot}/odometry", _odometry(header), now_ns)
-            for camera in field["cameras"]:
+            for camera in field.cameras:
                 sight = _sighting(Header(now_ns, _CLOCK, camera, camera, step), robot, (1.5 * index, 0.5, 2.5))
                 tracker.ingest(f"{camera}/{robot}", sight, now_ns)
-            for target in targets_of(field):
+            for target in field.tracked:
                 tracker.ingest(f"{robot}/{target}", _sighting(header, target, (0.0, 0.0, 1.2)), now_ns)
         tracker.advance(now_ns)
     tracker.plan(now_ns)

@@ -2,28 +2,34 @@
 
 import fcntl
 import os
-import socket
 from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.errors import GroundStationError
+from groundstation.process.ports import holder_of, is_free, networks_in_use
+from groundstation.supervisor import runtime_file
 
-ROUTER_PORT = 7447
 _FIRST_DRONE, _FIRST_CAMERA, _STREAM_PORT = 11, 50, 8080
+_PORTS_TRIED = 20
 _CANDIDATES = [(a, b) for a in range(64, 128) for b in range(1, 5)]
 
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """127.a.b.0/24, held as long as the lock's descriptor is open here or in a child that inherited it."""
+    """127.a.b.0/24, held as long as the lock's descriptor is open here or in a child that inherited it.
+
+    bus_port: of the router; stream_port: of all emulated network cameras.
+    """
 
     prefix: str
     lock: int
+    bus_port: int
+    stream_port: int
 
     @property
     def endpoint(self) -> str:
         """Where the router listens."""
-        return f"tcp/{self.prefix}.1:{ROUTER_PORT}"
+        return f"tcp/{self.prefix}.1:{self.bus_port}"
 
     def drone_address(self, index: int) -> str:
         """Return the address of an emulated drone."""
@@ -31,44 +37,66 @@ class Network:
 
     def stream(self, index: int) -> tuple[str, int]:
         """Return address and port of an emulated network camera."""
-        return f"{self.prefix}.{_FIRST_CAMERA + index}", _STREAM_PORT
+        return f"{self.prefix}.{_FIRST_CAMERA + index}", self.stream_port
 
     def release(self) -> None:
         """Give the network up."""
         os.close(self.lock)
 
 
-def claim(folder: Path) -> Network:
-    """Return the first free network, locked by a file in the folder; raises GroundStationError when none is."""
+def claim(folder: Path, bus_port: int) -> Network:
+    """Return the first free network, locked by a file in the folder, with ports that nobody holds on all addresses.
+
+    bus_port: first choice for the router, as 8080 is for the cameras; the next ones follow. Raises GroundStationError
+    when there is no network or no port.
+    """
+    in_use = networks_in_use()  # by another user's run, whose locks are elsewhere
     for a, b in _CANDIDATES:
         prefix = f"127.{a}.{b}"
-        descriptor = os.open(folder / f"{prefix}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(descriptor)
+        if prefix in in_use or (lock := _lock(folder / f"{prefix}.lock")) is None:
             continue
-        # Locks are per user and folder; a port that is taken belongs to someone else's run.
-        if _is_free(f"{prefix}.1", ROUTER_PORT) and _is_free(f"{prefix}.{_FIRST_CAMERA}", _STREAM_PORT):
-            return Network(prefix, descriptor)
+        try:
+            return Network(prefix, lock, _free_port(prefix, bus_port), _free_port(prefix, _STREAM_PORT))
+        except GroundStationError:
+            os.close(lock)
+            raise
+    raise GroundStationError(f"all {len(_CANDIDATES)} loopback networks are held by other simulated runs: end some")
+
+
+def _lock(path: Path) -> int | None:
+    """Return the descriptor that holds a lock file, None when another run has it."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
         os.close(descriptor)
-    raise GroundStationError("no free loopback network is left: are other runs still landing?")
+        return None
+    return descriptor
+
+
+def _free_port(prefix: str, wanted: int) -> int:
+    """Return the first free port from `wanted` on in a network where nobody listens: others listen on all addresses."""
+    address, last = f"{prefix}.1", min(wanted + _PORTS_TRIED - 1, 65535)
+    for port in range(wanted, last + 1):
+        if is_free(address, port):
+            return port
+    raise GroundStationError(
+        f"no port from {wanted} to {last} is free for a simulated run: {_taken(address, wanted)}, and so on"
+    )
 
 
 def require_free(endpoint: str) -> None:
-    """Raise GroundStationError when something already listens where the router is to."""
+    """Raise GroundStationError naming who already listens where the router should."""
     address, _, port = endpoint.removeprefix("tcp/").rpartition(":")
-    if not _is_free(address, int(port)):
+    if not is_free(address, int(port)):
         raise GroundStationError(
-            f"port {port} on {address} is in use: is another ground station running? (groundstation land stops it)"
+            f"{_taken(address, int(port))}: end it, or give this ground station another port (--set bus.port=...)"
         )
 
 
-def _is_free(address: str, port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((address, port))
-        except OSError:
-            return False
-    return True
+def _taken(address: str, port: int) -> str:
+    holder = holder_of(address, port)
+    for record in runtime_file.live_records():
+        if holder.pid in (process.pid for process in record.processes):
+            return f"port {port} on {address} is taken by the ground station {record.name}, field {record.field}"
+    return f"port {port} on {address} is taken by {holder}"

@@ -9,7 +9,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Lifecycle, ProcessStatus
 from groundstation.bus.topics import PROCESS_STATUS
 from groundstation.process.heartbeat import SlotState
-from groundstation.supervisor.managed import ManagedProcess
+from groundstation.supervisor.managed_process import ManagedProcess
 
 _PERIOD_NS = 1_000_000_000
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")

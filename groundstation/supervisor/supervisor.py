@@ -1,4 +1,4 @@
-"""Starts the process table, watches it, restarts what dies or hangs, and stops it in order."""
+"""Watches the processes of a run, restarts what dies or hangs, and stops them in order."""
 
 import logging
 import os
@@ -9,30 +9,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.bus.api import Subscription
-from groundstation.bus.messages import Event, Lifecycle, ProcessStatus, Severity
-from groundstation.bus.topics import EVENT, PROCESS_STATUS
+from groundstation.bus.messages import Lifecycle, ProcessStatus, Severity
+from groundstation.bus.topics import PROCESS_STATUS
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
-from groundstation.errors import GroundStationError
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.events import ProcessEvents
+from groundstation.supervisor.failsafe import LastWordsSender
 from groundstation.supervisor.interrupts import Interrupts
-from groundstation.supervisor.last_words import LastWordsSender
 from groundstation.supervisor.launcher import Launcher
-from groundstation.supervisor.managed import NS_PER_S, ManagedProcess, exit_text
+from groundstation.supervisor.managed_process import ManagedProcess, exit_text
 from groundstation.supervisor.status import StatusPublisher
 from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder
 from groundstation.supervisor.terminal import Terminal
+from groundstation.time_units import NS_PER_S
 
 SOURCE = "supervisor"
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200_000_000
-_OPTIONAL_GRACE_S = 5.0
-_SAME_NOTE_S = 8.0
 _log = logging.getLogger(__name__)
-
-
-class Interrupted(GroundStationError):
-    """The operator asked to stop while the run was starting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +42,15 @@ class Run:
 
 
 class Supervisor:
-    """Owns all processes of a run. `step` must be called 10 times a second or more; it sleeps by itself."""
+    """Owns all processes of a run, which `Start` starts.
+
+    `step` must be called 10 times a second or more; it sleeps by itself.
+    """
 
     def __init__(self, run: Run, table: tuple[ProcessSpec, ...], terminal: Terminal) -> None:
         self.run = run
-        self._terminal = terminal
+        self.terminal = terminal
+        self.events = ProcessEvents(terminal)
         self.interrupts = Interrupts()
         self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
         self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path))
@@ -64,77 +63,55 @@ class Supervisor:
         self._record: runtime_file.RuntimeRecord | None = None
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
         self._stopping = False
-        self._degraded: set[ManagedProcess] = set()
 
     # --- start ---------------------------------------------------------------------------------------------------
 
-    def start(self) -> None:
-        """Start the router, then everything else at once; returns when the run can begin.
-
-        Raises GroundStationError when a required process fails or is late, Interrupted when the operator stops it.
-        """
+    def prepare(self) -> None:
+        """Listen to the operator's signals and open the log files; raises GroundStationError when it cannot."""
         self.interrupts.install()
         self._launcher.prepare(tuple(process.spec for process in self.processes))
         self._block.set_state(SUPERVISOR_SLOT, SlotState.READY)
-        routers = [p for p in self.processes if p.spec.stop_order is StopOrder.CONNECTS]
-        for process in routers:
-            self._launch(process)
-        self._wait_for(routers)
-        self.bus = open_bus(self.run.endpoint, self.run.site, SOURCE)
+
+    def connect(self) -> None:
+        """Join the bus; its router is up."""
+        self.bus = self.events.bus = open_bus(self.run.endpoint, self.run.site, SOURCE)
         self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
         self._publisher = StatusPublisher(self.bus)
-        others = [p for p in self.processes if p not in routers and not p.spec.on_terminal]
-        for process in others:
-            self._launch(process)
-        self._write_runtime_file()
-        self._wait_for([p for p in others if p.spec.required])
-        self._wait_for([p for p in others if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
 
-    @property
-    def unwell(self) -> list[str]:
-        """Names of what was started and does not work (yet): a camera without pictures, a silent drone."""
-        return [
-            p.spec.name for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY
-        ]
-
-    def show_screen(self) -> None:
-        """Hand the terminal to the process that draws on it, if the table has one."""
-        for process in self.processes:
-            if process.spec.on_terminal and not process.life:
-                self._terminal.muted = True
-                self._launch(process)
-
-    def _wait_for(self, processes: list[ManagedProcess], limit_s: float | None = None) -> None:
-        began = time.monotonic()
-        waiting = list(processes)
-        next_note, noted = began + 2.0, ""
-        while waiting:
-            self.step()
-            now = time.monotonic()
-            for process in [p for p in waiting if p.is_up]:
-                waiting.remove(process)
-                self._tell_state(process)
-            if self.failure:
-                raise GroundStationError(self.failure)
-            if self.interrupts.stop_requested:
-                raise Interrupted("stopped while starting")
-            if limit_s is not None and now > began + limit_s:
-                for process in waiting:
-                    self._event(Severity.WARNING, process, "is not ready; going on without it", "see its log")
-                return
-            waits = ", ".join(_in_words(p) for p in waiting)
-            if waiting and now > (next_note + _SAME_NOTE_S if waits == noted else next_note):
-                next_note, noted = now + 2.0, waits
-                self._terminal.say(f"  waiting for {waits}")
-
-    def _launch(self, process: ManagedProcess) -> None:
+    def launch(self, process: ManagedProcess) -> None:
+        """Start a process; one that cannot be executed is tried again, or is the failure of a run that needs it."""
         try:
             handle = self._launcher.launch(process.spec, process.slot, process.life)
+            process.adopt(handle, time.monotonic_ns())
         except OSError as error:
-            process.schedule_restart(time.monotonic_ns())
-            self._event(Severity.ERROR, process, f"cannot be started: {error.strerror}")
-            return
-        process.adopt(handle, time.monotonic_ns())
+            why = f"cannot be started: {error.strerror}" + (f": {error.filename}" if error.filename else "")
+            if process.spec.required and not process.life:
+                self.failure = f"{process.spec.name} {why}"
+            else:
+                process.schedule_restart(time.monotonic_ns())
+            self.events.event(Severity.ERROR, process, why)
+
+    def write_runtime_file(self) -> None:
+        """Write where other commands find this run and its processes."""
+
+        def record(process: ManagedProcess) -> runtime_file.ProcessRecord:
+            return runtime_file.ProcessRecord(process.spec.name, process.spec.role, process.pid, process.start_time)
+
+        own = runtime_file.ProcessRecord(SOURCE, SOURCE, os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+        self._record = runtime_file.RuntimeRecord(
+            site=self.run.site,
+            field=self.run.field,
+            endpoint=self.run.endpoint,
+            run_dir=str(self.run.run_dir.absolute()),
+            heartbeat=str(self._block.path),
+            drones=self.run.drones,
+            supervisor=own,
+            processes=tuple(record(process) for process in self.processes if process.running),
+        )
+        try:
+            runtime_file.write(self._record)
+        except OSError as error:  # the run is worth more than its signpost
+            _log.error("cannot write the runtime file: %s", error)
 
     # --- watch ---------------------------------------------------------------------------------------------------
 
@@ -154,6 +131,13 @@ class Supervisor:
         if self._publisher is not None:
             self._publisher.publish_due(now_ns, self.processes)
 
+    @property
+    def unwell(self) -> list[str]:
+        """Names of what was started and does not work (yet): a camera without pictures, a silent drone."""
+        return [
+            p.spec.name for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY
+        ]
+
     def _sleep(self, timeout_s: float) -> None:
         poll = select.poll()
         poll.register(self.interrupts.descriptor, select.POLLIN)
@@ -172,14 +156,14 @@ class Supervisor:
             status = details.get(process.spec.name)
             if isinstance(status, ProcessStatus):
                 process.detail = status.detail
-                if process in self._degraded and status.state is Lifecycle.READY:
-                    self._tell_state(process)
+                if status.state is Lifecycle.READY:
+                    self.events.recovery(process)
 
     def _watch(self, process: ManagedProcess, now_ns: int) -> None:
         if not process.running:
             if process.restart_due_ns is not None and now_ns >= process.restart_due_ns and not self._stopping:
-                self._launch(process)
-                self._write_runtime_file()
+                self.launch(process)
+                self.write_runtime_file()
             return
         code = process.reap()
         if code is not None:
@@ -201,7 +185,7 @@ class Supervisor:
         silent_s = min(process.heartbeat_age_ns(now_ns), now_ns - self._awake_since_ns) / NS_PER_S
         if silent_s < process.spec.silence_limit_s:
             if self._last_words.end(process.spec.name):
-                self._event(Severity.INFO, process, "has the word again")
+                self.events.event(Severity.INFO, process, "has the word again")
             return
         self._speak_for(process, f"silent for {silent_s:.2f} s", now_ns)
         self._kill(process, f"hung: no heartbeat for {silent_s:.2f} s", silent_s >= process.spec.hang_limit_s)
@@ -209,7 +193,7 @@ class Supervisor:
     def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
         words = process.spec.last_words
         if words is not None and not self._stopping and self._last_words.begin(process.spec.name, words, now_ns):
-            self._event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
+            self.events.event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
 
     def _kill(self, process: ManagedProcess, reason: str, due: bool) -> None:
         if due and not process.kill_reason:
@@ -223,18 +207,20 @@ class Supervisor:
         self._speak_for(process, why, now_ns)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):
-            tail = self._launcher.log_tail(process.spec.name)
-            self.failure = (
-                f"{process.spec.name} {why}; its log {self._launcher.log_path(process.spec.name)} ends:\n{tail}"
-            )
-            self._event(Severity.ERROR, process, why, "the run ends; see its log")
+            self.fail(process, why)
             return
         delay_s = process.schedule_restart(now_ns)
         process.ready_ns = 0
         severity = Severity.ERROR if process.storms else Severity.WARNING
-        self._event(
+        self.events.event(
             severity, process, f"{why}; restarting" + (f" in {delay_s:.1f} s" if delay_s else ""), "see its log"
         )
+
+    def fail(self, process: ManagedProcess, why: str) -> None:
+        """End the run: a process that it needs has failed."""
+        name = process.spec.name
+        self.failure = f"{name} {why}; its log {self._launcher.log_path(name)} ends:\n{self._launcher.log_tail(name)}"
+        self.events.event(Severity.ERROR, process, why, "the run ends; see its log")
 
     # --- stop ----------------------------------------------------------------------------------------------------
 
@@ -267,48 +253,9 @@ class Supervisor:
         self.stop()
         if self.bus is not None:
             self.bus.close()
-            self.bus = self._statuses = self._publisher = None
+            self.bus = self.events.bus = self._statuses = self._publisher = None
         if self._record is not None:
             runtime_file.remove(self._record)
             self._record = None
         self._launcher.close()
         self._block.path.unlink(missing_ok=True)
-
-    # --- words ---------------------------------------------------------------------------------------------------
-
-    def _tell_state(self, process: ManagedProcess) -> None:
-        (self._degraded.discard if process.state is SlotState.READY else self._degraded.add)(process)
-        self._terminal.say(f"  {process.spec.name:<12} {process.state.name.lower()}  {process.detail}".rstrip())
-
-    def _event(self, severity: Severity, process: ManagedProcess, text: str, remedy: str = "") -> None:
-        _log.warning("%s %s %s", severity, process.spec.name, text)
-        if severity is not Severity.INFO:
-            self._terminal.say(f"  {process.spec.name}: {text}")
-        if self.bus is not None:
-            header = self.bus.header(process.spec.name)
-            self.bus.publish(EVENT, Event(header=header, severity=severity, text=text, remedy=remedy))
-
-    def _write_runtime_file(self) -> None:
-        def record(process: ManagedProcess) -> runtime_file.ProcessRecord:
-            return runtime_file.ProcessRecord(process.spec.name, process.spec.role, process.pid, process.start_time)
-
-        own = runtime_file.ProcessRecord(SOURCE, SOURCE, os.getpid(), runtime_file.start_time(os.getpid()) or 0)
-        self._record = runtime_file.RuntimeRecord(
-            site=self.run.site,
-            field=self.run.field,
-            endpoint=self.run.endpoint,
-            run_dir=str(self.run.run_dir.absolute()),
-            heartbeat=str(self._block.path),
-            drones=self.run.drones,
-            supervisor=own,
-            processes=tuple(record(process) for process in self.processes if process.running),
-        )
-        try:
-            runtime_file.write(self._record)
-        except OSError as error:  # the run is worth more than its signpost
-            _log.error("cannot write the runtime file: %s", error)
-
-
-def _in_words(process: ManagedProcess) -> str:
-    state = "starting" if process.state is SlotState.EMPTY else process.state.name.lower()
-    return f"{process.spec.name} ({process.detail or state})"

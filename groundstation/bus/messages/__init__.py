@@ -24,7 +24,7 @@ from groundstation.bus.messages.flight import (
     Verb,
 )
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
-from groundstation.bus.messages.process import Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.messages.process import RUN, Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.messages.sensing import (
     CameraStatus,
     ClockOffset,
@@ -36,6 +36,7 @@ from groundstation.bus.messages.sensing import (
 from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthState
 
 __all__ = [
+    "RUN",
     "AckStage",
     "Alternative",
     "Belief",

@@ -45,23 +45,25 @@ def _is_whole(value: int) -> bool:
 
 
 class Header(msgspec.Struct, frozen=True, gc=False):
-    """Who says what about whom, and when it was measured.
-
-    stamp_ns: time of measurement on the boot clock named by `clock` [ns]; entity: whom it is about;
-    source: who says so; seq: rises by one per (key, sender).
-    """
+    """When something was measured, about whom, and who says so."""
 
     stamp_ns: Whole
+    """Time of the measurement [ns] on the boot clock named by `clock`."""
     clock: str
+    """Id of the host's boot clock that the stamp was read from."""
     entity: str
+    """The robot, camera or process that the message is about."""
     source: str
+    """The process that sends it."""
     seq: Whole
+    """Rises by one per key and sender."""
 
 
 class Message(msgspec.Struct, frozen=True, kw_only=True):
     """Base of all messages: a header, and fields whose numbers are finite and fit 64 bits (ValueError otherwise)."""
 
     header: Header
+    """Stamp, entity and source."""
 
     def __post_init__(self) -> None:
         for value in astuple(self):

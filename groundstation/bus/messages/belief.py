@@ -1,4 +1,4 @@
-"""What the tracker believes and why."""
+"""The tracker's belief, and what it made of each measurement."""
 
 from enum import StrEnum
 
@@ -8,88 +8,119 @@ from groundstation.bus.messages.base import Message
 
 
 class EntityEstimate(msgspec.Struct, frozen=True):
-    """Mean and own covariance of one entity.
-
-    Robots: mean (x, y, z, yaw) [m, m, m, rad; world], velocity (3) [m/s; world]. Target: mean (x, y), velocity (2).
-    covariance: row-major, of the mean. age_s: since it was last corrected by an observation.
-    """
+    """Mean and own covariance of one entity."""
 
     name: str
+    """The robot or target."""
     kind: str
+    """`robot` or `target`."""
     mean: tuple[float, ...]
+    """Robot: (x, y, z, yaw) [m, m, m, rad; world]. Target: (x, y) [m; world]."""
     covariance: tuple[float, ...]
+    """Covariance of the mean, row-major."""
     velocity_m_s: tuple[float, ...]
+    """Robot: (vx, vy, vz) [m/s; world]. Target: (vx, vy)."""
     converged: bool
+    """Whether the estimate is good enough to fly on."""
     age_s: float
+    """Time since the last observation that corrected it [s]."""
 
 
 class Estimate(Message, frozen=True, kw_only=True):
     """All entities of the belief, predicted to the header's stamp (50 Hz)."""
 
     entities: tuple[EntityEstimate, ...]
+    """One estimate per robot and target."""
     epoch: int
+    """The tracker's epoch: rises when it restarts or its belief breaks."""
 
 
 class SensorLateness(msgspec.Struct, frozen=True):
-    """By how much longer a camera's way to us seems than its setting says, and one sigma [ms]; nothing acts on it."""
+    """Estimated error of a camera's configured delay; for the operator, nothing acts on it."""
 
     sensor: str
+    """The camera."""
     offset_ms: float
+    """True delay minus configured delay [ms]."""
     std_ms: float
+    """Standard deviation of the offset [ms]."""
 
 
 class Belief(Message, frozen=True, kw_only=True):
-    """The joint belief: mean, upper triangle of the covariance packed by rows, and what each entry is (<= 5 Hz).
-
-    lateness: of the cameras whose delay the flight tells.
-    """
+    """The joint belief over all robots and targets (at most 5 Hz)."""
 
     mean: tuple[float, ...]
+    """Mean of the joint state, in the order of `layout`."""
     covariance_upper: tuple[float, ...]
+    """Upper triangle of its covariance, packed by rows."""
     layout: tuple[str, ...]
+    """What each entry of the mean is, such as `drone_1.x`."""
     lateness: tuple[SensorLateness, ...] = ()
+    """Delay errors of the cameras whose delay the flight reveals."""
 
 
 class Verdict(StrEnum):
     """What became of a measurement."""
 
     ACCEPTED = "ACCEPTED"
+    """Fused as it is."""
     INFLATED = "INFLATED"
+    """Beyond the gate: fused with a covariance inflated until it lies on the gate."""
     LATE = "LATE"
+    """Older than `estimator.max_lateness_s`."""
     UNSYNCED = "UNSYNCED"
+    """Its clock has no known offset."""
     OUT_OF_VIEW = "OUT_OF_VIEW"
+    """The subject would be behind the camera."""
     AMBIGUOUS = "AMBIGUOUS"
+    """It cannot be placed: a heading is missing, or this sensor alone cannot locate its subject."""
     SINGULAR = "SINGULAR"
+    """Its covariance is not positive definite, or of the wrong shape."""
     UNKNOWN_ENTITY = "UNKNOWN_ENTITY"
+    """Observer or subject is not in the field, not in the belief yet, or does not fly."""
     IMPLAUSIBLE = "IMPLAUSIBLE"
+    """Far beyond the gate, absurdly large, or from the future."""
     DUPLICATE = "DUPLICATE"
+    """The same message arrived before."""
     NOT_PERMITTED = "NOT_PERMITTED"
+    """This camera must not observe targets."""
     FROZEN = "FROZEN"
+    """Repeats itself to the last bit: its sensor or stream is stuck."""
 
 
 class Innovation(Message, frozen=True, kw_only=True):
-    """Why a correction did what it did: residual y, its covariance S (row-major), NIS, verdict and edge."""
+    """What the estimator made of one observation, and why."""
 
     observer: str
+    """Entity that observed."""
     subject: str
+    """Entity that was observed."""
     verdict: Verdict
+    """What became of the observation."""
     residual: tuple[float, ...] = ()
+    """Residual y = z - h(x), in the units of the measurement."""
     covariance: tuple[float, ...] = ()
+    """Covariance S of the residual, row-major."""
     nis: float | None = None
+    """Normalised innovation squared, y' S^-1 y, of as many degrees of freedom as y has entries."""
     latency_ms: float = 0.0
+    """Time from the measurement to its arrival [ms]."""
     reason: str = ""
+    """Words for a verdict other than ACCEPTED."""
 
 
 class JournalEntry(Message, frozen=True, kw_only=True):
-    """One tick of the tracker: what it ingested in which order, and what it planned.
-
-    ingested: (key, seq) pairs in order; now_ns; plan_tick: tick whose plan was adopted now (or -1);
-    evaluations and stop_reason of that plan.
-    """
+    """One tick of the tracker: what it ingested in which order, and which plan it adopted. Replay follows it."""
 
     tick: int
+    """Number of the tick."""
     now_ns: int
+    """The tick's time [ns; boot clock]."""
     ingested: tuple[tuple[str, int], ...]
+    """(key, seq) of each message, in the order of ingestion."""
     plan_tick: int = -1
+    """Tick on whose belief the plan adopted now was made; -1: none was adopted."""
     evaluations: int = 0
+    """Cost evaluations of that plan."""
     stop_reason: str = ""
+    """Why its search ended."""

@@ -8,88 +8,122 @@ from groundstation.bus.messages.base import Message, Vector3
 
 
 class FlightState(StrEnum):
-    """What the vehicle itself says it is doing."""
+    """What the vehicle reports of its flight."""
 
     UNKNOWN = "UNKNOWN"
+    """Not reported yet."""
     LANDED = "LANDED"
+    """On the ground, motors off."""
     TAKING_OFF = "TAKING_OFF"
+    """Climbing from the ground."""
     FLYING = "FLYING"
+    """In the air, moving."""
     HOVERING = "HOVERING"
+    """In the air, holding its place."""
     LANDING = "LANDING"
+    """Descending to the ground."""
     EMERGENCY = "EMERGENCY"
+    """Motors cut by the vehicle's own emergency stop."""
     LOST = "LOST"
+    """Nothing is heard of the vehicle any more."""
 
 
 class VehicleStatus(Message, frozen=True, kw_only=True):
-    """Health of one vehicle and of the link to it (5 Hz).
-
-    mode: the driver's own mode (see drivers.watchdog); battery, link_quality in 0..1; rate_hz of its telemetry;
-    rejected: datagrams dropped, by reason.
-    """
+    """Health of one vehicle and of the link to it (5 Hz)."""
 
     flight_state: FlightState
+    """The vehicle's own report."""
     mode: str
+    """Mode of the driver's watchdog: CONNECTING, LANDED, TAKING_OFF, HOVER, TRACK, HOLD, LANDING or CUT."""
     battery: float | None = None
+    """Charge, 0 to 1; none: unknown."""
     link_quality: float | None = None
+    """Share of datagrams that arrive, 0 to 1; none: unknown."""
     rate_hz: float = 0.0
+    """Rate of the telemetry [Hz]."""
     rejected: dict[str, int] = msgspec.field(default_factory=dict)
+    """Datagrams, setpoints and commands that were dropped, by reason."""
     detail: str = ""
+    """What the operator should know, in words."""
 
 
 class VelocitySetpoint(Message, frozen=True, kw_only=True):
-    """Velocity [base_stabilized, FLU] and yaw rate (counter-clockwise) that expire after `lifetime_ms`.
-
-    epoch: identifies the tracker's life; converged: its belief of this drone is fit to fly on.
-    """
+    """Velocity and yaw rate of one drone, valid for a short time."""
 
     velocity_m_s: Vector3
+    """Velocity [m/s; base_stabilized, FLU]."""
     yaw_rate_rad_s: float
+    """Yaw rate [rad/s], counter-clockwise."""
     lifetime_ms: int
+    """Time from the stamp after which it expires [ms]."""
     epoch: int
+    """Epoch of the tracker that sent it."""
     converged: bool = True
+    """Whether the estimate of this drone is good enough to fly on; if not, the drone hovers."""
 
 
 class Verb(StrEnum):
-    """Discrete requests, in no order; their priority is in drivers.watchdog."""
+    """Discrete requests. Priority: CUT_MOTORS, LAND, HOLD, setpoint, TAKEOFF."""
 
     TAKEOFF = "TAKEOFF"
+    """Take off."""
     TRACK = "TRACK"
+    """Obey setpoints."""
     HOLD = "HOLD"
+    """Hover until RESUME or TRACK."""
     RESUME = "RESUME"
+    """Obey setpoints again after a hold or a new epoch."""
     LAND = "LAND"
+    """Land, and stay down until a new TAKEOFF."""
     CUT_MOTORS = "CUT_MOTORS"
+    """Stop the motors at once: the drone falls."""
 
 
 class Command(Message, frozen=True, kw_only=True):
-    """A request to the drivers in `scope` (empty: all). `expires_ns` is 0 for stops, which never expire."""
+    """A request to the drivers."""
 
     id: str
+    """Names the command; a repeated id is acknowledged again, not obeyed again."""
     verb: Verb
+    """What to do."""
     scope: tuple[str, ...]
+    """Drones it is meant for; empty: all."""
     issuer: str
+    """Process that gave it."""
     expires_ns: int = 0
+    """Time after which it is ignored [ns; boot clock]; 0: never, as for all stops."""
 
 
 class AckStage(StrEnum):
     """How far a command has come at one driver."""
 
     RECEIVED = "RECEIVED"
+    """The driver has the command."""
     ACCEPTED = "ACCEPTED"
+    """The driver acts on it."""
     EFFECTIVE = "EFFECTIVE"
+    """The vehicle does what was asked."""
     REFUSED = "REFUSED"
+    """The driver will not do it."""
 
 
 class CommandAck(Message, frozen=True, kw_only=True):
-    """One driver's word on one command; `reason` names why it was refused."""
+    """One driver's answer to one command."""
 
     command_id: str
+    """Id of the command."""
     verb: Verb
+    """Verb of the command."""
     stage: AckStage
+    """How far it has come."""
     reason: str = ""
+    """Why it was refused."""
 
 
 class Lease(Message, frozen=True, kw_only=True):
-    """Who is operator until `expires_ns`; drivers accept TAKEOFF, TRACK and RESUME only from the holder."""
+    """Who is the operator: drivers accept TAKEOFF, TRACK and RESUME from the holder only."""
 
     holder: str
+    """The operator's process."""
     expires_ns: int
+    """Time until which the lease holds [ns; boot clock]."""

@@ -1,4 +1,4 @@
-"""What the tracker decided."""
+"""The plan that the tracker adopted."""
 
 import msgspec
 
@@ -6,51 +6,71 @@ from groundstation.bus.messages.base import Message, Vector3
 
 
 class Alternative(msgspec.Struct, frozen=True):
-    """A topology that was considered, with its cost, or its lower bound if it was dropped with proof."""
+    """A topology that was considered."""
 
     topology: str
+    """Text form, such as `a,b/c`."""
     cost: float
+    """Its cost [m^2], or its lower bound."""
     bound_only: bool = False
+    """Whether `cost` is a lower bound with which it was ruled out."""
 
 
 class Control(msgspec.Struct, frozen=True):
-    """Commanded velocity of one robot: (vx, vy, vz) [base_stabilized] and yaw rate, with what safety changed.
-
-    wanted_m_s: the velocity before safety, where it is known.
-    """
+    """Commanded velocity of one robot, and what the safety limits changed of it."""
 
     robot: str
+    """The robot."""
     velocity_m_s: Vector3
+    """Velocity [m/s; base_stabilized]."""
     yaw_rate_rad_s: float
+    """Yaw rate [rad/s], counter-clockwise."""
     limited_by: tuple[str, ...] = ()
+    """Safety rules that changed it."""
     wanted_m_s: Vector3 | None = None
+    """The velocity before the safety limits [m/s; base_stabilized], where it is known."""
 
 
 class Edge(msgspec.Struct, frozen=True):
-    """A permitted observation of the chosen topology and the information it is expected to bring [1/m^2]."""
+    """A permitted observation of the chosen topology."""
 
     observer: str
+    """Entity that observes."""
     subject: str
+    """Entity that is observed."""
     information: float
+    """Information that the observation is expected to bring [1/m^2]."""
 
 
 class SolverReport(msgspec.Struct, frozen=True):
-    """What the optimiser did: status, cost evaluations, CPU seconds, topologies looked at and optimised."""
+    """What the optimiser did."""
 
     status: str
+    """`complete`, or `stopped` when its time was over."""
     evaluations: int
+    """Evaluations of the cost."""
     seconds: float
+    """CPU time [s]."""
     topologies: int
+    """Topologies that were considered."""
     survivors: int
+    """Those of them that were optimised."""
 
 
 class Plan(Message, frozen=True, kw_only=True):
-    """The chosen topology with its controls and cost [m^2], beside the alternatives."""
+    """The chosen topology with its controls, and the alternatives."""
 
     topology: str
+    """Levels from the top, separated by /; robots of a level by commas."""
     cost: float
+    """Cost of the plan [m^2]."""
     controls: tuple[Control, ...]
+    """Velocity of each airborne robot."""
     edges: tuple[Edge, ...]
+    """Observations that the topology permits."""
     alternatives: tuple[Alternative, ...]
+    """The other topologies, with their costs."""
     solver: SolverReport
+    """What the optimiser did."""
     mode: str
+    """`certified` or `paper`, or HOLD while the tracker's belief is broken."""

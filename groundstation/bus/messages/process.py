@@ -1,42 +1,62 @@
-"""Life of the processes."""
+"""Lifecycle and events of the processes."""
 
 from enum import StrEnum
 
 from groundstation.bus.messages.base import Message
 
+# The entity of the one event about a run as a whole: that it ends, and how.
+RUN = "run"
+
 
 class Severity(StrEnum):
-    """How loud an event is."""
+    """How much attention an event needs."""
 
     INFO = "INFO"
+    """For the log."""
     WARNING = "WARNING"
+    """Something does not work as it should."""
     ERROR = "ERROR"
+    """Something has failed."""
 
 
 class Event(Message, frozen=True, kw_only=True):
-    """Something that happened, about header.entity, with what the operator can do about it."""
+    """Something that happened to `header.entity`."""
 
     severity: Severity
+    """How much attention it needs."""
     text: str
+    """What happened."""
     remedy: str = ""
+    """What the operator can do about it."""
 
 
 class Lifecycle(StrEnum):
     """States of every process."""
 
     STARTING = "STARTING"
+    """Connects, compiles, loads calibrations."""
     READY = "READY"
+    """Does its work."""
     DEGRADED = "DEGRADED"
+    """Works, with something missing."""
     STOPPING = "STOPPING"
+    """Finishes what it has begun and exits."""
 
 
 class ProcessStatus(Message, frozen=True, kw_only=True):
-    """Lifecycle, CPU use (share of one core since the last status) and deadlines of one process (1 Hz)."""
+    """Lifecycle, CPU use and deadlines of one process (1 Hz)."""
 
     state: Lifecycle
+    """Lifecycle state."""
     pid: int
+    """Process id."""
     cpu: float
+    """Share of one core since the last status."""
     ticks: int = 0
+    """Cycles of its loop so far."""
     overruns: int = 0
+    """Cycles that began more than 10 ms late."""
     overflowed: int = 0
+    """Messages lost because a queue was full."""
     detail: str = ""
+    """What it waits for or lacks, in words."""

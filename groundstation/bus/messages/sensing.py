@@ -1,4 +1,4 @@
-"""What devices measured."""
+"""Measurements of devices, and their health."""
 
 import msgspec
 
@@ -6,30 +6,35 @@ from groundstation.bus.messages.base import Message, Quaternion, Vector3, requir
 
 
 class ImuSample(Message, frozen=True, kw_only=True):
-    """Body rates and specific force [base, FLU], with the device's own attitude (wxyz) if it has one."""
+    """Body rates and specific force of a vehicle."""
 
     angular_velocity_rad_s: Vector3
+    """Body rates [rad/s; base, FLU]."""
     specific_force_m_s2: Vector3
+    """Specific force [m/s^2; base, FLU]."""
     attitude: Quaternion | None = None
+    """The device's own attitude, quaternion (w, x, y, z), if it has one."""
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """What a vehicle measured of its own motion; never an integral of ours.
-
-    velocity_m_s [base_stabilized, FLU], velocity_covariance 3x3 row-major; yaw_rad [odom, counter-clockwise];
-    roll_rad, pitch_rad [base_stabilized -> base, FLU: roll right side down positive, pitch nose down positive];
-    height_m above ground; position_m [odom]; reset rises by one
-    when yaw or position jump: increments across it are void.
-    """
+    """What a vehicle measured of its own motion; never an integral of ours."""
 
     velocity_m_s: Vector3
+    """Velocity [m/s; base_stabilized, FLU]."""
     velocity_covariance: tuple[float, ...]
+    """Covariance of the velocity [m^2/s^2], 3x3 row-major."""
     yaw_rad: float
+    """Heading [rad; odom], counter-clockwise."""
     roll_rad: float
+    """Roll [rad], right side down positive."""
     pitch_rad: float
+    """Pitch [rad], nose down positive."""
     height_m: float | None = None
+    """Height above the ground [m], if measured."""
     position_m: Vector3 | None = None
+    """Position [m; odom], if measured."""
     reset: int = 0
+    """Rises by one when yaw or position jump: differences across a reset mean nothing."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -37,34 +42,40 @@ class Odometry(Message, frozen=True, kw_only=True):
 
 
 class PoseHypothesis(msgspec.Struct, frozen=True):
-    """The other solution of an ambiguous planar pose, in the units of `RelativeObservation`."""
+    """The other solution of an ambiguous planar pose."""
 
     position_m: Vector3
+    """As in `RelativeObservation`."""
     yaw_rad: float | None
+    """As in `RelativeObservation`."""
     covariance: tuple[float, ...]
+    """As in `RelativeObservation`."""
 
 
 class RelativeObservation(Message, frozen=True, kw_only=True):
-    """One entity's marker as seen by one camera.
-
-    header.entity is the observer (a drone, or the name of a world-fixed camera); header.stamp_ns the exposure.
-    position_m: marker centre [camera_optical]. yaw_rad: heading of the subject relative to the observer's
-    base_stabilized x axis (for world-fixed cameras: relative to the world x axis), counter-clockwise, or None.
-    covariance: of (position, yaw), 4x4 row-major, or 3x3 without yaw.
-    margin: identity margin of the detector (> 1 is sure).
-    roll_rad, pitch_rad: observer's attitude that the yaw was derived with (0 for world-fixed cameras).
-    """
+    """One entity's marker as seen by one camera; stamped with the exposure, about the observer."""
 
     observer: str
+    """A drone, or the name of a world-fixed camera."""
     subject: str
+    """The robot or target whose marker was seen."""
     camera: str
+    """The camera."""
     position_m: Vector3
+    """Centre of the marker [m; camera_optical]."""
     yaw_rad: float | None
+    """Heading of the subject [rad], counter-clockwise, relative to the observer's base_stabilized x axis (world-fixed
+    camera: world x axis); none: unknown."""
     covariance: tuple[float, ...]
+    """Covariance of (position, yaw), 4x4 row-major, or 3x3 without yaw."""
     alternative: PoseHypothesis | None = None
+    """The other pose, where the planar ambiguity stands."""
     margin: float = 0.0
+    """Identity margin of the detector; above 1 is sure."""
     roll_rad: float = 0.0
+    """Roll of the observer that the yaw was derived with [rad]; 0 for world-fixed cameras."""
     pitch_rad: float = 0.0
+    """Pitch of the observer that the yaw was derived with [rad]; 0 for world-fixed cameras."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -72,20 +83,30 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
 
 
 class CameraStatus(Message, frozen=True, kw_only=True):
-    """Health of one camera process (2 Hz); rejected: what was refused since its start, by reason."""
+    """Health of one camera process (2 Hz)."""
 
     connected: bool
+    """Whether images arrive."""
     fps: float
+    """Images processed per second."""
     age_ms: float
+    """Age of the newest image [ms]."""
     frames: int
+    """Images processed so far."""
     skipped: int
+    """Images that were overtaken by newer ones."""
     detections: int
+    """Observations so far."""
     detail: str = ""
+    """What is wrong, in words."""
     rejected: dict[str, int] = msgspec.field(default_factory=dict)
+    """What was refused since the start, by reason."""
 
 
 class ClockOffset(Message, frozen=True, kw_only=True):
-    """Offset to add to stamps of clock `of` to read them on header.clock [ns]."""
+    """Offset between two clocks."""
 
     of: str
+    """The other clock."""
     offset_ns: int
+    """To be added to its stamps to read them on `header.clock` [ns]."""

@@ -1,11 +1,9 @@
 """Are a camera's pictures as old as its setting says? The operator is told when they are not; nothing else follows."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from groundstation.bus.messages import Message, Odometry, RelativeObservation, SensorLateness, Severity
-from groundstation.estimation.lateness import Lateness, LatenessWatch
-from groundstation.tracker import Notice
+from groundstation.bus.notice import Notice
+from groundstation.estimation.camera_latency import Lateness, LatenessWatch
+from groundstation.field.resolved import ResolvedField
 
 # Told from so many sigmas and so much on; withdrawn below the second.
 _SIGMAS, _TOLERATED_S = 3.0, 0.015
@@ -18,14 +16,14 @@ class PictureAge:
     clock: whose stamps count; those of another host would need its offset.
     """
 
-    def __init__(self, field: Mapping[str, Any], clock: str) -> None:
+    def __init__(self, field: ResolvedField, clock: str) -> None:
         self._watch, self._clock = LatenessWatch(), clock
-        cameras = {name: (f"cameras.{name}", camera) for name, camera in field["cameras"].items()}
-        onboard = {name: drone["camera"] for name, drone in field["drones"].items() if drone.get("camera")}
-        cameras |= {name: (f"drones.{name}.camera", camera) for name, camera in onboard.items()}
         self._settings = {
-            name: (f"{place}.video_delay_ms", float(camera["video_delay_ms"]))
-            for name, (place, camera) in cameras.items()
+            name: (f"cameras.{name}.video_delay_ms", camera.video_delay_ms) for name, camera in field.cameras.items()
+        }
+        self._settings |= {
+            name: (f"drones.{name}.camera.video_delay_ms", drone.camera.video_delay_ms)
+            for name, drone in field.drones.items()
         }
         self._told: dict[str, bool] = {}
 

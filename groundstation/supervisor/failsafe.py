@@ -4,9 +4,9 @@ import socket
 from contextlib import suppress
 
 from groundstation.supervisor.table import LastWords
+from groundstation.time_units import NS_PER_S
 
 _PERIOD_NS = 100_000_000
-_NS_PER_S = 1_000_000_000
 
 
 class LastWordsSender:
@@ -36,7 +36,7 @@ class LastWordsSender:
             return
         self._next_ns = now_ns + _PERIOD_NS
         for words, since_ns in self._speaking.values():
-            too_long = now_ns - since_ns >= words.land_after_s * _NS_PER_S
+            too_long = now_ns - since_ns >= words.land_after_s * NS_PER_S
             with suppress(OSError):
                 self._socket.sendto(words.land if too_long else words.hover, (words.address, words.port))
 

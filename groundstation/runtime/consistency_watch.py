@@ -8,8 +8,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Message, Odometry, RelativeObservation, Severity, Verdict
+from groundstation.bus.notice import Notice
 from groundstation.estimation.measurement import Correction
-from groundstation.tracker import Notice
 
 # NIS per degree of freedom is 1 where the belief is right. Up at the first, down again at the second, each for so long.
 _FAR, _NEAR, _LASTING_NS = 4.0, 2.0, 3_000_000_000

@@ -8,8 +8,8 @@ from contextlib import suppress
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
 from groundstation.supervisor.runtime_file import start_time
 from groundstation.supervisor.table import ProcessSpec
+from groundstation.time_units import NS_PER_S
 
-NS_PER_S = 1_000_000_000
 _BACK_OFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)
 _FORGIVEN_AFTER_NS = 30 * NS_PER_S
 STORM_RESTARTS = 5
@@ -50,10 +50,15 @@ class ManagedProcess:
         return self.running and self.state in (SlotState.READY, SlotState.DEGRADED)
 
     def adopt(self, handle: subprocess.Popen[bytes], now_ns: int) -> None:
-        """Take over a process that was just started."""
+        """Take over a process that was just started; ends it and raises OSError when it cannot be watched."""
+        try:
+            self.pidfd = os.pidfd_open(handle.pid)
+        except OSError:
+            handle.kill()
+            handle.wait()
+            raise
         self._handle = handle
         self.pid = handle.pid
-        self.pidfd = os.pidfd_open(handle.pid)
         self.start_time = start_time(handle.pid) or 0
         self.life += 1
         self.started_ns, self.ready_ns = now_ns, 0

@@ -1,4 +1,4 @@
-"""Compiles the kernels that fly, in two processes; `python -m groundstation.runtime.kernels` does so beforehand."""
+"""Compiles the kernels that fly, in two processes: `python -m groundstation.runtime.compile_kernels`."""
 
 import importlib
 from pathlib import Path

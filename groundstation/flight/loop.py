@@ -5,34 +5,22 @@ import select
 import time
 from dataclasses import dataclass
 
+from groundstation.bus.messages import RUN, Event, Severity
+from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
-from groundstation.runtime.operator import Operator, Phase
-from groundstation.runtime.take_off import TakeOffLimits
-from groundstation.supervisor.supervisor import Interrupted, Supervisor
+from groundstation.flight.plan import FlightPlan
+from groundstation.runtime.operator import Operator, TeamPhase
+from groundstation.supervisor.start import Interrupted, Start
+from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
+from groundstation.time_units import NS_PER_S
 
-_NS_PER_S = 1_000_000_000
 _STDIN = 0
 _FAILED_LANDING_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class FlightPlan:
-    """What is asked of a flight.
-
-    duration_s: tracking time, None = until stopped; asks: take off only when the operator says so at the prompt or
-    from another shell; landing_limit_s: how long a landing may take before the processes are stopped anyway.
-    """
-
-    duration_s: float | None
-    asks: bool
-    limits: TakeOffLimits
-    start_tracking_limit_s: float = 90.0
-    landing_limit_s: float = 15.0
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class FlightOutcome:
     """How a flight ended. failure: why it could not go on, or ""; interrupted: by the operator; landed: all said so."""
 
     failure: str
@@ -45,30 +33,46 @@ class Flight:
 
     def __init__(self, supervisor: Supervisor, plan: FlightPlan, terminal: Terminal) -> None:
         self._supervisor = supervisor
+        self._start = Start(supervisor)
         self._plan = plan
         self._terminal = terminal
         self._began_ns = time.monotonic_ns()
         self._prompting = False
         self._grounded = False
 
-    def run(self) -> Outcome:
+    def run(self) -> FlightOutcome:
         """Start, fly, land, stop. Raises GroundStationError when the start failed; everything is stopped then too."""
-        supervisor = self._supervisor
         try:
-            supervisor.start()
-            assert supervisor.bus is not None
-            operator = Operator(supervisor.bus, supervisor.run.drones, self._plan.limits, self._say)
-            failure = self._fly(operator)
-            landed = self._land(operator)
-            return Outcome(failure, supervisor.interrupts.stop_requested, landed)
-        except Interrupted:
-            return Outcome("", interrupted=True, landed=True)
+            outcome = self._start_and_fly()
+            self._announce(*end_of(outcome))
+            return outcome
         finally:
-            supervisor.close()
+            self._supervisor.close()
             self._terminal.unmute()
 
+    def _start_and_fly(self) -> FlightOutcome:
+        supervisor = self._supervisor
+        try:
+            self._start.run()
+        except Interrupted:
+            return FlightOutcome("", interrupted=True, landed=True)
+        except GroundStationError as error:
+            self._announce(Severity.ERROR, f"its start failed: {str(error).splitlines()[0]}")
+            raise
+        assert supervisor.bus is not None
+        operator = Operator(supervisor.bus, supervisor.run.drones, self._plan.cameras, self._plan.limits, self._say)
+        failure = self._fly(operator)
+        landed = self._land(operator)
+        return FlightOutcome(failure, supervisor.interrupts.stop_requested, landed)
+
+    def _announce(self, severity: Severity, how: str) -> None:
+        """Say on the bus that the run ends, and how, while there is still somebody to hear it."""
+        if self._supervisor.bus is not None:
+            header = self._supervisor.bus.header(RUN)
+            self._supervisor.bus.publish(EVENT, Event(header=header, severity=severity, text=f"run ended: {how}"))
+
     def _say(self, text: str) -> None:
-        elapsed_s = (time.monotonic_ns() - self._began_ns) / _NS_PER_S
+        elapsed_s = (time.monotonic_ns() - self._began_ns) / NS_PER_S
         self._terminal.say(f"{elapsed_s:6.1f} s  {text}")
 
     def _turn(self, operator: Operator) -> int:
@@ -94,7 +98,7 @@ class Flight:
         else:
             self._say(f"{self._state()}; taking off")
             operator.take_off(now_ns)
-            self._supervisor.show_screen()
+            self._start.show_screen()
         began_ns = now_ns
         while True:
             now_ns = self._turn(operator)
@@ -111,7 +115,7 @@ class Flight:
 
     def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
         """Say what a run waits for whose drones landed though nobody ordered it (their watchdogs did)."""
-        flew = operator.phase in (Phase.UP, Phase.TRACKING, Phase.HELD)
+        flew = operator.phase in (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD)
         grounded = flew and operator.landed(now_ns)
         if grounded and not self._grounded:
             self._say(
@@ -123,21 +127,23 @@ class Flight:
     def _is_over(self, operator: Operator, now_ns: int, began_ns: int) -> tuple[bool, str]:
         if self._plan.asks:
             return False, ""
-        if operator.phase is Phase.GROUND:
+        if operator.mistake is not None:
+            return True, str(operator.mistake)
+        if operator.phase is TeamPhase.GROUND:
             return True, "no drone took off"
-        if operator.phase is Phase.LANDING and operator.landed(now_ns):
+        if operator.phase is TeamPhase.LANDING and operator.landed(now_ns):
             return True, ""  # landed by someone else's order
         duration_s = self._plan.duration_s
         if duration_s is None:
             return False, ""
         since_ns = operator.tracking_since_ns
         if since_ns:
-            return now_ns - since_ns >= duration_s * _NS_PER_S, ""
-        late = now_ns - began_ns > self._plan.start_tracking_limit_s * _NS_PER_S
+            return now_ns - since_ns >= duration_s * NS_PER_S, ""
+        late = now_ns - began_ns > self._plan.start_tracking_limit_s * NS_PER_S
         return late, "tracking did not begin" if late else ""
 
     def _prompt(self, operator: Operator, now_ns: int) -> None:
-        if operator.phase is not Phase.GROUND:
+        if operator.phase is not TeamPhase.GROUND:
             self._prompting = False  # another shell was faster
         elif select.select([_STDIN], [], [], 0)[0]:
             # os.read and not input(): nothing here may block the watch over the processes.
@@ -148,7 +154,7 @@ class Flight:
             elif not self._prompting:
                 operator.take_off(now_ns)
         if not self._prompting:
-            self._supervisor.show_screen()
+            self._start.show_screen()
 
     # --- land ----------------------------------------------------------------------------------------------------
 
@@ -161,7 +167,7 @@ class Flight:
         operator.land(now_ns)
         # When the simulator is gone there is nobody left to report a landing.
         limit_s = _FAILED_LANDING_S if supervisor.failure else self._plan.landing_limit_s
-        deadline_ns = now_ns + int(limit_s * _NS_PER_S)
+        deadline_ns = now_ns + int(limit_s * NS_PER_S)
         while now_ns < deadline_ns and not supervisor.interrupts.hurry:
             now_ns = self._turn(operator)
             if operator.landed(now_ns):
@@ -172,7 +178,16 @@ class Flight:
         return not aloft
 
 
-def require_outcome(outcome: Outcome) -> None:
+def end_of(outcome: FlightOutcome) -> tuple[Severity, str]:
+    """Return how loud the end of a run is, and how it ended."""
+    landing = "all drones are on the ground" if outcome.landed else "not every drone reported a landing"
+    if outcome.failure:
+        return Severity.ERROR, f"{outcome.failure.splitlines()[0]}; {landing}"
+    severity = Severity.INFO if outcome.landed else Severity.WARNING
+    return severity, f"stopped by the operator; {landing}" if outcome.interrupted else landing
+
+
+def require_outcome(outcome: FlightOutcome) -> None:
     """Raise GroundStationError for a flight that failed."""
     if outcome.failure:
         raise GroundStationError(outcome.failure)

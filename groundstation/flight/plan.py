@@ -1,0 +1,35 @@
+"""What is asked of a flight, and what a field says of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from groundstation.geometry.rotations import world_from_downward_optical
+from groundstation.runtime.marker_height import FixedCamera
+from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.settings.schema import Field
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """What is asked of a flight.
+
+    duration_s: tracking time, None = until stopped; asks: take off only when the operator says so at the prompt or
+    from another shell; cameras: those fixed in the world; landing_limit_s: how long a landing may take before the
+    processes are stopped anyway.
+    """
+
+    duration_s: float | None
+    asks: bool
+    cameras: Mapping[str, FixedCamera]
+    limits: TakeOffLimits
+    start_tracking_limit_s: float = 90.0
+    landing_limit_s: float = 15.0
+
+
+def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan:
+    """Return the plan of a flight in this field."""
+    cameras = {}
+    for name, camera in field.cameras.items():
+        right, down, forward = world_from_downward_optical(camera.rotation_deg)[2].tolist()
+        cameras[name] = FixedCamera(camera.position_m[2], (right, down, forward))
+    return FlightPlan(duration_s, asks, cameras, TakeOffLimits(unseen_s=field.safety.unseen_land_after_s))

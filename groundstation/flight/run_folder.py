@@ -1,0 +1,64 @@
+"""The folder of a run: made and tried before anything starts; what the command knows of the run is written to it."""
+
+import logging
+import os
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from groundstation.errors import GroundStationError, OperatorMistake
+from groundstation.process.log import DiscreetFormatter
+from groundstation.report import run_facts
+from groundstation.supervisor.runtime_file import start_time
+from groundstation.time_units import NS_PER_S
+
+_MIN_FREE_BYTES = 50_000_000
+
+
+def make_run_dir(parent: Path, field_name: str) -> Path:
+    """Return a new run folder that can be written; raises GroundStationError before anything has started."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    path = parent / f"{stamp}-{field_name}"
+    try:
+        for number in range(2, 100):
+            if not path.exists():
+                break
+            path = parent / f"{stamp}-{field_name}-{number}"
+        path.mkdir(parents=True)
+        probe = path / ".probe"
+        probe.write_bytes(b"x" * 4096)
+        probe.unlink()
+        free = _free_bytes(path)
+    except OSError as error:
+        raise OperatorMistake(f"cannot write to {path}: {error.strerror} (--set recording.directory=...)") from error
+    if free < _MIN_FREE_BYTES:
+        path.rmdir()
+        raise GroundStationError(f"only {free / 1e6:.0f} MB are free for {parent}: make room before take-off")
+    return path
+
+
+def _free_bytes(path: Path) -> int:
+    status = os.statvfs(path)
+    return status.f_bavail * status.f_frsize
+
+
+def write_facts(run_dir: Path, mode: str, path: Path, facts: dict[str, Any]) -> None:
+    """Write how the run was asked for, and when this process was started: the operator waits from then on."""
+    command_ns = time.time_ns() - _age_ns()
+    run_facts.write(run_dir, run_facts.RunFacts(mode=mode, field=str(path), command_unix_ns=command_ns, **facts))
+
+
+def _age_ns() -> int:
+    started_s = (start_time(os.getpid()) or 0) / os.sysconf("SC_CLK_TCK")
+    return max(0, time.clock_gettime_ns(time.CLOCK_BOOTTIME) - int(started_s * NS_PER_S))
+
+
+def log_to(run_dir: Path) -> None:
+    """Send the log of this process to the run folder."""
+    (run_dir / "log").mkdir(exist_ok=True)
+    handler = logging.FileHandler(run_dir / "log" / "supervisor.log")
+    handler.setFormatter(DiscreetFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logging.getLogger().addHandler(handler)
+    logging.getLogger().setLevel(logging.INFO)
+    logging.raiseExceptions = False  # a full disk must not fill the terminal with tracebacks

@@ -1,0 +1,116 @@
+"""Who holds a port of this machine: the kernel's tables of sockets, and the descriptors of processes."""
+
+import errno
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from ipaddress import IPv4Address, IPv6Address
+from pathlib import Path
+
+_PROC = Path("/proc")
+_LISTENING, _UNCONNECTED = "0A", "07"  # of TCP, of UDP (proc_pid_net(5))
+_WORD = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """A process that holds a port; pid 0: one that this user may not look at."""
+
+    name: str
+    pid: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.name} (pid {self.pid})" if self.pid else self.name
+
+
+_HIDDEN = Holder("another user's process")
+_UNSEEN = Holder("a process that cannot be found")
+
+
+@dataclass(frozen=True, slots=True)
+class _Socket:
+    address: str
+    port: int
+    inode: str
+
+
+def holder_of(address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> Holder:
+    """Return who keeps others from binding an address and port: it holds that address, or all of them."""
+    everywhere = ("0.0.0.0", "::")
+    inodes = {
+        f"socket:[{held.inode}]"
+        for held in _sockets(kind)
+        if held.port == port and (held.address in (address, *everywhere) or address in ("", *everywhere))
+    }
+    if not inodes:
+        return _UNSEEN  # bound without listening, or gone meanwhile
+    return next((holder for pid in _pids() if (holder := _holder(pid, inodes))), _HIDDEN)
+
+
+def why_refused(error: OSError, address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> str:
+    """Return why an address and port cannot be bound: who holds them, or else what the system says."""
+    if error.errno == errno.EADDRINUSE:
+        return f"the port is taken by {holder_of(address, port, kind)}"
+    return os.strerror(error.errno or 0)
+
+
+def networks_in_use() -> set[str]:
+    """Return the /24 networks of loopback (as "127.64.1") with an address that somebody listens on."""
+    held = (*_sockets(socket.SOCK_STREAM), *_sockets(socket.SOCK_DGRAM))
+    return {one.address.rpartition(".")[0] for one in held if one.address.startswith("127.")}
+
+
+def is_free(address: str, port: int) -> bool:
+    """Return whether a TCP port can be listened on now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address, port))
+        except OSError:
+            return False
+    return True
+
+
+def _sockets(kind: socket.SocketKind) -> Iterator[_Socket]:
+    name, state = ("tcp", _LISTENING) if kind is socket.SOCK_STREAM else ("udp", _UNCONNECTED)
+    for table in (name, f"{name}6"):
+        try:
+            lines = (_PROC / "net" / table).read_text().splitlines()[1:]
+        except OSError:
+            continue  # a kernel without IPv6, or without this file
+        for fields in map(str.split, lines):
+            if fields[3] == state:
+                address, _, port = fields[1].partition(":")
+                yield _Socket(_address(address), int(port, 16), fields[9])
+
+
+def _address(text: str) -> str:
+    """Return an address as people write it; the kernel prints words of 32 bits in the machine's own order."""
+    words = (int(text[at : at + _WORD], 16).to_bytes(4, sys.byteorder) for at in range(0, len(text), _WORD))
+    packed = b"".join(words)
+    if len(packed) == 4:
+        return str(IPv4Address(packed))
+    address = IPv6Address(packed)
+    return str(address.ipv4_mapped or address)
+
+
+def _pids() -> list[int]:
+    return sorted(int(entry.name) for entry in _PROC.iterdir() if entry.name.isdecimal())
+
+
+def _holder(pid: int, inodes: set[str]) -> Holder | None:
+    folder = _PROC / str(pid)
+    with suppress(OSError):  # another user's, or it has just ended
+        if any(_target(entry) in inodes for entry in (folder / "fd").iterdir()):
+            return Holder((folder / "comm").read_text().strip(), pid)
+    return None
+
+
+def _target(descriptor: Path) -> str:
+    try:
+        return str(descriptor.readlink())
+    except OSError:
+        return ""  # closed meanwhile

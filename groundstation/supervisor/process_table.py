@@ -1,0 +1,78 @@
+"""The process table: one row per kind of process, with the reasons for its limits. Times in seconds.
+
+A run completes the rows with its sections and addresses (`groundstation/flight/composition.py`).
+"""
+
+import sys
+
+from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder
+
+ROUTER = ProcessSpec(
+    name="router",
+    role="router",
+    entry="groundstation.runtime.router:run",
+    # Drones go on by themselves after pauses below 0.5 s; no router must come back so soon.
+    restart_delay_s=0.5,
+    hang_limit_s=1.0,
+    stop_order=StopOrder.CONNECTS,
+    on_bus=False,
+)
+SIM_BRIDGE = ProcessSpec(
+    name="sim_bridge",
+    role="sim_bridge",
+    command=(sys.executable, "-m", "sim_bridge", "--spec", "{spec}"),  # never imported by what flies
+    restart=Restart.ENDS_RUN,  # a new one would put the drones back on their pads
+    hang_limit_s=5.0,
+    stop_order=StopOrder.EMULATES,  # drivers land on it first
+)
+TRACKER = ProcessSpec(
+    name="tracker",
+    role="tracker",
+    entry="groundstation.runtime.node:run",
+    numbered=True,  # drivers obey the newest tracker, and hover until the operator resumes
+    start_limit_s=180.0,  # kernels that are compiled for the first time, on a busy machine, need minutes
+    hang_limit_s=0.5,  # as long as a drone flies on without setpoints
+    stop_order=StopOrder.DECIDES,
+)
+RECORDER = ProcessSpec(
+    name="recorder",
+    role="recorder",
+    entry="groundstation.runtime.recorder:run",
+    silence_limit_s=5.0,
+    hang_limit_s=5.0,  # nobody flies by it, and a slow disk is no fault of its own
+    stop_order=StopOrder.RECORDS,
+    stop_limit_s=8.0,  # it writes what it still holds, and the index
+)
+DRONE = ProcessSpec(  # name and entry are those of the drone
+    name="",
+    role="driver",
+    required=False,  # the others can fly without it
+    stop_order=StopOrder.DRIVES,
+    stop_limit_s=12.0,  # it lands before it ends
+)
+CAMERA = ProcessSpec(  # name and entry are those of the camera
+    name="",
+    role="camera",
+    required=False,
+    hang_limit_s=2.0,  # a decoder may stop for longer than a drone may be left alone
+    stop_order=StopOrder.DRIVES,
+)
+CONSOLE = ProcessSpec(
+    name="console",
+    role="console",
+    entry="groundstation.console.process:run",
+    required=False,
+    silence_limit_s=5.0,
+    hang_limit_s=5.0,
+    stop_order=StopOrder.DRIVES,
+)
+MONITOR = ProcessSpec(
+    name="monitor",
+    role="monitor",
+    entry="groundstation.runtime.monitor:run",
+    silence_limit_s=5.0,
+    hang_limit_s=5.0,
+    stop_order=StopOrder.DECIDES,  # the terminal is the operator's again before the shut-down writes on it
+    on_terminal=True,
+)
+ROWS = (ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, CONSOLE, MONITOR)

@@ -1,0 +1,82 @@
+"""The start of a run: the router, then everything else at once, and the wait until it is up."""
+
+import time
+
+from groundstation.bus.messages import Severity
+from groundstation.errors import GroundStationError
+from groundstation.supervisor.managed_process import ManagedProcess
+from groundstation.supervisor.supervisor import Supervisor
+from groundstation.supervisor.table import StopOrder
+from groundstation.supervisor.waiting import Waiting
+
+_OPTIONAL_GRACE_S = 5.0
+
+
+class Interrupted(GroundStationError):
+    """The operator asked to stop while the run was starting."""
+
+
+class Start:
+    """Starts what a supervisor watches from then on; `Supervisor.close` stops it, finished or not."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+
+    def run(self) -> None:
+        """Start the router, then everything else at once; returns when the run can begin.
+
+        Raises GroundStationError when a required process cannot be started, fails or is late, Interrupted when the
+        operator stops it.
+        """
+        supervisor = self._supervisor
+        supervisor.prepare()
+        routers = [p for p in supervisor.processes if p.spec.stop_order is StopOrder.CONNECTS]
+        self._launch_all(routers)
+        self._wait_for(routers)
+        supervisor.connect()
+        others = [p for p in supervisor.processes if p not in routers and not p.spec.on_terminal]
+        self._launch_all(others)
+        supervisor.write_runtime_file()
+        self._wait_for([p for p in others if p.spec.required])
+        self._wait_for([p for p in others if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
+
+    def show_screen(self) -> None:
+        """Hand the terminal to the process that draws on it, if the table has one; once."""
+        for process in self._supervisor.processes:
+            if process.spec.on_terminal and not process.life:
+                self._supervisor.terminal.muted = True
+                self._supervisor.launch(process)
+
+    def _launch_all(self, processes: list[ManagedProcess]) -> None:
+        for process in processes:
+            self._supervisor.launch(process)
+            self._raise_failure()
+
+    def _wait_for(self, processes: list[ManagedProcess], limit_s: float | None = None) -> None:
+        """Wait until all are up, for each as long as its start may take, or `limit_s`; go on without optional ones."""
+        supervisor = self._supervisor
+        waiting = Waiting(processes, time.monotonic(), limit_s)
+        while waiting.processes:
+            supervisor.step()
+            now_s = time.monotonic()
+            for process in waiting.take_up():
+                supervisor.events.state(process)
+            self._raise_failure()
+            if supervisor.interrupts.stop_requested:
+                raise Interrupted("stopped while starting")
+            for process in waiting.take_late(now_s):
+                self._late(process)
+            self._raise_failure()
+            if note := waiting.note(now_s):
+                supervisor.terminal.say(f"  waiting for {note}")
+
+    def _late(self, process: ManagedProcess) -> None:
+        if process.spec.required:
+            self._supervisor.fail(process, f"is not ready {process.spec.start_limit_s:.0f} s after the start")
+        else:
+            events = self._supervisor.events
+            events.event(Severity.WARNING, process, "is not ready; going on without it", "see its log")
+
+    def _raise_failure(self) -> None:
+        if self._supervisor.failure:
+            raise GroundStationError(self._supervisor.failure)

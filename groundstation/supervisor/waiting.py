@@ -1,0 +1,49 @@
+"""Whom a start waits for, how long, and what the operator reads meanwhile."""
+
+from groundstation.process.heartbeat import SlotState
+from groundstation.supervisor.managed_process import ManagedProcess
+
+_NOTE_PERIOD_S = 2.0
+_SAME_NOTE_PERIOD_S = 10.0
+
+
+class Waiting:
+    """Processes that are not up yet.
+
+    limit_s: how long each may take from `began_s` on (None: its own start limit, over all of its restarts).
+    """
+
+    def __init__(self, processes: list[ManagedProcess], began_s: float, limit_s: float | None = None) -> None:
+        self.processes = list(processes)
+        self._began_s = self._noted_s = began_s
+        self._limit_s = limit_s
+        self._noted = ""
+        self._seen_up: list[tuple[ManagedProcess, int]] = []
+
+    def take_up(self) -> list[ManagedProcess]:
+        """Return those that have come up, and were so at the last call too: who dies of its first work is not up."""
+        before = self._seen_up
+        self._seen_up = [(process, process.life) for process in self.processes if process.is_up]
+        return self._take([process for process, life in self._seen_up if (process, life) in before])
+
+    def take_late(self, now_s: float) -> list[ManagedProcess]:
+        """Return those whose time is up; nobody waits for them any longer."""
+        elapsed_s = now_s - self._began_s
+        return self._take([p for p in self.processes if elapsed_s > (self._limit_s or p.spec.start_limit_s)])
+
+    def note(self, now_s: float) -> str:
+        """Return whom the start waits for when the operator should read it (again), else nothing."""
+        note = ", ".join(_in_words(process) for process in self.processes)
+        if now_s - self._noted_s <= (_SAME_NOTE_PERIOD_S if note == self._noted else _NOTE_PERIOD_S):
+            return ""
+        self._noted, self._noted_s = note, now_s
+        return note
+
+    def _take(self, processes: list[ManagedProcess]) -> list[ManagedProcess]:
+        self.processes = [process for process in self.processes if process not in processes]
+        return processes
+
+
+def _in_words(process: ManagedProcess) -> str:
+    state = "starting" if process.state is SlotState.EMPTY else process.state.name.lower()
+    return f"{process.spec.name} ({process.detail or state})"

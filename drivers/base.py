@@ -3,13 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from drivers.authority import Decision, VehicleView
+from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Severity
 
 
 @dataclass(frozen=True, slots=True)
-class Health:
+class LinkHealth:
     """What a driver knows of its link; rejected: datagrams dropped, by reason."""
 
     link_quality: float | None = None
@@ -30,10 +30,10 @@ class Vehicle(Protocol):
     def view(self, now_ns: int) -> VehicleView:
         """Return what the vehicle last said, and whether that is fresh."""
 
-    def apply(self, now_ns: int, decision: Decision) -> None:
+    def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Tell the vehicle what to do; called at the sender's rate, also while it is silent."""
 
-    def health(self, now_ns: int) -> Health:
+    def health(self, now_ns: int) -> LinkHealth:
         """Return the state of the link for the status message."""
 
     def flush(self) -> None:

@@ -4,9 +4,9 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 
-from drivers.authority import AIRBORNE, Ack, AuthorityLimits, Decision, Mode, Upstream, VehicleView
 from drivers.base import HostProcess, Vehicle
 from drivers.watchdog import Watchdog
+from drivers.watchdog_types import AIRBORNE, Ack, AuthorityLimits, DriverMode, Upstream, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     Command,
@@ -27,7 +27,7 @@ _UNCONFIGURED_NS = 15_000_000_000
 _SILENCE_EVENT_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
-_LOUD = {Mode.CUT: Severity.ERROR, Mode.LANDING: Severity.WARNING}
+_LOUD = {DriverMode.CUT: Severity.ERROR, DriverMode.LANDING: Severity.WARNING}
 
 
 class VehicleHost:
@@ -57,7 +57,7 @@ class VehicleHost:
         """Whether a setpoint or command waits for the next turn."""
         return self._setpoints.waiting or self._commands.waiting
 
-    def turn(self, now_ns: int) -> Decision:
+    def turn(self, now_ns: int) -> WatchdogDecision:
         """Run one cycle: orders, decision, command to the vehicle, reports."""
         for received in self._leases.drain():
             if isinstance(received.message, Lease):
@@ -80,15 +80,17 @@ class VehicleHost:
         if not self._child.stop_requested and self._child.supervisor_alive:
             return False
         state, mode = self.watchdog.vehicle, self.watchdog.mode
-        if mode in (Mode.CONNECTING, Mode.LANDED):
+        if mode in (DriverMode.CONNECTING, DriverMode.LANDED):
             return True
-        cut = mode is Mode.CUT and state.fresh and state.flight_state in (FlightState.EMERGENCY, FlightState.LANDED)
+        cut = (
+            mode is DriverMode.CUT and state.fresh and state.flight_state in (FlightState.EMERGENCY, FlightState.LANDED)
+        )
         return cut or now_ns - self._heard_ns > _GIVE_UP_NS
 
     def publish_status(self, now_ns: int) -> None:
         """Publish the VehicleStatus now."""
         health, view = self.vehicle.health(now_ns), self.watchdog.vehicle
-        lost = self.watchdog.mode is not Mode.CONNECTING and not view.fresh
+        lost = self.watchdog.mode is not DriverMode.CONNECTING and not view.fresh
         status = VehicleStatus(
             header=self._bus.header(self.vehicle.name),
             flight_state=FlightState.LOST if lost else view.flight_state,
@@ -128,7 +130,7 @@ class VehicleHost:
         )
         self._bus.publish(COMMAND_ACK, message)
 
-    def _report(self, now_ns: int, view: VehicleView, decision: Decision) -> None:
+    def _report(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
         for ack in decision.acks:
             self._answer(ack)
         self._announce_mode(decision)
@@ -140,7 +142,7 @@ class VehicleHost:
             self._next_status_ns = now_ns + _STATUS_PERIOD_NS
             self.publish_status(now_ns)
 
-    def _announce_mode(self, decision: Decision) -> None:
+    def _announce_mode(self, decision: WatchdogDecision) -> None:
         if (decision.mode, decision.reason) == self._announced:
             return
         if decision.mode is not self._announced[0]:
@@ -150,7 +152,7 @@ class VehicleHost:
         severity = _LOUD.get(decision.mode, Severity.INFO)
         self._event(severity, f"{self.vehicle.name} {decision.mode}: {decision.reason}")
 
-    def _announce_silence(self, now_ns: int, view: VehicleView, decision: Decision) -> None:
+    def _announce_silence(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
         name, address = self.vehicle.name, self.vehicle.address
         if view.fresh:
             self._heard_ns = now_ns
@@ -159,19 +161,19 @@ class VehicleHost:
                 self._event(Severity.INFO, f"{name} answers")
             self._silent = False
             return
-        limit_ns = _UNANSWERED_NS if decision.mode is Mode.CONNECTING else _SILENCE_EVENT_NS
+        limit_ns = _UNANSWERED_NS if decision.mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
         if not self._silent and now_ns - self._heard_ns >= limit_ns:
             self._silent = True
             remedy = f"check that it is switched on and that this computer is in its network: ping {address}"
             self._event(Severity.ERROR, f"{name} does not answer at {address}; trying on", remedy)
             self._child.degrade(f"{name} does not answer at {address}")
 
-    def _announce_start(self, now_ns: int, view: VehicleView, decision: Decision) -> None:
+    def _announce_start(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
         """Say READY once the vehicle may take off, or at once when it flies: then it has to be spoken for."""
         name, address = self.vehicle.name, self.vehicle.address
         if view.configured or view.flight_state in AIRBORNE:
             self._unconfigured_ns = now_ns
-            if self._silent or decision.mode is not Mode.CONNECTING:
+            if self._silent or decision.mode is not DriverMode.CONNECTING:
                 self._child.ready(f"{name} at {address}")
         elif now_ns - self._unconfigured_ns > _UNCONFIGURED_NS:
             self._child.degrade(f"{name} at {address}: {view.not_ready}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from drivers.authority import AuthorityLimits
+from drivers.watchdog_types import AuthorityLimits
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -13,13 +13,13 @@ Port = Annotated[int, Field(ge=1, le=65535)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
 
 
-class Section(BaseModel):
+class DriverSection(BaseModel):
     """A part of a driver's settings: closed, immutable, finite."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Limits(Section):
+class VehicleLimits(DriverSection):
     """What a vehicle is never asked to exceed."""
 
     max_speed_m_s: Positive = 0.6
@@ -34,14 +34,14 @@ class Limits(Section):
         return math.radians(self.max_yaw_rate_deg_s)
 
 
-class Safety(Section):
+class SilenceLimits(DriverSection):
     """How long silence is borne; setpoint_lifetime_ms caps the lifetime that a setpoint may claim."""
 
     setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
 
-    def authority(self, limits: Limits) -> AuthorityLimits:
+    def authority(self, limits: VehicleLimits) -> AuthorityLimits:
         """Return the limits of the shared watchdog for a vehicle with these limits."""
         return AuthorityLimits(
             hover_after_s=self.setpoint_lifetime_ms / 1000,

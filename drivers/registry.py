@@ -14,4 +14,4 @@ def entry_point(kind: str) -> str:
     try:
         return ENTRY_POINTS[kind]
     except KeyError:
-        raise DriverError(f"no driver of kind {kind!r}; there are: {', '.join(sorted(ENTRY_POINTS))}") from None
+        raise DriverError(f"kind: {kind} is not known; known: {', '.join(ENTRY_POINTS)}") from None

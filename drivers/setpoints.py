@@ -5,8 +5,8 @@ Pure; times are monotonic nanoseconds handed in.
 
 from dataclasses import dataclass
 
-from groundstation.bus.clock import NS_PER_MS
 from groundstation.bus.messages import VelocitySetpoint
+from groundstation.time_units import NS_PER_MS
 
 
 @dataclass(slots=True)

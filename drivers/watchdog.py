@@ -1,48 +1,50 @@
 """Who may move a vehicle, and what it is to do now: one state machine for all kinds of vehicles.
 
 Pure: `now_ns` and inputs in, a decision out. Priority: CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF. LAND latches
-until a new TAKEOFF. Silence of the tracker, the vehicle or the supervisor stops, then lands. Tables: README.md.
+until a new TAKEOFF. Silence of the tracker, the vehicle or the supervisor stops, then lands.
+Tables: docs/explanation/authority.md#the-watchdog.
 """
 
-from drivers.authority import (
+from drivers.lease import LeaseBook
+from drivers.setpoints import SetpointGate
+from drivers.watchdog_types import (
     AIRBORNE,
     ALOFT,
     FREE,
+    STANDING,
     UP,
     Ack,
     Action,
     AuthorityLimits,
-    Decision,
-    Mode,
+    DriverMode,
     Upstream,
     VehicleView,
+    WatchdogDecision,
 )
-from drivers.lease import LeaseBook
-from drivers.setpoints import SetpointGate
 from groundstation.bus.messages import AckStage, Command, FlightState, Lease, VelocitySetpoint, Verb
+from groundstation.time_units import NS_PER_S
 
-NS_PER_S = 1_000_000_000
 _REMEMBERED_COMMANDS = 256
 
 
 class Watchdog:
     """Authority over one vehicle. Feed it with `accept_*`, then call `step` at the sender's rate.
 
-    mode, reason: see `Decision`. The vehicle's and upstream's last words are remembered between steps.
+    mode, reason: see `WatchdogDecision`. The vehicle's and upstream's last words are remembered between steps.
     """
 
     def __init__(self, limits: AuthorityLimits, clock: str) -> None:
         self.limits = limits
-        self.mode = Mode.CONNECTING
+        self.mode = DriverMode.CONNECTING
         self.reason = "waiting for the vehicle's first word"
         self.gate = SetpointGate(int(limits.hover_after_s * NS_PER_S), clock)
         self.lease = LeaseBook(clock)
         self.vehicle = VehicleView()
         self.upstream = Upstream()
         self._since: dict[str, int] = {}
-        self._mode_since_ns = 0
+        self._entered_ns = 0
         self._last_step_ns: int | None = None
-        self._airborne_since_ns = 0
+        self._take_off_ended_ns = 0
         self._brake_until_ns = 0
         self._clearing = False
         self._paused_ns: int | None = None
@@ -81,7 +83,7 @@ class Watchdog:
     def _obey(self, now_ns: int, command: Command) -> str:
         match command.verb:
             case Verb.CUT_MOTORS:
-                return self._enter(now_ns, Mode.CUT, f"motors cut by {command.issuer}")
+                return self._enter(now_ns, DriverMode.CUT, f"motors cut by {command.issuer}")
             case Verb.LAND:
                 return self._obey_land(now_ns, command)
             case Verb.HOLD:
@@ -93,19 +95,19 @@ class Watchdog:
 
     def _obey_land(self, now_ns: int, command: Command) -> str:
         if self.mode in ALOFT:
-            return self._enter(now_ns, Mode.LANDING, f"landing for {command.issuer}")
-        return "motors are cut" if self.mode is Mode.CUT else self._end_braking()
+            return self._enter(now_ns, DriverMode.LANDING, f"landing for {command.issuer}")
+        return "motors are cut" if self.mode is DriverMode.CUT else self._end_braking()
 
     def _end_braking(self) -> str:
         self._brake_until_ns = 0
         return ""
 
     def _obey_hold(self, now_ns: int, command: Command) -> str:
-        if self.mode is Mode.TAKING_OFF and self.vehicle.flight_state is FlightState.LANDED:
-            return self._enter(now_ns, Mode.LANDED, f"take-off cancelled by {command.issuer}")
+        if self.mode is DriverMode.TAKING_OFF and self.vehicle.flight_state in STANDING:
+            return self._enter(now_ns, DriverMode.LANDED, f"take-off cancelled by {command.issuer}")
         if self.mode in ALOFT:
-            return self._enter(now_ns, Mode.HOLD, f"held by {command.issuer}")
-        return f"{self.mode} goes before HOLD" if self.mode in (Mode.LANDING, Mode.CUT) else ""
+            return self._enter(now_ns, DriverMode.HOLD, f"held by {command.issuer}")
+        return f"{self.mode} goes before HOLD" if self.mode in (DriverMode.LANDING, DriverMode.CUT) else ""
 
     def _obey_take_off(self, now_ns: int, command: Command) -> str:
         refusal = self._take_off_refusal()
@@ -114,15 +116,15 @@ class Watchdog:
         self._clearing = self.vehicle.flight_state is FlightState.EMERGENCY
         self.gate.forget_epoch()
         self._since.clear()
-        return self._enter(now_ns, Mode.TAKING_OFF, f"taking off for {command.issuer}")
+        return self._enter(now_ns, DriverMode.TAKING_OFF, f"taking off for {command.issuer}")
 
     def _take_off_refusal(self) -> str:
         battery = self.vehicle.battery
-        if self.mode not in (Mode.LANDED, Mode.CUT):
-            return "the vehicle was not heard yet" if self.mode is Mode.CONNECTING else f"already {self.mode}"
+        if self.mode not in (DriverMode.LANDED, DriverMode.CUT):
+            return "the vehicle was not heard yet" if self.mode is DriverMode.CONNECTING else f"already {self.mode}"
         if not self.vehicle.fresh:
             return "no telemetry from the vehicle"
-        if self.vehicle.flight_state not in (FlightState.LANDED, FlightState.EMERGENCY):
+        if self.vehicle.flight_state not in STANDING:
             return f"the vehicle says {self.vehicle.flight_state}"
         if battery is None or battery < self.limits.battery_min:
             known = "unknown" if battery is None else f"{battery:.0%}"
@@ -139,6 +141,8 @@ class Watchdog:
             return f"the vehicle is {self.mode}"
         if not self.vehicle.fresh:
             return "no telemetry from the vehicle"
+        if self.vehicle.flight_state in STANDING | {FlightState.LANDING}:
+            return f"the vehicle says {self.vehicle.flight_state}"
         refusal = self._upstream_refusal()
         if refusal:
             return refusal
@@ -147,11 +151,12 @@ class Watchdog:
                 return "the tracker was restarted: RESUME is needed"
             if not self.gate.adopt(now_ns):
                 return "the restarted tracker has no converged belief of this drone yet"
-        return self._enter(now_ns, Mode.TRACK, f"tracking for {command.issuer}")
+        return self._enter(now_ns, DriverMode.TRACK, f"tracking for {command.issuer}")
 
-    def _enter(self, now_ns: int, mode: Mode, reason: str, brake: bool = False) -> str:
-        if mode is not self.mode:
-            self._mode_since_ns = now_ns
+    def _enter(self, now_ns: int, mode: DriverMode, reason: str, brake: bool = False) -> str:
+        if self.mode is DriverMode.TAKING_OFF:
+            self._take_off_ended_ns = now_ns
+        self._entered_ns = now_ns
         self.mode, self.reason = mode, reason
         self._paused_ns = None
         self._brake_until_ns = now_ns + int(self.limits.brake_s * NS_PER_S) if brake else 0
@@ -161,7 +166,7 @@ class Watchdog:
 
     # -- step ---------------------------------------------------------------------------------------------------------
 
-    def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> Decision:
+    def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> WatchdogDecision:
         """Return what to do now; call it at the sender's rate, 30 Hz."""
         self.see(vehicle, upstream)
         gap_s = 0.0 if self._last_step_ns is None else (now_ns - self._last_step_ns) / NS_PER_S
@@ -172,38 +177,37 @@ class Watchdog:
         setpoint = self._obeyed_setpoint(now_ns)
         acks = self._effective_ack(now_ns)
         if setpoint is None:
-            return Decision(self.mode, self._action(now_ns), reason=self.reason, acks=acks)
+            return WatchdogDecision(self.mode, self._action(now_ns), reason=self.reason, acks=acks)
         velocity, turn, stamp_ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
-        return Decision(self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns)
+        return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns)
 
     def _follow_vehicle(self, now_ns: int) -> None:
         state = self.vehicle.flight_state
         self._clearing = self._clearing and state is FlightState.EMERGENCY
         if not self.vehicle.fresh or state in (FlightState.UNKNOWN, FlightState.LOST):
             return
-        if self.mode is Mode.CONNECTING:
+        if self.mode is DriverMode.CONNECTING:
             self._meet_vehicle(now_ns)
         elif state is FlightState.EMERGENCY:
-            cleared_in_time = now_ns - self._mode_since_ns < self.limits.clear_s * NS_PER_S
-            if self.mode in ALOFT | {Mode.LANDING} and not (self._clearing and cleared_in_time):
-                self._enter(now_ns, Mode.CUT, "the vehicle reports an emergency")
+            cleared_in_time = now_ns - self._entered_ns < self.limits.clear_s * NS_PER_S
+            if self.mode in ALOFT | {DriverMode.LANDING} and not (self._clearing and cleared_in_time):
+                self._enter(now_ns, DriverMode.CUT, "the vehicle reports an emergency")
         elif state is FlightState.LANDED:
-            if self.mode in FREE | {Mode.LANDING}:
-                self._enter(now_ns, Mode.LANDED, f"landed ({self.reason})")
-        elif self.mode is Mode.LANDED:
-            self._enter(now_ns, Mode.LANDING, "airborne without a take-off of ours")
+            if self.mode in FREE | {DriverMode.LANDING}:
+                self._enter(now_ns, DriverMode.LANDED, f"landed ({self.reason})")
+        elif self.mode is DriverMode.LANDED:
+            self._enter(now_ns, DriverMode.LANDING, f"airborne without a standing take-off order ({self.reason})")
         elif state is FlightState.LANDING and self.mode in ALOFT:
-            self._enter(now_ns, Mode.LANDING, "the vehicle lands by itself")
-        elif state in UP and self.mode is Mode.TAKING_OFF:
-            self._airborne_since_ns = now_ns
-            self._enter(now_ns, Mode.HOVER, "airborne, waiting for TRACK")
+            self._enter(now_ns, DriverMode.LANDING, "the vehicle lands by itself")
+        elif state in UP and self.mode is DriverMode.TAKING_OFF:
+            self._enter(now_ns, DriverMode.HOVER, "airborne, waiting for TRACK")
 
     def _meet_vehicle(self, now_ns: int) -> None:
         # A restarted driver: what flies is stopped and landed, what stands never takes off by itself.
         if self.vehicle.flight_state in AIRBORNE:
-            self._enter(now_ns, Mode.LANDING, "it was flying when this driver started", brake=True)
+            self._enter(now_ns, DriverMode.LANDING, "it was flying when this driver started", brake=True)
         else:
-            self._enter(now_ns, Mode.LANDED, "connected")
+            self._enter(now_ns, DriverMode.LANDED, "connected")
 
     def _heed_silence(self, now_ns: int, gap_s: float) -> None:
         limits, up, vehicle = self.limits, self.upstream, self.vehicle
@@ -226,7 +230,7 @@ class Watchdog:
         )
         for applies, reason in landings:
             if applies:
-                self._enter(now_ns, Mode.LANDING, reason)
+                self._enter(now_ns, DriverMode.LANDING, reason)
                 return
         heard_ns, paused = self.gate.last_heard_ns, self._tracker_paused(now_ns)
         suspensions = (
@@ -237,25 +241,23 @@ class Watchdog:
             (paused, "no setpoint from the tracker"),
         )
         for applies, reason in suspensions:
-            if applies and self.mode is Mode.TRACK:
-                self._enter(now_ns, Mode.HOVER, f"{reason}; RESUME is needed")
+            if applies and self.mode is DriverMode.TRACK:
+                self._enter(now_ns, DriverMode.HOVER, f"{reason}; RESUME is needed")
                 self._paused_ns = heard_ns if paused else None
 
     def _lasted(self, what: str, condition: bool, now_ns: int) -> float:
         # Seconds for which a condition has held without a break.
-        if not condition:
-            self._since.pop(what, None)
-            return 0.0
-        return (now_ns - self._since.setdefault(what, now_ns)) / NS_PER_S
+        since_ns = self._since.setdefault(what, now_ns) if condition else self._since.pop(what, now_ns)
+        return (now_ns - since_ns) / NS_PER_S if condition else 0.0
 
     def _take_off_overdue(self, now_ns: int) -> bool:
-        return self.mode is Mode.TAKING_OFF and now_ns - self._mode_since_ns > self.limits.take_off_s * NS_PER_S
+        return self.mode is DriverMode.TAKING_OFF and now_ns - self._entered_ns > self.limits.take_off_s * NS_PER_S
 
     def _tracker_silent(self, now_ns: int) -> bool:
-        if self.mode is Mode.TAKING_OFF:
+        if self.mode is DriverMode.TAKING_OFF:
             return False
         heard_ns = self.gate.last_heard_ns
-        unseen_until_ns = self._airborne_since_ns + int(self.limits.unseen_land_after_s * NS_PER_S)
+        unseen_until_ns = self._take_off_ended_ns + int(self.limits.unseen_land_after_s * NS_PER_S)
         if heard_ns is None:
             return now_ns >= unseen_until_ns
         return now_ns - heard_ns >= self.limits.land_after_s * NS_PER_S
@@ -269,24 +271,24 @@ class Watchdog:
         if heard_ns is None:
             return False
         # Whoever orders TRACK before the tracker speaks again means it: the pause counts from that order.
-        silent_ns = now_ns - max(heard_ns, self._mode_since_ns)
+        silent_ns = now_ns - max(heard_ns, self._entered_ns)
         return silent_ns >= self.limits.tracker_resume_within_s * NS_PER_S
 
     def _obeyed_setpoint(self, now_ns: int) -> VelocitySetpoint | None:
         heard = self.vehicle.fresh and self.upstream.supervisor_fresh and self.upstream.supervisor_alive
-        return self.gate.obeyed(now_ns) if self.mode is Mode.TRACK and heard else None
+        return self.gate.obeyed(now_ns) if self.mode is DriverMode.TRACK and heard else None
 
     def _action(self, now_ns: int) -> Action:
         match self.mode:
-            case Mode.CONNECTING:
+            case DriverMode.CONNECTING:
                 return Action.WAIT
-            case Mode.LANDED:
+            case DriverMode.LANDED:
                 return Action.IDLE
-            case Mode.TAKING_OFF:
+            case DriverMode.TAKING_OFF:
                 return Action.TAKE_OFF
-            case Mode.LANDING:
+            case DriverMode.LANDING:
                 return Action.HOVER if now_ns < self._brake_until_ns else Action.LAND
-            case Mode.CUT:
+            case DriverMode.CUT:
                 return Action.CUT
             case _:
                 return Action.HOVER
@@ -310,7 +312,8 @@ class Watchdog:
             case Verb.TRACK | Verb.RESUME:
                 return self._obeyed_setpoint(now_ns) is not None
             case Verb.HOLD:
-                return self.mode in (Mode.HOLD, Mode.LANDED) and state in (FlightState.HOVERING, FlightState.LANDED)
+                still = (FlightState.HOVERING, FlightState.LANDED)
+                return self.mode in (DriverMode.HOLD, DriverMode.LANDED) and state in still
             case Verb.LAND:
                 return state is FlightState.LANDED
             case Verb.CUT_MOTORS:

@@ -5,19 +5,18 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.bus.messages import Vector3
-from groundstation.control.frames import stabilized_from_world, world_from_stabilized
-from groundstation.control.modes import Phase, Situation, phase_of
+from groundstation.control.flight_mode import FlightMode, Situation, phase_of
 from groundstation.control.parameters import ControlParameters
-from groundstation.control.seeking import Stand, return_stand, search_stands
+from groundstation.control.returning import is_lost, return_stand
+from groundstation.control.search import Stand, search_stands, view_of
+from groundstation.control.spacing import apart
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
+from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.plan import PlanResult
 from groundstation.sensing.models import SensorSuite
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +26,12 @@ class Setpoint:
 
     velocity_m_s: Vector3
     yaw_rate_rad_s: float
-    phase: Phase
+    phase: FlightMode
     blocked: str = ""
 
 
 NEVER_UNSEEN: Mapping[str, float] = {}
-HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, Phase.UNKNOWN)
+HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, FlightMode.UNKNOWN)
 
 
 def setpoints_from_plan(
@@ -65,22 +64,21 @@ def setpoints_from_plan(
         )
         for name in airborne
     }
-    tracking = [name for name in robots if phases[name] is Phase.TRACK]
+    tracking = [name for name in robots if phases[name] is FlightMode.TRACK]
     scout = _scout(belief, tracking, missing) if fresh and missing else None
     if scout is not None:
-        phases[scout] = Phase.SEARCH
+        phases[scout] = FlightMode.SEARCH
     wanted_targets = tuple(missing) if scout is not None else belief.layout.targets
-    stands = search_stands(belief, robots, parameters, sensors, wanted_targets)
+    stands = _stands(phases, belief, robots, parameters, sensors, wanted_targets)
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
-        if phase is Phase.UNKNOWN:
+        if phase is FlightMode.UNKNOWN:
             wanted[name] = HOVER
-        elif phase is Phase.TRACK and plan is not None:
+        elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = (float(value) for value in plan.controls[name])
             wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
         else:
-            stand = stands[name] if phase is Phase.SEARCH else return_stand(belief.mean_of(name), parameters, sensors)
-            wanted[name] = _towards(name, stand, phase, belief, robots, parameters)
+            wanted[name] = _towards(name, stands[name], phase, belief, robots, parameters)
     return wanted
 
 
@@ -92,23 +90,28 @@ def _scout(belief: JointBelief, tracking: Sequence[str], missing: Collection[str
     return max(tracking, key=lambda name: min(math.dist(belief.mean_of(name)[:2], place) for place in seen))
 
 
-def is_lost(
-    name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, unseen_s: float = 0.0
-) -> bool:
-    """Return whether no camera has seen a robot for too long, or it is badly localised outside every fixed view."""
-    if unseen_s > parameters.return_unseen_s:
-        return True
-    spread = math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
-    if spread <= parameters.return_std_m:
-        return False
-    marker = sensors.marker(name, belief.mean_of(name), is_robot=True)
-    return not any(sensors.world_in_view(camera, marker) for camera in sensors.world)
+def _stands(
+    phases: Mapping[str, FlightMode],
+    belief: JointBelief,
+    robots: Sequence[str],
+    parameters: ControlParameters,
+    sensors: SensorSuite,
+    targets: Collection[str],
+) -> dict[str, Stand]:
+    """Return where each robot stands that returns or searches, apart from each other; who returns comes first."""
+    means = {name: belief.mean_of(name) for name in robots}
+    places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
+    views = {name: view_of(*places[name], name, parameters, sensors) for name in robots}
+    searching = search_stands(belief, robots, parameters, sensors, targets)
+    wanted = {name: return_stand(means[name], views[name]) for name in robots if phases[name] is FlightMode.RETURN}
+    wanted |= {name: searching[name] for name in robots if phases[name] is FlightMode.SEARCH}
+    return apart(wanted, places, views, parameters.column_m)
 
 
 def _towards(
     name: str,
     stand: Stand,
-    phase: Phase,
+    phase: FlightMode,
     belief: JointBelief,
     robots: list[str],
     parameters: ControlParameters,
@@ -117,7 +120,7 @@ def _towards(
     mean = belief.mean_of(name)
     velocity = 0.6 * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
-    most = parameters.return_speed_m_s if phase is Phase.RETURN else parameters.search_speed_m_s
+    most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
     velocity *= min(1.0, most / max(speed, 1e-9))
     for other in robots:
         away = mean[:2] - belief.mean_of(other)[:2]
@@ -139,7 +142,7 @@ def _with_height(
     velocity: tuple[float, float],
     rate: float,
     slot: float,
-    phase: Phase,
+    phase: FlightMode,
     belief: JointBelief,
     robots: list[str],
     parameters: ControlParameters,

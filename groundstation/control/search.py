@@ -1,23 +1,22 @@
-"""Where robots stand and look while they search for a target, or fly back to where they are seen."""
+"""Where robots stand and look while they search for a target."""
 
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.control.parameters import ControlParameters
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
-
-Array = NDArray[np.float64]
 
 VIEW_INSET_M = 0.3
 FAN_RAD = math.radians(70)
 SWEEP_RAD = 0.6
 SWEEP_PERIOD_S = 8.0
 CIRCUIT_S = 40.0
+_SWING_STEPS = 36
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +36,6 @@ def view_of(x: float, y: float, name: str, parameters: ControlParameters, sensor
     return min(inside, key=lambda view: math.dist((x, y), view.nearest(x, y)), default=None)
 
 
-def return_stand(mean: Array, parameters: ControlParameters, sensors: SensorSuite) -> Stand:
-    """Return the middle of the nearest world-fixed view, with the heading as it is."""
-    x, y, yaw = float(mean[0]), float(mean[1]), float(mean[3])
-    views = sensors.root_views(parameters.search_height_m)
-    middle = min((view.center for view in views), key=lambda point: math.dist(point, (x, y)), default=(x, y))
-    return Stand(*middle, yaw)
-
-
 def search_stands(
     belief: JointBelief,
     robots: Sequence[str],
@@ -52,10 +43,11 @@ def search_stands(
     sensors: SensorSuite,
     targets: Collection[str],
 ) -> dict[str, Stand]:
-    """Return where each robot searches for targets: all within the world-fixed view, looking different ways.
+    """Return where each robot would search for targets: all within the world-fixed view, looking different ways.
 
-    While the prediction of one of them is any good they fan out around it and sweep over it; later each
-    goes slowly round an ellipse, opposite to the others, and turns.
+    While the prediction of one of them is any good they fan out around it and sweep over it; later they go slowly
+    round an ellipse, spread evenly, and turn; where they would come within a column of each other, they only swing to
+    and fro about its long axis. In a corner of the view stands may coincide: spacing.py moves them apart.
     """
     hint = _hint(belief, parameters, targets)
     seconds = belief.stamp_ns * 1e-9
@@ -68,7 +60,7 @@ def search_stands(
             part = index - (len(robots) - 1) / 2
             stands[name] = _around(hint, (x, y), part, share, seconds, view, parameters)
         else:
-            stands[name] = _on_ellipse((x, y), share, seconds, view, parameters)
+            stands[name] = _on_ellipse((x, y), index, len(robots), seconds, view, parameters)
     return stands
 
 
@@ -111,13 +103,38 @@ def _around(
 
 
 def _on_ellipse(
-    at: tuple[float, float], share: float, seconds: float, view: Rectangle | None, parameters: ControlParameters
+    at: tuple[float, float],
+    index: int,
+    count: int,
+    seconds: float,
+    view: Rectangle | None,
+    parameters: ControlParameters,
 ) -> Stand:
     rate = 0.8 * parameters.search_yaw_rate_rad_s
-    yaw = math.tau * share + math.fmod(rate * seconds, math.tau)
+    yaw = math.tau * index / count + math.fmod(rate * seconds, math.tau)
     if view is None:
         return Stand(*at, yaw, rate)
-    angle = math.tau * (share + 0.25 + math.fmod(seconds / CIRCUIT_S, 1.0))
-    half_x, half_y = (view.x_m[1] - view.x_m[0]) / 2, (view.y_m[1] - view.y_m[0]) / 2
     x, y = view.center
+    half_x, half_y = view.x_m[1] - x, view.y_m[1] - y
+    swing = _swing_rad(max(half_x, half_y), min(half_x, half_y), count, parameters.column_m)
+    turned = math.tau * math.fmod(seconds / CIRCUIT_S, 1.0)
+    if swing < math.pi / 2:
+        turned = swing * math.sin(turned)
+    angle = math.tau * (index / count + (0.25 if half_y > half_x else 0.0)) + turned
     return Stand(x + half_x * math.cos(angle), y + half_y * math.sin(angle), yaw, rate)
+
+
+def _swing_rad(long_m: float, short_m: float, count: int, apart_m: float) -> float:
+    """Return how far robots spread evenly over an ellipse may turn to and fro about its long axis and stay apart.
+
+    long_m, short_m: half axes. A quarter turn: they may go all the way round.
+    """
+    swing = 0.0
+    for step in range(1, _SWING_STEPS + 1):
+        angle = math.pi / 2 * step / _SWING_STEPS
+        turned = [angle + math.tau * index / count for index in range(count)]
+        points = [(long_m * math.cos(one), short_m * math.sin(one)) for one in turned]
+        if any(math.dist(a, b) < apart_m for a, b in combinations(points, 2)):
+            break
+        swing = angle
+    return swing

@@ -5,17 +5,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Vector3
-from groundstation.control.frames import stabilized_from_world, world_from_stabilized
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
-
-Array = NDArray[np.float64]
+from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 
 PASSES = 4
+# No two bodies are this near: a belief that has them there does not say on which side the other one is.
+_NO_SIDE_M = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:
     for as long as its reaction T lags behind. What is projected on a half-space that contains zero only shrinks.
     """
     tilted = wall.normal + reaction_s * rate * np.array([wall.normal[1], -wall.normal[0], 0.0])
-    size = max(float(np.linalg.norm(tilted)), 1e-9)
+    size = float(np.linalg.norm(tilted))
     return _Wall(wall.name, tilted / size, wall.most / size)
 
 
@@ -101,7 +101,14 @@ def _unfit(robot: str, setpoint: Setpoint, belief: JointBelief, now_ns: int, par
     variances = np.diag(belief.covariance_of(robot))[:3]
     if not float(variances.max()) <= parameters.max_position_std_m**2 or float(variances.min()) < 0:
         return "uncertain"
-    return ""
+    return "separation" if _coincides(robot, belief) else ""
+
+
+def _coincides(robot: str, belief: JointBelief) -> bool:
+    """Return whether another robot is believed in the same place, so that every direction may be the one towards it."""
+    place = belief.mean_of(robot)[:3]
+    others = (belief.mean_of(other)[:3] for other in belief.layout.robots if other != robot)
+    return not all(float(np.linalg.norm(other - place)) >= _NO_SIDE_M for other in others)
 
 
 def _clip(robot: str, setpoint: Setpoint, parameters: SafetyParameters) -> tuple[Array, float, list[str]]:
@@ -154,7 +161,10 @@ def _fence(
 def _others(
     robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
 ) -> list[_Wall]:
-    """Return one wall towards each other robot; half of the closing speed is this robot's share."""
+    """Return two walls towards each other robot, which is not in the same place: at rest, and now.
+
+    Half of the closing speed is this robot's share.
+    """
     rest, time = _braking(robot, belief, parameters, velocities)
     place = belief.mean_of(robot)[:3]
     walls = []
@@ -162,9 +172,12 @@ def _others(
         if other == robot:
             continue
         there, other_time = _braking(other, belief, parameters, velocities)
-        for gap in (there - rest, belief.mean_of(other)[:3] - place):
+        apart = belief.mean_of(other)[:3] - place
+        for gap in (there - rest, apart):
             distance = float(np.linalg.norm(gap))
-            normal = gap / distance if distance > 1e-6 else np.zeros(3)
+            # Points of rest may coincide between robots that fly at each other: the direction is then today's.
+            direction = gap if distance > 1e-6 else apart
+            normal = direction / float(np.linalg.norm(direction))
             keep = parameters.min_separation_m + parameters.margin_m
             keep += parameters.sigmas * _relative_spread(robot, other, normal, belief)
             walls.append(_Wall("separation", normal, max(0.0, distance - keep) / (2.0 * max(time, other_time))))

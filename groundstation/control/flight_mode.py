@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Phase(StrEnum):
+class FlightMode(StrEnum):
     """What a robot is flown by."""
 
     GROUNDED = "GROUNDED"  # not airborne: no setpoint is published
@@ -25,14 +25,14 @@ class Situation:
     planned: bool = False
 
 
-def phase_of(situation: Situation) -> Phase:
+def phase_of(situation: Situation) -> FlightMode:
     """Return the phase; the first row that fits, from the most careful to the boldest."""
     if not situation.airborne:
-        return Phase.GROUNDED
+        return FlightMode.GROUNDED
     if not situation.in_belief:
-        return Phase.UNKNOWN
+        return FlightMode.UNKNOWN
     if situation.lost:
-        return Phase.RETURN
+        return FlightMode.RETURN
     if not (situation.target_fresh and situation.planned):
-        return Phase.SEARCH
-    return Phase.TRACK
+        return FlightMode.SEARCH
+    return FlightMode.TRACK

@@ -1,0 +1,113 @@
+"""Vocabulary of the watchdog: modes, actions, what it is told, what it answers."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from groundstation.bus.messages import AckStage, FlightState, Vector3, Verb
+
+
+class DriverMode(StrEnum):
+    """What the driver is about; published in VehicleStatus.mode."""
+
+    CONNECTING = "CONNECTING"
+    LANDED = "LANDED"
+    TAKING_OFF = "TAKING_OFF"
+    HOVER = "HOVER"
+    TRACK = "TRACK"
+    HOLD = "HOLD"
+    LANDING = "LANDING"
+    CUT = "CUT"
+
+
+class Action(StrEnum):
+    """What the vehicle is told now.
+
+    WAIT: say nothing that could start or end a flight; IDLE: stay on the ground with motors off; HOVER: stand still
+    if it flies, never take off.
+    """
+
+    WAIT = "WAIT"
+    IDLE = "IDLE"
+    TAKE_OFF = "TAKE_OFF"
+    FLY = "FLY"
+    HOVER = "HOVER"
+    LAND = "LAND"
+    CUT = "CUT"
+
+
+UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
+AIRBORNE = UP | {FlightState.TAKING_OFF, FlightState.LANDING}
+STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+FREE = frozenset({DriverMode.HOVER, DriverMode.TRACK, DriverMode.HOLD})
+ALOFT = FREE | {DriverMode.TAKING_OFF}
+
+
+@dataclass(frozen=True, slots=True)
+class AuthorityLimits:
+    """Times and limits of the watchdog [s].
+
+    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
+    of the tracker, whatever broke on the way from it; gap_s: a pause of our own loop after which it does; brake_s:
+    hover before landing where nobody knows what the vehicle was doing.
+    """
+
+    hover_after_s: float = 0.3
+    land_after_s: float = 3.0
+    unseen_land_after_s: float = 10.0
+    battery_min: float = 0.15
+    battery_hold_s: float = 3.0
+    resume_within_s: float = 1.0
+    tracker_resume_within_s: float = 0.5
+    gap_s: float = 0.5
+    brake_s: float = 1.0
+    take_off_s: float = 10.0
+    clear_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleView:
+    """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or "".
+
+    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before.
+    """
+
+    flight_state: FlightState = FlightState.UNKNOWN
+    fresh: bool = False
+    battery: float | None = None
+    not_ready: str = ""
+    configured: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Upstream:
+    """What the process knows of those above it."""
+
+    supervisor_alive: bool = True
+    supervisor_fresh: bool = True
+    stop_requested: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Ack:
+    """What is to be answered to a command."""
+
+    command_id: str
+    verb: Verb
+    stage: AckStage
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class WatchdogDecision:
+    """What to do now; velocity and yaw rate count for FLY only. `reason` says why the mode is what it is.
+
+    setpoint_ns: stamp of the setpoint obeyed, for vehicles that are told each setpoint once; 0 when none is.
+    """
+
+    mode: DriverMode
+    action: Action
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    yaw_rate_rad_s: float = 0.0
+    reason: str = ""
+    acks: tuple[Ack, ...] = ()
+    setpoint_ns: int = 0

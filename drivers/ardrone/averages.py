@@ -2,7 +2,7 @@
 
 import threading
 
-from drivers.ardrone.convert import Motion
+from drivers.ardrone.convert import NavdataMotion
 
 
 class MotionMean:
@@ -10,11 +10,11 @@ class MotionMean:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: list[Motion] = []
+        self._waiting: list[NavdataMotion] = []
         self._velocity = (0.0, 0.0, 0.0)
         self._force: tuple[float, float] | None = None
 
-    def add(self, motion: Motion) -> None:
+    def add(self, motion: NavdataMotion) -> None:
         """Take the motion of one packet."""
         with self._lock:
             self._waiting.append(motion)

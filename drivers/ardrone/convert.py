@@ -1,7 +1,8 @@
 """Units and frames: what the drone's figures mean on the bus, and what our velocities mean to the drone.
 
-WIRE (AR.Drone sheet 4.5): body x forward, y right, z down; theta nose up, phi right side down, psi clockwise; mdeg,
-mm/s, mg, deg/s. Ours: x forward, y left, z up; roll right side down, pitch nose down, yaw counter-clockwise.
+WIRE (docs/reference/ardrone.md 4.5): body x forward, y right, z down; theta nose up, phi right side down, psi
+clockwise; mdeg, mm/s, mg, deg/s. Ours: x forward, y left, z up; roll right side down, pitch nose down, yaw
+counter-clockwise.
 """
 
 import math
@@ -39,7 +40,7 @@ _PHASES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class NavdataMotion:
     """What one packet says of the vehicle's motion, in our frames.
 
     velocity_m_s [base_stabilized], as reported (no scale applied); rates and specific force [base], None in demo mode.
@@ -54,7 +55,7 @@ class Motion:
     specific_force_m_s2: Vector3 | None
 
 
-def motion_from_navdata(packet: Navdata) -> Motion | None:
+def motion_from_navdata(packet: Navdata) -> NavdataMotion | None:
     """Return the motion in a packet, or None if it carries no DEMO option (a status packet).
 
     Raises WireError (not_finite, implausible, option_size).
@@ -70,7 +71,7 @@ def motion_from_navdata(packet: Navdata) -> Motion | None:
         raise WireError("not_finite" if climb_mm_s - climb_mm_s != 0.0 else "implausible", "climb rate")
     phys = packet.read(PHYS_MEASURES)
     rates, force = (None, None) if phys is None else _imu_from_phys(phys)
-    return Motion(
+    return NavdataMotion(
         velocity_m_s=(demo.vx_mm_s / 1000, -demo.vy_mm_s / 1000, climb_mm_s / 1000),
         roll_rad=demo.phi_mdeg * _RAD_FROM_MDEG,
         pitch_rad=-demo.theta_mdeg * _RAD_FROM_MDEG,
@@ -132,7 +133,7 @@ class HeadingWatch:
         self._stamp_ns = 0
         self._aloft = False
 
-    def update(self, stamp_ns: int, motion: Motion) -> int:
+    def update(self, stamp_ns: int, motion: NavdataMotion) -> int:
         """Take the heading of a packet; returns the number of jumps so far."""
         elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
         aloft = motion.height_m is not None
@@ -141,7 +142,7 @@ class HeadingWatch:
         self._yaw_rad, self._stamp_ns, self._aloft = motion.yaw_rad, stamp_ns, aloft
         return self.resets
 
-    def _has_jumped(self, elapsed_s: float, motion: Motion) -> bool:
+    def _has_jumped(self, elapsed_s: float, motion: NavdataMotion) -> bool:
         assert self._yaw_rad is not None
         explained = 0.0 if motion.rates_rad_s is None else motion.rates_rad_s[2] * elapsed_s
         step = difference(motion.yaw_rad, self._yaw_rad + explained)

@@ -10,26 +10,27 @@ from pydantic import ValidationError
 
 from drivers.ardrone import convert, velocity_loop
 from drivers.ardrone.averages import MotionMean
+from drivers.ardrone.commands import orders_from_decision
+from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.identity import Model, model_from_navdata
-from drivers.ardrone.inquiry import TcpInquirer
 from drivers.ardrone.link import ArDroneLink
-from drivers.ardrone.orders import orders_from_decision
-from drivers.ardrone.publisher import MotionPublisher
+from drivers.ardrone.publisher import NavdataPublisher
+from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
-from drivers.ardrone.session import Notice, Phase, Session
+from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.velocity_loop import VelocityLoop
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO
 from drivers.ardrone.wire.state import StateBit, bit_names
-from drivers.ardrone.wishes import ids_of, scale_from_settings, wishes
-from drivers.authority import Action, Decision, VehicleView
-from drivers.base import Health, HostProcess
+from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
+from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity
+from groundstation.bus.notice import Notice
 from groundstation.errors import SettingsError
 from groundstation.process.priority import go_first
 
@@ -47,7 +48,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Telemetry:
+class LatestNavdata:
     """The newest word of the drone; heard_ns 0: never; moved_ns: when it last told its motion."""
 
     heard_ns: int = 0
@@ -68,13 +69,15 @@ class ArDrone:
     def __init__(self, settings: ArDroneDriverSettings, bus: Bus) -> None:
         self.name = settings.name
         self.address = settings.address
-        self.telemetry = Telemetry()
+        self.telemetry = LatestNavdata()
         self._settings = settings
         self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
         self._link = ArDroneLink(settings, self._log)
-        self._publisher = MotionPublisher(settings, bus)
+        self._publisher = NavdataPublisher(settings, bus)
         inquirer = TcpInquirer(settings.address, settings.ftp_port, settings.control_port)
-        self._session = Session(partial(wishes, settings), ids_of(settings.name), inquirer, settings.flight.flat_trim)
+        self._session = ArdroneSession(
+            partial(wishes, settings), ids_of(settings.name), inquirer, settings.flight.flat_trim
+        )
         self._rate_watch = RateWatch()
         self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
@@ -126,16 +129,16 @@ class ArDrone:
         """Return what the drone last said."""
         heard = self.telemetry
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
-        configured = self._session.phase is Phase.READY
+        configured = self._session.phase is SessionPhase.READY
         return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard), configured)
 
-    def _not_ready(self, heard: Telemetry) -> str:
-        if self._session.phase is not Phase.READY:
+    def _not_ready(self, heard: LatestNavdata) -> str:
+        if self._session.phase is not SessionPhase.READY:
             return self._session.detail
         faults = bit_names(heard.state & _FAULTS)
         return f"the drone reports {', '.join(faults)}" if faults else ""
 
-    def apply(self, now_ns: int, decision: Decision) -> None:
+    def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send one datagram with what the decision means to an AR.Drone, and what the session needs."""
         heard = self.telemetry
         silence_ns = now_ns - heard.heard_ns
@@ -143,15 +146,15 @@ class ArDrone:
             self._link.request_navdata()
         attitude = self._attitude(now_ns, decision, heard)
         action = decision.action
-        if action is Action.TAKE_OFF and self._session.phase is not Phase.READY:
+        if action is Action.TAKE_OFF and self._session.phase is not SessionPhase.READY:
             action = Action.HOVER  # it was restarted since the order: what flies stays up, what stands stays there
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
         commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
-        self._link.send(commands, restart=self._session.phase is Phase.SEARCHING)
+        self._link.send(commands, restart=self._session.phase is SessionPhase.SEARCHING)
         self._watch_rate(now_ns)
 
     def _watch_rate(self, now_ns: int) -> None:
-        if self._session.phase is not Phase.READY:
+        if self._session.phase is not SessionPhase.READY:
             self._rate_watch.reset()
         elif now_ns >= self._next_rate_ns:
             self._next_rate_ns = now_ns + _RATE_PERIOD_NS
@@ -168,7 +171,7 @@ class ArDrone:
             told.append(_NO_AR1_VIDEO)
         return told
 
-    def _attitude(self, now_ns: int, decision: Decision, heard: Telemetry) -> velocity_loop.Attitude:
+    def _attitude(self, now_ns: int, decision: WatchdogDecision, heard: LatestNavdata) -> velocity_loop.AttitudeRequest:
         dt_s = (now_ns - self._applied_ns) * 1e-9
         self._applied_ns = now_ns
         (vx, vy, vz), force = self._motion.drain()
@@ -182,12 +185,12 @@ class ArDrone:
         measured = (vx * scale, vy * scale, vz)
         return self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force)
 
-    def health(self, now_ns: int) -> Health:
+    def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals of the link."""
         rate_hz, quality = self._link.rates(now_ns)
         heights = Counter({"height_jump": self._publisher.heights.refused})
         rejected = dict(self._link.rejected + self._refused + heights)
-        return Health(quality, rate_hz, rejected, self._session.detail)
+        return LinkHealth(quality, rate_hz, rejected, self._session.detail)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

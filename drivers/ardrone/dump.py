@@ -13,7 +13,7 @@ _RELATIVE = 1e-3
 def parse_dump(text: bytes) -> dict[str, str]:
     """Return key -> value text of a dump with or without its NUL; a line that begins no key goes on with the last.
 
-    WIRE (AR.Drone sheet 5.2): `section:key = value` lines; vectors and matrices may be wrapped over lines.
+    WIRE (docs/reference/ardrone.md 5.2): `section:key = value` lines; vectors and matrices may be wrapped over lines.
     """
     values: dict[str, str] = {}
     last = ""

@@ -8,7 +8,7 @@ from enum import StrEnum
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.tags import Tag
 
-# WIRE (AR.Drone sheet 5.3): session, user and application ids exist since firmware 1.6.0.
+# WIRE (docs/reference/ardrone.md 5.3): session, user and application ids exist since firmware 1.6.0.
 _FIRST_WITH_IDS = (1, 6, 0)
 _VERSION = re.compile(r"(\d{1,3})\.(\d{1,3})(?:\.(\d{1,5}))?")
 # WIRE: general:num_version_mb of the two generations.

@@ -14,6 +14,7 @@ from drivers.ardrone.wire.navdata import Navdata
 from drivers.datagrams import DatagramLog
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.process.ports import why_refused
 
 # After this silence a lower sequence number is a new session of the drone, before it a replay.
 _RESTART_NS = 300_000_000
@@ -143,6 +144,7 @@ def _open(local_address: str, port: int) -> socket.socket:
         channel.bind((local_address, port))
     except OSError as error:
         channel.close()
-        raise DriverError(f"cannot bind {local_address or '*'}:{port or 'any'} (UDP): {error.strerror}") from error
+        why = why_refused(error, local_address, port, socket.SOCK_DGRAM)
+        raise DriverError(f"cannot bind {local_address or '*'}:{port or 'any'} (UDP): {why}") from error
     channel.settimeout(_POLL_S)
     return channel

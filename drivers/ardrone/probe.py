@@ -10,17 +10,17 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from drivers.ardrone.desired_config import FULL_NAVDATA
 from drivers.ardrone.dump import category, parse_dump
 from drivers.ardrone.identity import Identity, Model, identity_from_dump, identity_from_version, model_from_navdata
-from drivers.ardrone.inquiry import TcpInquirer
+from drivers.ardrone.queries import TcpInquirer
+from drivers.ardrone.state_text import state_in_words, state_remedies
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO
 from drivers.ardrone.wire.state import StateBit, split_control_state
-from drivers.ardrone.wishes import FULL_NAVDATA
-from drivers.ardrone.words import state_in_words, state_remedies
 from groundstation.errors import DriverError
 
 NAVDATA_PORT, AT_PORT, CONTROL_PORT, FTP_PORT = 5554, 5556, 5559, 5551
@@ -36,7 +36,7 @@ _UNPAIRED = "00:00:00:00:00:00"
 
 
 @dataclass(slots=True)
-class Stream:
+class NavdataStretch:
     """A stretch of navdata: what was heard in how many seconds; mode: bootstrap, demo or full."""
 
     mode: str
@@ -45,7 +45,7 @@ class Stream:
 
 
 @dataclass(slots=True)
-class Report:
+class ProbeReport:
     """What was found; battery 0..1; config: key -> (value, category), both as text."""
 
     address: str
@@ -53,7 +53,7 @@ class Report:
     state: int = 0
     phase: str = ""
     battery: float | None = None
-    streams: list[Stream] = field(default_factory=list)
+    streams: list[NavdataStretch] = field(default_factory=list)
     rejected: int = 0
     config: dict[str, tuple[str, str]] = field(default_factory=dict)
     hints: list[str] = field(default_factory=list)
@@ -130,17 +130,19 @@ class _Line:
     def is_set(self, bit: StateBit) -> bool:
         return self.packet is not None and bool(self.packet.state & bit)
 
-    def stream(self, seconds: float) -> Stream:
+    def stream(self, seconds: float) -> NavdataStretch:
         """Listen for some seconds and say what came."""
         self.listen(seconds)
         mode = "demo" if self.is_set(StateBit.NAVDATA_DEMO) else "full"
         numbers = self._numbers
         expected = numbers[-1] - numbers[0] + 1 if numbers else 0
         quality = min(1.0, len(numbers) / expected) if expected > 0 else None
-        return Stream("bootstrap" if self.is_set(StateBit.NAVDATA_BOOTSTRAP) else mode, len(numbers) / seconds, quality)
+        return NavdataStretch(
+            "bootstrap" if self.is_set(StateBit.NAVDATA_BOOTSTRAP) else mode, len(numbers) / seconds, quality
+        )
 
 
-def probe(address: str) -> Report:
+def probe(address: str) -> ProbeReport:
     """Return what can be found out about the drone at an IPv4 address.
 
     Raises DriverError when it does not answer within 1.5 s or cannot be reached.
@@ -151,7 +153,7 @@ def probe(address: str) -> Report:
         inquirer.ask_version()
         if not line.listen(_ANSWER_S, lambda: line.packet is not None):
             raise DriverError(f"no AR.Drone answers at {address} (navdata, UDP {NAVDATA_PORT}) within {_ANSWER_S:g} s")
-        report = Report(address)
+        report = ProbeReport(address)
         _look(line, report)
         version = inquirer.version
         if not line.is_set(StateBit.FLY):
@@ -164,7 +166,7 @@ def probe(address: str) -> Report:
         line.close()
 
 
-def _look(line: _Line, report: Report) -> None:
+def _look(line: _Line, report: ProbeReport) -> None:
     """Watch without a word; a standing drone that nobody uses is then asked for both kinds of navdata."""
     first = line.stream(_LOOK_S)
     if first.mode != "bootstrap" or line.is_set(StateBit.FLY):
@@ -186,7 +188,7 @@ def _acknowledge(line: _Line) -> None:
     line.repeat(at.ctrl(at.CTRL_ACK), lambda: not line.is_set(StateBit.COMMAND))
 
 
-def _ask(line: _Line, inquirer: TcpInquirer, report: Report) -> None:
+def _ask(line: _Line, inquirer: TcpInquirer, report: ProbeReport) -> None:
     line.listen(1.0, lambda: inquirer.version is not None)
     version, line.speaking = inquirer.version, True
     inquirer.ask_dump()
@@ -199,7 +201,7 @@ def _ask(line: _Line, inquirer: TcpInquirer, report: Report) -> None:
     report.config = {key: (value, category(key)) for key, value in stored.items()}
 
 
-def _conclude(line: _Line, version: str, report: Report) -> None:
+def _conclude(line: _Line, version: str, report: ProbeReport) -> None:
     assert line.packet is not None
     report.state, report.rejected = line.packet.state, line.rejected
     if line.demo_packet is not None:
@@ -216,7 +218,7 @@ def _conclude(line: _Line, version: str, report: Report) -> None:
     report.hints += _hints(report, values)
 
 
-def _hints(report: Report, values: dict[str, str]) -> list[str]:
+def _hints(report: ProbeReport, values: dict[str, str]) -> list[str]:
     state, hints = report.state, list(state_remedies(report.state))
     low = report.battery is not None and report.battery < _LOW_BATTERY
     facts = (
@@ -229,7 +231,7 @@ def _hints(report: Report, values: dict[str, str]) -> list[str]:
         (report.rejected > 0, f"{report.rejected} packets were damaged"),
         (
             values.get("network:wifi_mode") == "0",
-            "it is an access point of its own: to fly several together see config/README.md, AR.Drones on one network",
+            'it is an access point of its own: see "Put several AR.Drones on one network" in docs/how-to',
         ),
         (
             values.get("network:owner_mac", _UNPAIRED) != _UNPAIRED,
@@ -239,6 +241,6 @@ def _hints(report: Report, values: dict[str, str]) -> list[str]:
     return hints + [text for applies, text in facts if applies]
 
 
-def _is_slow(report: Report) -> bool:
+def _is_slow(report: ProbeReport) -> bool:
     nominal = {"demo": 200 / 13, "full": 200.0}
     return any(s.rate_hz < _SLOW_SHARE * nominal.get(s.mode, 0.0) for s in report.streams)

@@ -1,6 +1,6 @@
 """Odometry and IMU samples on the bus, at most so often as the settings say."""
 
-from drivers.ardrone.convert import HeadingWatch, Motion
+from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.settings import ArDroneDriverSettings
 from groundstation.bus.api import Bus
@@ -30,7 +30,7 @@ class Decimator:
         return True
 
 
-class MotionPublisher:
+class NavdataPublisher:
     """Turns motions into messages stamped with their receipt; the estimator accounts for the delay."""
 
     def __init__(self, settings: ArDroneDriverSettings, bus: Bus) -> None:
@@ -46,7 +46,7 @@ class MotionPublisher:
             for std in (_CLIMB_STD_M_S, _VOID_CLIMB_STD_M_S)
         )
 
-    def publish(self, stamp_ns: int, motion: Motion) -> None:
+    def publish(self, stamp_ns: int, motion: NavdataMotion) -> None:
         """Publish what is due; every motion counts for the heading's jumps."""
         reset = self._heading.update(stamp_ns, motion)
         sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
@@ -61,7 +61,7 @@ class MotionPublisher:
             )
             self._bus.publish(IMU, sample)
 
-    def _odometry_message(self, stamp_ns: int, motion: Motion, reset: int, sound: bool) -> Odometry:
+    def _odometry_message(self, stamp_ns: int, motion: NavdataMotion, reset: int, sound: bool) -> Odometry:
         return Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=motion.velocity_m_s,

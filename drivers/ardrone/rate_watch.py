@@ -1,11 +1,11 @@
 """Watches the navdata rate for the collapses that a Wi-Fi scan of this computer causes. Pure.
 
-WIRE (AR.Drone sheet 11; ardrone_autonomy #118): while the host's network manager scans, 200 Hz fall to 4-10 Hz for some
-5 s, every couple of minutes; the drone misses commands meanwhile as well.
+WIRE (docs/reference/ardrone.md 11; ardrone_autonomy #118): while the host's network manager scans, 200 Hz fall to 4-10
+Hz for some 5 s, every couple of minutes; the drone misses commands meanwhile as well.
 """
 
-from drivers.ardrone.session import Notice
 from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
 
 _SLOW_SHARE, _FINE_SHARE = 0.4, 0.7
 _LONG_ENOUGH_NS = 500_000_000

@@ -1,23 +1,24 @@
 """Bootstrap and configuration of the drone: what to send beside REF and PCMD. Pure but for the inquirer handed in.
 
-WIRE (AR.Drone sheet 3, 5.1): CONFIG until state bit 6 rises, CTRL 5 until it falls, then the next key. A CONFIG sent
-while bit 6 is still up is lost, therefore each key waits for the whole cycle of the one before. A late duplicate can
-still raise the bit for a key that was lost: so at the end everything is read back over the control port, where the
-drone has one, and what differs is written again, at most three times in all.
+WIRE (docs/reference/ardrone.md 3, 5.1): CONFIG until state bit 6 rises, CTRL 5 until it falls, then the next key. A
+CONFIG sent while bit 6 is still up is lost, therefore each key waits for the whole cycle of the one before. A late
+duplicate can still raise the bit for a key that was lost: so at the end everything is read back over the control port,
+where the drone has one, and what differs is written again, at most three times in all.
 """
 
 from collections import deque
 from collections.abc import Callable
 from enum import StrEnum
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
+from drivers.ardrone.desired_config import FULL_NAVDATA, Ids, Wish
 from drivers.ardrone.dump import differences, parse_dump
 from drivers.ardrone.identity import Identity, Model, identity_from_dump, identity_from_version
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.state import StateBit
-from drivers.ardrone.wishes import FULL_NAVDATA, Ids, Wish
 from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
 
 _REQUEST_PERIOD_NS = 100_000_000
 _REQUEST_AFTER_NS = 1_000_000_000
@@ -33,7 +34,7 @@ _FLAT_TRIMS = 3
 _FORGOTTEN_NS = 1_000_000_000
 
 
-class Phase(StrEnum):
+class SessionPhase(StrEnum):
     """Where the session stands; FAILED: what is required was not confirmed, another attempt follows."""
 
     SEARCHING = "SEARCHING"
@@ -48,14 +49,6 @@ class _Cycle(StrEnum):
     CLEAR = "CLEAR"
     SET = "SET"
     ACKNOWLEDGE = "ACKNOWLEDGE"
-
-
-class Notice(NamedTuple):
-    """Something that the operator should hear of."""
-
-    severity: Severity
-    text: str
-    remedy: str = ""
 
 
 class Inquirer(Protocol):
@@ -83,7 +76,7 @@ class Inquirer(Protocol):
         """Connect to the control port and wait for a dump."""
 
 
-class Session:
+class ArdroneSession:
     """Brings one drone from silence to full navdata with our limits, and back again when it forgets us."""
 
     def __init__(
@@ -109,27 +102,27 @@ class Session:
         self._problem = self._told = ""
         self._full_ns = 0
         self.identity = Identity()
-        self.phase = Phase.SEARCHING
+        self.phase = SessionPhase.SEARCHING
         self.news: deque[Notice] = deque(maxlen=32)
 
     @property
     def detail(self) -> str:
         """Return what the session waits for or misses, or ""."""
         match self.phase:
-            case Phase.SEARCHING:
+            case SessionPhase.SEARCHING:
                 return "waiting for navdata"
-            case Phase.CONFIGURING:
+            case SessionPhase.CONFIGURING:
                 return f"configuring {self._queue[0].key}" if self._queue else "asking for the firmware's version"
-            case Phase.VERIFYING:
+            case SessionPhase.VERIFYING:
                 return "reading the configuration back"
-            case Phase.TRIMMING:
+            case SessionPhase.TRIMMING:
                 return "trimming"
             case _:
                 return self._problem
 
     def request_due(self, now_ns: int, silence_ns: int) -> bool:
         """Return whether to ask for navdata now: every 100 ms while there is none."""
-        silent = self.phase is Phase.SEARCHING or silence_ns > _REQUEST_AFTER_NS
+        silent = self.phase is SessionPhase.SEARCHING or silence_ns > _REQUEST_AFTER_NS
         if not silent or now_ns < self._next_request_ns:
             return False
         self._next_request_ns = now_ns + _REQUEST_PERIOD_NS
@@ -141,35 +134,35 @@ class Session:
         state, silence_ns: the newest state word and its age; seen: the generation as far as navdata tells.
         """
         if silence_ns > _DISCONNECTED_NS:
-            self.phase = Phase.SEARCHING
+            self.phase = SessionPhase.SEARCHING
             return []
         if self._must_begin(now_ns, state):
             self._begin(now_ns)
         pending = bool(state & StateBit.COMMAND)
-        if self.phase is Phase.CONFIGURING:
+        if self.phase is SessionPhase.CONFIGURING:
             return self._configure(now_ns, pending, seen)
-        if self.phase is Phase.VERIFYING:
+        if self.phase is SessionPhase.VERIFYING:
             return self._verify(now_ns, pending)
         if pending:
             return [at.ctrl(at.CTRL_ACK)]  # a late duplicate raised it
-        return self._trim(state) if self.phase is Phase.TRIMMING else []
+        return self._trim(state) if self.phase is SessionPhase.TRIMMING else []
 
     def _must_begin(self, now_ns: int, state: int) -> bool:
         if not state & (StateBit.NAVDATA_BOOTSTRAP | StateBit.NAVDATA_DEMO):
             self._full_ns = now_ns
         forgotten = now_ns - self._full_ns > _FORGOTTEN_NS
         match self.phase:
-            case Phase.SEARCHING:
+            case SessionPhase.SEARCHING:
                 return True
-            case Phase.FAILED:
+            case SessionPhase.FAILED:
                 return now_ns - self._stage_ns > _RETRY_NS
-            case Phase.CONFIGURING:
+            case SessionPhase.CONFIGURING:
                 return forgotten and bool(self._wanted)  # it left the bootstrap once, and is back in it
             case _:
                 return forgotten
 
     def _begin(self, now_ns: int) -> None:
-        self.phase, self._problem = Phase.CONFIGURING, ""
+        self.phase, self._problem = SessionPhase.CONFIGURING, ""
         self._began_ns = self._full_ns = now_ns
         self._round = 0
         self._trims_left = self._trims
@@ -232,7 +225,7 @@ class Session:
     # -- reading back -------------------------------------------------------------------------------------------------
 
     def _read_back(self, now_ns: int) -> list[AtCommand]:
-        self.phase = Phase.VERIFYING
+        self.phase = SessionPhase.VERIFYING
         self._round += 1
         self._next_dump_ns = 0
         self._inquirer.ask_dump()
@@ -256,7 +249,7 @@ class Session:
         if self._trims_left and not state & StateBit.FLY:
             self._trims_left -= 1  # several times, since datagrams get lost and nothing acknowledges it
             return [at.ftrim()]
-        self.phase = Phase.READY
+        self.phase = SessionPhase.READY
         return []
 
     def _judge(self, now_ns: int, stored: dict[str, str]) -> None:
@@ -276,13 +269,13 @@ class Session:
             else:
                 self._queue = deque(wish for wish in self._wanted if wish in wrong)
             self._doubtful.clear()
-            self.phase = Phase.CONFIGURING
+            self.phase = SessionPhase.CONFIGURING
             self._enter(_Cycle.CLEAR, now_ns)
         elif required:
             wish = required[0]
             self._fail(now_ns, f"{wish.key} is {wrong[wish]} on the drone, and {wish.value} was written")
         else:
-            self.phase = Phase.TRIMMING
+            self.phase = SessionPhase.TRIMMING
             self._confirm(now_ns, wrong)
 
     def _confirm(self, now_ns: int, wrong: dict[Wish, str]) -> None:
@@ -295,5 +288,5 @@ class Session:
         if problem != self._told:
             remedy = "restart the drone, and see that no other program speaks to it"
             self.news.append(Notice(Severity.ERROR, f"not configured: {problem}", remedy))
-        self.phase, self._stage_ns = Phase.FAILED, now_ns
+        self.phase, self._stage_ns = SessionPhase.FAILED, now_ns
         self._problem = self._told = problem

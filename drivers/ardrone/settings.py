@@ -5,13 +5,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.authority import AuthorityLimits
-from drivers.limits import Limits, Name, Port, Positive, Safety, Section
+from drivers.limits import DriverSection, Name, Port, Positive, SilenceLimits, VehicleLimits
+from drivers.watchdog_types import AuthorityLimits
 
 VideoCodec = Literal["h264_360p", "h264_720p"]
 
 
-class ArDroneLimits(Limits):
+class ArDroneLimits(VehicleLimits):
     """What the drone is never asked to exceed; written to its configuration as well."""
 
     max_tilt_deg: Annotated[float, Field(ge=3, le=29)] = 12.0
@@ -22,14 +22,14 @@ class ArDroneLimits(Limits):
         return math.radians(self.max_tilt_deg)
 
 
-class OdometryCalibration(Section):
+class VelocityScale(DriverSection):
     """True velocity = scale x reported velocity; one sigma of it. Delays and the rest concern the estimator alone."""
 
     velocity_scale: Annotated[float, Field(ge=0.2, le=5)] = 1.0
     velocity_std_m_s: Positive = 0.05
 
 
-class Flight(Section):
+class FlightConfiguration(DriverSection):
     """Flight configuration of the drone itself; two drones near each other need different ultrasound rates (7, 8)."""
 
     altitude_max_m: Annotated[float, Field(ge=0.5, le=100)] = 3.0
@@ -39,7 +39,7 @@ class Flight(Section):
     flat_trim: bool = True
 
 
-class Video(Section):
+class Video(DriverSection):
     """What the drone sends over TCP 5555 to whoever connects; bitrate [kbit/s], constant; none: the drone's own."""
 
     codec: VideoCodec = "h264_360p"
@@ -47,7 +47,7 @@ class Video(Section):
     bitrate: Annotated[int, Field(ge=250, le=4000)] | None = None
 
 
-class ArDroneDriverSettings(Section):
+class ArDroneDriverSettings(DriverSection):
     """One AR.Drone: where it is, what it may do, what is published of it.
 
     local_address: address to bind (empty: any); local_navdata_port, local_at_port: ports to bind there, 0: any free
@@ -64,9 +64,9 @@ class ArDroneDriverSettings(Section):
     local_at_port: Annotated[int, Field(ge=0, le=65535)] = 0
     local_address: str = ""
     limits: ArDroneLimits = ArDroneLimits()
-    odometry: OdometryCalibration = OdometryCalibration()
-    safety: Safety = Safety()
-    flight: Flight = Flight()
+    odometry: VelocityScale = VelocityScale()
+    safety: SilenceLimits = SilenceLimits()
+    flight: FlightConfiguration = FlightConfiguration()
     video: Video | None = None
     odometry_hz: Annotated[float, Field(gt=0, le=200)] = 100.0
     imu_hz: Annotated[float, Field(ge=0, le=200)] = 100.0

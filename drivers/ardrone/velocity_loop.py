@@ -16,7 +16,7 @@ _LONGEST_STEP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Attitude:
+class AttitudeRequest:
     """What to ask of the drone, FLU: pitch nose down (forward) and roll right side down [rad], climb, yaw rate ccw.
 
     hover: let the drone hold its place by itself; the other fields are zero then.
@@ -29,7 +29,7 @@ class Attitude:
     hover: bool = False
 
 
-HOVER = Attitude(hover=True)
+HOVER = AttitudeRequest(hover=True)
 
 
 class VelocityLoop:
@@ -61,7 +61,7 @@ class VelocityLoop:
         measured_m_s: Vector3,
         dt_s: float,
         force_m_s2: tuple[float, float] | None = None,
-    ) -> Attitude:
+    ) -> AttitudeRequest:
         """Return the attitude for a wanted velocity, given the true (scaled) one [base_stabilized, FLU].
 
         force_m_s2: specific force forward and left [base], None when the drone does not tell.
@@ -75,7 +75,7 @@ class VelocityLoop:
             self._flying = False
             return HOVER
         x, y = self._accelerations(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
-        return Attitude(
+        return AttitudeRequest(
             roll_rad=-math.atan(y / _GRAVITY_M_S2),
             pitch_rad=math.atan(x / _GRAVITY_M_S2),
             climb_m_s=_clamp(wanted_m_s[2], self._limits.max_climb_m_s),

@@ -1,15 +1,15 @@
-"""Layouts of the options about the drone's surroundings and its own condition. WIRE: AR.Drone sheet 4.4."""
+"""Layouts of the options about the drone's surroundings and its own condition. WIRE: docs/reference/ardrone.md 4.4."""
 
 from typing import Any, NamedTuple
 
-from drivers.ardrone.wire.layout import Layout
+from drivers.ardrone.wire.layout import OptionLayout
 from drivers.ardrone.wire.tags import Tag
 
 _Triple = tuple[float, float, float]
 _ZEROS: _Triple = (0.0, 0.0, 0.0)
 
 
-class Watchdog(NamedTuple):
+class ControlLoopCounter(NamedTuple):
     """Counter of the control loop (real drones: 4822, 4999)."""
 
     value: int = 0
@@ -128,17 +128,17 @@ class Gps(NamedTuple):
     firmware_status: int = 0
 
 
-WATCHDOG = Layout(Tag.WATCHDOG, Watchdog, "i")
-ADC_DATA_FRAME = Layout(Tag.ADC_DATA_FRAME, AdcDataFrame, "I 32s")
-PRESSURE_RAW = Layout(Tag.PRESSURE_RAW, PressureRaw, "i h i i")
-MAGNETO = Layout(Tag.MAGNETO, Magneto, "3h 3f 3f 3f f f f B I f f f")
-WIND = Layout(Tag.WIND, Wind, "f f f f 6f 3f")
-KALMAN_PRESSURE = Layout(Tag.KALMAN_PRESSURE, KalmanPressure, "f f f f f f f f f f I f I f f I I")
-WIFI = Layout(Tag.WIFI, Wifi, "I")
+WATCHDOG = OptionLayout(Tag.WATCHDOG, ControlLoopCounter, "i")
+ADC_DATA_FRAME = OptionLayout(Tag.ADC_DATA_FRAME, AdcDataFrame, "I 32s")
+PRESSURE_RAW = OptionLayout(Tag.PRESSURE_RAW, PressureRaw, "i h i i")
+MAGNETO = OptionLayout(Tag.MAGNETO, Magneto, "3h 3f 3f 3f f f f B I f f f")
+WIND = OptionLayout(Tag.WIND, Wind, "f f f f 6f 3f")
+KALMAN_PRESSURE = OptionLayout(Tag.KALMAN_PRESSURE, KalmanPressure, "f f f f f f f f f f I f I f f I I")
+WIFI = OptionLayout(Tag.WIFI, Wifi, "I")
 # WIRE: one number, two meanings: 12 bytes before firmware 2.4, GPS from then on.
-ZIMMU_3000 = Layout(Tag.GPS, Zimmu3000, "i f", exact=True)
-GPS = Layout(Tag.GPS, Gps, "d d d d i i i d d d d I 10f d d f I f f f f f I 24B i I f f I", newer=True)
+ZIMMU_3000 = OptionLayout(Tag.GPS, Zimmu3000, "i f", exact=True)
+GPS = OptionLayout(Tag.GPS, Gps, "d d d d i i i d d d d I 10f d d f I f f f f f I 24B i I f f I", newer=True)
 
-AMBIENT_LAYOUTS: tuple[Layout[Any], ...] = (
+AMBIENT_LAYOUTS: tuple[OptionLayout[Any], ...] = (
     WATCHDOG, ADC_DATA_FRAME, PRESSURE_RAW, MAGNETO, WIND, KALMAN_PRESSURE, WIFI, ZIMMU_3000, GPS,
 )  # fmt: skip

@@ -86,7 +86,7 @@ class AtCommand(NamedTuple):
         return value
 
 
-class Motion(NamedTuple):
+class ProgressiveMotion(NamedTuple):
     """Progressive motion, each -1..1 of the configured limits.
 
     flags: `PCMD_*` (0: hover); phi > 0 right, theta > 0 backward (nose up), gaz > 0 up, yaw > 0 clockwise; psi: heading
@@ -122,12 +122,12 @@ def ref(start: bool, select: bool = False) -> AtCommand:
     return AtCommand("REF", (REF_BASE | start * REF_START | select * REF_SELECT,))
 
 
-def pcmd(motion: Motion) -> AtCommand:
+def pcmd(motion: ProgressiveMotion) -> AtCommand:
     """Move; the values are clamped to +-1."""
     return AtCommand("PCMD", (motion.flags, *(_fraction(value) for value in motion[1:5])))
 
 
-def pcmd_mag(motion: Motion) -> AtCommand:
+def pcmd_mag(motion: ProgressiveMotion) -> AtCommand:
     """Move relative to the magnetic heading psi (AR.Drone 2)."""
     return AtCommand("PCMD_MAG", (motion.flags, *(_fraction(value) for value in motion[1:])))
 
@@ -222,9 +222,9 @@ _ARGUMENT = re.compile(rb',(?:(-?\d{1,10})|"([^"]{1,127})")')
 def decode_datagram(datagram: bytes, strict: bool = False) -> list[AtCommand]:
     """Return the commands a drone would obey; never raises.
 
-    WIRE: as Parrot's own codec does (AR.Drone sheet 2.1): only CR ends a command, what is malformed, unknown or has
-    the wrong number of arguments is skipped up to the next CR, and a datagram of 1024 bytes or more is dropped whole.
-    A trailing comma is accepted unless strict: several clients that fly real drones send it.
+    WIRE: as Parrot's own codec does (docs/reference/ardrone.md 2.1): only CR ends a command, what is malformed, unknown
+    or has the wrong number of arguments is skipped up to the next CR, and a datagram of 1024 bytes or more is dropped
+    whole. A trailing comma is accepted unless strict: several clients that fly real drones send it.
     """
     if len(datagram) >= CODEC_LIMIT:
         return []
@@ -251,7 +251,7 @@ def _signed(value: int) -> int:
     return (value + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
-def decode_motion(command: AtCommand) -> Motion:
+def decode_motion(command: AtCommand) -> ProgressiveMotion:
     """Return the motion of a PCMD or PCMD_MAG, clamped to +-1.
 
     Raises WireError (argument, not_finite). WIRE: clients in the field send values outside +-1.
@@ -259,4 +259,4 @@ def decode_motion(command: AtCommand) -> Motion:
     values = [command.real(index) for index in range(1, len(command.arguments))]
     if not all(map(math.isfinite, values)):
         raise WireError("not_finite", command.name)
-    return Motion(command.integer(0), *(min(1.0, max(-1.0, value)) for value in values))
+    return ProgressiveMotion(command.integer(0), *(min(1.0, max(-1.0, value)) for value in values))

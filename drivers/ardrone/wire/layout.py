@@ -13,7 +13,7 @@ Value = TypeVar("Value", bound=tuple[Any, ...])
 _HEAD = 4
 
 
-class Layout(Generic[Value]):
+class OptionLayout(Generic[Value]):
     """One option's number, value type and wire format.
 
     fields: one token per field of the value type in `struct` notation; a token with a count is a tuple field.

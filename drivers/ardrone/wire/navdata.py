@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from drivers.ardrone.wire.errors import WireError
-from drivers.ardrone.wire.layout import Layout
+from drivers.ardrone.wire.layout import OptionLayout
 from drivers.ardrone.wire.tags import Tag
 
 MAGIC = 0x55667788
@@ -36,7 +36,7 @@ class Navdata:
     options: tuple[tuple[int, bytes], ...] = ()
     magic: int = MAGIC
 
-    def read(self, layout: Layout[Value]) -> Value | None:
+    def read(self, layout: OptionLayout[Value]) -> Value | None:
         """Return an option's value, or None when the packet's firmware does not send it.
 
         Raises WireError (option_size) when it is there but shorter than the layout.

@@ -3,13 +3,13 @@
 A layout covers the part of an option that all firmwares which send it share; what only newer ones append is a layout
 of its own, which reads as None where it is missing. Surplus is ignored on decode and zero on encode.
 
-WIRE: offsets from the Parrot SDK 2.0.1 headers, units from recordings of real drones (AR.Drone sheet 4.4).
+WIRE: offsets from the Parrot SDK 2.0.1 headers, units from recordings of real drones (docs/reference/ardrone.md 4.4).
 """
 
 from typing import Any, NamedTuple
 
 from drivers.ardrone.wire.ambient import AMBIENT_LAYOUTS
-from drivers.ardrone.wire.layout import Layout
+from drivers.ardrone.wire.layout import OptionLayout
 from drivers.ardrone.wire.tags import Tag
 from drivers.ardrone.wire.vision import VISION_LAYOUTS
 
@@ -203,23 +203,23 @@ class PwmAltitude(NamedTuple):
     derivative: float = 0.0
 
 
-DEMO = Layout(Tag.DEMO, Demo, "I I f f f i f f f I")
-DEMO_DETECTION = Layout(Tag.DEMO, DemoDetection, "9f 3f I I 9f 3f", start=44)
-TIME = Layout(Tag.TIME, Time, "I")
-RAW_MEASURES = Layout(Tag.RAW_MEASURES, RawMeasures, "3H 3h 2h I H H H H H H H H")
-RAW_ECHOES = Layout(Tag.RAW_MEASURES, RawEchoes, "H I i h", start=40)
-PHYS_MEASURES = Layout(Tag.PHYS_MEASURES, PhysMeasures, "f H 3f 3f I I I")
-GYROS_OFFSETS = Layout(Tag.GYROS_OFFSETS, GyrosOffsets, "3f")
-EULER_ANGLES = Layout(Tag.EULER_ANGLES, EulerAngles, "f f")
-REFERENCES = Layout(Tag.REFERENCES, References, "i i i i i i i i")
-SPEED_REFERENCES = Layout(Tag.REFERENCES, SpeedReferences, "f f f f f f I f f f f f i", start=36)
-TRIMS = Layout(Tag.TRIMS, Trims, "f f f")
-RC_REFERENCES = Layout(Tag.RC_REFERENCES, RcReferences, "i i i i i")
-PWM = Layout(Tag.PWM, Pwm, "4B 4B f f f f i i i f i i i f 4H")
-PWM_ALTITUDE = Layout(Tag.PWM, PwmAltitude, "f f", start=68)
-ALTITUDE = Layout(Tag.ALTITUDE, Altitude, "i f i i f f 3f I 2f I")
+DEMO = OptionLayout(Tag.DEMO, Demo, "I I f f f i f f f I")
+DEMO_DETECTION = OptionLayout(Tag.DEMO, DemoDetection, "9f 3f I I 9f 3f", start=44)
+TIME = OptionLayout(Tag.TIME, Time, "I")
+RAW_MEASURES = OptionLayout(Tag.RAW_MEASURES, RawMeasures, "3H 3h 2h I H H H H H H H H")
+RAW_ECHOES = OptionLayout(Tag.RAW_MEASURES, RawEchoes, "H I i h", start=40)
+PHYS_MEASURES = OptionLayout(Tag.PHYS_MEASURES, PhysMeasures, "f H 3f 3f I I I")
+GYROS_OFFSETS = OptionLayout(Tag.GYROS_OFFSETS, GyrosOffsets, "3f")
+EULER_ANGLES = OptionLayout(Tag.EULER_ANGLES, EulerAngles, "f f")
+REFERENCES = OptionLayout(Tag.REFERENCES, References, "i i i i i i i i")
+SPEED_REFERENCES = OptionLayout(Tag.REFERENCES, SpeedReferences, "f f f f f f I f f f f f i", start=36)
+TRIMS = OptionLayout(Tag.TRIMS, Trims, "f f f")
+RC_REFERENCES = OptionLayout(Tag.RC_REFERENCES, RcReferences, "i i i i i")
+PWM = OptionLayout(Tag.PWM, Pwm, "4B 4B f f f f i i i f i i i f 4H")
+PWM_ALTITUDE = OptionLayout(Tag.PWM, PwmAltitude, "f f", start=68)
+ALTITUDE = OptionLayout(Tag.ALTITUDE, Altitude, "i f i i f f 3f I 2f I")
 
-LAYOUTS: tuple[Layout[Any], ...] = (
+LAYOUTS: tuple[OptionLayout[Any], ...] = (
     DEMO, DEMO_DETECTION, TIME, RAW_MEASURES, RAW_ECHOES, PHYS_MEASURES, GYROS_OFFSETS, EULER_ANGLES, REFERENCES,
     SPEED_REFERENCES, TRIMS, RC_REFERENCES, PWM, PWM_ALTITUDE, ALTITUDE, *VISION_LAYOUTS, *AMBIENT_LAYOUTS,
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """PaVE frames of the AR.Drone 2's video stream (TCP 5555): written, and found again after damage.
 
-WIRE (AR.Drone sheet 6): header sizes of 64, 68 and 76 bytes occur; the payload begins where `header_size` says.
+WIRE (docs/reference/ardrone.md 6): headers have 64, 68 or 76 bytes; the payload begins where `header_size` says.
 """
 
 import struct
@@ -31,7 +31,7 @@ class FrameType(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class PaveFrame:
     """One frame: codec 4 is H.264 (Annex B), size in pixels as displayed, time since power-on.
 
     slices, slice_index: a picture sent in several frames of one number; stream: which encoder it comes from;
@@ -51,15 +51,18 @@ class Frame:
     parameter_sizes: tuple[int, int] = (0, 0)
 
 
-def encode_frame(frame: Frame, position: int = 0) -> bytes:
-    """Return a frame with its 64 bytes of header; position: bytes of the stream before it."""
+def encode_frame(frame: PaveFrame, position: int = 0, header_size: int = HEADER_SIZE) -> bytes:
+    """Return a frame with its header of 64 bytes or more; position: bytes of the stream before it.
+
+    What a longer header holds beyond the described fields is sent as 0.
+    """
     # WIRE: pictures are encoded in whole blocks of 16 pixels: 640x368 for the 640x360 that are shown.
     blocks = (-(-side // _BLOCK_PX) * _BLOCK_PX for side in (frame.width, frame.height))
     header = _HEADER.pack(
         SIGNATURE,
         _VERSION,
         frame.codec,
-        HEADER_SIZE,
+        header_size,
         len(frame.payload),
         *blocks,
         frame.width,
@@ -78,7 +81,7 @@ def encode_frame(frame: Frame, position: int = 0) -> bytes:
         *frame.parameter_sizes,
         len(frame.payload),
     )
-    return header + frame.payload
+    return header.ljust(header_size, b"\0") + frame.payload
 
 
 class FrameReader:
@@ -89,7 +92,7 @@ class FrameReader:
         self._looked = 0
         self.skipped = 0
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[PaveFrame]:
         """Return the frames that these bytes complete; damaged stretches are skipped up to the next signature."""
         self._buffer += data
         frames = []
@@ -147,12 +150,12 @@ def _extent(data: bytearray, offset: int = 0) -> tuple[int, int]:
     return header_size, header_size + payload_size
 
 
-def _frame(data: bytes, start: int) -> Frame:
+def _frame(data: bytes, start: int) -> PaveFrame:
     fields = _HEADER.unpack_from(data)
     codec, width, height, number, timestamp_ms, kind = fields[2], *fields[7:11], fields[13]
     stream, slices, slice_index, *parameter_sizes = fields[17:22]
     known = FrameType(kind) if kind in FrameType.__members__.values() else FrameType.UNKNOWN
-    return Frame(
+    return PaveFrame(
         codec,
         width,
         height,

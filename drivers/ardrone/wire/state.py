@@ -58,7 +58,7 @@ class ControlState(IntEnum):
     TRANS_LOOPING = 9
 
 
-# WIRE: some minor states (SDK control_states.h, AR.Drone sheet 4.2).
+# WIRE: some minor states (SDK control_states.h, docs/reference/ardrone.md 4.2).
 TAKE_OFF_AUTO = 1
 FLYING_COMBINED_YAW = 4
 HOVERING_LOST_COM = 8

@@ -37,7 +37,8 @@ class Tag(IntEnum):
     CHECKSUM = 0xFFFF
 
 
-# WIRE: sizes with the 4-byte head (AR.Drone sheet 4.3). Decoders must not rely on them: they differ between firmwares.
+# WIRE: sizes with the 4-byte head (docs/reference/ardrone.md 4.3). They differ between firmwares: no decoder
+# may rely on them.
 _AR2_2_3: dict[int, int] = {
     Tag.DEMO: 148, Tag.TIME: 8, Tag.RAW_MEASURES: 52, Tag.PHYS_MEASURES: 46, Tag.GYROS_OFFSETS: 16,
     Tag.EULER_ANGLES: 12, Tag.REFERENCES: 88, Tag.TRIMS: 16, Tag.RC_REFERENCES: 24, Tag.PWM: 76, Tag.ALTITUDE: 56,

@@ -1,8 +1,8 @@
-"""Layouts of the options about pictures: optical flow, trackers, detected tags, video. WIRE: AR.Drone sheet 4.4."""
+"""Layouts of the options about pictures: flow, trackers, detected tags, video. WIRE: docs/reference/ardrone.md 4.4."""
 
 from typing import Any, NamedTuple
 
-from drivers.ardrone.wire.layout import Layout
+from drivers.ardrone.wire.layout import OptionLayout
 from drivers.ardrone.wire.tags import Tag
 
 _Triple = tuple[float, float, float]
@@ -25,7 +25,7 @@ class VisionOf(NamedTuple):
     dy: _Fives = (0.0,) * 5
 
 
-class Vision(NamedTuple):
+class OpticalFlowSpeed(NamedTuple):
     """Speed estimation by the bottom camera; capture time in the form of TIME, body velocity [mm/s; FRD]."""
 
     state: int = 0
@@ -131,19 +131,19 @@ class HdVideoStream(NamedTuple):
     remaining_s: int = 0
 
 
-VISION_RAW = Layout(Tag.VISION_RAW, VisionRaw, "3f")
-VISION_OF = Layout(Tag.VISION_OF, VisionOf, "5f 5f")
-VISION = Layout(Tag.VISION, Vision, "I i f f f f i f f f i I 3f f f f I I f f")
-VISION_PERF = Layout(Tag.VISION_PERF, VisionPerf, "f f f f f f 20f")
-TRACKERS_SEND = Layout(Tag.TRACKERS_SEND, TrackersSend, "30i 60i")
-VISION_DETECT = Layout(Tag.VISION_DETECT, VisionDetect, "I 4I 4I 4I 4I 4I 4I 4f")
-VISION_DETECT_POSES = Layout(Tag.VISION_DETECT, VisionDetectPoses, "36f 12f 4I", start=120)
-VIDEO_STREAM = Layout(Tag.VIDEO_STREAM, VideoStream, "B I I I I f I")
-VIDEO_STREAM_RATE = Layout(Tag.VIDEO_STREAM, VideoStreamRate, "I I 5i I I", start=29)
-GAMES = Layout(Tag.GAMES, Games, "I I")
-HDVIDEO_STREAM = Layout(Tag.HDVIDEO_STREAM, HdVideoStream, "I I I I I I I")
+VISION_RAW = OptionLayout(Tag.VISION_RAW, VisionRaw, "3f")
+VISION_OF = OptionLayout(Tag.VISION_OF, VisionOf, "5f 5f")
+VISION = OptionLayout(Tag.VISION, OpticalFlowSpeed, "I i f f f f i f f f i I 3f f f f I I f f")
+VISION_PERF = OptionLayout(Tag.VISION_PERF, VisionPerf, "f f f f f f 20f")
+TRACKERS_SEND = OptionLayout(Tag.TRACKERS_SEND, TrackersSend, "30i 60i")
+VISION_DETECT = OptionLayout(Tag.VISION_DETECT, VisionDetect, "I 4I 4I 4I 4I 4I 4I 4f")
+VISION_DETECT_POSES = OptionLayout(Tag.VISION_DETECT, VisionDetectPoses, "36f 12f 4I", start=120)
+VIDEO_STREAM = OptionLayout(Tag.VIDEO_STREAM, VideoStream, "B I I I I f I")
+VIDEO_STREAM_RATE = OptionLayout(Tag.VIDEO_STREAM, VideoStreamRate, "I I 5i I I", start=29)
+GAMES = OptionLayout(Tag.GAMES, Games, "I I")
+HDVIDEO_STREAM = OptionLayout(Tag.HDVIDEO_STREAM, HdVideoStream, "I I I I I I I")
 
-VISION_LAYOUTS: tuple[Layout[Any], ...] = (
+VISION_LAYOUTS: tuple[OptionLayout[Any], ...] = (
     VISION_RAW, VISION_OF, VISION, VISION_PERF, TRACKERS_SEND, VISION_DETECT, VISION_DETECT_POSES, VIDEO_STREAM,
     VIDEO_STREAM_RATE, GAMES, HDVIDEO_STREAM,
 )  # fmt: skip

@@ -19,7 +19,7 @@ _DUMP_S = 2.0
 def read_version(address: str, port: int, timeout_s: float = _FTP_S) -> str:
     """Return version.txt of the drone, "" when it cannot be had; timeout_s is of each step.
 
-    WIRE (AR.Drone sheet 1): FTP on port 5551, anonymous, passive.
+    WIRE (docs/reference/ardrone.md 1): FTP on port 5551, anonymous, passive.
     """
     parts: list[bytes] = []
 
@@ -40,7 +40,7 @@ def read_dump(
 ) -> bytes:
     """Return the next configuration dump, without its NUL, b"" when none comes; `connected` is called in between.
 
-    WIRE (AR.Drone sheet 5.2): the client connects first, then asks by CTRL 4; a NUL ends the text.
+    WIRE (docs/reference/ardrone.md 5.2): the client connects first, then asks by CTRL 4; a NUL ends the text.
     """
     text = bytearray()
     try:

@@ -8,7 +8,7 @@ from drivers.ardrone.identity import Identity, Model
 from drivers.ardrone.settings import ArDroneDriverSettings, Video
 from drivers.ardrone.wire.configuration import CONFIGURATION, format_value
 
-# WIRE (AR.Drone sheet 5.4): values of video:video_codec.
+# WIRE (docs/reference/ardrone.md 5.4): values of video:video_codec.
 _CODECS = {"h264_360p": 129, "h264_720p": 131}
 _CHANNELS = {"front": 0, "bottom": 1}
 

@@ -1,24 +1,24 @@
 """AT commands that a decision of the watchdog means to an AR.Drone. Pure.
 
-WIRE (AR.Drone sheet 2.4): REF bit 9 is a level (1 take off and stay up, 0 land), bit 8 toggles the emergency on its
-rising edge. PCMD flag 0 lets the drone hold its place. phi > 0 right, theta > 0 backward, gaz > 0 up, yaw > 0
+WIRE (docs/reference/ardrone.md 2.4): REF bit 9 is a level (1 take off and stay up, 0 land), bit 8 toggles the emergency
+on its rising edge. PCMD flag 0 lets the drone hold its place. phi > 0 right, theta > 0 backward, gaz > 0 up, yaw > 0
 clockwise.
 """
 
-from drivers.ardrone.velocity_loop import Attitude
+from drivers.ardrone.desired_config import Scale
+from drivers.ardrone.velocity_loop import AttitudeRequest
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.state import StateBit
-from drivers.ardrone.wishes import Scale
-from drivers.authority import Action
+from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
 
 
 def orders_from_decision(
-    action: Action, attitude: Attitude, state: int, flight_state: FlightState, scale: Scale
+    action: Action, attitude: AttitudeRequest, state: int, flight_state: FlightState, scale: Scale
 ) -> list[AtCommand]:
     """Return REF and PCMD for an action, and COMWDG where the drone missed us; no REF while waiting."""
-    motion = motion_from_attitude(attitude, scale) if action is Action.FLY else at.Motion()
+    motion = motion_from_attitude(attitude, scale) if action is Action.FLY else at.ProgressiveMotion()
     orders = [at.pcmd(motion)]
     if action is not Action.WAIT:
         orders.insert(0, _reference(action, bool(state & StateBit.EMERGENCY), flight_state))
@@ -41,11 +41,11 @@ def _reference(action: Action, emergency: bool, flight_state: FlightState) -> At
             return at.ref(start=False)
 
 
-def motion_from_attitude(attitude: Attitude, scale: Scale) -> at.Motion:
+def motion_from_attitude(attitude: AttitudeRequest, scale: Scale) -> at.ProgressiveMotion:
     """Return the PCMD of an attitude: fractions of the configured limits, in the drone's signs."""
     if attitude.hover:
-        return at.Motion()
-    return at.Motion(
+        return at.ProgressiveMotion()
+    return at.ProgressiveMotion(
         at.PCMD_PROGRESSIVE,
         phi=attitude.roll_rad / scale.tilt_rad,
         theta=-attitude.pitch_rad / scale.tilt_rad,

@@ -1,17 +1,24 @@
 """Units and frames: what MAVLink's figures mean on the bus, and what our velocities and poses mean to an autopilot.
 
-WIRE (mavlink.md 5.1): NED and FRD, yaw clockwise. Since the autopilot's heading comes from our estimate, its local NED
-is the world turned upside down about x: north = world x, east = -y, down = -z.
+WIRE (docs/reference/mavlink.md 5.1): NED and FRD, yaw clockwise. Since the autopilot's heading comes from our estimate,
+its local NED is the world turned upside down about x: north = world x, east = -y, down = -z.
 """
 
 import math
 from dataclasses import dataclass
 
-from drivers.limits import Limits
+from drivers.limits import VehicleLimits
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.flight import Odometry as OdometryMessage
-from drivers.mavlink.wire.flight import SetPositionTargetLocalNed, VisionPositionEstimate
-from drivers.mavlink.wire.names import ARMED, ESTIMATOR_VISION, VELOCITY_AND_YAW_RATE, Flavour, Frame, Landed, land_mode
+from drivers.mavlink.wire.flight import OdometryMessage, SetPositionTargetLocalNed, VisionPositionEstimate
+from drivers.mavlink.wire.names import (
+    ARMED,
+    ESTIMATOR_VISION,
+    VELOCITY_AND_YAW_RATE,
+    Flavour,
+    Landed,
+    MavFrame,
+    land_mode,
+)
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
 from groundstation.geometry.angles import quaternion_from_euler, wrap
@@ -24,7 +31,7 @@ _STILL_M_S = 0.15
 
 
 @dataclass(frozen=True, slots=True)
-class Attitude:
+class BaseAttitude:
     """Euler angles [rad; FLU, intrinsic z-y-x] and body rates [rad/s; base]."""
 
     roll_rad: float
@@ -34,7 +41,7 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class VisionPose:
     """What is believed of a vehicle [world, FLU]: position, heading, their variances, velocity, time [ns]."""
 
     stamp_ns: int
@@ -51,7 +58,7 @@ def _sane(what: str, limit: float, *values: float) -> None:
         raise WireError("implausible" if finite else "not_finite", f"{what} {values}")
 
 
-def attitude_from_quaternion(message: AttitudeQuaternion) -> Attitude:
+def attitude_from_quaternion(message: AttitudeQuaternion) -> BaseAttitude:
     """Return the attitude; raises WireError unless the quaternion is one."""
     w, x, y, z = message.q1, message.q2, message.q3, message.q4
     norm2 = w * w + x * x + y * y + z * z
@@ -62,10 +69,10 @@ def attitude_from_quaternion(message: AttitudeQuaternion) -> Attitude:
     roll = math.atan2(2 * (w * x + y * z), norm2 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x) / norm2)))
     yaw = math.atan2(2 * (w * z + x * y), norm2 - 2 * (y * y + z * z))
-    return Attitude(roll, -pitch, wrap(-yaw), (rates[0], -rates[1], -rates[2]))
+    return BaseAttitude(roll, -pitch, wrap(-yaw), (rates[0], -rates[1], -rates[2]))
 
 
-def velocity_from_local(message: LocalPositionNed, attitude: Attitude) -> Vector3:
+def velocity_from_local(message: LocalPositionNed, attitude: BaseAttitude) -> Vector3:
     """Return the estimated velocity [m/s; base_stabilized]; raises WireError."""
     north, east, down = message.vx, message.vy, message.vz
     _sane("velocity", _MOST_M_S, north, east, down)
@@ -119,7 +126,7 @@ def is_still(velocity_m_s: Vector3) -> bool:
 
 
 def setpoint_from_velocity(
-    system: int, now_ns: int, velocity_m_s: Vector3, yaw_rate_rad_s: float, limits: Limits
+    system: int, now_ns: int, velocity_m_s: Vector3, yaw_rate_rad_s: float, limits: VehicleLimits
 ) -> SetPositionTargetLocalNed:
     """Return the set-point of a velocity [base_stabilized, FLU], clamped to the limits."""
     forward, left, up = velocity_m_s
@@ -131,7 +138,7 @@ def setpoint_from_velocity(
         time_boot_ms=now_ns // 1_000_000 % (1 << 32),
         target_system=system,
         target_component=1,
-        coordinate_frame=Frame.BODY_NED,
+        coordinate_frame=MavFrame.BODY_NED,
         type_mask=VELOCITY_AND_YAW_RATE,
         x=0.0, y=0.0, z=0.0,
         vx=forward * shrink, vy=-left * shrink, vz=-up,
@@ -148,7 +155,7 @@ def _upper(diagonal: tuple[float, ...]) -> tuple[float, ...]:
 _TILT_VARIANCE = math.radians(3.0) ** 2
 
 
-def vision_from_pose(pose: Pose, attitude: Attitude, resets: int) -> VisionPositionEstimate:
+def vision_from_pose(pose: VisionPose, attitude: BaseAttitude, resets: int) -> VisionPositionEstimate:
     """Return the pose as both flavours take it; roll and pitch are the vehicle's own, they are not ours to say."""
     x, y, z = pose.position_m
     vx, vy, vz, vyaw = pose.variances
@@ -165,7 +172,7 @@ def vision_from_pose(pose: Pose, attitude: Attitude, resets: int) -> VisionPosit
 _UNKNOWN_VARIANCE = 1e4
 
 
-def odometry_from_pose(pose: Pose, attitude: Attitude, resets: int) -> OdometryMessage:
+def odometry_from_pose(pose: VisionPose, attitude: BaseAttitude, resets: int) -> OdometryMessage:
     """Return the pose as PX4 takes it best: frame NED, child body FRD; the velocity counts as unknown.
 
     A velocity of ours would be the autopilot's own, late and scaled: it differentiates our positions itself.
@@ -179,8 +186,8 @@ def odometry_from_pose(pose: Pose, attitude: Attitude, resets: int) -> OdometryM
     )
     return OdometryMessage(
         time_usec=pose.stamp_ns // 1000,
-        frame_id=Frame.LOCAL_NED,
-        child_frame_id=Frame.BODY_FRD,
+        frame_id=MavFrame.LOCAL_NED,
+        child_frame_id=MavFrame.BODY_FRD,
         x=x, y=-y, z=-z,
         q=quaternion_from_euler(attitude.roll_rad, -attitude.pitch_rad, -pose.yaw_rad),
         vx=forward, vy=-left, vz=-pose.velocity_m_s[2],
@@ -193,6 +200,6 @@ def odometry_from_pose(pose: Pose, attitude: Attitude, resets: int) -> OdometryM
     )  # fmt: skip
 
 
-def attitude_quaternion(attitude: Attitude) -> Quaternion:
+def attitude_quaternion(attitude: BaseAttitude) -> Quaternion:
     """Return wxyz of odom from base [FLU]."""
     return quaternion_from_euler(attitude.roll_rad, attitude.pitch_rad, attitude.yaw_rad)

@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from drivers.base import HostProcess
 from drivers.host import VehicleHost, run_hosts
-from drivers.mavlink.link import Heard, Link, open_link
+from drivers.mavlink.links.opening import open_link
+from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
@@ -39,7 +40,7 @@ class Fleet:
         self._child = child
         self._estimates = child.bus.subscribe([ESTIMATE], newest=True)
         self.vehicles: dict[int, MavlinkVehicle] = {}
-        self.link: Link = open_link(settings.link, self._sniff)
+        self.link: MavlinkLink = open_link(settings.link, self._sniff)
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
         self.strangers: Counter[int] = Counter()
         self._news: list[str] = []

@@ -1,6 +1,6 @@
 """Parameters that indoor flight on our position needs, and what is wrong with those a vehicle has.
 
-Sources: mavlink.md 1.1 (ArduPilot, flown), 2 (PX4, flown), 5.2 and 5.3 (failsafes).
+Sources: docs/reference/mavlink.md 1.1, 2 (flown), docs/reference/mavlink.md 5.2, 5.3 (failsafes).
 """
 
 from collections.abc import Mapping
@@ -57,7 +57,7 @@ def needed(flavour: Flavour, our_system: int) -> tuple[Needed, ...]:
     """Return what a vehicle of a flavour must be set to, when this ground station has a system id."""
     if flavour is Flavour.PX4:
         return _PX4
-    # WIRE (mavlink.md 1): only heartbeats from SYSID_MYGCS keep the ground-station failsafe quiet.
+    # WIRE (docs/reference/mavlink.md 1): only heartbeats from SYSID_MYGCS keep the ground-station failsafe quiet.
     return (*_ARDUPILOT, Needed("SYSID_MYGCS", our_system, "the ground station whose heartbeat counts"))
 
 

@@ -3,10 +3,10 @@
 import time
 from dataclasses import dataclass, field
 
-from drivers.mavlink.link import Link
+from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import id_of
-from drivers.mavlink.wire.names import ARMED, Command, Flavour, mode_name
+from drivers.mavlink.wire.names import ARMED, Flavour, MavCmd, mode_name
 from drivers.mavlink.wire.telemetry import (
     AutopilotVersion,
     Heartbeat,
@@ -41,7 +41,7 @@ class Found:
         return {3: "ardupilot", 12: "px4"}.get(self.autopilot, f"autopilot {self.autopilot}")
 
 
-def probe(link: Link, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int, Found]:
+def probe(link: MavlinkLink, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int, Found]:
     """Return the vehicles that answer within some seconds, by system id; nothing is changed on them.
 
     greet: systems to speak to first, where the link has to.
@@ -67,13 +67,13 @@ def probe(link: Link, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int
     return found
 
 
-def _ask(link: Link, vehicle: Found) -> None:
+def _ask(link: MavlinkLink, vehicle: Found) -> None:
     for kind, known in ((AutopilotVersion, vehicle.version), (VideoStreamInformation, vehicle.video)):
         if not known:
-            link.send(vehicle.system, CommandLong(vehicle.system, 1, Command.REQUEST_MESSAGE, 0, float(id_of(kind))))
+            link.send(vehicle.system, CommandLong(vehicle.system, 1, MavCmd.REQUEST_MESSAGE, 0, float(id_of(kind))))
     if not vehicle.battery:
         interval = (float(id_of(SysStatus)), 500_000.0)
-        link.send(vehicle.system, CommandLong(vehicle.system, 1, Command.SET_MESSAGE_INTERVAL, 0, *interval))
+        link.send(vehicle.system, CommandLong(vehicle.system, 1, MavCmd.SET_MESSAGE_INTERVAL, 0, *interval))
 
 
 def _mode(message: Heartbeat) -> str:

@@ -2,12 +2,12 @@
 
 The autopilot's position, height and heading are our own estimate come back, and are never published. Its velocity is
 partly ours: it goes out with an inflated covariance. Its heading is replaced by what its gyros say, whose increments
-are the vehicle's own measurement (estimation.md 3).
+are the vehicle's own measurement (docs/explanation/estimation.md 8).
 """
 
 import math
 
-from drivers.mavlink.convert import Attitude, attitude_quaternion
+from drivers.mavlink.convert import BaseAttitude, attitude_quaternion
 from drivers.mavlink.settings import VehicleSettings
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
@@ -27,7 +27,7 @@ class GyroHeading:
         self._stamp_ns: int | None = None
         self._rate_rad_s = 0.0
 
-    def update(self, stamp_ns: int, attitude: Attitude) -> None:
+    def update(self, stamp_ns: int, attitude: BaseAttitude) -> None:
         """Take the turn rate of a sample."""
         _, q, r = attitude.rates_rad_s
         # Rate of the heading about the vertical, not about the tilted body axis.
@@ -42,7 +42,7 @@ class GyroHeading:
         self._stamp_ns, self._rate_rad_s = stamp_ns, rate
 
 
-class MotionPublisher:
+class TelemetryPublisher:
     """Turns what the reader hears into messages, stamped with their receipt."""
 
     def __init__(self, settings: VehicleSettings, bus: Bus) -> None:
@@ -52,11 +52,11 @@ class MotionPublisher:
         vertical = horizontal * _CLIMB_SHARE**2
         self._covariance = (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical)
 
-    def attitude(self, stamp_ns: int, attitude: Attitude) -> None:
+    def attitude(self, stamp_ns: int, attitude: BaseAttitude) -> None:
         """Take an attitude: its turn rate moves the heading."""
         self._heading.update(stamp_ns, attitude)
 
-    def velocity(self, stamp_ns: int, velocity_m_s: Vector3, attitude: Attitude) -> None:
+    def velocity(self, stamp_ns: int, velocity_m_s: Vector3, attitude: BaseAttitude) -> None:
         """Publish a velocity [base_stabilized]."""
         message = Odometry(
             header=self._bus.header(self._name, stamp_ns),
@@ -69,7 +69,7 @@ class MotionPublisher:
         )
         self._bus.publish(ODOMETRY, message)
 
-    def imu(self, stamp_ns: int, rates: Vector3, force: Vector3, attitude: Attitude | None) -> None:
+    def imu(self, stamp_ns: int, rates: Vector3, force: Vector3, attitude: BaseAttitude | None) -> None:
         """Publish rates and specific force [base]."""
         sample = ImuSample(
             header=self._bus.header(self._name, stamp_ns),

@@ -3,8 +3,8 @@
 from collections import deque
 from dataclasses import dataclass
 
-from drivers.mavlink.wire.flight import CommandAck, CommandLong
-from drivers.mavlink.wire.names import Command, Result
+from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong
+from drivers.mavlink.wire.names import MavCmd, MavResult
 
 _RETRY_NS = 500_000_000
 _TRIES = 4
@@ -32,7 +32,7 @@ class Requests:
         self.accepted: set[str] = set()
         self.failures: deque[str] = deque(maxlen=16)
 
-    def ask(self, now_ns: int, key: str, command: Command, *params: float) -> None:
+    def ask(self, now_ns: int, key: str, command: MavCmd, *params: float) -> None:
         """Wish for a command; nothing happens while it is under way, or was answered within the last second."""
         if key in self._open or now_ns < self._quiet_until_ns.get(key, 0):
             return
@@ -65,18 +65,18 @@ class Requests:
             request.tries, request.due_ns = request.tries + 1, now_ns + _RETRY_NS
         return messages
 
-    def answer(self, now_ns: int, ack: CommandAck) -> None:
+    def answer(self, now_ns: int, ack: CommandAckMessage) -> None:
         """Take an acknowledgement; it belongs to the oldest open request of that command that was sent."""
         sent = [key for key, r in self._open.items() if r.message.command == ack.command and r.tries]
         if not sent:
             return
         key, request = sent[0], self._open[sent[0]]
-        if ack.result == Result.IN_PROGRESS:
+        if ack.result == MavResult.IN_PROGRESS:
             request.due_ns = now_ns + _RETRY_NS
             return
         del self._open[key]
         self._quiet_until_ns[key] = now_ns + _SETTLE_NS
-        if ack.result == Result.ACCEPTED:
+        if ack.result == MavResult.ACCEPTED:
             self.accepted.add(key)
         else:
             self._quiet_until_ns[key] = now_ns + _REFUSED_NS
@@ -85,6 +85,6 @@ class Requests:
 
 def _word(result: int) -> str:
     try:
-        return Result(result).name.lower().replace("_", " ")
+        return MavResult(result).name.lower().replace("_", " ")
     except ValueError:
         return f"result {result}"

@@ -1,19 +1,19 @@
 """From silence to full telemetry: streams asked for, origin set, parameters checked. Pure.
 
-WIRE (mavlink.md 1): ArduPilot streams nothing but heartbeats unless asked, one interval at a time; the origin is
-ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back. One that is set is neither
-changed nor told: it is asked for as well. PX4 flies indoors without: nothing waits for its answer.
+WIRE (docs/reference/mavlink.md 1): ArduPilot streams nothing but heartbeats unless asked, one interval at a time; the
+origin is ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back. One that is set is
+neither changed nor told: it is asked for as well. PX4 flies indoors without: nothing waits for its answer.
 """
 
 from collections import Counter
 
 from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
-from drivers.mavlink.settings import Origin
+from drivers.mavlink.settings import GlobalOrigin
 from drivers.mavlink.wire import service, telemetry
-from drivers.mavlink.wire.flight import CommandLong, Odometry
+from drivers.mavlink.wire.flight import CommandLong, OdometryMessage
 from drivers.mavlink.wire.frames import Message, id_of
-from drivers.mavlink.wire.names import Command, Flavour
+from drivers.mavlink.wire.names import Flavour, MavCmd
 from drivers.mavlink.wire.parameters import value_from_carried
 
 _ORIGIN_PERIOD_NS = 3_000_000_000
@@ -41,19 +41,19 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
     if flavour is Flavour.ARDUPILOT:
         wanted[telemetry.EkfStatusReport] = 5.0
     else:
-        # WIRE (mavlink.md 2): unasked, PX4 sends 100 and 30 a second of these, more than all that is used.
-        wanted |= {telemetry.Attitude: _STOPPED, Odometry: _STOPPED}
+        # WIRE (docs/reference/mavlink.md 2): unasked, PX4 sends 100 and 30 of these a second.
+        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: _STOPPED}
     return wanted
 
 
-class Session:
+class MavlinkSession:
     """What one vehicle still has to be asked; starts over when it was silent for 2 s.
 
     problems: parameters that forbid a take-off. detail: what is waited for, or "".
     """
 
     def __init__(
-        self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: Origin
+        self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: GlobalOrigin
     ) -> None:
         self._system, self._flavour, self._rates, self._origin = system, flavour, rates, origin
         self._needed = parameters.needed(flavour, our_system)
@@ -82,7 +82,7 @@ class Session:
             return "waiting for its heartbeat"
         missing = [kind for kind in self._rates if self._key(kind) not in requests.accepted]
         if missing:
-            return f"asking for {missing[0].__name__}"
+            return f"asking for {missing[0].__name__.removesuffix('Message')}"
         if self.unread:
             return self._unread_detail(self.unread[0])
         if self.problems:
@@ -124,7 +124,7 @@ class Session:
             if (key := self._key(kind)) not in requests.accepted:
                 # WIRE (SET_MESSAGE_INTERVAL): microseconds; -1 stops the stream.
                 interval_us = 1e6 / rate_hz if rate_hz > 0.0 else -1.0
-                requests.ask(now_ns, key, Command.SET_MESSAGE_INTERVAL, float(id_of(kind)), interval_us)
+                requests.ask(now_ns, key, MavCmd.SET_MESSAGE_INTERVAL, float(id_of(kind)), interval_us)
                 break
         return messages + self._service(now_ns)
 
@@ -152,9 +152,9 @@ class Session:
         # Not through the requests: "denied" here means "none yet", which is no news for the operator.
         return [
             service.SetGpsGlobalOrigin(self._system, *place),
-            CommandLong(self._system, 1, Command.REQUEST_MESSAGE, 0, asked),
+            CommandLong(self._system, 1, MavCmd.REQUEST_MESSAGE, 0, asked),
         ]
 
     @staticmethod
     def _key(kind: type[Message]) -> str:
-        return f"stream {kind.__name__}"
+        return f"stream {kind.__name__.removesuffix('Message')}"

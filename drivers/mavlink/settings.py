@@ -4,11 +4,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from drivers.authority import AuthorityLimits
-from drivers.limits import Limits, Name, Positive, Safety, Section
+from drivers.limits import DriverSection, Name, Positive, SilenceLimits, VehicleLimits
+from drivers.watchdog_types import AuthorityLimits
 
 
-class Vision(Section):
+class VisionFeedback(DriverSection):
     """What of the tracker's estimate is fed back to the autopilot, and what its loss does.
 
     rate_hz: of the messages; max_std_m: a worse known position is none (what no camera keeps sharp gets there within
@@ -30,7 +30,7 @@ class Vision(Section):
         return self
 
 
-class Origin(Section):
+class GlobalOrigin(DriverSection):
     """Where on Earth the estimator is told to be; any place will do indoors."""
 
     latitude_deg: Annotated[float, Field(ge=-85, le=85)] = 47.397742
@@ -38,7 +38,7 @@ class Origin(Section):
     altitude_m: Annotated[float, Field(ge=-500, le=9000)] = 488.0
 
 
-class LinkSettings(Section):
+class LinkSettings(DriverSection):
     """How a port is reached.
 
     target: `udpout:ADDRESS:PORT` speaks first; `udpin:ADDRESS:PORT` waits there, for many vehicles at once;
@@ -60,7 +60,7 @@ class LinkSettings(Section):
         return self
 
 
-class VehicleSettings(Section):
+class VehicleSettings(DriverSection):
     """One vehicle on the link: who it is, where it stands before take-off [world], what it may do."""
 
     name: Name
@@ -68,7 +68,7 @@ class VehicleSettings(Section):
     flavour: Literal["px4", "ardupilot"]
     pad_m: tuple[float, float] = (0.0, 0.0)
     pad_yaw_rad: float = 0.0
-    limits: Limits = Limits()
+    limits: VehicleLimits = VehicleLimits()
     take_off_m: Annotated[float, Field(ge=0.4, le=3)] = 0.8
     odometry_hz: Annotated[float, Field(gt=0, le=100)] = 50.0
     imu_hz: Annotated[float, Field(ge=0, le=200)] = 100.0
@@ -76,14 +76,14 @@ class VehicleSettings(Section):
     velocity_std_m_s: Positive = 0.15
 
 
-class MavlinkDriverSettings(Section):
+class MavlinkDriverSettings(DriverSection):
     """One port and the vehicles behind it."""
 
     link: LinkSettings
     vehicles: Annotated[tuple[VehicleSettings, ...], Field(min_length=1)]
-    safety: Safety = Safety()
-    vision: Vision = Vision()
-    origin: Origin = Origin()
+    safety: SilenceLimits = SilenceLimits()
+    vision: VisionFeedback = VisionFeedback()
+    origin: GlobalOrigin = GlobalOrigin()
     raw_datagrams: bool = True
 
     @model_validator(mode="after")

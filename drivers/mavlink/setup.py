@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from drivers.mavlink.link import Link
+from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, Flavour
@@ -20,7 +20,7 @@ _OURS = Heartbeat(6, 8, 0, 0, 4)
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class ParameterDifference:
     """One parameter that is not as needed; found None: the vehicle does not answer for it."""
 
     wanted: Needed
@@ -28,10 +28,10 @@ class Difference:
     text: str
 
 
-class Setup:
+class ParameterSetup:
     """The parameters of one vehicle on an open link that nobody else reads."""
 
-    def __init__(self, link: Link, system: int, flavour: Flavour, our_system: int) -> None:
+    def __init__(self, link: MavlinkLink, system: int, flavour: Flavour, our_system: int) -> None:
         self._link, self._system, self._flavour = link, system, flavour
         self._needed = needed(flavour, our_system)
 
@@ -57,13 +57,13 @@ class Setup:
             f"system {self._system} does not answer{refused}; `groundstation mavlink probe` tells who is on a link"
         )
 
-    def differences(self) -> Iterator[Difference]:
+    def differences(self) -> Iterator[ParameterDifference]:
         """Yield what is not as needed."""
         for wanted in self._needed:
             value = self._exchange(wanted, ParamRequestRead(self._system, 1, wanted.name, -1))
             text = difference(wanted, {} if value is None else {wanted.name: value})
             if text:
-                yield Difference(wanted, value, text)
+                yield ParameterDifference(wanted, value, text)
 
     def apply(self, wanted: Needed) -> bool:
         """Write one parameter; returns whether the vehicle confirmed it."""

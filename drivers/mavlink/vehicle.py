@@ -3,23 +3,23 @@
 from collections import Counter, deque
 from dataclasses import dataclass, replace
 
-from drivers.authority import Decision, VehicleView
-from drivers.base import Health
+from drivers.base import LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert
-from drivers.mavlink.convert import Attitude
-from drivers.mavlink.link import Heard, Link
-from drivers.mavlink.orders import Orders
-from drivers.mavlink.publisher import MotionPublisher
+from drivers.mavlink.commands import Orders
+from drivers.mavlink.convert import BaseAttitude
+from drivers.mavlink.links.seam import Heard, MavlinkLink
+from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.requests import Requests
-from drivers.mavlink.session import Session, streams
+from drivers.mavlink.session import MavlinkSession, streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
 from drivers.mavlink.texts import BootClock, Texts
 from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, Sensor
+from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, SensorBits
+from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, FlightState, Vector3
@@ -30,12 +30,12 @@ _HEARTBEAT_NS = 4_000_000_000
 _EXPLAIN_NS = 700_000_000
 # ArduPilot repeats what keeps it from arming every 30 s.
 _COMPLAINTS_NS = 35_000_000_000
-_FAULTS = Sensor.GYRO | Sensor.ACCELEROMETER
+_FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
 
 
 @dataclass(frozen=True, slots=True)
-class Telemetry:
+class LatestTelemetry:
     """The newest word of the vehicle; times 0: never. moved_ns is of the last velocity."""
 
     heard_ns: int = 0
@@ -48,7 +48,7 @@ class Telemetry:
     healthy: int = 0
     ekf: int = 0
     battery: float | None = None
-    attitude: Attitude | None = None
+    attitude: BaseAttitude | None = None
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     position_m: Vector3 | None = None
 
@@ -56,20 +56,20 @@ class Telemetry:
 class MavlinkVehicle:
     """The reader thread calls `hear` and replaces `telemetry` as a whole; everything else is the sender loop's."""
 
-    def __init__(self, settings: MavlinkDriverSettings, vehicle: VehicleSettings, link: Link, bus: Bus) -> None:
+    def __init__(self, settings: MavlinkDriverSettings, vehicle: VehicleSettings, link: MavlinkLink, bus: Bus) -> None:
         self.name, self.address = vehicle.name, settings.link.target
         self.system = vehicle.system_id
-        self.telemetry = Telemetry()
+        self.telemetry = LatestTelemetry()
         self.flavour = _FLAVOURS[vehicle.flavour]
         self.texts: deque[tuple[int, telemetry.Statustext]] = deque(maxlen=64)
         self.log = DatagramLog(bus, vehicle.name, settings.raw_datagrams)
         self._settings, self._link = settings, link
-        self._publisher = MotionPublisher(vehicle, bus)
+        self._publisher = TelemetryPublisher(vehicle, bus)
         self._requests = Requests(self.system)
-        self._acks: deque[flight.CommandAck] = deque(maxlen=64)
+        self._acks: deque[flight.CommandAckMessage] = deque(maxlen=64)
         self._values: deque[service.ParamValue | telemetry.GpsGlobalOrigin] = deque(maxlen=256)
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
-        self._session = Session(self.system, self.flavour, rates, settings.link.system_id, settings.origin)
+        self._session = MavlinkSession(self.system, self.flavour, rates, settings.link.system_id, settings.origin)
         pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
         self.orders = Orders(vehicle, self.flavour, settings.vision, self._requests)
@@ -81,7 +81,7 @@ class MavlinkVehicle:
         self._jumps: deque[int] = deque(maxlen=8)
         self._refusals: deque[tuple[int, str]] = deque(maxlen=16)
 
-    def use(self, link: Link) -> None:
+    def use(self, link: MavlinkLink) -> None:
         """Send through another link from now on."""
         self._link = link
 
@@ -121,7 +121,7 @@ class MavlinkVehicle:
                 known = self._take_rare(now_ns, message, known)
         self.telemetry = known
 
-    def _moved(self, now_ns: int, message: telemetry.LocalPositionNed, known: Telemetry) -> Telemetry:
+    def _moved(self, now_ns: int, message: telemetry.LocalPositionNed, known: LatestTelemetry) -> LatestTelemetry:
         if (jump_ms := self._boot_clock.hear(now_ns, message.time_boot_ms)) != 0:
             self._refused["clock_jump"] += 1
             self._jumps.append(jump_ms)
@@ -132,7 +132,7 @@ class MavlinkVehicle:
         self._publisher.velocity(now_ns, velocity, known.attitude)
         return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
 
-    def _take_rare(self, now_ns: int, message: tuple[object, ...], known: Telemetry) -> Telemetry:
+    def _take_rare(self, now_ns: int, message: tuple[object, ...], known: LatestTelemetry) -> LatestTelemetry:
         match message:
             case telemetry.ExtendedSysState():
                 return replace(known, landed=message.landed_state)
@@ -148,12 +148,12 @@ class MavlinkVehicle:
                 return replace(known, ekf=message.flags)
             case telemetry.Statustext():
                 self.texts.append((now_ns, message))
-            case flight.CommandAck():
+            case flight.CommandAckMessage():
                 self._acks.append(message)
             case service.ParamValue() | telemetry.GpsGlobalOrigin():
                 self._values.append(message)
             case service.Timesync() if message.tc1 == 0:
-                # WIRE (mavlink.md 5.6): without answers PX4 does not accept the times of our poses.
+                # WIRE (docs/reference/mavlink.md 5.6): without answers PX4 does not accept the times of our poses.
                 self._link.send(self.system, service.Timesync(clock.now_ns(), message.ts1))
         return known
 
@@ -176,12 +176,12 @@ class MavlinkVehicle:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
         return VehicleView(state, fresh, known.battery, self._not_ready(now_ns, known))
 
-    def _is_heard(self, now_ns: int, known: Telemetry) -> bool:
+    def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
         # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.
         newest = known.moved_ns if known.landed != 1 else known.heard_ns
         return known.heartbeat_ns > 0 and now_ns - newest < _FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
 
-    def _not_ready(self, now_ns: int, known: Telemetry) -> str:
+    def _not_ready(self, now_ns: int, known: LatestTelemetry) -> str:
         detail = self._session.detail(self._requests)
         if detail:
             return detail
@@ -190,17 +190,18 @@ class MavlinkVehicle:
         if known.healthy & _FAULTS != _FAULTS:
             return "its gyros or accelerometers are not healthy"
         if self.flavour is Flavour.PX4:
-            # WIRE (mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD arming works.
+            # WIRE (docs/reference/mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD
+            # arming works.
             return ""
         if not known.ekf & EkfFlag.POS_HORIZ_REL:
             return "its estimator has no position yet"
-        return "" if known.healthy & Sensor.PREARM_CHECK else self._arming_reason()
+        return "" if known.healthy & SensorBits.PREARM_CHECK else self._arming_reason()
 
     def _arming_reason(self) -> str:
         said = self._said.reasons(clock.now_ns() - _COMPLAINTS_NS, "arm")
         return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"
 
-    def apply(self, now_ns: int, decision: Decision) -> None:
+    def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Tell the vehicle what the decision means to it, feed its estimator, and ask what is still unknown."""
         known = self.telemetry
         self._take_answers(now_ns)
@@ -247,7 +248,7 @@ class MavlinkVehicle:
             reasons = self._said.reasons(at_ns - _EXPLAIN_NS)
             events.append((4, f"{text} ({'; '.join(reasons)})" if reasons else text))
 
-    def _feed(self, now_ns: int, known: Telemetry) -> list[tuple[object, ...]]:
+    def _feed(self, now_ns: int, known: LatestTelemetry) -> list[tuple[object, ...]]:
         if now_ns < self._next_vision_ns or known.attitude is None:
             return []
         self._next_vision_ns = max(self._next_vision_ns + self._vision_period_ns, now_ns)
@@ -259,11 +260,11 @@ class MavlinkVehicle:
             return [convert.odometry_from_pose(pose, known.attitude, self.vision.resets)]
         return [convert.vision_from_pose(pose, known.attitude, self.vision.resets)]
 
-    def health(self, now_ns: int) -> Health:
+    def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals; those of the link are shared by all vehicles on it."""
         rate_hz, quality = self._traffic.rates(now_ns)
         detail = self.orders.detail or self._session.detail(self._requests)
-        return Health(quality, rate_hz, dict(self._link.rejected + self._refused), detail)
+        return LinkHealth(quality, rate_hz, dict(self._link.rejected + self._refused), detail)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

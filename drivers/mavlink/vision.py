@@ -8,28 +8,30 @@ is its covariance, not who was seen: a vehicle is localised by what its own came
 import math
 from dataclasses import replace
 
-from drivers.mavlink.convert import Pose
-from drivers.mavlink.settings import Vision
-from groundstation.bus.clock import NS_PER_S
+from drivers.mavlink.convert import VisionPose
+from drivers.mavlink.settings import VisionFeedback
 from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.angles import difference
+from groundstation.time_units import NS_PER_S
 
 _FRESH_NS = 300_000_000
 _JUMP_RAD = math.radians(15.0)
 _STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
-# After lift-off cameras need a while to find it; autopilots coast for 4.8 s and more (mavlink.md 1.1, 2).
+# After lift-off cameras need a while to find it; autopilots coast for 4.8 s or more (docs/reference/mavlink.md 1.1, 2).
 _FIRST_SIGHT_NS = 4 * NS_PER_S
 
 
 class VisionFeed:
     """The poses for one vehicle. resets: rises at each jump, as the autopilots want it told."""
 
-    def __init__(self, name: str, clock: str, vision: Vision, pad_m: tuple[float, float], pad_yaw_rad: float) -> None:
+    def __init__(
+        self, name: str, clock: str, vision: VisionFeedback, pad_m: tuple[float, float], pad_yaw_rad: float
+    ) -> None:
         self.resets = 0
         self._name, self._clock, self._vision = name, clock, vision
-        self._standing = Pose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
-        self._last: Pose | None = None
-        self._newest: Pose | None = None
+        self._standing = VisionPose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
+        self._last: VisionPose | None = None
+        self._newest: VisionPose | None = None
         self._epoch: int | None = None
         self._good_ns: int | None = None
         self._aloft_ns: int | None = None
@@ -52,18 +54,18 @@ class VisionFeed:
             x, y, z, yaw = entity.mean[:4]
             variances = (entity.covariance[0], entity.covariance[5], entity.covariance[10], entity.covariance[15])
             vx, vy, vz = entity.velocity_m_s[:3]
-            self._newest = Pose(stamp_ns, (x, y, z), yaw, variances, (vx, vy, vz))
+            self._newest = VisionPose(stamp_ns, (x, y, z), yaw, variances, (vx, vy, vz))
             self._good_ns = stamp_ns
 
     def _is_good(self, entity: EntityEstimate) -> bool:
         worst = max(entity.covariance[0], entity.covariance[5], entity.covariance[10])
         return entity.converged and worst <= self._vision.max_std_m**2 and entity.age_s <= self._vision.max_age_s
 
-    def pose(self, now_ns: int, aloft: bool) -> Pose | None:
+    def pose(self, now_ns: int, aloft: bool) -> VisionPose | None:
         """Return what to feed now, or None; aloft: the vehicle says it flies."""
         if not aloft:
             self._aloft_ns = None
-            pose: Pose | None = replace(self._standing, stamp_ns=now_ns)
+            pose: VisionPose | None = replace(self._standing, stamp_ns=now_ns)
         else:
             if self._aloft_ns is None:
                 self._aloft_ns, self._newest, self._good_ns = now_ns, None, None
@@ -78,7 +80,7 @@ class VisionFeed:
         self._last = pose
         return pose
 
-    def _jumps(self, before: Pose, now: Pose) -> bool:
+    def _jumps(self, before: VisionPose, now: VisionPose) -> bool:
         # A pose further off than the vehicle can have flown since.
         elapsed_s = (now.stamp_ns - before.stamp_ns) / NS_PER_S
         allowed_m = self._vision.jump_m + 2.0 * elapsed_s

@@ -8,7 +8,7 @@ Floats = tuple[float, ...]
 class SetPositionTargetLocalNed(NamedTuple):
     """A set-point; a bit of type_mask that is set means: ignore this.
 
-    WIRE (mavlink.md 5.1): frame 8 rotates the velocity by the current heading; both flavours accept 1 and 8 only.
+    WIRE (docs/reference/mavlink.md 5.1): frame 8 rotates the velocity by the current heading; both accept 1 and 8 only.
     """
 
     time_boot_ms: int
@@ -54,11 +54,11 @@ class VisionSpeedEstimate(NamedTuple):
     reset_counter: int
 
 
-class Odometry(NamedTuple):
+class OdometryMessage(NamedTuple):
     """Pose in frame_id, velocity and rates in child_frame_id; q is frame from child, w x y z.
 
-    WIRE (mavlink.md 5.5): covariances are upper triangles, a first element NaN means unknown. PX4 sends child frame 1
-    (velocity in NED) and takes 1 or 12; ArduPilot never sends it and takes frame 20 with child 12 only.
+    WIRE (docs/reference/mavlink.md 5.5): covariances are upper triangles, a first element NaN means unknown. PX4 sends
+    child frame 1 (velocity in NED) and takes 1 or 12; ArduPilot never sends it and takes frame 20 with child 12 only.
     """
 
     time_usec: int
@@ -115,7 +115,7 @@ class CommandInt(NamedTuple):
     z: float
 
 
-class CommandAck(NamedTuple):
+class CommandAckMessage(NamedTuple):
     """The answer to a command."""
 
     command: int

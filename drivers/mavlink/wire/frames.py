@@ -1,45 +1,30 @@
-"""Frames: cut a datagram, decode and encode one message, sign and check signatures. No sockets, no clock.
+"""Frames: cut a datagram, decode and encode one message, sign it. No sockets, no clock.
 
-pymavlink's dialect knows layout, order, checksum seeds and signatures; this file decides what is refused and by which
-name it is counted.
+pymavlink's dialect knows layout and order, and signs; `verification.py` decides which frames are decoded at all.
 """
 
-import hashlib
-import hmac
 import re
 import struct
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.verification import Signing, Verifier, frame_size, number_of
 
 Message = tuple[Any, ...]
 MAX_DATAGRAM = 2048
-_MAGIC, _MAGIC_1 = 0xFD, 0xFE
-_HEADER, _CHECKSUM, _SIGNATURE = 10, 2, 13
-_SIGNED = 1
 
 
-class Frame(NamedTuple):
-    """Who said what; message is None for kinds that this project does not use. sequence counts per sender."""
+class ReceivedFrame(NamedTuple):
+    """A verified frame; message is None for kinds that this project does not use. sequence counts per sender."""
 
     system: int
     component: int
     sequence: int
     message: Message | None
-
-
-@dataclass(frozen=True, slots=True)
-class Signing:
-    """A key of 32 bytes, and the time from which we sign [10 us since 2015-01-01 UTC]."""
-
-    key: bytes
-    timestamp: int
-    link_id: int = 1
 
 
 def _classes() -> dict[str, type[Message]]:
@@ -52,7 +37,8 @@ def _classes() -> dict[str, type[Message]]:
                 and value is not tuple
                 and hasattr(value, "_fields")
             ):
-                found[re.sub(r"(?<!^)(?=[A-Z])", "_", name).upper()] = value
+                # "Message" sets apart a class whose name the bus has as well; it is no part of the name on the wire.
+                found[re.sub(r"(?<!^)(?=[A-Z])", "_", name.removesuffix("Message")).upper()] = value
     return found
 
 
@@ -94,68 +80,39 @@ def split(data: bytes) -> Iterator[bytes]:
         offset += size
 
 
-def frame_size(data: bytes | bytearray, offset: int = 0) -> int:
-    """Return the length of the frame that begins at an offset; raises WireError (mavlink_1, no_frame, ...)."""
-    if data[offset] != _MAGIC:
-        raise WireError("mavlink_1" if data[offset] == _MAGIC_1 else "no_frame", f"byte {data[offset]:#x}")
-    if len(data) - offset < 3:
-        raise WireError("truncated", "header")
-    flags = data[offset + 2]
-    # WIRE (mavlink.md 5.10): a frame with an incompatibility flag that is not understood must be dropped.
-    if flags & ~_SIGNED:
-        raise WireError("incompatible", f"flags {flags:#x}")
-    return _HEADER + int(data[offset + 1]) + _CHECKSUM + (_SIGNATURE if flags & _SIGNED else 0)
-
-
-class Decoder:
-    """Turns frames of one link into messages; with a key, only rightly signed ones."""
+class FrameDecoder:
+    """Turns frames of one link into messages; only verified ones, which with a key are rightly signed."""
 
     def __init__(self, signing: Signing | None = None) -> None:
-        self._mav = _codec(0, 0, signing)
-        self._key = None if signing is None else signing.key
+        self._verifier = Verifier(signing)
+        self._mav = dialect.MAVLink(None)
 
-    def decode(self, frame: bytes) -> Frame:
-        """Return what a frame says; raises WireError (checksum, unsigned, signature, size, ...)."""
-        if len(frame) < _HEADER + _CHECKSUM or frame_size(frame) != len(frame):
-            raise WireError("size", f"{len(frame)} bytes")
-        number = int.from_bytes(frame[7:10], "little")
+    def decode(self, frame: bytes) -> ReceivedFrame:
+        """Return what a verified frame says; raises WireError (those of Verifier.verify, malformed)."""
+        self._verifier.verify(frame)
+        number = number_of(frame)
         system, component, sequence = frame[5], frame[6], frame[4]
         cls = _BY_ID.get(number)
         if cls is None:
-            return Frame(system, component, sequence, None)
-        if self._key is not None:
-            _verify(frame, self._key)
+            return ReceivedFrame(system, component, sequence, None)
         try:
             decoded = self._mav.decode(bytearray(frame))
             values = [tuple(v) if isinstance(v, list) else v for v in map(decoded.__getattribute__, decoded.fieldnames)]
-        except dialect.MAVError as error:
-            raise WireError(_reason(str(error)), str(error)) from error
-        except (struct.error, ValueError, IndexError, TypeError) as error:
+        except (dialect.MAVError, struct.error, ValueError, IndexError, TypeError) as error:
             raise WireError("malformed", f"message {number}: {error}") from error
-        return Frame(system, component, sequence, cls(*values))
+        return ReceivedFrame(system, component, sequence, cls(*values))
 
 
-def _verify(frame: bytes, key: bytes) -> None:
-    # WIRE (mavlink.md 5.9): the last 6 bytes are of SHA256(key, all before them). Checked here before pymavlink sees
-    # the frame, because pymavlink remembers the timestamp of a frame that it then finds to be forged.
-    if not frame[2] & _SIGNED:
-        raise WireError("unsigned", f"from system {frame[5]}")
-    if not hmac.compare_digest(hashlib.sha256(key + frame[:-6]).digest()[:6], frame[-6:]):
-        raise WireError("signature", f"from system {frame[5]}")
-
-
-def _reason(text: str) -> str:
-    for word, reason in (("CRC", "checksum"), ("ignature", "replayed"), ("length", "size")):
-        if word in text:
-            return reason
-    return "malformed"
-
-
-class Encoder:
+class FrameEncoder:
     """Numbers, and with a key signs, what one component sends; one per sender, used by one thread at a time."""
 
     def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
-        self._mav = _codec(system, component, signing)
+        self._mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        if signing is not None:
+            self._mav.signing.secret_key = signing.key
+            self._mav.signing.sign_outgoing = True
+            self._mav.signing.link_id = signing.link_id
+            self._mav.signing.timestamp = signing.timestamp
 
     def encode(self, message: Message) -> bytes:
         """Return the frame of a message; raises WireError when a value does not fit its field."""
@@ -167,13 +124,3 @@ class Encoder:
             return bytes(frame)
         except (struct.error, TypeError, OverflowError) as error:
             raise WireError("unencodable", f"{name_of(message)}: {error}") from error
-
-
-def _codec(system: int, component: int, signing: Signing | None) -> Any:
-    mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
-    if signing is not None:
-        mav.signing.secret_key = signing.key
-        mav.signing.sign_outgoing = True
-        mav.signing.link_id = signing.link_id
-        mav.signing.timestamp = signing.timestamp
-    return mav

@@ -2,7 +2,7 @@
 
 from enum import IntEnum, IntFlag
 
-# SET_POSITION_TARGET_LOCAL_NED.type_mask: obey velocity and yaw rate, ignore all else (mavlink.md 5.1).
+# SET_POSITION_TARGET_LOCAL_NED.type_mask: obey velocity and yaw rate, ignore all else (docs/reference/mavlink.md 5.1).
 VELOCITY_AND_YAW_RATE = 0x5C7
 VELOCITY_AND_YAW = 0x9C7
 VELOCITY_ONLY = 0xDC7
@@ -21,7 +21,7 @@ class Flavour(IntEnum):
     PX4 = 12
 
 
-class Frame(IntEnum):
+class MavFrame(IntEnum):
     """MAV_FRAME."""
 
     LOCAL_NED = 1
@@ -32,7 +32,7 @@ class Frame(IntEnum):
     LOCAL_FRD = 20
 
 
-class Command(IntEnum):
+class MavCmd(IntEnum):
     """MAV_CMD."""
 
     NAV_RETURN_TO_LAUNCH = 20
@@ -48,7 +48,7 @@ class Command(IntEnum):
     REQUEST_AUTOPILOT_CAPABILITIES = 520
 
 
-class Result(IntEnum):
+class MavResult(IntEnum):
     """MAV_RESULT."""
 
     ACCEPTED = 0
@@ -69,7 +69,7 @@ class Landed(IntEnum):
     LANDING = 4
 
 
-class Sensor(IntFlag):
+class SensorBits(IntFlag):
     """MAV_SYS_STATUS_SENSOR."""
 
     GYRO = 0x1
@@ -114,7 +114,7 @@ class Px4Auto(IntEnum):
     LAND = 6
 
 
-class Copter(IntEnum):
+class CopterMode(IntEnum):
     """ArduCopter's custom_mode."""
 
     STABILIZE = 0
@@ -136,19 +136,19 @@ def px4_mode(main: int, sub: int = 0) -> int:
 
 def guided_mode(flavour: Flavour) -> int:
     """Return the custom_mode in which set-points are obeyed."""
-    return px4_mode(Px4Main.OFFBOARD) if flavour is Flavour.PX4 else Copter.GUIDED
+    return px4_mode(Px4Main.OFFBOARD) if flavour is Flavour.PX4 else CopterMode.GUIDED
 
 
 def land_mode(flavour: Flavour) -> int:
     """Return the custom_mode in which it lands by itself."""
-    return px4_mode(Px4Main.AUTO, Px4Auto.LAND) if flavour is Flavour.PX4 else Copter.LAND
+    return px4_mode(Px4Main.AUTO, Px4Auto.LAND) if flavour is Flavour.PX4 else CopterMode.LAND
 
 
 def mode_name(flavour: Flavour, custom_mode: int) -> str:
     """Return a mode in words."""
     try:
         if flavour is Flavour.ARDUPILOT:
-            return Copter(custom_mode).name
+            return CopterMode(custom_mode).name
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
         name = Px4Main(main).name
         return f"AUTO.{Px4Auto(sub).name}" if main == Px4Main.AUTO else name

@@ -1,4 +1,7 @@
-"""How parameters travel: PX4 puts the bits of an integer into the float, ArduPilot its value (mavlink.md 5.4)."""
+"""Encoding of parameters: PX4 puts the bits of an integer into the float, ArduPilot its value.
+
+WIRE: docs/reference/mavlink.md 5.4.
+"""
 
 import math
 import struct

@@ -20,7 +20,10 @@ class ParamRequestList(NamedTuple):
 
 
 class ParamSet(NamedTuple):
-    """Write a parameter; WIRE (mavlink.md 5.4): PX4 carries integers bytewise, ArduPilot as a float of the value."""
+    """Write a parameter.
+
+    WIRE (docs/reference/mavlink.md 5.4): PX4 carries integers bytewise, ArduPilot as a float of the value.
+    """
 
     target_system: int
     target_component: int
@@ -109,7 +112,7 @@ class FileTransferProtocol(NamedTuple):
 
 
 class SetupSigning(NamedTuple):
-    """Hand over a signing key; WIRE (mavlink.md 5.9): in clear, so over a wire only."""
+    """Hand over a signing key; WIRE (docs/reference/mavlink.md 5.9): in clear, so over a wire only."""
 
     target_system: int
     target_component: int

@@ -6,15 +6,41 @@ import termios
 import threading
 from collections import Counter
 
-from drivers.mavlink.link import Heard, Sniffer, StreamCutter, ignore_bytes
+from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import Decoder, Encoder, Message, Signing
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message
+from drivers.mavlink.wire.verification import Signing, frame_size
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 
 _POLL_S = 0.1
 _CHUNK = 4096
+
+
+class StreamCutter:
+    """Finds frames in a stream of bytes that may begin, end and break anywhere."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Return the whole frames that the stream holds by now; bytes that belong to none are skipped."""
+        buffer, frames = self._buffer, []
+        buffer += data
+        while len(buffer) >= 3:
+            try:
+                size = frame_size(buffer)
+            except WireError:
+                del buffer[0]
+                continue
+            if len(buffer) < size:
+                break
+            frames.append(bytes(buffer[:size]))
+            # A false start may hide a true frame: only what a checksum confirms is skipped as a whole, by the caller's
+            # count of refusals; at most one frame is lost with it.
+            del buffer[:size]
+        return frames
 
 
 class SerialLink:
@@ -24,8 +50,8 @@ class SerialLink:
         _, device, baud = settings.target.split(":")
         self.rejected: Counter[str] = Counter()
         self._own = (settings.system_id, settings.component_id)
-        self._decoder = Decoder(signing)
-        self._encoder = Encoder(settings.system_id, settings.component_id, signing)
+        self._decoder = FrameDecoder(signing)
+        self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._cutter, self._lock, self._sniffer = StreamCutter(), threading.Lock(), sniffer
         try:
             self._fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)

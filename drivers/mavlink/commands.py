@@ -6,12 +6,12 @@ sends is our own loop: when it stands still, nothing is sent and the vehicle's o
 
 from collections import deque
 
-from drivers.authority import Action, Decision, Mode
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.requests import Requests
-from drivers.mavlink.settings import VehicleSettings, Vision
+from drivers.mavlink.settings import VehicleSettings, VisionFeedback
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import ARMED, FORCE, Command, Flavour, Landed, guided_mode, land_mode, mode_name
+from drivers.mavlink.wire.names import ARMED, FORCE, Flavour, Landed, MavCmd, guided_mode, land_mode, mode_name
+from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import Vector3
 
 _STREAM_FIRST_NS = 1_200_000_000
@@ -26,7 +26,7 @@ _CLIMBED = 0.9
 class Orders:
     """Keeps what was asked of one vehicle. events: (severity, text) for the operator; said: its own STATUSTEXT."""
 
-    def __init__(self, vehicle: VehicleSettings, flavour: Flavour, vision: Vision, requests: Requests) -> None:
+    def __init__(self, vehicle: VehicleSettings, flavour: Flavour, vision: VisionFeedback, requests: Requests) -> None:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
         self.said: deque[tuple[int, str]] = deque(maxlen=8)
         self.detail = ""
@@ -48,7 +48,7 @@ class Orders:
         return f" ({self.said[-1][1]})" if self.said else ""
 
     def step(
-        self, now_ns: int, decision: Decision, base_mode: int, custom_mode: int, landed: int, height_m: float,
+        self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float,
         lost_s: float,
     ) -> SetPositionTargetLocalNed | None:  # fmt: skip
         """Return the set-point to send now, if any; commands are asked through the requests."""
@@ -66,15 +66,15 @@ class Orders:
                 return self._hover(now_ns, decision.mode, guided, height_m)
             case Action.LAND:
                 if armed and custom_mode != self._landing:
-                    self._ask(now_ns, "landing", Command.NAV_LAND)
+                    self._ask(now_ns, "landing", MavCmd.NAV_LAND)
                     # Until it obeys it must not fly on with the last velocity.
                     return self._send(now_ns, _STILL, 0.0) if guided else None
             case Action.CUT:
                 if armed:
-                    self._ask(now_ns, "motor cut", Command.COMPONENT_ARM_DISARM, 0.0, FORCE)
+                    self._ask(now_ns, "motor cut", MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE)
             case Action.IDLE:
                 if armed and landed == Landed.ON_GROUND:
-                    self._ask(now_ns, "disarming", Command.COMPONENT_ARM_DISARM, 0.0, 0.0)
+                    self._ask(now_ns, "disarming", MavCmd.COMPONENT_ARM_DISARM, 0.0, 0.0)
             case Action.WAIT:
                 pass
         return None
@@ -120,22 +120,22 @@ class Orders:
 
     def _take_off(self, now_ns: int, armed: bool, guided: bool, landed: int) -> SetPositionTargetLocalNed | None:
         px4 = self._flavour is Flavour.PX4
-        # WIRE (mavlink.md 5.2): PX4 wants a second of set-points before it enters OFFBOARD, and arms in it.
+        # WIRE (docs/reference/mavlink.md 5.2): PX4 needs a second of set-points before OFFBOARD, and arms in it.
         if px4 and now_ns - self._since_ns < _STREAM_FIRST_NS:
             return self._send(now_ns, _STILL, 0.0)
         if not guided:
             self._ask_guided(now_ns)
         elif not armed:
-            self._ask(now_ns, "arming", Command.COMPONENT_ARM_DISARM, 1.0)
+            self._ask(now_ns, "arming", MavCmd.COMPONENT_ARM_DISARM, 1.0)
         elif not px4 and landed == Landed.ON_GROUND and "take-off" not in self._requests.accepted:
             height = self._vehicle.take_off_m
-            self._ask(now_ns, "take-off", Command.NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height)
+            self._ask(now_ns, "take-off", MavCmd.NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height)
         if not px4:
             return None
         return self._send(now_ns, (0.0, 0.0, self._vehicle.limits.max_climb_m_s) if armed and guided else _STILL, 0.0)
 
-    def _hover(self, now_ns: int, mode: Mode, guided: bool, height_m: float) -> SetPositionTargetLocalNed | None:
-        if mode is not Mode.HOVER or height_m >= _CLIMBED * self._vehicle.take_off_m:
+    def _hover(self, now_ns: int, mode: DriverMode, guided: bool, height_m: float) -> SetPositionTargetLocalNed | None:
+        if mode is not DriverMode.HOVER or height_m >= _CLIMBED * self._vehicle.take_off_m:
             self._climb_until_ns = 0
         if now_ns < self._climb_until_ns:
             # It has left the ground; it goes on to its take-off height (ArduPilot does so by itself).
@@ -144,7 +144,7 @@ class Orders:
             return self._send(now_ns, (0.0, 0.0, self._vehicle.limits.max_climb_m_s), 0.0)
         return self._send(now_ns, _STILL, 0.0) if guided else None
 
-    def _fly(self, now_ns: int, decision: Decision, guided: bool) -> SetPositionTargetLocalNed | None:
+    def _fly(self, now_ns: int, decision: WatchdogDecision, guided: bool) -> SetPositionTargetLocalNed | None:
         if not guided and now_ns < self._regain_until_ns:
             self._ask_guided(now_ns)
         if self._taken_over or decision.setpoint_ns == self._told_ns:
@@ -156,9 +156,9 @@ class Orders:
 
     def _ask_guided(self, now_ns: int) -> None:
         main = float(self._guided >> 16 if self._flavour is Flavour.PX4 else self._guided)
-        self._ask(now_ns, "guided mode", Command.DO_SET_MODE, 1.0, main)
+        self._ask(now_ns, "guided mode", MavCmd.DO_SET_MODE, 1.0, main)
 
-    def _ask(self, now_ns: int, key: str, command: Command, *params: float) -> None:
+    def _ask(self, now_ns: int, key: str, command: MavCmd, *params: float) -> None:
         self._requests.ask(now_ns, key, command, *params)
 
     def _send(self, now_ns: int, velocity_m_s: Vector3, yaw_rate: float) -> SetPositionTargetLocalNed | None:

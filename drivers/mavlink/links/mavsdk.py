@@ -24,10 +24,10 @@ from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkDirect
 from mavsdk.plugins.mavlink_direct.mavlink_direct import MavlinkMessage
 
-from drivers.mavlink.link import Heard, Transport
+from drivers.mavlink.links.seam import Heard, Transport
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import CLASSES, Frame, Message, name_of
+from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, name_of
 from drivers.mavlink.wire.telemetry import Heartbeat
 from groundstation.errors import DriverError
 
@@ -108,7 +108,7 @@ class _System:
         if passed is None:
             self._transport.rejected["unexpected"] += 1
             return
-        frame = Frame(self.number, int(message.component_id), passed.frame.sequence, decoded)
+        frame = ReceivedFrame(self.number, int(message.component_id), passed.frame.sequence, decoded)
         try:
             self._heard.put_nowait(Heard(passed.stamp_ns, frame))
         except queue.Full:

@@ -1,0 +1,45 @@
+"""The seam between the driver and a link: the driver sends and receives messages, the link carries them."""
+
+from collections import Counter
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from drivers.mavlink.wire.frames import Message, ReceivedFrame
+
+Sniffer = Callable[[int, int, bytes, bool], None]  # system, stamp_ns, bytes, received
+
+
+class Heard(NamedTuple):
+    """A frame and when it came."""
+
+    stamp_ns: int
+    frame: ReceivedFrame
+
+
+class MavlinkLink(Protocol):
+    """One port with any number of vehicles behind it. Nothing that arrives raises; refusals are counted by reason."""
+
+    rejected: Counter[str]
+
+    def receive(self) -> list[Heard]:
+        """Wait up to 0.1 s; return what came."""
+
+    def send(self, system: int, message: Message) -> None:
+        """Send to one vehicle; never blocks, a message to a vehicle that was never heard may be lost."""
+
+    def close(self) -> None:
+        """Give the port back."""
+
+
+class Transport(MavlinkLink, Protocol):
+    """A link that can also be used for frames that somebody else takes apart and makes."""
+
+    def receive_raw(self) -> list[tuple[Heard, bytes]]:
+        """Wait up to 0.1 s; return what came, and the bytes of each frame."""
+
+    def send_raw(self, system: int, data: bytes) -> None:
+        """Send whole frames to one vehicle; never blocks."""
+
+
+def ignore_bytes(system: int, stamp_ns: int, data: bytes, received: bool) -> None:
+    """Sniff nothing."""

@@ -1,0 +1,96 @@
+"""What a frame must pass before anything is learned from it: signature, checksum, time of signing. No decoding.
+
+A frame of any kind that pymavlink's widest dialect knows can be verified, whether or not this project uses it; one of
+another kind cannot, because its checksum needs a seed that only its definition has.
+"""
+
+import hashlib
+import hmac
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import all as widest
+
+from drivers.mavlink.wire.errors import WireError
+
+MAGIC, MAGIC_1 = 0xFD, 0xFE
+HEADER, CHECKSUM, SIGNATURE = 10, 2, 13
+SIGNED = 1
+# WIRE (pymavlink): a sender that was not heard before may sign with a time up to a minute old [10 us].
+_NEW_SENDER_LAG = 6_000_000
+# WIRE (docs/reference/mavlink.md 5.10): the seed comes from a message's definition: other dialects fail.
+_CRC_EXTRA = {number: bytes([kind.crc_extra]) for number, kind in widest.mavlink_map.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Signing:
+    """A key of 32 bytes, and the time from which we sign [10 us since 2015-01-01 UTC]."""
+
+    key: bytes
+    timestamp: int
+    link_id: int = 1
+
+
+def frame_size(data: bytes | bytearray, offset: int = 0) -> int:
+    """Return the length of the frame that begins at an offset; raises WireError (mavlink_1, no_frame, ...)."""
+    if data[offset] != MAGIC:
+        raise WireError("mavlink_1" if data[offset] == MAGIC_1 else "no_frame", f"byte {data[offset]:#x}")
+    if len(data) - offset < 3:
+        raise WireError("truncated", "header")
+    flags = data[offset + 2]
+    # WIRE (docs/reference/mavlink.md 5.10): a frame with an unknown incompatibility flag must be dropped.
+    if flags & ~SIGNED:
+        raise WireError("incompatible", f"flags {flags:#x}")
+    return HEADER + int(data[offset + 1]) + CHECKSUM + (SIGNATURE if flags & SIGNED else 0)
+
+
+def number_of(frame: bytes) -> int:
+    """Return the number of the kind of message in a frame."""
+    return int.from_bytes(frame[7:10], "little")
+
+
+class Verifier:
+    """Verifies the frames of one link: the checksum, and with a key the signature and the order of its times."""
+
+    def __init__(self, signing: Signing | None = None) -> None:
+        self._key = None if signing is None else signing.key
+        self._newest = 0 if signing is None else signing.timestamp
+        self._stamps: dict[tuple[int, int, int], int] = {}
+
+    def verify(self, frame: bytes) -> None:
+        """Return if the frame is whole and its sender's own; raises WireError.
+
+        Reasons: size, unsigned, signature, unknown_kind, checksum, replayed.
+        """
+        if len(frame) < HEADER + CHECKSUM or frame_size(frame) != len(frame):
+            raise WireError("size", f"{len(frame)} bytes")
+        if self._key is not None:
+            _check_signature(frame, self._key)
+        _check_sum(frame)
+        if self._key is not None:
+            self._check_time(frame)
+
+    def _check_time(self, frame: bytes) -> None:
+        # WIRE (docs/reference/mavlink.md 5.9): times of one sender on one of its links grow from frame to frame.
+        sender = (frame[-SIGNATURE], frame[5], frame[6])
+        stamp = int.from_bytes(frame[-12:-6], "little")
+        if stamp <= self._stamps.get(sender, self._newest - _NEW_SENDER_LAG - 1):
+            raise WireError("replayed", f"from system {frame[5]}")
+        self._stamps[sender] = stamp
+        self._newest = max(self._newest, stamp)
+
+
+def _check_signature(frame: bytes, key: bytes) -> None:
+    # WIRE (docs/reference/mavlink.md 5.9): the last 6 bytes are of SHA256(key, all before them).
+    if not frame[2] & SIGNED:
+        raise WireError("unsigned", f"from system {frame[5]}")
+    if not hmac.compare_digest(hashlib.sha256(key + frame[:-6]).digest()[:6], frame[-6:]):
+        raise WireError("signature", f"from system {frame[5]}")
+
+
+def _check_sum(frame: bytes) -> None:
+    extra = _CRC_EXTRA.get(number_of(frame))
+    if extra is None:
+        raise WireError("unknown_kind", f"message {number_of(frame)} from system {frame[5]}")
+    end = HEADER + frame[1]
+    if widest.x25crc(frame[1:end] + extra).crc != int.from_bytes(frame[end : end + CHECKSUM], "little"):
+        raise WireError("checksum", f"message {number_of(frame)} from system {frame[5]}")

@@ -3,19 +3,17 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.pose import RelativePose
 from drivers.camera.settings import MountSettings
 from drivers.camera.sighting import Sighting
+from groundstation.arrays import Array
 from groundstation.bus.messages import Header, PoseHypothesis, RelativeObservation
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
     rotation_from_euler,
     world_from_downward_optical,
 )
-
-Array = NDArray[np.float64]
 
 
 def parent_from_optical(mount: MountSettings) -> Array:

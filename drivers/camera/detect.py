@@ -5,12 +5,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array, Image
 from groundstation.geometry import board as marker
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 # Measured: the finder wants 10-12 px per square, 18 is safe and still cheap.
 _WANTED_PX_PER_SQUARE = 18.0
@@ -96,7 +93,7 @@ def enlargement(spacing: float) -> float:
     return float(np.clip(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT))
 
 
-def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
+def find_board(picture: Image, window: Window, spacing: float) -> Find | None:
     """Return the board in the window, whose squares are about `spacing` pixels wide, or None."""
     part = picture[window.top : window.bottom, window.left : window.right]
     enlarged, ratio = resized(part, enlargement(spacing))
@@ -107,7 +104,7 @@ def find_board(picture: Picture, window: Window, spacing: float) -> Find | None:
     return ordered(picture, refined(picture, coarse))
 
 
-def refined(picture: Picture, corners: Array, columns: int = marker.CORNERS_X) -> Array:
+def refined(picture: Image, corners: Array, columns: int = marker.CORNERS_X) -> Array:
     """Return lattice corners (n, 2) refined to sub-pixels; `columns` of them make a row.
 
     Small squares are enlarged first: a window of a whole number of pixels is too coarse for them. It reaches 0.55
@@ -128,7 +125,7 @@ def refined(picture: Picture, corners: Array, columns: int = marker.CORNERS_X) -
     return np.where(slipped[:, None], corners, fine)
 
 
-def resized(part: Picture, scale: float) -> tuple[Picture, Array]:
+def resized(part: Image, scale: float) -> tuple[Image, Array]:
     """Return a picture scaled by about `scale`, and the size of its pixels in pixels of the original (2)."""
     if abs(scale - 1.0) <= 0.1:
         return part, np.ones(2)
@@ -150,7 +147,7 @@ def _least_distance(corners: Array, columns: int) -> float:
     return float(min(np.hypot(step[..., 0], step[..., 1]).min() for step in steps))
 
 
-def ordered(picture: Picture, corners: Array) -> Find | None:
+def ordered(picture: Image, corners: Array) -> Find | None:
     """Return the corners in marker order, black end first; None when the squares between them are no checkerboard."""
     grid = corners.reshape(marker.CORNERS_Y, marker.CORNERS_X, 2)
     along, across = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
@@ -172,7 +169,7 @@ def ordered(picture: Picture, corners: Array) -> Find | None:
     return Find(np.ascontiguousarray(corners), white, black)
 
 
-def _has_white_rim(picture: Picture, pixels_from_plane: Array, least: float) -> bool:
+def _has_white_rim(picture: Image, pixels_from_plane: Array, least: float) -> bool:
     """Return whether the board ends where it should: a lattice shifted by one square fits the colours just as well."""
     rim = _mapped(pixels_from_plane, _RIM)
     if rim.min() < 0.0 or rim[:, 0].max() > picture.shape[1] - 1 or rim[:, 1].max() > picture.shape[0] - 1:
@@ -181,7 +178,7 @@ def _has_white_rim(picture: Picture, pixels_from_plane: Array, least: float) -> 
     return min(float(side.mean()) for side in sides) >= least
 
 
-def sample(picture: Picture, points: Array) -> Array:
+def sample(picture: Image, points: Array) -> Array:
     """Return grey levels (n) at points (n, 2) [px], interpolated; the border repeats outside the picture."""
     columns, rows = points.T.astype(np.float32).reshape(2, 1, -1)
     grey = cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -9,17 +9,19 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from drivers.camera import convert, jpeg
+from drivers.camera.context import Surroundings
 from drivers.camera.pipeline import Pipeline
-from drivers.camera.settings import CameraDriverSettings, without_password
-from drivers.camera.sources.frames import FrameSource, Grey, Packet, Unit
+from drivers.camera.settings import CameraDriverSettings
+from drivers.camera.sources.frames import FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
-from drivers.camera.surroundings import Surroundings
+from groundstation.arrays import Image
 from groundstation.bus import clock
 from groundstation.bus.messages import CameraStatus, Severity
 from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, VIDEO
-from groundstation.errors import SettingsError
+from groundstation.errors import SettingsError, without_password
 from groundstation.process.child import Child
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
 _POLL_S = 0.02
@@ -56,7 +58,7 @@ class CameraDriver:
     def __init__(self, child: Child, settings: CameraDriverSettings, source: FrameSource) -> None:
         self._child, self._settings, self._source = child, settings, source
         self._intrinsics = settings.calibration.intrinsics()
-        self._delay_ns = round(settings.video_delay_ms * clock.NS_PER_MS)
+        self._delay_ns = round(settings.video_delay_ms * NS_PER_MS)
         self._pipeline = Pipeline(
             self._intrinsics,
             settings.expected_markers,
@@ -120,7 +122,7 @@ class CameraDriver:
         """Return when a picture was exposed: the calibrated delay before it came, or would have come usually [ns]."""
         return min(taken.settled_ns - self._delay_ns, taken.arrival_ns)
 
-    def _decoded(self, packet: Packet) -> Grey | None:
+    def _decoded(self, packet: Packet) -> Image | None:
         """Return the grey picture, or None when it is damaged or not of the calibrated size."""
         if packet.picture is not None:
             picture = packet.picture.grey()
@@ -161,13 +163,13 @@ class CameraDriver:
             self._child.bus.publish(OBSERVATION, observation)
             self._detections += 1
         for notice in self._pipeline.take_notices():
-            self._child.event(Severity.WARNING, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
+            self._child.event(notice.severity, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
         """Pass a JPEG on, at most `image_fps` times a second: as it came, or made of what was decoded."""
         if self._settings.image_fps <= 0.0 or exposure_ns < self._next_image_ns:
             return
-        period_ns = round(clock.NS_PER_S / self._settings.image_fps)
+        period_ns = round(NS_PER_S / self._settings.image_fps)
         # On the grid of the rate, so that 15 fps thin out to 5 and not to every fourth; anew after a pause.
         on_grid = exposure_ns - self._next_image_ns < period_ns
         self._next_image_ns = (self._next_image_ns if on_grid else exposure_ns) + period_ns
@@ -204,13 +206,13 @@ class CameraDriver:
         return f"check the camera and its address {without_password(self._settings.source)}"
 
     def _publish_status(self, now_ns: int) -> None:
-        elapsed_s = (now_ns - self._status_ns) / clock.NS_PER_S
+        elapsed_s = (now_ns - self._status_ns) / NS_PER_S
         flowing = self._watch.state is StreamState.FLOWING
         status = CameraStatus(
             header=self._child.bus.header(self._settings.name),
             connected=flowing,
             fps=(self._processed - self._processed_then) / elapsed_s,
-            age_ms=(now_ns - (self._exposure_ns or self._watch.since_ns)) / clock.NS_PER_MS,
+            age_ms=(now_ns - (self._exposure_ns or self._watch.since_ns)) / NS_PER_MS,
             frames=self._processed,
             skipped=self._skipped,
             detections=self._detections,

@@ -5,10 +5,11 @@ from collections import Counter, defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.markers import Reading
+from drivers.camera.markers import BarReading
 from drivers.camera.settings import MarkerSettings
-from drivers.camera.sighting import Notice
 from drivers.camera.size_check import SizeCheck
+from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
 
 _MIRRORED_MARGIN, _MIRRORED_TIMES = 2.0, 5
 
@@ -27,12 +28,12 @@ class MarkerFaults:
         notices, self._notices = self._notices, []
         return notices
 
-    def mirrored(self, marker: MarkerSettings, reading: Reading) -> None:
+    def mirrored(self, marker: MarkerSettings, reading: BarReading) -> None:
         """Take in that a bar reads on the wrong side of its board; a few times, since clutter may look like one."""
         self._mirrored[marker.entity] += reading.is_sure(_MIRRORED_MARGIN)
         if self._mirrored[marker.entity] >= _MIRRORED_TIMES:
             text = f"the {marker.label} of {marker.entity} is mirrored and cannot be used"
-            self._tell("mirrored", Notice(marker.entity, text, "print it again, not mirrored"))
+            self._tell("mirrored", Notice(Severity.WARNING, text, "print it again, not mirrored", marker.entity))
 
     def measured(
         self, marker: MarkerSettings, stamp_ns: int, relative_m: NDArray[np.float64], drop_m: float | None
@@ -44,12 +45,15 @@ class MarkerFaults:
         if ratio is not None:
             text = f"the {marker.label} of {marker.entity} seems {ratio:.2f} times as far as height sensors say"
             remedy = f"measure it: {marker.size_mm:g} mm are set, {marker.size_mm / ratio:.0f} mm would fit"
-            self._tell("size", Notice(marker.entity, text, remedy))
+            self._tell("size", Notice(Severity.WARNING, text, remedy, marker.entity))
 
     def doubled(self, marker: MarkerSettings) -> None:
         """Take in that several markers in view carry one identity."""
         text = f"several markers in view carry the identity of {marker.entity} ({marker.label})"
-        self._tell("double", Notice(marker.entity, text, "remove all but one, or give them identities of their own"))
+        self._tell(
+            "double",
+            Notice(Severity.WARNING, text, "remove all but one, or give them identities of their own", marker.entity),
+        )
 
     def _tell(self, kind: str, notice: Notice) -> None:
         if (kind, notice.entity) not in self._told:

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.detect import Find, homography, sample
+from groundstation.arrays import Array
 from groundstation.geometry import board as marker
 from groundstation.geometry.lens import CameraIntrinsics
-
-Array = NDArray[np.float64]
 
 # Inner part of each cell, 3 x 3 samples, in squares.
 _OFFSETS = np.array([[x, y] for x in (-0.16, 0.0, 0.16) for y in (-0.1, 0.0, 0.1)])
@@ -22,7 +21,7 @@ _GRID = marker.corner_grid()
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class BarReading:
     """What the bar says: the likeliest code (0..15), and by how many cells the next one fits worse (0..4)."""
 
     code: int
@@ -35,7 +34,7 @@ class Reading:
 
 def read_bar(
     picture: NDArray[np.uint8], find: Find, intrinsics: CameraIntrinsics, mirrored: bool = False
-) -> Reading | None:
+) -> BarReading | None:
     """Return the reading of a board's bar, or None when the bar is not fully in the picture.
 
     mirrored: where the bar of a print that was mirrored lies; the squares alone look the same both ways.
@@ -51,7 +50,7 @@ def read_bar(
     return decode((find.white - grey) / (find.white - find.black), pitch_px, width_px)
 
 
-def decode(darkness: Array, pitch_px: float, width_px: float) -> Reading:
+def decode(darkness: Array, pitch_px: float, width_px: float) -> BarReading:
     """Return the code word that best explains the darkness of eight cells, from 0 (white) to 1 (black).
 
     pitch_px, width_px: size of a cell in the picture; small cells run into each other and into the paper.
@@ -59,7 +58,7 @@ def decode(darkness: Array, pitch_px: float, width_px: float) -> Reading:
     words = _expected(round(4.0 * min(pitch_px, 20.0)), round(4.0 * min(width_px, 20.0)))
     misfit = np.abs(darkness - words).sum(axis=1)
     first, second = np.argsort(misfit)[:2]
-    return Reading(int(first), float(misfit[second] - misfit[first]))
+    return BarReading(int(first), float(misfit[second] - misfit[first]))
 
 
 @lru_cache(maxsize=1024)

@@ -5,25 +5,24 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera import detect, markers, pose
 from drivers.camera.faults import MarkerFaults
-from drivers.camera.foresight import Prediction
+from drivers.camera.prediction import Prediction
 from drivers.camera.search import find_in, search
 from drivers.camera.settings import DetectorSettings, MarkerSettings
-from drivers.camera.sighting import Notice, Sighting
+from drivers.camera.sighting import Sighting
 from drivers.camera.tags import TagFinder
 from drivers.camera.tracks import Track
+from groundstation.arrays import Image
+from groundstation.bus.notice import Notice
 from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.time_units import NS_PER_S
 
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 Followed = list[tuple[Track, detect.Find]]
 GravityOf = Callable[[str], pose.Gravity]
 DropOf = Callable[[str], float | None]
 
-_NS = 1_000_000_000
 # Corners beside a tracked board, its bar's among them, are no new board.
 _TAKEN_SQUARES = 2.2
 # Where the belief expects a marker that does not show, it is looked for in so many pictures, then in every third.
@@ -56,7 +55,7 @@ class Pipeline:
         self._markers = {marker.entity: marker for marker in expected}
         self._tags = TagFinder(intrinsics, expected, settings)
         self._search_rate_hz = search_rate_hz
-        self._search_phase_ns = round(search_phase_s * _NS)
+        self._search_phase_ns = round(search_phase_s * NS_PER_S)
         self._next_search_ns: int | None = None
         self._searched_ns = 0
         self._tracks: list[Track] = []
@@ -81,7 +80,7 @@ class Pipeline:
 
     def process(
         self,
-        picture: Picture,
+        picture: Image,
         stamp_ns: int,
         gravity_of: GravityOf,
         predictions: Mapping[str, Prediction | None] = _NOTHING_EXPECTED,
@@ -114,7 +113,7 @@ class Pipeline:
     def _prediction_of(self, track: Track, predictions: Mapping[str, Prediction | None]) -> Prediction | None:
         return predictions.get(self._entity_of(track) or "")
 
-    def _follow(self, picture: Picture, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> Followed:
+    def _follow(self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> Followed:
         finds: Followed = []
         for track in self._tracks:
             prediction = self._prediction_of(track, predictions)
@@ -130,7 +129,7 @@ class Pipeline:
         return finds
 
     def _look_where_expected(
-        self, picture: Picture, stamp_ns: int, predictions: Mapping[str, Prediction | None], finds: Followed
+        self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None], finds: Followed
     ) -> None:
         """Look for markers that are not in view but should be, where the belief has them; adds to `finds`."""
         followed = {self._entity_of(track) for track, _ in finds}
@@ -160,7 +159,7 @@ class Pipeline:
         self._tracks.append(Track(find.corners, stamp_ns))
         return self._tracks[-1]
 
-    def _search(self, picture: Picture, stamp_ns: int) -> Followed:
+    def _search(self, picture: Image, stamp_ns: int) -> Followed:
         taken = []
         for track in self._tracks:
             if track.misses == 0:
@@ -193,7 +192,7 @@ class Pipeline:
         if not missing:
             rate_hz = self._settings.tracked_search_rate_hz
         self._searched_ns = stamp_ns
-        self._next_search_ns = stamp_ns + round(_NS / rate_hz)
+        self._next_search_ns = stamp_ns + round(NS_PER_S / rate_hz)
 
     def _forget(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
         """Drop tracks that are over; when a marker was lost that should still be in view, search soon."""
@@ -201,14 +200,14 @@ class Pipeline:
         self._tracks = [track for track in self._tracks if not self._is_over(track, stamp_ns)]
         lost = [entity for track in over if (entity := self._entity_of(track)) is not None]
         if any(predictions.get(entity, ...) is not None for entity in lost) and self._next_search_ns is not None:
-            soonest = self._searched_ns + round(_NS / (2.0 * self._search_rate_hz))
+            soonest = self._searched_ns + round(NS_PER_S / (2.0 * self._search_rate_hz))
             self._next_search_ns = min(self._next_search_ns, max(stamp_ns, soonest))
 
     def _is_over(self, track: Track, stamp_ns: int) -> bool:
         foreign = track.code is not None and track.code not in self._expected
         return foreign or track.is_lost(stamp_ns)
 
-    def _identify(self, picture: Picture, track: Track, find: detect.Find, stamp_ns: int) -> None:
+    def _identify(self, picture: Image, track: Track, find: detect.Find, stamp_ns: int) -> None:
         least = self._settings.identity_margin
         reading = markers.read_bar(picture, find, self._intrinsics)
         track.identify(reading, stamp_ns, least)

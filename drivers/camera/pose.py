@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import rotation_from_euler
-
-Array = NDArray[np.float64]
 
 # How far the measured roll and pitch of both vehicles may be off together, and how far assumed levelness may.
 _GRAVITY_STD_RAD = math.radians(3.0)

@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.detect import Find, Window, card_outline, enlargement, find_board, window_around
+from groundstation.arrays import Array, Image
 from groundstation.geometry import board as marker
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 _HALVE_ABOVE_PX = 800
 _SMOOTHING_PX = 1.2
@@ -47,7 +45,7 @@ class Cluster:
     spacing: float
 
 
-def find_in(picture: Picture, window: Window, spacing: float, others: list[Array]) -> Find | None:
+def find_in(picture: Image, window: Window, spacing: float, others: list[Array]) -> Find | None:
     """Return a board in the window that is none of the `others` (corners of each), or None.
 
     A window too wide to be enlarged as a whole is searched for saddle points first.
@@ -63,7 +61,7 @@ def find_in(picture: Picture, window: Window, spacing: float, others: list[Array
     return Find(finds[0].corners + np.array([window.left, window.top]), finds[0].white, finds[0].black)
 
 
-def _without(picture: Picture, window: Window, others: list[Array]) -> Picture:
+def _without(picture: Image, window: Window, others: list[Array]) -> Image:
     """Return a picture in which other boards that reach into the window are painted over."""
     outlines = [card_outline(corners) for corners in others]
     near = [
@@ -80,7 +78,7 @@ def _without(picture: Picture, window: Window, others: list[Array]) -> Picture:
     return painted
 
 
-def search(picture: Picture, taken: list[Window], most: int = _MOST_WINDOWS) -> list[Find]:
+def search(picture: Image, taken: list[Window], most: int = _MOST_WINDOWS) -> list[Find]:
     """Return the boards found in the whole picture but for the windows already taken; looks at `most` of them."""
     finds: list[Find] = []
     for cluster in clusters(saddle_points(picture), taken)[:most]:
@@ -91,7 +89,7 @@ def search(picture: Picture, taken: list[Window], most: int = _MOST_WINDOWS) -> 
     return finds
 
 
-def saddle_points(picture: Picture) -> Seeds:
+def saddle_points(picture: Image) -> Seeds:
     """Return the strongest saddle points of a picture; large pictures are halved first."""
     factor = 2 if picture.shape[1] > _HALVE_ABOVE_PX else 1
     if factor == 2:

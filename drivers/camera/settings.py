@@ -1,17 +1,17 @@
 """Settings of one camera driver, as the composition hands them over (JSON of `CameraDriverSettings`)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated, Literal
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from groundstation.geometry.board import VALID_CODES, Board
-from groundstation.geometry.calibration import intrinsics_from_mapping
+from groundstation.geometry.board import VALID_CODES, Checkerboard
+from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
 
 _Positive = Annotated[float, Field(gt=0)]
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
@@ -32,12 +32,16 @@ _PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554}
 
 @dataclass(frozen=True, slots=True)
 class SourceAddress:
-    """A source taken apart; path: of the stream with its query, of the device, of the file or folder."""
+    """A source taken apart.
+
+    path: of the stream with its query, of the device, of the file or folder; login: "user:password", or "" for none.
+    """
 
     kind: SourceKind
     host: str = ""
     port: int = 0
     path: str = ""
+    login: str = field(default="", repr=False)
 
 
 def parse_source(text: str) -> SourceAddress:
@@ -57,18 +61,13 @@ def parse_source(text: str) -> SourceAddress:
     try:
         port = parts.port or _PORTS[kinds[scheme]]
     except ValueError:
-        raise ValueError("the port is no number from 1 to 65535") from None
+        escape = " (a / in a password is written %2F)" if "@" in rest else ""
+        raise ValueError(f"the port is no number from 1 to 65535{escape}") from None
     if not parts.hostname:
         raise ValueError(f"must name a host, as in {scheme}://192.168.1.50")
     path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
-    return SourceAddress(kinds[scheme], parts.hostname, port, path)
-
-
-def without_password(source: str) -> str:
-    """Return a source's address for messages, without the user and password that it may carry."""
-    scheme, mark, rest = source.partition("://")
-    place, slash, path = rest.partition("/")
-    return f"{scheme}{mark}{place.rpartition('@')[2]}{slash}{path}"
+    login = "" if parts.username is None else f"{unquote(parts.username)}:{unquote(parts.password or '')}"
+    return SourceAddress(kinds[scheme], parts.hostname, port, path, login)
 
 
 def _checked_source(text: str) -> str:
@@ -116,7 +115,7 @@ class TagSettings(_Section):
 
     @model_validator(mode="after")
     def _known(self) -> "TagSettings":
-        Tag(self.dictionary, self.id, self.size_mm)
+        SquareTag(self.dictionary, self.id, self.size_mm)
         return self
 
 
@@ -140,12 +139,12 @@ class MarkerSettings(_Section):
         return self
 
     @property
-    def printed(self) -> Board | Tag:
+    def printed(self) -> Checkerboard | SquareTag:
         """Return its layout."""
         if self.tag is not None:
-            return Tag(self.tag.dictionary, self.tag.id, self.tag.size_mm)
+            return SquareTag(self.tag.dictionary, self.tag.id, self.tag.size_mm)
         assert self.code is not None and self.square_mm is not None
-        return Board(self.code, self.square_mm)
+        return Checkerboard(self.code, self.square_mm)
 
     @property
     def label(self) -> str:

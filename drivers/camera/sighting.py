@@ -16,12 +16,3 @@ class Sighting:
     margin: float
     choice: PoseChoice
     corners: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Notice:
-    """Something about a marker that is wrong and that a person can put right."""
-
-    entity: str
-    text: str
-    remedy: str

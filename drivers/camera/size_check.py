@@ -6,9 +6,10 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-_NS = 1_000_000_000
+from groundstation.time_units import NS_PER_S
+
 _LEAST_DROP_M = 0.5
-_KEPT, _LEAST_SAMPLES, _LEAST_SPAN_NS = 120, 40, 3 * _NS
+_KEPT, _LEAST_SAMPLES, _LEAST_SPAN_NS = 120, 40, 3 * NS_PER_S
 # Errors that do not average out: a height sensor's offset [m], and roll and pitch [rad] times the distance aside.
 _HEIGHT_STD_M, _ATTITUDE_STD_RAD = 0.05, math.radians(2.0)
 _SIGMAS, _LEAST_DEVIATION = 3.0, math.log(1.08)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-_NS = 1_000_000_000
+from groundstation.time_units import NS_PER_S
 
 
 class StreamState(StrEnum):
@@ -48,7 +48,7 @@ class StreamWatch:
 
     def silent_s(self, now_ns: int) -> float:
         """Return for how long nothing has come [s]."""
-        return (now_ns - self.since_ns) / _NS
+        return (now_ns - self.since_ns) / NS_PER_S
 
     def _go(self, state: StreamState, reason: str) -> bool:
         changed = (state, reason) != (self.state, self.reason)

@@ -5,18 +5,16 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera import pose
 from drivers.camera.detect import Window, resized, window_around
 from drivers.camera.dictionaries import dictionary_of
-from drivers.camera.foresight import Prediction
+from drivers.camera.prediction import Prediction
 from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Sighting
+from groundstation.arrays import Array, Image
 from groundstation.geometry.lens import CameraIntrinsics
 
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 GravityOf = Callable[[str], pose.Gravity]
 
 _LIFETIME_NS = 450_000_000
@@ -55,7 +53,7 @@ class TagFinder:
 
     def look(
         self,
-        picture: Picture,
+        picture: Image,
         stamp_ns: int,
         gravity_of: GravityOf,
         predictions: Mapping[str, Prediction | None],
@@ -87,7 +85,7 @@ class TagFinder:
             return prediction.window(shape), prediction.radius_px
         return None, 1.0
 
-    def _everywhere(self, picture: Picture) -> list[tuple[MarkerSettings, Array]]:
+    def _everywhere(self, picture: Image) -> list[tuple[MarkerSettings, Array]]:
         wanted = {(tag.dictionary, tag.id): marker for marker, tag in self._markers}
         window = Window(0, 0, picture.shape[1], picture.shape[0])
         return [
@@ -97,7 +95,7 @@ class TagFinder:
             if (name, number) in wanted
         ]
 
-    def _detect(self, picture: Picture, name: str, window: Window, side: float) -> list[tuple[int, Array]]:
+    def _detect(self, picture: Image, name: str, window: Window, side: float) -> list[tuple[int, Array]]:
         """Return ids and corners (4, 2) [px] of the tags in a window."""
         part = picture[window.top : window.bottom, window.left : window.right]
         enlarged, ratio = resized(part, float(np.clip(_WANTED_PX / max(side, 1.0), 1.0, _MOST_ENLARGEMENT)))

@@ -3,15 +3,13 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.detect import Find, Window, spacing_px, window_around
-from drivers.camera.foresight import Prediction
-from drivers.camera.markers import Reading
+from drivers.camera.markers import BarReading
+from drivers.camera.prediction import Prediction
+from groundstation.arrays import Array
+from groundstation.time_units import NS_PER_S
 
-Array = NDArray[np.float64]
-
-_NS = 1_000_000_000
 _MARGIN_SQUARES = 1.6
 # A window grows with the time since the last detection, for what constant velocity does not foresee.
 _UNREST_PX_S = 120.0
@@ -19,7 +17,7 @@ _MOST_UNREST_PX = 45.0
 _LIFETIME_NS = 450_000_000
 _MOST_MISSES = 5
 # An identity outlives the last sure reading by this much of unbroken tracking.
-_IDENTITY_NS = 2 * _NS
+_IDENTITY_NS = 2 * NS_PER_S
 
 
 # Below this a new board's code has to be read twice: far away, one reading in seventy is wrong with margin > 1.
@@ -50,11 +48,11 @@ class Track:
         """
         if prediction is not None and self.foreseen is not None:
             return np.asarray(self.corners + (prediction.centre - self.foreseen))
-        return np.asarray(self.corners + self.velocity * ((stamp_ns - self.stamp_ns) / _NS))
+        return np.asarray(self.corners + self.velocity * ((stamp_ns - self.stamp_ns) / NS_PER_S))
 
     def window(self, stamp_ns: int, shape: tuple[int, ...], prediction: Prediction | None = None) -> Window | None:
         """Return where to look, or None when that has left the picture."""
-        unrest = min(_MOST_UNREST_PX, _UNREST_PX_S * (stamp_ns - self.stamp_ns) / _NS)
+        unrest = min(_MOST_UNREST_PX, _UNREST_PX_S * (stamp_ns - self.stamp_ns) / NS_PER_S)
         margin = _MARGIN_SQUARES * spacing_px(self.corners) + unrest
         return window_around(self.expected_corners(stamp_ns, prediction), margin, shape)
 
@@ -66,7 +64,7 @@ class Track:
 
     def follow(self, find: Find, stamp_ns: int, prediction: Prediction | None = None) -> None:
         """Take over a new detection."""
-        seconds = (stamp_ns - self.stamp_ns) / _NS
+        seconds = (stamp_ns - self.stamp_ns) / NS_PER_S
         if seconds > 0.0:
             self.velocity = (find.corners - self.corners).mean(axis=0) / seconds
         self.corners, self.stamp_ns, self.misses = find.corners, stamp_ns, 0
@@ -80,7 +78,7 @@ class Track:
         """Return whether it is no longer worth looking for."""
         return self.misses > _MOST_MISSES or now_ns - self.stamp_ns > _LIFETIME_NS
 
-    def identify(self, reading: Reading | None, stamp_ns: int, least_margin: float) -> None:
+    def identify(self, reading: BarReading | None, stamp_ns: int, least_margin: float) -> None:
         """Take in a reading of the bar: a sure one decides, at once or confirmed by a second one.
 
         A sure contradiction leaves the board unknown, and so does a long time without any sure reading.

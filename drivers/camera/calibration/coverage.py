@@ -7,10 +7,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.calibration.judge import View
 from drivers.camera.calibration.pattern import Pattern
-
-Array = NDArray[np.float64]
+from drivers.camera.calibration.view_quality import KeptView
+from groundstation.arrays import Array
 
 _ROWS, _COLUMNS = ("top", "middle", "bottom"), ("left", "centre", "right")
 # The outer regions are narrower: a lens is known least where it bends most.
@@ -37,7 +36,7 @@ class Coverage:
         return (*regions, *self.missing_distances, *self.missing_tilts)
 
 
-def coverage_of(views: list[View], pattern: Pattern, size: tuple[int, int]) -> Coverage:
+def coverage_of(views: list[KeptView], pattern: Pattern, size: tuple[int, int]) -> Coverage:
     """Return what the views of a board cover in pictures of (width, height)."""
     regions = np.zeros((3, 3), dtype=np.int64)
     shares: list[float] = []

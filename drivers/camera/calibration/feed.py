@@ -6,23 +6,25 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from drivers.camera.settings import SourceKind, parse_source, without_password
+from drivers.camera.settings import SourceKind, parse_source
 from drivers.camera.sources.files import FileReader
-from drivers.camera.sources.frames import FrameSource, Grey, Packet
+from drivers.camera.sources.frames import FrameSource, Packet
 from drivers.camera.sources.opening import open_source
+from groundstation.arrays import Image
 from groundstation.bus import clock
-from groundstation.errors import DriverError
+from groundstation.errors import DriverError, without_password
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _POLL_S = 0.2
 PATIENCE_S = 6.0
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class SourcePicture:
     """One picture: its name (of a file, else its number), brightness (h, w), when it came, and its age then [ms]."""
 
     name: str
-    grey: Grey
+    grey: Image
     at_s: float
     age_ms: float = 0.0
 
@@ -32,7 +34,7 @@ class Shot:
         return int(self.grey.shape[1]), int(self.grey.shape[0])
 
 
-def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[Shot]:
+def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[SourcePicture]:
     """Yield pictures: of a file or folder every one, as fast as they are asked for; of a camera always the newest.
 
     size: what a camera of this machine is asked for. A camera never ends; raises DriverError when none comes
@@ -42,7 +44,7 @@ def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[Shot]:
     try:
         address = parse_source(source)
     except ValueError as error:
-        raise DriverError(f"camera source {source}: {error}") from None
+        raise DriverError(f"camera source {without_password(source)}: {error}") from None
     if address.kind is SourceKind.FILE:
         yield from _stored(address.path)
         return
@@ -53,20 +55,20 @@ def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[Shot]:
         opened.close()
 
 
-def _stored(path: str) -> Iterator[Shot]:
+def _stored(path: str) -> Iterator[SourcePicture]:
     reader = FileReader(path)
     count = 0
     try:
         for due_s, name, picture in reader.pictures():
             count += 1
-            yield Shot(name, picture.grey(), due_s)
+            yield SourcePicture(name, picture.grey(), due_s)
     except DriverError as error:
         raise DriverError(f"{path}: {error}") from None
     if not count:
         raise DriverError(f"{path}: there is no picture in it")
 
 
-def _live(source: FrameSource, name: str, patience_s: float) -> Iterator[Shot]:
+def _live(source: FrameSource, name: str, patience_s: float) -> Iterator[SourcePicture]:
     began_ns = last_ns = clock.now_ns()
     broken = 0
     while True:
@@ -75,17 +77,17 @@ def _live(source: FrameSource, name: str, patience_s: float) -> Iterator[Shot]:
         now_ns = clock.now_ns()
         if packet is not None and grey is not None:
             last_ns, broken = now_ns, 0
-            age_ms = (now_ns - packet.arrival_ns) / clock.NS_PER_MS
-            yield Shot(f"{packet.number:05d}", grey, (packet.arrival_ns - began_ns) / clock.NS_PER_S, age_ms)
+            age_ms = (now_ns - packet.arrival_ns) / NS_PER_MS
+            yield SourcePicture(f"{packet.number:05d}", grey, (packet.arrival_ns - began_ns) / NS_PER_S, age_ms)
             last_ns = clock.now_ns()
             continue
         broken += packet is not None
-        if (now_ns - last_ns) / clock.NS_PER_S > patience_s:
+        if (now_ns - last_ns) / NS_PER_S > patience_s:
             why = f"{broken} came that cannot be decoded" if broken else source.detail or "connected, but nothing comes"
             raise DriverError(f"{name}: no picture for {patience_s:g} s ({why})")
 
 
-def _grey(packet: Packet) -> Grey | None:
+def _grey(packet: Packet) -> Image | None:
     if packet.picture is not None:
         return packet.picture.grey()
     try:

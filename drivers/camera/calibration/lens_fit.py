@@ -5,14 +5,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from drivers.camera.calibration.judge import View
 from drivers.camera.calibration.pattern import Pattern
+from drivers.camera.calibration.view_quality import KeptView
+from groundstation.arrays import Array
 from groundstation.errors import DriverError
 from groundstation.geometry.lens import CameraIntrinsics
-
-Array = NDArray[np.float64]
 
 LEAST_VIEWS = 6
 _ROUNDS = 4
@@ -35,7 +33,11 @@ class LensFit:
 
 
 def fit_lens(
-    views: Sequence[View], pattern: Pattern, size: tuple[int, int], keep_all: bool = False, square_pixels: bool = False
+    views: Sequence[KeptView],
+    pattern: Pattern,
+    size: tuple[int, int],
+    keep_all: bool = False,
+    square_pixels: bool = False,
 ) -> LensFit:
     """Return the lens of pictures of (width, height).
 
@@ -65,7 +67,7 @@ def fit_lens(
 
 
 def _fitted(
-    views: list[View], pattern: Pattern, size: tuple[int, int], square_pixels: bool
+    views: list[KeptView], pattern: Pattern, size: tuple[int, int], square_pixels: bool
 ) -> tuple[float, Array, Array, Array, Array]:
     """Return rms, camera matrix, distortion (5), standard deviations (9) and rms by view."""
     objects = [pattern.points.astype(np.float32)] * len(views)

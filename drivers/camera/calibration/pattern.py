@@ -5,14 +5,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.detect import refined
 from drivers.camera.search import search
+from groundstation.arrays import Array, Image
 from groundstation.geometry import board as marker
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 MARKER = "skein"
 _FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
@@ -46,7 +43,7 @@ class Pattern:
         """Return what an operator calls it."""
         return "marker" if self.is_marker else f"{self.columns}x{self.rows} board"
 
-    def corners(self, picture: Picture) -> Array | None:
+    def corners(self, picture: Image) -> Array | None:
         """Return its corners (n, 2) [px] to fractions of a pixel, or None where it is not whole in the picture."""
         if self.is_marker:
             finds = search(picture, [])

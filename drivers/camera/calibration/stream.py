@@ -12,7 +12,7 @@ _MOST_VIEWERS = 4
 _PAUSE_S = 1.0
 
 
-class Stream:
+class PictureServer:
     """Serves the newest picture to each viewer until it is closed; `show` never waits for one."""
 
     def __init__(self, port: int) -> None:

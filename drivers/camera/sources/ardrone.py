@@ -6,18 +6,19 @@ fight over their sequence numbers.
 
 from collections import Counter
 
-from drivers.ardrone.wire.pave import Frame, FrameReader, FrameType
-from drivers.camera.sources.drain import Decoder, Drain
+from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
-from drivers.camera.sources.settled import SettledClock
+from drivers.camera.sources.jitter_filter import SettledClock
+from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from drivers.camera.sources.tcp import Line
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.time_units import NS_PER_MS
 
 PORT = 5555
 _READ_BYTES = 1 << 18
-# WIRE (AR.Drone sheet 6): codecs of PaVE frames.
+# WIRE (docs/reference/ardrone.md 6): codecs of PaVE frames.
 _CODECS = {1: "VLIB (AR.Drone 1)", 2: "P264 (AR.Drone 1)", 3: "MPEG-4.2"}
 _AVC = 4
 
@@ -27,10 +28,10 @@ class Assembly:
 
     def __init__(self) -> None:
         self._clock = SettledClock()
-        self._slices: list[Frame] = []
-        self._last: Frame | None = None
+        self._slices: list[PaveFrame] = []
+        self._last: PaveFrame | None = None
 
-    def units(self, frames: list[Frame], arrival_ns: int) -> list[Unit]:
+    def units(self, frames: list[PaveFrame], arrival_ns: int) -> list[Unit]:
         """Return the access units that these frames complete.
 
         Raises DriverError for a codec that cannot be decoded, naming it.
@@ -38,11 +39,11 @@ class Assembly:
         whole = [slices for frame in frames if frame.payload and (slices := self._joined(frame))]
         if not whole:
             return []
-        sent_ns = [slices[0].timestamp_ms * clock.NS_PER_MS for slices in whole]
+        sent_ns = [slices[0].timestamp_ms * NS_PER_MS for slices in whole]
         settled_ns = self._clock.settle(sent_ns, arrival_ns)
         return [self._unit(slices, arrival_ns, when) for slices, when in zip(whole, settled_ns, strict=True)]
 
-    def _joined(self, frame: Frame) -> list[Frame]:
+    def _joined(self, frame: PaveFrame) -> list[PaveFrame]:
         """Return the slices of the picture that this frame completes, or nothing."""
         if frame.codec != _AVC:
             named = _CODECS.get(frame.codec, f"codec {frame.codec}")
@@ -55,7 +56,7 @@ class Assembly:
         done, self._slices = self._slices, []
         return done
 
-    def _unit(self, slices: list[Frame], arrival_ns: int, settled_ns: int) -> Unit:
+    def _unit(self, slices: list[PaveFrame], arrival_ns: int, settled_ns: int) -> Unit:
         first, last = slices[0], self._last
         complete = [part.slice_index for part in slices] == list(range(first.slices))
         follows = complete and last is not None and _is_next(last, first)
@@ -64,7 +65,7 @@ class Assembly:
         return Unit(b"".join(part.payload for part in slices), arrival_ns, settled_ns, starts, follows)
 
 
-def _is_next(last: Frame, frame: Frame) -> bool:
+def _is_next(last: PaveFrame, frame: PaveFrame) -> bool:
     same = (last.width, last.height, last.stream) == (frame.width, frame.height, frame.stream)
     return same and frame.number == last.number + 1
 
@@ -76,7 +77,7 @@ class ArDroneReader:
         self._line = Line(host, port)
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
-        self.decoder: Decoder | None = H264Decoder(self.rejected)
+        self.decoder: PictureDecoder | None = H264Decoder(self.rejected)
 
     def interrupt(self) -> None:
         """Make `read` return."""

@@ -8,13 +8,14 @@ from collections.abc import Callable, Mapping
 
 import av
 
-from drivers.camera.sources.drain import Decoder, Drain
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
+from drivers.camera.sources.jitter_filter import SettledClock
 from drivers.camera.sources.raw import RawDecoder
-from drivers.camera.sources.settled import SettledClock
+from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.time_units import NS_PER_S
 
 _OPEN_LIMIT_S = 5.0
 _READ_LIMIT_S = 2.0
@@ -28,7 +29,7 @@ class ContainerReader:
     def __init__(self, address: str, name: str, choices: tuple[Choice, ...], form: str | None = None) -> None:
         self.name = name
         self.rejected: Counter[str] = Counter()
-        self.decoder: Decoder | None = None
+        self.decoder: PictureDecoder | None = None
         self._address, self._choices, self._form = address, choices, form
 
     def interrupt(self) -> None:
@@ -87,7 +88,7 @@ def _units(
     arrival_ns = clock.now_ns()
     settled_ns = arrival_ns
     if packet.pts is not None and packet.time_base is not None:
-        (settled_ns,) = settled.settle([round(packet.pts * packet.time_base * clock.NS_PER_S)], arrival_ns)
+        (settled_ns,) = settled.settle([round(packet.pts * packet.time_base * NS_PER_S)], arrival_ns)
     data = prepared(bytes(packet), packet.is_keyframe)
     return [Unit(data, arrival_ns, settled_ns, starts=packet.is_keyframe, follows=not packet.is_corrupt)]
 

@@ -8,12 +8,13 @@ import av
 import cv2
 import numpy as np
 
-from drivers.camera.sources.drain import Decoder, Drain, EndOfStreamError
 from drivers.camera.sources.frames import Matrix, Picture, Unit
 from drivers.camera.sources.h264 import VideoPicture
 from drivers.camera.sources.raw import Decoded
+from drivers.camera.sources.reader_thread import Drain, EndOfStreamError, PictureDecoder
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.time_units import NS_PER_S
 
 _FOLDER_FPS = 5.0
 _SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp"})
@@ -26,7 +27,7 @@ class FileReader:
         self._path = Path(path)
         self.name = self._path.name
         self.rejected: Counter[str] = Counter()
-        self.decoder: Decoder | None = Decoded()
+        self.decoder: PictureDecoder | None = Decoded()
 
     def interrupt(self) -> None:
         """Do nothing: a file never keeps its reader waiting."""
@@ -41,8 +42,8 @@ class FileReader:
         """Hand over pictures, each when it is due; raises EndOfStreamError after the last."""
         start_ns, count = clock.now_ns(), 0
         for due_s, _, picture in self.pictures():
-            due_ns = start_ns + round(due_s * clock.NS_PER_S)
-            if drain.wait(max(0.0, (due_ns - clock.now_ns()) / clock.NS_PER_S)):
+            due_ns = start_ns + round(due_s * NS_PER_S)
+            if drain.wait(max(0.0, (due_ns - clock.now_ns()) / NS_PER_S)):
                 return
             drain.opened()
             drain.keep([Unit(b"", clock.now_ns(), due_ns, picture=picture)])

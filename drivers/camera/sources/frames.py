@@ -8,14 +8,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Grey = NDArray[np.uint8]
+from groundstation.arrays import Image
+
 _JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
 
 
 class Picture(Protocol):
     """A picture that a source had to decode itself."""
 
-    def grey(self) -> Grey:
+    def grey(self) -> Image:
         """Return its brightness (h, w)."""
 
     def jpeg(self) -> bytes:
@@ -28,7 +29,7 @@ class Matrix:
 
     pixels: NDArray[np.uint8]
 
-    def grey(self) -> Grey:
+    def grey(self) -> Image:
         """Return its brightness (h, w)."""
         if self.pixels.ndim == 2:
             return self.pixels

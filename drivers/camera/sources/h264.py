@@ -8,7 +8,8 @@ import av
 import numpy as np
 from av.codec.context import Flags
 
-from drivers.camera.sources.frames import Grey, Matrix, Picture, Unit
+from drivers.camera.sources.frames import Matrix, Picture, Unit
+from groundstation.arrays import Image
 
 # Larger than any camera that we know; ffmpeg refuses a stream that claims more before it takes the memory.
 _MOST_PIXELS = 4096 * 2304
@@ -22,7 +23,7 @@ class VideoPicture:
 
     frame: av.VideoFrame
 
-    def grey(self) -> Grey:
+    def grey(self) -> Image:
         """Return its brightness (h, w) as the stream carries it."""
         if not self.frame.format.name.startswith(_PLANAR):
             return np.asarray(self.frame.to_ndarray(format="gray"), dtype=np.uint8)

@@ -1,11 +1,12 @@
 """MJPEG over HTTP, as network cameras send it (`http://host:port/path`)."""
 
 import socket
+from base64 import b64encode
 from collections import Counter
 
 from drivers.camera.multipart import MultipartParser, boundary_from_head
-from drivers.camera.sources.drain import Decoder, Drain
 from drivers.camera.sources.frames import Unit
+from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from drivers.camera.sources.tcp import Line
 from groundstation.bus import clock
 from groundstation.errors import DriverError
@@ -15,15 +16,18 @@ _MAX_HEAD_BYTES = 8192
 
 
 class MjpegReader:
-    """Asks for a stream and cuts it into JPEGs."""
+    """Asks for a stream and cuts it into JPEGs; login: "user:password", or "" where anybody may look."""
 
-    decoder: Decoder | None = None
+    decoder: PictureDecoder | None = None
 
-    def __init__(self, host: str, port: int, path: str) -> None:
+    def __init__(self, host: str, port: int, path: str, login: str = "") -> None:
         self._line = Line(host, port)
-        self._path = path
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
+        request = f"GET {path} HTTP/1.0\r\nHost: {self.name}\r\nAccept: multipart/x-mixed-replace\r\n"
+        # WIRE (RFC 7617): sent with the first request; a camera that wants Digest answers 401 all the same.
+        secret = f"Authorization: Basic {b64encode(login.encode()).decode()}\r\n" if login else ""
+        self._request = f"{request}{secret}\r\n".encode("ascii", "replace")
 
     def interrupt(self) -> None:
         """Make `read` return."""
@@ -32,8 +36,7 @@ class MjpegReader:
     def read(self, drain: Drain) -> None:
         """Hand over pictures until told to stop."""
         with self._line.open() as connection:
-            request = f"GET {self._path} HTTP/1.0\r\nHost: {self.name}\r\nAccept: multipart/x-mixed-replace\r\n\r\n"
-            connection.sendall(request.encode("ascii", "replace"))
+            connection.sendall(self._request)
             boundary, data = _read_head(connection)
             parser = MultipartParser(boundary)
             drain.opened()

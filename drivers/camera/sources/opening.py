@@ -3,11 +3,11 @@
 from drivers.camera.settings import SourceAddress, SourceKind, parse_source
 from drivers.camera.sources.ardrone import ArDroneReader
 from drivers.camera.sources.container import device, rtsp
-from drivers.camera.sources.drain import Drain, Reader
 from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import FrameSource
 from drivers.camera.sources.mjpeg import MjpegReader
-from groundstation.errors import DriverError
+from drivers.camera.sources.reader_thread import Drain, Reader
+from groundstation.errors import DriverError, without_password
 
 
 def open_source(source: str, size: tuple[int, int] | None = None) -> FrameSource:
@@ -18,13 +18,13 @@ def open_source(source: str, size: tuple[int, int] | None = None) -> FrameSource
     try:
         return Drain(_reader(parse_source(source), source, size))
     except ValueError as error:
-        raise DriverError(f"camera source {source}: {error}") from None
+        raise DriverError(f"camera source {without_password(source)}: {error}") from None
 
 
 def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -> Reader:
     match address.kind:
         case SourceKind.HTTP:
-            return MjpegReader(address.host, address.port, address.path)
+            return MjpegReader(address.host, address.port, address.path, address.login)
         case SourceKind.ARDRONE:
             return ArDroneReader(address.host, address.port)
         case SourceKind.RTSP:

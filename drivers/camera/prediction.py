@@ -5,17 +5,16 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera import convert
 from drivers.camera.detect import Window, window_around
 from drivers.camera.settings import MarkerKind, MarkerSettings, MountSettings
+from groundstation.arrays import Array
 from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import rotation_from_euler, rotation_z
 
-Array = NDArray[np.float64]
 Attitude = tuple[float, float]
 
 # Estimates at 50 Hz; a picture is exposed up to 0.5 s before it is looked at.

@@ -9,18 +9,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from drivers.camera.calibration.marks import Steady, flat_points
+from drivers.camera.calibration.static_markers import Steady, flat_points
 from drivers.camera.pose import planar_poses
+from groundstation.arrays import Array
 from groundstation.errors import DriverError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import rotation_z
-
-Array = NDArray[np.float64]
 
 _YAW_STD_RAD = math.radians(1.0)
 _FREE_YAW_STD_RAD = math.pi

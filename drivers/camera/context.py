@@ -4,8 +4,8 @@ import math
 
 from drivers.camera import convert
 from drivers.camera.attitudes import AttitudeHistory
-from drivers.camera.foresight import Attitude, Foresight, Predictions
 from drivers.camera.pose import Gravity
+from drivers.camera.prediction import Attitude, Foresight, Predictions
 from drivers.camera.settings import CameraDriverSettings, MarkerKind
 from groundstation.bus import clock
 from groundstation.bus.api import Bus

@@ -5,19 +5,17 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.calibration import annotate
-from drivers.camera.calibration.feed import Shot
+from drivers.camera.calibration.feed import SourcePicture
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.pose import Gravity, PlanarPose, planar_poses
 from drivers.camera.settings import DetectorSettings, MarkerSettings
+from groundstation.arrays import Array, Image
 from groundstation.geometry import board as marker
 from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.time_units import NS_PER_S
 
-Array = NDArray[np.float64]
-
-_NS = 1_000_000_000
 _SEARCH_RATE_HZ = 2.0
 # Nobody knows how this camera hangs: what is assumed of "down" must not choose between poses here.
 _NOWHERE = Gravity(np.eye(3), 0.0, 0.0, known=False)
@@ -43,11 +41,11 @@ class Marked:
 class Look:
     """One picture: what was found, the CPU time that it took [ms], and the picture with all of it drawn in."""
 
-    shot: Shot
+    shot: SourcePicture
     marked: tuple[Marked, ...]
     unread: int
     cpu_ms: float
-    picture: annotate.Canvas
+    picture: Image
 
     @property
     def text(self) -> str:
@@ -57,7 +55,7 @@ class Look:
         return f"{self.shot.name}: {', '.join(found) or 'nothing found'}; {self.cpu_ms:.1f} ms, {_age(self.shot)}"
 
 
-class Viewer:
+class DetectorPreview:
     """Runs the detector over pictures with every code expected.
 
     lens: None for a camera that is not calibrated: markers are found, but have no distance.
@@ -68,15 +66,15 @@ class Viewer:
         guess = CameraIntrinsics(width, height, width, width, (width - 1) / 2, (height - 1) / 2)
         self._lens, self._known = lens or guess, lens is not None
         self._square_m = square_mm / 1000.0
-        self._points = marker.Board(0, square_mm).corners()
+        self._points = marker.Checkerboard(0, square_mm).corners()
         expected = [MarkerSettings(entity=f"m{code}", code=code, square_mm=square_mm) for code in marker.VALID_CODES]
         # A lens that is only guessed leaves residuals that are no fault of a board.
         settings = DetectorSettings() if lens is not None else DetectorSettings(max_residual_px=20.0)
         self._pipeline = Pipeline(self._lens, tuple(expected), settings, _SEARCH_RATE_HZ)
 
-    def look(self, shot: Shot) -> Look:
+    def look(self, shot: SourcePicture) -> Look:
         """Return what is in a picture."""
-        stamp_ns = round(shot.at_s * _NS)
+        stamp_ns = round(shot.at_s * NS_PER_S)
         windows = self._pipeline.windows(stamp_ns, shot.grey.shape)
         began_s = time.process_time()
         unread = self._pipeline.counts["unknown"]
@@ -103,7 +101,7 @@ class Viewer:
         residual = math.sqrt(best.squared_error / (2 * len(corners) - 6)) if best is not None else math.nan
         return Marked(code, margin, corners, best, residual)
 
-    def _draw(self, drawn: annotate.Canvas, one: Marked) -> None:
+    def _draw(self, drawn: Image, one: Marked) -> None:
         annotate.dots(drawn, one.corners, annotate.GOOD)
         if one.pose is not None:
             annotate.axes(drawn, one.pose.rotation, one.pose.translation, 2 * self._square_m, self._lens)
@@ -115,5 +113,5 @@ def _range(one: Marked) -> str:
     return f"at {one.range_m:.2f} m" if one.pose is not None else "somewhere"
 
 
-def _age(shot: Shot) -> str:
+def _age(shot: SourcePicture) -> str:
     return f"{shot.age_ms:.0f} ms after it came"

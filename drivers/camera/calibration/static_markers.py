@@ -5,15 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.markers import read_bar
 from drivers.camera.search import search
+from groundstation.arrays import Array, Image
 from groundstation.geometry import board as marker
 from groundstation.geometry.lens import CameraIntrinsics
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 _MOST_BOARDS = 16
 _SURE = 1.0
@@ -22,7 +19,7 @@ _STILL_PX = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class MarkerReading:
     """A marker in one picture: its code (None: not sure), margin of the reading, corners (12, 2) [px]."""
 
     code: int | None
@@ -40,14 +37,14 @@ class Steady:
     moved: bool
 
 
-def markers_in(picture: Picture, lens: CameraIntrinsics) -> list[Seen]:
+def markers_in(picture: Image, lens: CameraIntrinsics) -> list[MarkerReading]:
     """Return all markers of ours in a picture, the unreadable ones without a code."""
     seen = []
     for find in search(picture, [], _MOST_BOARDS):
         reading = read_bar(picture, find, lens)
         sure = reading is not None and reading.is_sure(_SURE)
         code = reading.code if reading is not None and sure else None
-        seen.append(Seen(code, reading.margin if reading is not None else 0.0, find.corners))
+        seen.append(MarkerReading(code, reading.margin if reading is not None else 0.0, find.corners))
     return seen
 
 
@@ -61,7 +58,7 @@ class Gathering:
         self.unread = 0
         self.doubled: set[int] = set()
 
-    def take(self, picture: Picture) -> list[Seen]:
+    def take(self, picture: Image) -> list[MarkerReading]:
         """Take in a picture; returns what is in it."""
         seen = markers_in(picture, self._lens)
         self.pictures += 1
@@ -88,4 +85,4 @@ class Gathering:
 
 def flat_points(square_mm: float) -> Array:
     """Return a marker's corners (12, 3) [m; marker frame]."""
-    return marker.Board(0, square_mm).corners()
+    return marker.Checkerboard(0, square_mm).corners()

@@ -23,7 +23,7 @@ class EndOfStreamError(DriverError):
     """A source that has given all it has: it is not opened again."""
 
 
-class Decoder(Protocol):
+class PictureDecoder(Protocol):
     """Turns units into pictures; needs_all: it has to see every unit, in order, and they make up a video."""
 
     needs_all: bool
@@ -36,7 +36,7 @@ class Reader(Protocol):
     """One kind of source."""
 
     name: str
-    decoder: Decoder | None
+    decoder: PictureDecoder | None
     rejected: Counter[str]
 
     def read(self, drain: "Drain") -> None:

@@ -6,12 +6,9 @@ from enum import StrEnum
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera.calibration.pattern import Pattern
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from groundstation.arrays import Array, Image
 
 # From dark to bright within so many pixels: measured 2.5 to 3.5 on sharp photographs, 8 with 3 px of blur.
 _BLURRED_PX = 5.0
@@ -34,7 +31,7 @@ class Flaw(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class KeptView:
     """A kept picture: its name, and the corners (n, 2) [px] in it."""
 
     name: str
@@ -46,18 +43,18 @@ class Judge:
 
     def __init__(self, pattern: Pattern, size: tuple[int, int]) -> None:
         self._pattern, self._size = pattern, size
-        self.views: list[View] = []
+        self.views: list[KeptView] = []
         self.flaws: Counter[Flaw] = Counter()
         self._shapes: Counter[tuple[int, int]] = Counter()
 
-    def look(self, name: str, picture: Picture) -> tuple[Flaw | None, Array | None]:
+    def look(self, name: str, picture: Image) -> tuple[Flaw | None, Array | None]:
         """Return the flaw (None: the picture was kept), and the corners that were found."""
         corners = self._pattern.corners(picture)
         flaw = self._without_board(picture) if corners is None else self._flaw_of(picture, corners)
         if flaw is not None:
             self.flaws[flaw] += 1
         elif corners is not None:
-            self.views.append(View(name, corners))
+            self.views.append(KeptView(name, corners))
         return flaw, corners
 
     @property
@@ -66,7 +63,7 @@ class Judge:
         shape, count = self._shapes.most_common(1)[0] if self._shapes else ((0, 0), 0)
         return f"{shape[0]}x{shape[1]}" if count >= max(_LEAST_SHAPES, self._shapes.total() / 3) else ""
 
-    def _flaw_of(self, picture: Picture, corners: Array) -> Flaw | None:
+    def _flaw_of(self, picture: Image, corners: Array) -> Flaw | None:
         if self._pattern.spacing_px(corners) < _LEAST_SPACING_PX:
             return Flaw.SMALL
         if self._edge_px(picture, corners) > _BLURRED_PX:
@@ -74,7 +71,7 @@ class Judge:
         moved = (np.hypot(*(corners - view.corners).T).mean() for view in self.views)
         return Flaw.SIMILAR if min(moved, default=np.inf) < _SIMILAR_SHARE * self._size[0] else None
 
-    def _edge_px(self, picture: Picture, corners: Array) -> float:
+    def _edge_px(self, picture: Image, corners: Array) -> float:
         shape = (self._pattern.columns, self._pattern.rows)
         points = corners.astype(np.float32).reshape(-1, 1, 2)
         try:
@@ -82,7 +79,7 @@ class Judge:
         except cv2.error:  # squares at the border: nothing to measure an edge on
             return 0.0
 
-    def _without_board(self, picture: Picture) -> Flaw:
+    def _without_board(self, picture: Image) -> Flaw:
         """Say what there is instead: part of a board at the border, or a board of another size."""
         if self._pattern.is_marker:
             return Flaw.NO_BOARD

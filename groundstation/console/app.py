@@ -12,12 +12,12 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from groundstation.console.board import Board
-from groundstation.console.gate import Gate
+from groundstation.console.access import Gate
 from groundstation.console.pages import StaticFile
 from groundstation.console.protocol import Hello, decode
 from groundstation.console.session import Sessions
-from groundstation.console.viewer import Viewer
+from groundstation.console.snapshot import Snapshot
+from groundstation.console.viewer import PageConnection
 from groundstation.errors import MessageError
 
 MAX_VIEWERS = 100
@@ -36,7 +36,7 @@ class ConsoleApp:
         self,
         pages: dict[str, StaticFile],
         token: str,
-        board: Board,
+        board: Snapshot,
         sessions: Sessions,
         seed: Callable[[int], str],
         clock: Callable[[], int],
@@ -71,7 +71,7 @@ class ConsoleApp:
             with contextlib.suppress(*_GONE):
                 await socket.close(_CLOSE_FULL, f"{MAX_VIEWERS} viewers are connected already")
             return
-        viewer = Viewer(next(self._numbers), self._board, socket.send_text, socket.send_bytes, self._clock)
+        viewer = PageConnection(next(self._numbers), self._board, socket.send_text, socket.send_bytes, self._clock)
         self._sessions.add(viewer)
         if first is not None:
             self._sessions.handle(viewer, first)
@@ -99,7 +99,7 @@ class ConsoleApp:
             self._asked -= 1
         return message if isinstance(message, Hello) and self._sessions.is_operators(message) else None
 
-    async def _listen(self, socket: WebSocket, viewer: Viewer) -> str:
+    async def _listen(self, socket: WebSocket, viewer: PageConnection) -> str:
         """Obey the page until it goes; returns why it must go, if it must."""
         while True:
             try:
@@ -118,7 +118,7 @@ class ConsoleApp:
         self.refused[reason] += 1
         return reason
 
-    async def _farewell(self, socket: WebSocket, viewer: Viewer, reason: object) -> None:
+    async def _farewell(self, socket: WebSocket, viewer: PageConnection, reason: object) -> None:
         try:
             if isinstance(reason, str):
                 await socket.close(_CLOSE_POLICY, f"message refused: {reason}")

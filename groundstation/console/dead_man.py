@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from groundstation.bus.messages import Verb
+from groundstation.time_units import NS_PER_S
 
-_NS = 1_000_000_000
-_LAND_AFTER_NS = 5 * _NS
+_LAND_AFTER_NS = 5 * NS_PER_S
 
 
 class Grip(StrEnum):

@@ -11,7 +11,7 @@ _TYPES = {
     "svg": "image/svg+xml",
     "txt": "text/plain; charset=utf-8",
 }
-_TOKEN = b"@@TOKEN@@"
+_TOKEN, _RUN = b"@@TOKEN@@", b"@@RUN@@"
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,12 @@ class StaticFile:
     media_type: str
 
 
-def load_pages(token: str) -> dict[str, StaticFile]:
-    """Return all files by their path on the server; the token for commands is written into the page."""
+def load_pages(token: str, run: str) -> dict[str, StaticFile]:
+    """Return all files by their path on the server; the page holds the token for commands and the run's identity."""
     files = dict(_walk(resources.files("groundstation.console") / "static", ""))
     index = files.pop("/index.html")
-    files["/"] = StaticFile(index.content.replace(_TOKEN, token.encode()), index.media_type)
+    content = index.content.replace(_TOKEN, token.encode()).replace(_RUN, run.encode())
+    files["/"] = StaticFile(content, index.media_type)
     return files
 
 

@@ -4,33 +4,43 @@ import asyncio
 
 import msgspec
 
+from groundstation.bus.clock import now_ns
 from groundstation.bus.messages import Severity
-from groundstation.console.scene import scene_from_field
-from groundstation.console.section import ConsoleSection, port_of
-from groundstation.console.server import ConsoleServer, claim_port
+from groundstation.console.room import scene_from_field
+from groundstation.console.section import ConsoleSection, run_id
+from groundstation.console.server import HOST, ConsoleServer, claim_port
 from groundstation.errors import GroundStationError
 from groundstation.monitor.state import cast_from_field
 from groundstation.process.child import Child
+from groundstation.process.ports import holder_of
+
+# The signal to stop may overtake the event that the run ends.
+_OVERTAKEN_NS = 500_000_000
 
 
 def run(child: Child) -> int:
     """Serve the page until asked to stop or until the supervisor is gone."""
     try:
         section = msgspec.json.decode(child.section, type=ConsoleSection)
-        field = msgspec.json.decode(section.field)
     except msgspec.DecodeError as error:
         raise GroundStationError(f"the console's section is malformed: {error}") from error
-    wanted = port_of(section.field)
+    field = section.field
+    wanted = field.console.port
     listener = claim_port(wanted)
-    server = ConsoleServer(
-        child.bus, cast_from_field(section.field), scene_from_field(field, section.truth), field, listener
-    )
+    cast, scene = cast_from_field(field), scene_from_field(field, section.truth)
+    server = ConsoleServer(child.bus, cast, scene, field, listener, run_id(section.run_dir))
     _announce(child, server.url, listener.getsockname()[1], wanted)
 
+    leaves_ns = 0
+
     def go_on(turns: int, late: int) -> bool:
+        nonlocal leaves_ns
         child.beat()
         child.tick_status(turns, late, server.overflowed)
-        return not child.stop_requested and child.supervisor_alive
+        if not child.stop_requested or not child.supervisor_alive:
+            return child.supervisor_alive
+        leaves_ns = leaves_ns or now_ns() + _OVERTAKEN_NS
+        return not server.ended and now_ns() < leaves_ns
 
     asyncio.run(server.serve(go_on))
     return 0
@@ -41,5 +51,5 @@ def _announce(child: Child, url: str, port: int, wanted: int) -> None:
     if port == wanted:
         child.event(Severity.INFO, f"console at {url}")
     else:
-        remedy = "another run may use it; set console.port to choose"
-        child.event(Severity.WARNING, f"port {wanted} is in use: console at {url}", remedy)
+        text = f"port {wanted} is taken by {holder_of(HOST, wanted)}: console at {url}"
+        child.event(Severity.WARNING, text, "set console.port to choose another one")

@@ -24,12 +24,18 @@ class Hello(FromPage, frozen=True):
     client: Annotated[str, msgspec.Meta(min_length=4, max_length=40)]
 
 
-class Order(FromPage, frozen=True):
-    """A command to the drones named (none: all); at_ms: the server's time when it was given; ref: the page's own id."""
+class CommandRequest(FromPage, frozen=True, tag="order"):
+    """A command to the drones named (none: all), given for the run that the page then showed.
+
+    at_ms: the server's time when it was given, as the page reckons it; age_ms: for how long the page has kept it;
+    ref: the page's own id.
+    """
 
     verb: Verb
     drones: Names
+    run: Annotated[str, msgspec.Meta(max_length=40)]
     at_ms: float
+    age_ms: Annotated[float, msgspec.Meta(ge=0)]
     ref: Annotated[str, msgspec.Meta(max_length=40)] = ""
 
 
@@ -41,7 +47,7 @@ class Release(FromPage, frozen=True):
     """I am not the operator any more."""
 
 
-class Seen(FromPage, frozen=True):
+class FramesHandled(FromPage, frozen=True, tag="seen"):
     """Frames up to this number have been handled."""
 
     seq: int
@@ -93,14 +99,14 @@ class Seek(FromPage, frozen=True):
     at_ms: Annotated[float, msgspec.Meta(ge=0, le=1e13)]
 
 
-class Step(FromPage, frozen=True):
+class StepReplay(FromPage, frozen=True, tag="step"):
     """Takes a replay so many ticks of the tracker forwards, or backwards if negative, and stops it there."""
 
     ticks: Annotated[int, msgspec.Meta(ge=-50, le=50)]
 
 
-Playing = Play | Speed | Seek | Step
-PageMessage = Hello | Order | TakeOver | Release | Seen | Watch | Drive | Place | FollowPath | Playing
+Playing = Play | Speed | Seek | StepReplay
+PageMessage = Hello | CommandRequest | TakeOver | Release | FramesHandled | Watch | Drive | Place | FollowPath | Playing
 _decoder: msgspec.json.Decoder[PageMessage] = msgspec.json.Decoder(PageMessage)
 
 

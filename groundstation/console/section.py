@@ -1,25 +1,24 @@
 """What the console is handed at its start."""
 
+import hashlib
+from pathlib import Path
+
 import msgspec
+
+from groundstation.field.resolved import ResolvedField
 
 
 class ConsoleSection(msgspec.Struct, frozen=True):
-    """The resolved field as JSON, the run folder, the tracker's first epoch, and whether ground truth is to be had."""
+    """The resolved field, the run folder, and whether ground truth is to be had."""
 
-    field: msgspec.Raw
-    run_dir: str = ""
-    epoch: int = 0
+    field: ResolvedField
+    run_dir: str
     truth: bool = False
 
 
-class _Console(msgspec.Struct, frozen=True):
-    port: int = 8765
+def run_id(run_dir: str) -> str:
+    """Return the identity of a run: a console that is restarted in it has the same one, no other run does.
 
-
-class _Field(msgspec.Struct, frozen=True):
-    console: _Console = _Console()
-
-
-def port_of(field: bytes) -> int:
-    """Return the port that the field asks for."""
-    return msgspec.json.decode(field, type=_Field).console.port
+    Each run makes a folder of its own, and the supervisor hands that folder to every start of a process.
+    """
+    return hashlib.sha256(str(Path(run_dir).absolute()).encode()).hexdigest()[:16]

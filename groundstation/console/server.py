@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import secrets
 import socket
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import msgspec
@@ -12,7 +12,7 @@ import uvicorn
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Received
-from groundstation.bus.messages import Command, CommandAck, Lease, RelativeObservation
+from groundstation.bus.messages import RUN, Command, CommandAck, Event, Lease, RelativeObservation
 from groundstation.bus.topics import (
     CAMERA_STATUS,
     COMMAND,
@@ -31,20 +31,22 @@ from groundstation.bus.topics import (
     VEHICLE_STATUS,
 )
 from groundstation.console.app import ConsoleApp
-from groundstation.console.board import Board
-from groundstation.console.orders import OrderDesk
+from groundstation.console.commands import OrderDesk
 from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
 from groundstation.console.player import Player
-from groundstation.console.scene import lenses_of
+from groundstation.console.room import lenses_of
 from groundstation.console.session import Sessions
+from groundstation.console.snapshot import Snapshot
 from groundstation.console.state import ConsoleState
 from groundstation.errors import GroundStationError
+from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.state import Cast
 
 RATE_HZ = 20
 HOST = "127.0.0.1"
 _PORTS_TRIED = 10
+_FAREWELL_S = 0.5
 # Small, so that frames wait here, where the newest wins, and not in the kernel.
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
@@ -71,9 +73,10 @@ def claim_port(port: int) -> socket.socket:
 
 
 class ConsoleServer:
-    """Serves one run. `scene`: what does not move; `field`: the resolved field, or {} if it is not known.
+    """Serves one run. `scene`: what does not move; `field`: the resolved field, or None if it is not known.
 
-    player: what replays a recording on the bus, where this is no live run.
+    run: its identity (`section.run_id`), which pages name in their orders; player: what replays a recording on the bus,
+    where this is no live run.
     """
 
     def __init__(
@@ -81,8 +84,9 @@ class ConsoleServer:
         bus: Bus,
         cast: Cast,
         scene: dict[str, Any],
-        field: Mapping[str, Any],
+        field: ResolvedField | None,
         listener: socket.socket,
+        run: str,
         player: Player | None = None,
     ) -> None:
         self._scene = scene
@@ -91,20 +95,26 @@ class ConsoleServer:
         self._lenses = lenses_of(field) if field else {}
         self._now_ns = player.now_ns if player else clock.now_ns
         self.url = f"http://{HOST}:{listener.getsockname()[1]}/"
-        self.board = Board()
+        self.board = Snapshot()
         self.state = ConsoleState(cast, self._now_ns())
         self._pictures = PictureDesk(self._lenses)
         token = secrets.token_urlsafe(24)
         steered = cast.targets if scene["truth"] and player is None else ()
         desk = OrderDesk(bus, tuple(cast.drones))
-        self.sessions = Sessions(bus, desk, token, steered, lambda: self._pictures.frames, player)
-        self.app = ConsoleApp(load_pages(token), token, self.board, self.sessions, self._seed, self._now_ns)
-        self._run = secrets.token_hex(6)
+        self.sessions = Sessions(bus, desk, token, run, steered, lambda: self._pictures.frames, player)
+        self.app = ConsoleApp(load_pages(token, run), token, self.board, self.sessions, self._seed, self._now_ns)
+        self._run = run
+        self._end: Event | None = None
         less_often = (*_LESS_OFTEN, TRUTH) if scene["truth"] else _LESS_OFTEN
         self._newest = bus.subscribe(_NEWEST, newest=True)
         self._less_often = bus.subscribe(less_often, newest=True)
         self._each = bus.subscribe(_EACH, capacity=2048)
         self._images = bus.subscribe((IMAGE,), newest=True)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run was announced to end."""
+        return self._end is not None
 
     @property
     def overflowed(self) -> int:
@@ -133,6 +143,7 @@ class ConsoleServer:
         serving = asyncio.create_task(server.serve(sockets=[self._listener]))
         try:
             await self._turns(go_on, serving)
+            await self._say_farewell()
         finally:
             server.should_exit = True
             await serving
@@ -148,6 +159,14 @@ class ConsoleServer:
                 late += 1
                 due_s = loop.time()
             await asyncio.sleep(due_s - loop.time())
+
+    async def _say_farewell(self) -> None:
+        """Let the viewers know how the run ended before their connections close."""
+        self.turn(self._now_ns())
+        loop, viewers = asyncio.get_running_loop(), self.sessions.viewers
+        give_up_s = loop.time() + _FAREWELL_S
+        while self.ended and loop.time() < give_up_s and any(viewer.is_behind for viewer in viewers.values()):
+            await asyncio.sleep(0.01)
 
     def turn(self, now_ns: int) -> None:
         """Take in what has arrived and tell the viewers."""
@@ -204,6 +223,8 @@ class ConsoleServer:
         self.board.put("refused_pictures", self._pictures.refused)
         self.board.put("orders", self.sessions.desk.summary())
         self.board.put("session", self.sessions.summary(now_ns))
+        if self._end is not None:
+            self.board.put("ended", {"text": self._end.text, "severity": self._end.severity})
         if self._player is not None:
             self.board.put("playback", self._player.section())
             self.board.put("passed", self.state.history.take_passed())
@@ -216,6 +237,8 @@ class ConsoleServer:
                 self.sessions.desk.hear_lease(message)
             case RelativeObservation():
                 self._pictures.take_detection(message)
+            case Event() if message.header.entity == RUN and self._player is None:
+                self._end = message
             case _:
                 pass
 

@@ -11,27 +11,28 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import SimCommand
 from groundstation.bus.topics import SIM_COMMAND
-from groundstation.console.helm import Helm
-from groundstation.console.orders import STOPS, OrderDesk
+from groundstation.console.commands import STOPS, OrderDesk
+from groundstation.console.operator_lock import Helm
 from groundstation.console.player import Player
 from groundstation.console.protocol import (
+    CommandRequest,
     Drive,
     FollowPath,
+    FramesHandled,
     Hello,
-    Order,
     PageMessage,
     Place,
     Play,
     Playing,
     Release,
     Seek,
-    Seen,
     Speed,
-    Step,
+    StepReplay,
     TakeOver,
     Watch,
 )
-from groundstation.console.viewer import Viewer
+from groundstation.console.viewer import PageConnection
+from groundstation.time_units import NS_PER_MS
 
 
 def encoded(kind: str, **content: Any) -> str:
@@ -40,14 +41,15 @@ def encoded(kind: str, **content: Any) -> str:
 
 
 def _ref_of(message: PageMessage) -> str:
-    return message.ref if isinstance(message, Order) else ""
+    return message.ref if isinstance(message, CommandRequest) else ""
 
 
 class Sessions:
     """All viewers, the operator among them, and what their pages may do.
 
-    simulated_targets: the bodies that pages may steer, none outside of simulation; pictures: the newest frame of each
-    camera; player: what replays, where this is a replay: then nothing can be commanded.
+    run: the identity of the run, which each order must name; simulated_targets: the bodies that pages may steer, none
+    outside of simulation; pictures: the newest frame of each camera; player: what replays, where this is a replay: then
+    nothing can be commanded.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Sessions:
         bus: Bus,
         desk: OrderDesk,
         token: str,
+        run: str,
         simulated_targets: tuple[str, ...],
         pictures: Callable[[], Mapping[str, bytes]] = dict,
         player: Player | None = None,
@@ -62,18 +65,19 @@ class Sessions:
         self._bus = bus
         self.desk = desk
         self._token = token
+        self._run = run
         self._targets = simulated_targets
         self._newest_pictures = pictures
         self._player = player
         self.helm = Helm()
-        self.viewers: dict[int, Viewer] = {}
+        self.viewers: dict[int, PageConnection] = {}
         self.refused: Counter[str] = Counter()
 
-    def add(self, viewer: Viewer) -> None:
+    def add(self, viewer: PageConnection) -> None:
         """A viewer came."""
         self.viewers[viewer.number] = viewer
 
-    def remove(self, viewer: Viewer) -> None:
+    def remove(self, viewer: PageConnection) -> None:
         """A viewer went."""
         self.viewers.pop(viewer.number, None)
         if viewer.client and not any(other.client == viewer.client for other in self.viewers.values()):
@@ -92,10 +96,10 @@ class Sessions:
             "lease": self.desk.lease_holder(now_ns),
         }
 
-    def handle(self, viewer: Viewer, message: PageMessage) -> None:
+    def handle(self, viewer: PageConnection, message: PageMessage) -> None:
         """Do what a page asks for; what it may not is answered with the reason."""
         match message:
-            case Seen(seq=seq):
+            case FramesHandled(seq=seq):
                 viewer.saw(seq)
             case Watch(cameras=cameras):
                 self._watch(viewer, frozenset(cameras))
@@ -103,11 +107,11 @@ class Sessions:
                 self._greet(viewer, message)
             case _ if not viewer.trusted:
                 self._refuse(viewer, "untrusted", "this page may only look: reload it")
-            case Play() | Speed() | Seek() | Step():
+            case Play() | Speed() | Seek() | StepReplay():
                 self._replay(viewer, message)
             case _ if self._player is not None:
                 self._refuse(viewer, "replay", "this is a replay: nothing here can be commanded", _ref_of(message))
-            case Order():
+            case CommandRequest():
                 self._order(viewer, message)
             case TakeOver():
                 self._take_over(viewer)
@@ -116,13 +120,13 @@ class Sessions:
             case _:
                 self._steer(viewer, message)
 
-    def _watch(self, viewer: Viewer, cameras: frozenset[str]) -> None:
+    def _watch(self, viewer: PageConnection, cameras: frozenset[str]) -> None:
         fresh, viewer.watched = cameras - viewer.watched, cameras
         for camera, frame in self._newest_pictures().items():
             if camera in fresh:
                 viewer.show(camera, frame)
 
-    def _replay(self, viewer: Viewer, message: Playing) -> None:
+    def _replay(self, viewer: PageConnection, message: Playing) -> None:
         if self._player is None:
             self._refuse(viewer, "no_replay", "this is no replay: time goes as it goes")
             return
@@ -133,10 +137,10 @@ class Sessions:
                 self._player.set_speed(factor)
             case Seek(at_ms=at_ms):
                 self._player.seek(round(at_ms * 1e6))
-            case Step(ticks=ticks):
+            case StepReplay(ticks=ticks):
                 self._player.step(ticks)
 
-    def _greet(self, viewer: Viewer, hello: Hello) -> None:
+    def _greet(self, viewer: PageConnection, hello: Hello) -> None:
         viewer.client = hello.client
         viewer.trusted = self._has_token(hello)
         if viewer.trusted:
@@ -148,24 +152,29 @@ class Sessions:
     def _has_token(self, hello: Hello) -> bool:
         return hmac.compare_digest(hello.token.encode(), self._token.encode())
 
-    def _order(self, viewer: Viewer, order: Order) -> None:
+    def _order(self, viewer: PageConnection, order: CommandRequest) -> None:
+        if order.run != self._run:
+            self._refuse(viewer, "other_run", f"{order.verb} was given for another run and was dropped", order.ref)
+            return
         if order.verb not in STOPS:
             if not self.helm.may_start(viewer.client):
                 self._refuse(viewer, "not_operator", f"{self.helm.name} is the operator: take over first", order.ref)
                 return
             self.helm.take(viewer.client, viewer.name)
         now_ns = clock.now_ns()
-        problem = self.desk.give(order.verb, order.drones, viewer.name, order.at_ms, order.ref, now_ns)
+        # A page that slept may reckon the server's time wrongly, and cannot know how long an order waited here.
+        age_ms = max(order.age_ms, now_ns / NS_PER_MS - order.at_ms)
+        problem = self.desk.give(order.verb, order.drones, viewer.name, age_ms, order.ref, now_ns)
         if problem:
             self._refuse(viewer, "order", problem, order.ref)
 
-    def _take_over(self, viewer: Viewer) -> None:
+    def _take_over(self, viewer: PageConnection) -> None:
         replaced = self.helm.take(viewer.client, viewer.name)
         for other in self.viewers.values():
             if replaced and other is not viewer:
                 other.say(encoded("notice", text=f"{viewer.name} has taken over from {replaced}", grave=True, ref=""))
 
-    def _steer(self, viewer: Viewer, message: Drive | Place | FollowPath) -> None:
+    def _steer(self, viewer: PageConnection, message: Drive | Place | FollowPath) -> None:
         if not self._targets:
             self._refuse(viewer, "not_simulated", "the target is real: it cannot be steered from here")
             return
@@ -183,6 +192,6 @@ class Sessions:
                 command = SimCommand(header=header, action="path")
         self._bus.publish(SIM_COMMAND, command)
 
-    def _refuse(self, viewer: Viewer, reason: str, text: str, ref: str = "") -> None:
+    def _refuse(self, viewer: PageConnection, reason: str, text: str, ref: str = "") -> None:
         self.refused[reason] += 1
         viewer.say(encoded("notice", text=text, grave=True, ref=ref))

@@ -5,11 +5,11 @@ from typing import Any
 
 from groundstation.bus import messages as m
 from groundstation.bus.api import Received
-from groundstation.console.board import Board
-from groundstation.console.health import Health
 from groundstation.console.history import History
+from groundstation.console.innovation_statistics import InnovationStatistics
+from groundstation.console.snapshot import Snapshot
 from groundstation.monitor.alarms import alarms_of
-from groundstation.monitor.state import Cast, MonitorState, Seen
+from groundstation.monitor.state import Cast, MonitorState, StampedMessage
 
 _EVENTS = 40
 _ALTERNATIVES = 8
@@ -22,10 +22,10 @@ class ConsoleState:
 
     def __init__(self, cast: Cast, started_ns: int) -> None:
         self.monitor = MonitorState(cast=cast, started_ns=started_ns)
-        self.health = Health()
+        self.health = InnovationStatistics()
         self.history = History(cast.targets)
-        self.setpoints: dict[str, Seen[m.VelocitySetpoint]] = {}
-        self.truth: dict[str, Seen[m.TruthState]] = {}
+        self.setpoints: dict[str, StampedMessage[m.VelocitySetpoint]] = {}
+        self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self._sample: dict[str, Any] | None = None
 
     def ingest(self, received: Iterable[Received]) -> None:
@@ -33,9 +33,9 @@ class ConsoleState:
         for item in received:
             match item.message:
                 case m.VelocitySetpoint() as setpoint:
-                    self.setpoints[item.header.entity] = Seen(item.header.stamp_ns, setpoint)
+                    self.setpoints[item.header.entity] = StampedMessage(item.header.stamp_ns, setpoint)
                 case m.TruthState() as truth:
-                    self.truth[item.header.entity] = Seen(item.header.stamp_ns, truth)
+                    self.truth[item.header.entity] = StampedMessage(item.header.stamp_ns, truth)
                 case m.Innovation() as innovation:
                     self.health.take(innovation)
                 case _:
@@ -51,7 +51,7 @@ class ConsoleState:
         nis = self.health.nis() if self.history.sample_due(now_ns) else None
         self._sample = self.history.step(now_ns, estimate, plan, nis, truth) or self._sample
 
-    def put(self, board: Board, now_ns: int) -> None:
+    def put(self, board: Snapshot, now_ns: int) -> None:
         """Put what changed on the board."""
         board.put("estimate", _estimate(self.monitor.estimate))
         board.put("setpoints", {name: _setpoint(seen) for name, seen in self.setpoints.items()})
@@ -64,7 +64,7 @@ class ConsoleState:
         if board.turn % _SELDOM == 0:
             self.put_seldom(board, now_ns)
 
-    def put_often(self, board: Board) -> None:
+    def put_often(self, board: Snapshot) -> None:
         """Put what changes ten times a second."""
         known = self.monitor
         board.put("vehicles", {name: _vehicle(seen) for name, seen in known.vehicles.items()})
@@ -72,7 +72,7 @@ class ConsoleState:
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [_event(seen) for seen in list(known.events)[-_EVENTS:]])
 
-    def put_seldom(self, board: Board, now_ns: int) -> None:
+    def put_seldom(self, board: Snapshot, now_ns: int) -> None:
         """Put what may be a quarter of a second old."""
         known = self.monitor
         board.put("cameras", {name: _camera(seen) for name, seen in known.cameras.items()})
@@ -82,7 +82,7 @@ class ConsoleState:
         board.put("health", self.health.summary())
 
 
-def _ms(seen: Seen[Any]) -> float:
+def _ms(seen: StampedMessage[Any]) -> float:
     return seen.stamp_ns / 1e6
 
 
@@ -90,7 +90,7 @@ def _rounded(values: Iterable[float], digits: int = 4) -> list[float]:
     return [round(value, digits) for value in values]
 
 
-def _estimate(seen: Seen[m.Estimate] | None) -> dict[str, Any] | None:
+def _estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
     if seen is None:
         return None
     entities = [
@@ -110,7 +110,7 @@ def _estimate(seen: Seen[m.Estimate] | None) -> dict[str, Any] | None:
     return {"at": _ms(seen), "epoch": seen.message.epoch, "entities": entities}
 
 
-def _setpoint(seen: Seen[m.VelocitySetpoint]) -> dict[str, Any]:
+def _setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:
     setpoint = seen.message
     return {
         "at": _ms(seen),
@@ -120,12 +120,12 @@ def _setpoint(seen: Seen[m.VelocitySetpoint]) -> dict[str, Any]:
     }
 
 
-def _truth(seen: Seen[m.TruthState]) -> dict[str, Any]:
+def _truth(seen: StampedMessage[m.TruthState]) -> dict[str, Any]:
     truth = seen.message
     return {"at": _ms(seen), "position": _rounded(truth.position_m, 3), "yaw": round(truth.attitude_rad[2], 4)}
 
 
-def _vehicle(seen: Seen[m.VehicleStatus]) -> dict[str, Any]:
+def _vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
     status = seen.message
     return {
         "at": _ms(seen),
@@ -139,7 +139,7 @@ def _vehicle(seen: Seen[m.VehicleStatus]) -> dict[str, Any]:
     }
 
 
-def _camera(seen: Seen[m.CameraStatus]) -> dict[str, Any]:
+def _camera(seen: StampedMessage[m.CameraStatus]) -> dict[str, Any]:
     status = seen.message
     return {
         "at": _ms(seen),
@@ -150,7 +150,7 @@ def _camera(seen: Seen[m.CameraStatus]) -> dict[str, Any]:
     }
 
 
-def _process(seen: Seen[m.ProcessStatus]) -> dict[str, Any]:
+def _process(seen: StampedMessage[m.ProcessStatus]) -> dict[str, Any]:
     status = seen.message
     late = status.overruns / status.ticks if status.ticks else 0.0
     return {
@@ -162,7 +162,7 @@ def _process(seen: Seen[m.ProcessStatus]) -> dict[str, Any]:
     }
 
 
-def _event(seen: Seen[m.Event]) -> dict[str, Any]:
+def _event(seen: StampedMessage[m.Event]) -> dict[str, Any]:
     event = seen.message
     return {
         "at": _ms(seen),
@@ -173,7 +173,7 @@ def _event(seen: Seen[m.Event]) -> dict[str, Any]:
     }
 
 
-def _plan(seen: Seen[m.Plan] | None) -> dict[str, Any] | None:
+def _plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:
     if seen is None:
         return None
     plan = seen.message

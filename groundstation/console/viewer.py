@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-from groundstation.console.board import Board
+from groundstation.console.snapshot import Snapshot
 
 # Frames that may be on the way unanswered; the page answers each fourth. 12 frames are 0.6 s.
 WINDOW = 12
@@ -14,7 +14,7 @@ _RATE_PER_S = 60.0
 _BURST = 120.0
 
 
-class Viewer:
+class PageConnection:
     """What is waiting for one page. `run` sends; the others only say that there is something to send.
 
     Telemetry and pictures wait as "newest" and replace each other; notices and answers wait in order, and a viewer
@@ -24,7 +24,7 @@ class Viewer:
     def __init__(
         self,
         number: int,
-        board: Board,
+        board: Snapshot,
         send_text: "SendText",
         send_bytes: "SendBytes",
         clock: Callable[[], int] = time.monotonic_ns,
@@ -46,6 +46,11 @@ class Viewer:
         self._turn = -1
         self._unseeded = True
         self._allowance, self._allowance_at = _BURST, time.monotonic()
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether the board holds what was not sent yet."""
+        return self._turn < self._board.turn
 
     def notice(self) -> None:
         """Say that the board has changed."""
@@ -101,7 +106,7 @@ class Viewer:
             self._turn = self._board.turn
             self._seq += 1
             await self._send_text(seed(self._seq))
-        elif self._turn < self._board.turn:
+        elif self.is_behind:
             sections = self._board.since(self._turn)
             self._turn = self._board.turn
             self._seq += 1

@@ -4,7 +4,8 @@ import { store, takeDelta, takeSeed } from "./store.js";
 
 const ACK_EVERY = 4, RETRY_MS = 300, RETRY_MAX_MS = 2000;
 const handlers = { seed: [], delta: [], notice: [], picture: [], state: [], welcome: [] };
-export const me = { client: clientId(), name: "", trusted: false };
+// greeted: this connection has had its seed and its welcome.
+export const me = { client: clientId(), name: "", trusted: false, greeted: false };
 
 let socket = null, token = document.querySelector("meta[name=token]").content, retryMs = RETRY_MS, watched = [];
 
@@ -47,6 +48,7 @@ export function connect() {
 
 async function lost(reason = "") {
   socket = null;
+  me.greeted = false;
   Object.assign(store, { connected: false, reason });
   tell("state");
   const again = () => { retryMs = Math.min(RETRY_MAX_MS, retryMs * 1.5); setTimeout(reconnect, retryMs); };
@@ -76,7 +78,7 @@ function take(message) {
       break;
     }
     case "welcome":
-      Object.assign(me, { name: message.name, trusted: message.trusted });
+      Object.assign(me, { name: message.name, trusted: message.trusted, greeted: true });
       tell("welcome"); tell("state");
       break;
     case "notice":

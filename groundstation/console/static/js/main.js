@@ -5,7 +5,7 @@ import { buildCharts, showSamples } from "./charts.js";
 import { byId, el, svg } from "./dom.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
-import { give, showControls, showOrders, startOrders } from "./orders.js";
+import { give, showControls, showOrders, startOrders } from "./commands.js";
 import { ink, nameRobots, startTheme } from "./palette.js";
 import { showPlan, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";

@@ -2,7 +2,7 @@
 
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
-import { drawArrow, label, path } from "./pen.js";
+import { drawArrow, label, path } from "./canvas.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
 const ARROW_S = 1.5, OLD_S = 2;

@@ -1,7 +1,7 @@
 // What does not move: floor, grid, fence, pads.
 
 import { ink } from "./palette.js";
-import { label, path } from "./pen.js";
+import { label, path } from "./canvas.js";
 import { store } from "./store.js";
 
 export function drawRoom(g, view) {

@@ -2,7 +2,7 @@
 
 import { bodyToWorld, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
-import { drawArrow, label, path } from "./pen.js";
+import { drawArrow, label, path } from "./canvas.js";
 import { ageS, droneNames, entities, entity, isSeen, store, targetHeight } from "./store.js";
 
 const FIGURE_PX = 75;

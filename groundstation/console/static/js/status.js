@@ -2,7 +2,7 @@
 
 import { byId, el, seconds, text } from "./dom.js";
 import { drawn } from "./map.js";
-import { ageS, estimateAge, replaying, silentS, store } from "./store.js";
+import { ageS, estimateAge, replaying, runOver, silentS, store } from "./store.js";
 
 const SILENT_S = 0.8, TRACKER_S = 0.5, OLD_S = 1;
 const notices = [];
@@ -16,12 +16,14 @@ export function addNotice({ text: words, grave }) {
 export function showBanners() {
   const banners = [];
   const age = estimateAge(), ageWords = Number.isFinite(age) ? `What you see is ${seconds(age)} old.` : "";
-  if (!store.connected) banners.push(["link", true, "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
-  else if (silentS() > SILENT_S) banners.push(["silent", true, `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
-  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", true, `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land after 3 s."]);
-  for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave, notice.words, ""]);
-  for (const alarm of store.connected ? (store.s.alarms ?? []).slice(0, 4) : []) {
-    if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave, alarm.text, ""]);
+  const ended = store.s.ended;
+  if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", ended.text[0].toUpperCase() + ended.text.slice(1), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
+  else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
+  else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
+  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land after 3 s."]);
+  for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);
+  for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, 4) : []) {
+    if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave ? "grave" : "mild", alarm.text, ""]);
   }
   const host = byId("banners"), kinds = banners.map(([kind]) => kind).join();
   if (host.dataset.kinds !== kinds) {
@@ -29,10 +31,10 @@ export function showBanners() {
     host.dataset.kinds = kinds;
     host.replaceChildren(...banners.map(([kind, , , , shell]) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
   }
-  banners.forEach(([, grave, title, more], index) => {
+  banners.forEach(([, level, title, more], index) => {
     const node = host.children[index];
-    node.className = `banner ${grave ? "grave" : "mild"}`;
-    text(node.children[0], `${grave ? "⚠ " : ""}${title}`);
+    node.className = `banner ${level}`;
+    text(node.children[0], `${level === "grave" ? "⚠ " : ""}${title}`);
     text(node.children[1], more);
   });
 }
@@ -44,7 +46,7 @@ function noteSilence(kinds, before, ages) {
 
 export function showTop() {
   const link = byId("link"), silent = silentS() > SILENT_S, age = estimateAge();
-  const [level, words] = !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : age > TRACKER_S ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
+  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : age > TRACKER_S ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
   link.dataset.level = level;
   text(link, words);
   const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];

@@ -1,19 +1,22 @@
 // The one state of the page: the newest of each section, the server's time, trails and curves.
 
+import { moment, sinceMs } from "./clock.js";
+
 const TRAIL_MS = 200, TRAIL_POINTS = 300, SAMPLES = 240;
 const OFFSET_WINDOW_MS = 30000;
 
 export const store = {
-  scene: null, s: {}, run: "", seq: 0, frames: 0, seeds: 0,
+  scene: null, s: {}, run: document.querySelector("meta[name=run]").content, seq: 0, frames: 0, seeds: 0,
   trails: {}, samples: [], receivedAt: -Infinity, serverMs: 0, connected: false,
 };
 
-let offsets = [], lastTrail = 0, lastSample = 0;
+let offsets = [], heard = moment(), lastTrail = 0, lastSample = 0;
 
 // The greatest difference seen is the one with the least delay: sent and received at nearly the same time.
 function noteClock(serverMs) {
   const at = performance.now();
   store.serverMs = serverMs;
+  heard = moment();
   offsets.push([at, serverMs - at]);
   offsets = offsets.filter(([when]) => at - when < OFFSET_WINDOW_MS);
   store.offset = Math.max(...offsets.map(([, offset]) => offset));
@@ -21,9 +24,13 @@ function noteClock(serverMs) {
 }
 
 export const replaying = () => Boolean(store.scene?.replay);
+// Announced by the run itself; while drones may still be in the air, buttons stay for as long as the console does.
+export const runOver = () => Boolean(store.s.ended) && (store.s.ended.severity === "INFO" || !store.connected);
 export const steerable = () => Boolean(store.scene?.truth) && !replaying();
 // A replay's time stands still, runs and jumps: it is what the newest frame says.
 export const now = () => (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));
+// The same for what is sent, right also before the first frame after a sleep.
+export const serverNow = () => Math.max(now(), store.serverMs + sinceMs(heard));
 export const ageS = (atMs) => (atMs === undefined || atMs === null ? Infinity : Math.max(0, (now() - atMs) / 1000));
 export const silentS = () => (performance.now() - store.receivedAt) / 1000;
 

@@ -2,7 +2,7 @@
 
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
-import { give } from "./orders.js";
+import { give } from "./commands.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, seenBy, store } from "./store.js";
 

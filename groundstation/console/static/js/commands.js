@@ -1,28 +1,52 @@
 // Buttons and keys that command, and how far each order came.
 
+import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { me, on, send } from "./link.js";
-import { ageS, droneNames, now, replaying, store } from "./store.js";
+import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
 const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
-const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000;
+const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000, STOP_LIVES_MS = 5000;
+const OVER = "the run has ended: nothing is left to command";
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
 const STATES = {
-  unsent: "NOT SENT", sent: "NOT CONFIRMED", heard: "acknowledged", confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
+  unsent: "NOT SENT", dropped: "NOT SENT", sent: "NOT CONFIRMED", heard: "acknowledged", confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
 };
 const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ effective" };
 // Orders that the server has not shown yet, so that nothing is silently lost on the way there.
 let own = [], count = 0;
 
-export function give(verb, drones = []) {
+// run: the one that the operator meant, which while a button is held may have given way to the next.
+export function give(verb, drones = [], run = store.run) {
   if (replaying()) return; // the server would refuse it as well
-  const order = { ref: `${me.client}-${++count}`, verb, drones, at: performance.now(), given_ms: now(), state: "sent", note: "" };
-  order.out = send("order", { verb, drones, at_ms: order.given_ms, ref: order.ref });
-  if (!order.out) {
-    order.state = "unsent";
-    order.note = STOPS.has(verb) ? "no connection: goes out when it is back. Now: groundstation " + verb.toLowerCase().replace("_", "-") + " in a shell" : "no connection";
-  }
+  const order = { ref: `${me.client}-${++count}`, verb, drones, run, given: moment(), given_ms: now() };
   own.push(order);
+  put(order, "unsent", `no connection: goes out if it is back within ${STOP_LIVES_MS / 1000} s. Now: ${inShell(verb)}`);
+  if (runOver()) put(order, "dropped", OVER);
+  else if (run === store.run && transmit(order)) put(order, "sent");
+  else if (!STOPS.has(verb)) put(order, "dropped", "no connection");
+  showOrders();
+}
+
+const inShell = (verb) => `groundstation ${verb.toLowerCase().replace("_", "-")} in a shell`;
+const put = (order, state, note = "") => Object.assign(order, { state, note, since: moment() });
+
+function transmit({ verb, drones, run, ref, given }) {
+  const age_ms = sinceMs(given);
+  return me.greeted && send("order", { verb, drones, run, ref, age_ms, at_ms: serverNow() - age_ms });
+}
+
+// A stop that did not get out is good for the run that it was given for, and for so long only.
+function dropUnsent() {
+  for (const order of own.filter(({ state }) => state === "unsent")) {
+    if (order.run !== store.run) put(order, "dropped", "it was given for another run");
+    else if (sinceMs(order.given) > STOP_LIVES_MS) put(order, "dropped", `dropped: there was no connection for ${STOP_LIVES_MS / 1000} s. Give it again, or: ${inShell(order.verb)}`);
+  }
+}
+
+function sendUnsent() {
+  dropUnsent();
+  for (const order of own) if (order.state === "unsent" && transmit(order)) put(order, "sent", "sent when the connection was back");
   showOrders();
 }
 
@@ -33,30 +57,24 @@ export function startOrders() {
   byId("track").onclick = () => give("TRACK");
   byId("resume").onclick = () => give("RESUME");
   byId("takeover").onclick = () => send("takeover");
-  holdToPress(byId("cut"), () => give("CUT_MOTORS"));
-  on("welcome", () => {
-    // Stops never expire; a start that did not get out is forgotten.
-    for (const order of own) if (!order.out && STOPS.has(order.verb)) {
-      order.out = send("order", { verb: order.verb, drones: order.drones, at_ms: order.given_ms, ref: order.ref });
-      if (order.out) Object.assign(order, { state: "sent", note: "sent when the connection was back" });
-    }
-    showOrders();
-  });
+  holdToPress(byId("cut"), (run) => give("CUT_MOTORS", [], run));
+  on("welcome", sendUnsent);
   on("notice", ({ ref, text: reason }) => {
     const order = own.find((candidate) => ref && candidate.ref === ref);
-    if (order) Object.assign(order, { state: "refused", note: reason });
+    if (order) put(order, "refused", reason);
     showOrders();
   });
 }
 
-// Fires after one second of pressing, by pointer or by key; anything that ends it early ends it.
+// Fires after one second of pressing, by pointer or by key, for the run that was shown when it began; anything that ends
+// it early ends it.
 function holdToPress(button, fire) {
   let timer = 0;
   const stop = () => { clearTimeout(timer); timer = 0; button.classList.remove("held"); };
   const start = () => {
     if (timer) return;
     button.classList.add("held");
-    timer = setTimeout(() => { stop(); fire(); }, PRESS_MS);
+    timer = setTimeout((run) => { stop(); fire(run); }, PRESS_MS, store.run);
   };
   button.addEventListener("pointerdown", (event) => { if (event.button === 0) { button.setPointerCapture(event.pointerId); start(); } });
   for (const kind of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(kind, stop);
@@ -71,19 +89,24 @@ function holdToPress(button, fire) {
 
 export function showControls() {
   const names = droneNames(), session = store.s.session ?? {}, replay = replaying();
-  for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land]")) node.disabled = replay;
+  for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land]")) {
+    node.dataset.title ??= node.title;
+    node.disabled = replay || runOver();
+    node.title = runOver() ? OVER : node.dataset.title;
+  }
   for (const node of document.querySelectorAll(".count")) text(node, names.length ? `${names.length}` : "");
   const free = !session.operator, mine = session.operator === me.client;
   text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
   byId("takeover").hidden = replay || !me.trusted || free || mine;
-  const able = !replay && me.trusted && store.connected && (free || mine) && Boolean(session.lease);
-  const why = replay ? "a replay: nothing here can be commanded" : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
+  const able = !replay && !runOver() && me.trusted && store.connected && (free || mine) && Boolean(session.lease);
+  const why = replay ? "a replay: nothing here can be commanded" : runOver() ? OVER : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
   for (const id of ["takeoff", "track", "resume"]) { byId(id).disabled = !able; byId(id).title = why; }
 }
 
 export function showOrders() {
+  dropUnsent();
   const listed = store.s.orders ?? [], known = new Set(listed.map((order) => order.ref).filter(Boolean));
-  own = own.filter((order) => !known.has(order.ref) && (performance.now() - order.at < KEPT_MS || order.state === "unsent"));
+  own = own.filter((order) => !known.has(order.ref) && sinceMs(order.since) < KEPT_MS);
   const waiting = own.map((order) => ({ ...order, rows: (order.drones.length ? order.drones : droneNames()).map((name) => ({ name })), by: "you", team: !order.drones.length }));
   const all = [...waiting.reverse(), ...listed].slice(0, SHOWN);
   // Rebuilt only when an order has come further: a screen reader reads what changes.
@@ -110,6 +133,6 @@ function line(order) {
 }
 
 function stage(row, order) {
-  if (!row.stage) return order.state === "unsent" ? "not sent" : order.state === "refused" ? "—" : "no answer";
+  if (!row.stage) return ["unsent", "dropped"].includes(order.state) ? "not sent" : order.state === "refused" ? "—" : "no answer";
   return row.stage === "REFUSED" ? `refused: ${row.reason}` : STAGES[row.stage];
 }

@@ -43,7 +43,7 @@ class _Edge:
         return _Sums(len(self.nis), nis, int(degrees), len(self.verdicts), accepted)
 
 
-class Health:
+class InnovationStatistics:
     """Collects innovations per (observer, subject)."""
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ import msgspec
 _encoder = msgspec.json.Encoder(decimal_format="number")
 
 
-class Board:
+class Snapshot:
     """Sections are encoded once for all viewers; a viewer gets those that changed since its last frame.
 
     That is why a slow viewer costs nothing and misses nothing but what a newer value has replaced.

@@ -5,20 +5,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.bus.api import Bus
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.messages import AckStage, Command, CommandAck, Lease, Verb
 from groundstation.bus.topics import COMMAND
 from groundstation.runtime.acknowledgements import AckBook
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 OPERATOR = "operator"
 STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
 _TEAM = "team"
-_NS_PER_MS = 1_000_000
 _EXPIRY_NS = 5_000_000_000
 _PATIENCE_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 60_000_000_000}
 _PATIENCE_DEFAULT_NS = 8_000_000_000
-# A start that lay in a frozen server's queue must not surprise anybody later; a stop never expires.
-_STALE_MS = 2000.0
+# An order that lay in a page without a connection, or in a frozen server's queue, must not surprise anybody later.
+_START_LIVES_MS = 2000.0
+_STOP_LIVES_MS = 5000.0
 _KEPT = 8
 
 
@@ -57,14 +57,14 @@ class OrderDesk:
         """Return who holds a live operator lease, or ""."""
         return self._lease.holder if self._lease is not None and self._lease.expires_ns > now_ns else ""
 
-    def give(self, verb: Verb, drones: tuple[str, ...], by: str, at_ms: float, ref: str, now_ns: int) -> str:
-        """Send a command; returns "" or why it was not sent."""
+    def give(self, verb: Verb, drones: tuple[str, ...], by: str, age_ms: float, ref: str, now_ns: int) -> str:
+        """Send a command that was given `age_ms` ago; returns "" or why it was not sent."""
         strangers = [name for name in drones if name not in self._drones]
         if strangers:
             return f"there is no drone {', '.join(strangers)}"
         stop = verb in STOPS
-        if not stop and not now_ns / _NS_PER_MS - at_ms < _STALE_MS:
-            return f"{verb} came too late ({now_ns / _NS_PER_MS - at_ms:.0f} ms) and was dropped"
+        if age_ms > (_STOP_LIVES_MS if stop else _START_LIVES_MS):
+            return f"{verb} came too late ({age_ms / 1e3:.1f} s) and was dropped: give it again if it is still wanted"
         if not stop and not self.lease_holder(now_ns):
             return "nobody holds the operator lease: is the ground station's main process alive?"
         self._count += 1
@@ -137,7 +137,7 @@ def _summary(order: Followed) -> dict[str, Any]:
         "verb": book.command.verb,
         "by": order.by or book.command.issuer,
         "team": not set(book.command.scope) - {OPERATOR},
-        "given_ms": order.given_ns / _NS_PER_MS,
+        "given_ms": order.given_ns / NS_PER_MS,
         "closed": order.closed,
         "state": _state(order),
         "rows": [{"name": n, "stage": p.stage, "reason": p.reason} for n, p in book.progress.items()],

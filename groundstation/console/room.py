@@ -1,0 +1,96 @@
+"""What does not move: the room, who is in it, and how each camera looks, in the form that the page draws."""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.field.drones import FieldDrone
+from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import LensCalibration, WorldCamera
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
+
+Json = dict[str, Any]
+
+_EDGE_POINTS = 8
+
+
+def scene_from_field(field: ResolvedField, truth: bool) -> Json:
+    """Return the scene of a resolved field."""
+    planner = field.planner
+    return {
+        "site": field.site,
+        "truth": truth,
+        "room": msgspec.to_builtins(field.room),
+        "drones": [_drone(name, drone) for name, drone in field.drones.items()],
+        "cameras": [_world_camera(name, camera) for name, camera in field.cameras.items()],
+        "targets": [{"name": name, "height_m": target.marker.height_m} for name, target in field.tracked.items()],
+        "horizon": {"steps": planner.horizon_steps, "step_s": planner.step_s},
+        "hysteresis": planner.hysteresis,
+        "planned_range_m": planner.planned_range_m,
+        "lost_after_s": field.estimator.lost_after_s,
+    }
+
+
+def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
+    """Return a scene for a run whose field is not known: names only, in a room of the usual size."""
+    return {
+        "site": site,
+        "truth": truth,
+        "room": {"size_m": [8.0, 6.0, 4.5], "fence": None},
+        "drones": [{"name": name, "battery_min": 0.15} for name in drones],
+        "cameras": [],
+        "targets": [],
+        "horizon": {"steps": 10, "step_s": 0.3},
+        "hysteresis": 0.0,
+        "planned_range_m": 2.0,
+        "lost_after_s": 3.0,
+    }
+
+
+def lenses_of(field: ResolvedField) -> dict[str, CameraIntrinsics]:
+    """Return the lens of each camera by its name on the bus."""
+    fixed = {name: camera.calibration for name, camera in field.cameras.items()}
+    carried = {f"{name}_camera": drone.camera.calibration for name, drone in field.drones.items()}
+    return {name: _lens(calibration) for name, calibration in (fixed | carried).items()}
+
+
+def _lens(own: LensCalibration) -> CameraIntrinsics:
+    return CameraIntrinsics(
+        own.width_px, own.height_px, own.fx_px, own.fy_px, own.cx_px, own.cy_px, own.distortion, own.residual_px
+    )
+
+
+def _drone(name: str, drone: FieldDrone) -> Json:
+    camera = drone.camera
+    tilt, pan = np.radians(camera.tilt_down_deg), np.radians(camera.pan_left_deg)
+    return {
+        "name": name,
+        "battery_min": drone.limits.battery_min,
+        "max_speed_m_s": drone.limits.max_speed_m_s,
+        "pad_m": drone.pad_m,
+        "pad_yaw_rad": float(np.radians(drone.pad_yaw_deg)),
+        "camera": {
+            "name": f"{name}_camera",
+            "position_m": camera.position_m,
+            "rays": _rays(_lens(camera.calibration), base_from_tilted_optical(float(tilt), float(pan))),
+        },
+    }
+
+
+def _world_camera(name: str, camera: WorldCamera) -> Json:
+    rays = _rays(_lens(camera.calibration), world_from_downward_optical(camera.rotation_deg))
+    return {"name": name, "position_m": camera.position_m, "rays": rays, "observes": camera.observes}
+
+
+def _rays(lens: CameraIntrinsics, rotation: Array) -> list[list[float]]:
+    """Return directions along the border of the picture, distortion undone, in the frame that `rotation` leads to."""
+    along = np.linspace(0.0, 1.0, _EDGE_POINTS, endpoint=False)
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * [lens.width_px, lens.height_px] - 0.5
+    edges = [a + along[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    flat = lens.normalised_from_pixels(np.concatenate(edges))
+    flat = flat[np.isfinite(flat).all(axis=1)]
+    directions = np.column_stack((flat, np.ones(len(flat)))) @ rotation.T
+    return np.round(directions, 5).tolist()  # type: ignore[no-any-return]

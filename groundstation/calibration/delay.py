@@ -7,22 +7,24 @@ it predicts what they see worse.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Message, Odometry, RelativeObservation
-from groundstation.calibration.flown import Change as Dating
-from groundstation.calibration.flown import Flown, Surprise
-from groundstation.calibration.shift import Part, across, briefly, interpolated, rate_hz, shift_between
+from groundstation.calibration.recorded_likelihood import Change as Dating
+from groundstation.calibration.recorded_likelihood import Flown, Surprise
+from groundstation.calibration.time_offset import Part, across, briefly, interpolated, rate_hz, shift_between
 from groundstation.estimation.models import OdometryRobot
-from groundstation.estimation.parabola import least
 from groundstation.estimation.parameters import parameters_from_field
+from groundstation.field.drones import FieldDrone
+from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import WorldCamera
+from groundstation.geometry.parabola import least
 from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
 
-Array = NDArray[np.float64]
 M = TypeVar("M", bound=Message)
 
 # A height is told by climbs of so much within the window, for so long.
@@ -90,20 +92,20 @@ class _Own:
     height: Array
 
 
-def delays(flown: Flown, resolved: Mapping[str, Any]) -> list[Delay]:
+def delays(flown: Flown, resolved: ResolvedField) -> list[Delay]:
     """Return the delay of every camera, and of velocity and height of every robot."""
-    own = {name: _own(flown, name) for name in resolved["drones"]}
+    own = {name: _own(flown, name) for name in resolved.drones}
     models = parameters_from_field(resolved).entities
     habits = {name: model for name, model in models.items() if isinstance(model, OdometryRobot)}
     found: list[Delay] = []
     exposure_s: dict[str, float] = {}
-    for name, camera in resolved["cameras"].items():
+    for name, camera in resolved.cameras.items():
         tracks = {drone: _track(flown, name, camera, drone) for drone in own}
         one = _fixed_camera(name, camera, tracks, own)
         found.append(one)
         exposure_s[name] = (one.now_ms - (one.measured_ms or one.now_ms)) / 1e3 if one.sure else 0.0
-    for drone, settings in resolved["drones"].items():
-        seen = [(name, _track(flown, name, camera, drone)) for name, camera in resolved["cameras"].items()]
+    for drone, settings in resolved.drones.items():
+        seen = [(name, _track(flown, name, camera, drone)) for name, camera in resolved.cameras.items()]
         name, track = max(seen, key=lambda pair: len(pair[1].times))
         moved = _Track(track.times + exposure_s[name], track.positions, track.headings)
         found += _odometry(drone, settings, habits[drone], moved, own[drone])
@@ -111,12 +113,12 @@ def delays(flown: Flown, resolved: Mapping[str, Any]) -> list[Delay]:
     return found + _onboard_cameras(flown, resolved, later_ms)
 
 
-def _track(flown: Flown, name: str, camera: Mapping[str, Any], drone: str) -> _Track:
-    rotation = world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0)))
+def _track(flown: Flown, name: str, camera: WorldCamera, drone: str) -> _Track:
+    rotation = world_from_downward_optical(camera.rotation_deg)
     rows = {}
     for message in _messages(flown, RelativeObservation):
         if message.observer == name and message.subject == drone and message.yaw_rad is not None:
-            place = rotation @ np.array(message.position_m) + camera["position_m"]
+            place = rotation @ np.array(message.position_m) + camera.position_m
             rows[message.header.stamp_ns] = (*place, message.yaw_rad)
     table = np.array([(stamp, *row) for stamp, row in sorted(rows.items())], dtype=np.float64).reshape(-1, 5)
     return _Track(_seconds(flown, table[:, 0]), table[:, 1:4], np.unwrap(table[:, 4]))
@@ -141,8 +143,8 @@ def _seconds(flown: Flown, stamps_ns: Array) -> Array:
     return (stamps_ns - flown.ticks[0][0]) / 1e9
 
 
-def _fixed_camera(name: str, camera: Mapping[str, Any], tracks: Mapping[str, _Track], own: Mapping[str, _Own]) -> Delay:
-    now_ms = float(camera["video_delay_ms"])
+def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], own: Mapping[str, _Own]) -> Delay:
+    now_ms = camera.video_delay_ms
     parts: list[Part] = []
     for drone, track in tracks.items():
         if len(track.times) > _LEAST_PAIRS and len(own[drone].times) > _LEAST_PAIRS:
@@ -162,15 +164,14 @@ def _fixed_camera(name: str, camera: Mapping[str, Any], tracks: Mapping[str, _Tr
     return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, now_ms - 1e3 * shift[0], 1e3 * shift[1], flight=_TURN)
 
 
-def _odometry(drone: str, settings: Mapping[str, Any], habits: OdometryRobot, track: _Track, own: _Own) -> list[Delay]:
-    odometry = settings["odometry"]
+def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _Track, own: _Own) -> list[Delay]:
     names = [f"drones.{drone}.odometry.{kind}_delay_ms" for kind in ("velocity", "height")]
-    now_ms = [float(odometry[f"{kind}_delay_ms"]) for kind in ("velocity", "height")]
+    now_ms = [settings.odometry.velocity_delay_ms, settings.odometry.height_delay_ms]
     if len(track.times) < _LEAST_PAIRS or len(own.times) < _LEAST_PAIRS:
         reason = "no fixed camera saw it long enough"
         told = zip(("velocity", "height"), names, now_ms, (_DASH, _CLIMB), strict=True)
         return [Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight) for kind, name, now, flight in told]
-    body = _body_positions(track, own, settings["marker"]["position_m"])
+    body = _body_positions(track, own, settings.marker.position_m)
     lasting_s = habits.velocity_bias_correlation_s
     velocity = shift_between([Part(track.times, body[:, :2], _path(track, own), briefly(track.times, lasting_s))], True)
     known = np.isfinite(own.height)
@@ -218,22 +219,22 @@ def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
     return path
 
 
-def _onboard_cameras(flown: Flown, resolved: Mapping[str, Any], later_ms: dict[str, float]) -> list[Delay]:
+def _onboard_cameras(flown: Flown, resolved: ResolvedField, later_ms: dict[str, float]) -> list[Delay]:
     """Return the delays of the cameras on vehicles, one after the other: each is judged by what the others saw.
 
     later_ms: by how much others are known to be later than their settings say; is added to.
     """
     found: dict[str, Delay] = {}
     for _ in range(_ROUNDS):
-        for drone, settings in resolved["drones"].items():
-            one = _onboard_camera(flown, resolved, drone, float(settings["camera"]["video_delay_ms"]), later_ms)
+        for drone, settings in resolved.drones.items():
+            one = _onboard_camera(flown, resolved, drone, settings.camera.video_delay_ms, later_ms)
             found[drone] = one
             later_ms[drone] = (one.measured_ms or one.now_ms) - one.now_ms if one.sure else 0.0
     return list(found.values())
 
 
 def _onboard_camera(
-    flown: Flown, resolved: Mapping[str, Any], drone: str, now_ms: float, later_ms: Mapping[str, float]
+    flown: Flown, resolved: ResolvedField, drone: str, now_ms: float, later_ms: Mapping[str, float]
 ) -> Delay:
     setting = f"drones.{drone}.camera.video_delay_ms"
     surprise = Surprise(flown, resolved, drone)
@@ -248,7 +249,7 @@ def _onboard_camera(
     if found.curvature <= 0:
         return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell", flight=_WATCH)
     std_ms = float(np.sqrt(_NEIGHBOURS / found.curvature))
-    drones = sum(m.observer == drone and m.subject in resolved["drones"] for m in _messages(flown, RelativeObservation))
+    drones = sum(m.observer == drone and m.subject in resolved.drones for m in _messages(flown, RelativeObservation))
     doubt = "" if drones >= _LEAST_PAIRS else _TARGET_ONLY
     return Delay(f"{drone} camera", setting, now_ms, now_ms + found.place, std_ms, doubt, _WATCH)
 

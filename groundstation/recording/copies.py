@@ -12,14 +12,14 @@ from mcap.records import Channel, Schema
 from mcap.writer import CompressionType, Writer
 
 from groundstation.recording.chunks import RawRecord, inner_records, message_of
+from groundstation.recording.compatibility import PROFILE, RecordingError
+from groundstation.recording.file_topics import LATCHED_TOPICS
 from groundstation.recording.index import FileIndex
 from groundstation.recording.mcap_file import write_preamble
-from groundstation.recording.origin import PROFILE, RecordingError
 from groundstation.recording.outputs import new_file
 from groundstation.recording.preamble import Preamble
 from groundstation.recording.reader import Recording, open_recording
 from groundstation.recording.run import RecordedRun
-from groundstation.recording.selection import LATCHED_TOPICS
 
 _FOR_EVER = 1 << 63
 

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import msgspec
 
-from groundstation.bus.clock import NS_PER_MS
 from groundstation.bus.messages import Severity
 from groundstation.bus.topics import ESTIMATE, EVENT
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
@@ -18,6 +17,7 @@ from groundstation.geometry.rotations import (
 from groundstation.recording.capture import Entry
 from groundstation.recording.schemas import well_known
 from groundstation.recording.viewers import LOG_CHANNEL, TF_CHANNEL, Transform, frame_transforms, log_line
+from groundstation.time_units import NS_PER_MS
 
 WORLD = "world"
 # Viewers interpolate between transforms; the estimate itself is recorded at its full rate.
@@ -44,18 +44,18 @@ _estimate = msgspec.json.Decoder(_Estimate)
 _event = msgspec.json.Decoder(_Event)
 
 
-def camera_frames(field: dict[str, Any]) -> tuple[Transform, ...]:
-    """Return the optical frame of every camera of a resolved field (decoded JSON), by its name on the bus."""
+def camera_frames(field: ResolvedField) -> tuple[Transform, ...]:
+    """Return the optical frame of every camera of a resolved field, by its name on the bus."""
     fixed, carried = [], []
-    for name, camera in field.get("cameras", {}).items():
-        rotation = world_from_downward_optical(camera.get("rotation_deg", (0.0, 0.0, 0.0)))
+    for name, camera in field.cameras.items():
+        rotation = world_from_downward_optical(camera.rotation_deg)
         turn = quaternion_from_euler(*euler_from_rotation(rotation))
-        fixed.append(Transform(WORLD, name, tuple(camera["position_m"]), turn))
-    for name, drone in field.get("drones", {}).items():
-        camera = drone["camera"]
-        tilt, pan = math.radians(camera["tilt_down_deg"]), math.radians(camera.get("pan_left_deg", 0.0))
+        fixed.append(Transform(WORLD, name, camera.position_m, turn))
+    for name, drone in field.drones.items():
+        own = drone.camera
+        tilt, pan = math.radians(own.tilt_down_deg), math.radians(own.pan_left_deg)
         turn = quaternion_from_euler(*euler_from_rotation(base_from_tilted_optical(tilt, pan)))
-        carried.append(Transform(name, f"{name}_camera", tuple(camera["position_m"]), turn))
+        carried.append(Transform(name, f"{name}_camera", own.position_m, turn))
     return (*fixed, *carried)
 
 

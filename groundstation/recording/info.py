@@ -10,7 +10,6 @@ import numpy as np
 from mcap.opcode import Opcode
 
 from groundstation.bus import keys
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.topics import INNOVATION, OBSERVATION
 from groundstation.errors import MessageError
 from groundstation.recording.chunks import inner_records, message_of
@@ -18,6 +17,7 @@ from groundstation.recording.index import FileIndex
 from groundstation.recording.part_names import numbered_parts
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.schemas import description_of
+from groundstation.time_units import NS_PER_S
 
 # A topic that comes regularly has a hole where it is silent for this long and for this many of its periods.
 _HOLE_S = 1.0

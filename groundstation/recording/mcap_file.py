@@ -8,7 +8,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, IndexType, Writer
 
 from groundstation.recording.capture import Entry
-from groundstation.recording.origin import PROFILE
+from groundstation.recording.compatibility import PROFILE
 from groundstation.recording.preamble import Preamble
 from groundstation.recording.schemas import Description
 

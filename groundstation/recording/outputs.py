@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.errors import GroundStationError
-from groundstation.recording.origin import RecordingError
+from groundstation.recording.compatibility import RecordingError
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

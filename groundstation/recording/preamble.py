@@ -10,7 +10,7 @@ from typing import Any
 
 from groundstation.bus import clock
 from groundstation.process.numba_cache import sources_hash
-from groundstation.recording.origin import MESSAGE_VERSION, VERSION_FIELD
+from groundstation.recording.compatibility import MESSAGE_VERSION, VERSION_FIELD
 from groundstation.recording.timeline import Timeline
 
 FIELD_NAME = "field.json"

@@ -28,7 +28,7 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class ProtobufField:
     """One field of a type; `type_name` of messages and enumerations is absolute (`.foxglove.Vector3`)."""
 
     name: str
@@ -44,7 +44,7 @@ class Type:
 
     package: str
     name: str
-    fields: tuple[Field, ...]
+    fields: tuple[ProtobufField, ...]
     enum: tuple[str, tuple[str, ...]] | None = None
 
 

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.keys import Key
 from groundstation.recording.chunks import RawRecord, Wanted, every_topic
+from groundstation.recording.file_topics import RAW, STATE
 from groundstation.recording.index import Chunk, FileIndex
 from groundstation.recording.reader import RecordingError, open_parts, parts
-from groundstation.recording.selection import RAW, STATE
+from groundstation.time_units import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,11 @@ from groundstation.bus import codec, keys
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.api import Sample
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.topics import Topic
-from groundstation.recording.series import NO_ROTATION, Rotation
+from groundstation.recording.rotating_file import NO_ROTATION, Rotation
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
+from groundstation.time_units import NS_PER_S
 
 SITE = "lab"
 CLOCK = "synthetic"

@@ -6,13 +6,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any, Protocol
 
-from groundstation.bus.clock import NS_PER_S
 from groundstation.errors import MessageError
 from groundstation.recording.chunks import RawRecord
 from groundstation.recording.outputs import new_folder
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.tables import COMMON, Cell, Row, Table, column, tables_of
+from groundstation.time_units import NS_PER_S
 
 _BATCH_ROWS = 20_000
 _COLUMNS_FILE = "columns.csv"

@@ -1,7 +1,7 @@
 """Boot-clock stamps to UNIX time, by one mapping that stays the same for a whole recording."""
 
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.messages import ClockOffset
+from groundstation.time_units import NS_PER_S
 
 # A stamp further than this from the time of arrival is a defect of its sender: it must not stretch the time axis.
 _PLAUSIBLE_NS = 10 * NS_PER_S

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import starmap
 
-from groundstation.bus.clock import NS_PER_S
-from groundstation.recording.protobuf import Field, Kind, Type, blob, descriptor_set, double, fields, integer
+from groundstation.recording.protobuf import Kind, ProtobufField, Type, blob, descriptor_set, double, fields, integer
+from groundstation.time_units import NS_PER_S
 
 TF_CHANNEL = "/tf"
 LOG_CHANNEL = "/log"
@@ -18,17 +18,23 @@ VIEWER_CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL, SCENE_CHANNEL))
 
 _HEADER_FIELD = 1000
 _STAMP = ".google.protobuf.Timestamp"
-_TIMESTAMP = Type("google.protobuf", "Timestamp", (Field("seconds", 1, Kind.INT64), Field("nanos", 2, Kind.INT32)))
+_TIMESTAMP = Type(
+    "google.protobuf", "Timestamp", (ProtobufField("seconds", 1, Kind.INT64), ProtobufField("nanos", 2, Kind.INT32))
+)
 
 
 def _doubles(name: str, names: str) -> Type:
-    return Type("foxglove", name, tuple(Field(one, number + 1, Kind.DOUBLE) for number, one in enumerate(names)))
+    return Type(
+        "foxglove", name, tuple(ProtobufField(one, number + 1, Kind.DOUBLE) for number, one in enumerate(names))
+    )
 
 
 def _picture(name: str, data: int, kind: int, frame: int) -> Type:
     parts = (("data", data, Kind.BYTES), ("format", kind, Kind.STRING), ("frame_id", frame, Kind.STRING))
-    ours = Field("skein_header", _HEADER_FIELD, Kind.STRING)
-    return Type("foxglove", name, (Field("timestamp", 1, Kind.MESSAGE, _STAMP), *starmap(Field, parts), ours))
+    ours = ProtobufField("skein_header", _HEADER_FIELD, Kind.STRING)
+    return Type(
+        "foxglove", name, (ProtobufField("timestamp", 1, Kind.MESSAGE, _STAMP), *starmap(ProtobufField, parts), ours)
+    )
 
 
 _IMAGE = _picture("CompressedImage", data=2, kind=3, frame=4)
@@ -38,12 +44,12 @@ _LOG = Type(
     "foxglove",
     "Log",
     (
-        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
-        Field("level", 2, Kind.ENUM, ".foxglove.Log.Level"),
-        Field("message", 3, Kind.STRING),
-        Field("name", 4, Kind.STRING),
-        Field("file", 5, Kind.STRING),
-        Field("line", 6, Kind.FIXED32),
+        ProtobufField("timestamp", 1, Kind.MESSAGE, _STAMP),
+        ProtobufField("level", 2, Kind.ENUM, ".foxglove.Log.Level"),
+        ProtobufField("message", 3, Kind.STRING),
+        ProtobufField("name", 4, Kind.STRING),
+        ProtobufField("file", 5, Kind.STRING),
+        ProtobufField("line", 6, Kind.FIXED32),
     ),
     ("Level", _LEVELS),
 )
@@ -51,17 +57,17 @@ _TRANSFORM = Type(
     "foxglove",
     "FrameTransform",
     (
-        Field("timestamp", 1, Kind.MESSAGE, _STAMP),
-        Field("parent_frame_id", 2, Kind.STRING),
-        Field("child_frame_id", 3, Kind.STRING),
-        Field("translation", 4, Kind.MESSAGE, ".foxglove.Vector3"),
-        Field("rotation", 5, Kind.MESSAGE, ".foxglove.Quaternion"),
+        ProtobufField("timestamp", 1, Kind.MESSAGE, _STAMP),
+        ProtobufField("parent_frame_id", 2, Kind.STRING),
+        ProtobufField("child_frame_id", 3, Kind.STRING),
+        ProtobufField("translation", 4, Kind.MESSAGE, ".foxglove.Vector3"),
+        ProtobufField("rotation", 5, Kind.MESSAGE, ".foxglove.Quaternion"),
     ),
 )
 _TRANSFORMS = Type(
     "foxglove",
     "FrameTransforms",
-    (Field("transforms", 1, Kind.MESSAGE, ".foxglove.FrameTransform", repeated=True),),
+    (ProtobufField("transforms", 1, Kind.MESSAGE, ".foxglove.FrameTransform", repeated=True),),
 )
 _TYPES: dict[str, tuple[Type, ...]] = {
     "foxglove.CompressedImage": (_TIMESTAMP, _IMAGE),

@@ -1,15 +1,15 @@
 """From samples of the bus to the files of a run: state in one series, pictures and datagrams in the other."""
 
-import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from groundstation.bus.api import Sample
+from groundstation.field.resolved import field_from_json
 from groundstation.recording.capture import Capture
 from groundstation.recording.derived import ViewerChannels, camera_frames
+from groundstation.recording.file_topics import RAW, STATE
 from groundstation.recording.preamble import preamble_of_run
-from groundstation.recording.selection import RAW, STATE
-from groundstation.recording.series import NO_ROTATION, FileSeries, Rotation
+from groundstation.recording.rotating_file import NO_ROTATION, FileSeries, Rotation
 from groundstation.recording.timeline import Timeline
 
 
@@ -30,7 +30,7 @@ class RunWriter:
     ) -> None:
         preamble = preamble_of_run(field, epoch, timeline, folder)
         self._capture = Capture(timeline)
-        self._viewers = ViewerChannels(camera_frames(json.loads(field)))
+        self._viewers = ViewerChannels(camera_frames(field_from_json(field)))
         self.state, self.raw = (
             FileSeries(folder, stem, preamble, has_room=has_room, rotation=rotation) for stem in (STATE, RAW)
         )

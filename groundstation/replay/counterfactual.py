@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.report.accuracy import time_grid
-from groundstation.report.metrics import Figures, figures_of
+from groundstation.report.metrics import RunFigures, figures_of
 from groundstation.report.topology_use import segments
 from groundstation.report.tracks import RunData
 
@@ -46,7 +46,7 @@ def rows_of(before: RunData, after: RunData) -> list[Row]:
     return [Row(name, first.get(name), second.get(name)) for name in names]
 
 
-def _figures(figures: Figures) -> dict[str, float | None]:
+def _figures(figures: RunFigures) -> dict[str, float | None]:
     rows: dict[str, float | None] = {words: getattr(figures, name) for name, words in _OVERALL.items()}
     single = {"target": figures.target} if figures.target and len(figures.targets) < 2 else figures.targets
     accuracies = {**single, **figures.robots}

@@ -11,7 +11,7 @@ _NOT_COMPARED = frozenset({"header", "seconds"})
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class MessageDifference:
     """A place inside a message, what stood there and what stands there now; by: now minus then, for numbers."""
 
     place: str
@@ -35,7 +35,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def first_difference(recorded: Any, now: Any, place: str = "") -> Difference | None:
+def first_difference(recorded: Any, now: Any, place: str = "") -> MessageDifference | None:
     """Return the first place where two messages or values differ, None when they are the same to the bit."""
     if isinstance(recorded, msgspec.Struct) and type(recorded) is type(now):
         for name in recorded.__struct_fields__:
@@ -47,11 +47,11 @@ def first_difference(recorded: Any, now: Any, place: str = "") -> Difference | N
         return None
     if isinstance(recorded, tuple) and isinstance(now, tuple):
         if len(recorded) != len(now):
-            return Difference(f"number of {place}", len(recorded), len(now))
+            return MessageDifference(f"number of {place}", len(recorded), len(now))
         pairs = enumerate(zip(recorded, now, strict=True))
         inner = (first_difference(a, b, f"{place}[{getattr(a, 'name', index)}]") for index, (a, b) in pairs)
         return next((difference for difference in inner if difference), None)
     if isinstance(recorded, float) and isinstance(now, float):
         same = recorded == now and math.copysign(1.0, recorded) == math.copysign(1.0, now)
-        return None if same else Difference(place, recorded, now)
-    return None if recorded == now else Difference(place, recorded, now)
+        return None if same else MessageDifference(place, recorded, now)
+    return None if recorded == now else MessageDifference(place, recorded, now)

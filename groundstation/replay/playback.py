@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from groundstation.replay.reel import Reel
+from groundstation.replay.arrival_order import Reel
 from groundstation.replay.source import Source
 
 # Trails are kept at 5 Hz: a fast replay takes so much at a time, and loses no point of them.

@@ -1,18 +1,18 @@
 """Today's tracker in the loop that flies, fed by a journal: same inputs, same ticks, plans where they were adopted."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 from groundstation.bus.api import Subscription
 from groundstation.bus.messages import Header, JournalEntry, Message
 from groundstation.bus.sender import Sender
 from groundstation.bus.topics import Topic
 from groundstation.errors import EstimatorFault
+from groundstation.field.resolved import ResolvedField
 from groundstation.planning.plan import Planner
-from groundstation.replay.ticks import Tick
+from groundstation.replay.tick_log import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
-from groundstation.runtime.tracking import Feed, TrackerSection, Tracking
+from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking
 from groundstation.tracker import PlanRequest
 
 Words = list[tuple[Topic, Message]]
@@ -107,12 +107,12 @@ class JournalWorker:
 class Rerun:
     """One life of the tracker, lived again with a field of choice."""
 
-    def __init__(self, field: Mapping[str, Any], site: str, first: JournalEntry, epoch: int) -> None:
+    def __init__(self, field: ResolvedField, site: str, first: JournalEntry, epoch: int) -> None:
         self._arrivals = JournalArrivals()
         self._workers: list[JournalWorker] = []
         self._bus = JournalBus(site, first.header.source, first.header.clock)
-        feed = Feed(self._arrivals, self._worker_of, first.header.clock, first.tick)
-        self._tracking = Tracking(self._bus, TrackerSection(dict(field), "", epoch), feed)
+        feed = TrackerFeed(self._arrivals, self._worker_of, first.header.clock, first.tick)
+        self._tracking = Tracking(self._bus, TrackerSection(field, "", epoch), feed)
 
     def _worker_of(self, planner: Planner) -> JournalWorker:
         self._workers.append(JournalWorker(planner))

@@ -8,9 +8,10 @@ from typing import Any
 
 import msgspec
 
+from groundstation.field.resolved import ResolvedField, field_from_json
+from groundstation.recording.file_topics import RAW, STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
-from groundstation.recording.selection import RAW, STATE
 
 _TYPICAL = "a run folder holds state.mcap"
 
@@ -35,10 +36,9 @@ class Source:
     damage: tuple[str, ...] = ()
 
     @property
-    def resolved(self) -> dict[str, Any]:
-        """Return the resolved field."""
-        decoded: dict[str, Any] = msgspec.json.decode(self.field)
-        return decoded
+    def resolved(self) -> ResolvedField:
+        """Return the resolved field; raises msgspec.DecodeError for one that this program does not know."""
+        return field_from_json(self.field)
 
 
 def open_source(paths: Sequence[Path]) -> Source:

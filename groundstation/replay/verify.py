@@ -2,19 +2,19 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from groundstation.bus import codec
 from groundstation.bus.messages import Estimate, Message
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import MessageError
+from groundstation.field.resolved import ResolvedField
 from groundstation.recording.reader import RawRecord
-from groundstation.replay.difference import Difference, first_difference
+from groundstation.replay.difference import MessageDifference, first_difference
 from groundstation.replay.rerun import Rerun, Words
 from groundstation.replay.source import Source
-from groundstation.replay.ticks import OUTPUTS, Tape, Tick
+from groundstation.replay.tick_log import OUTPUTS, Tape, Tick
 from groundstation.runtime.tracking import EPOCHS_PER_LIFE
 
 _KEPT_DIFFERENCES = 200
@@ -24,14 +24,14 @@ _NAMES = frozenset(topic.name for topic in OUTPUTS)
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class RerunFinding:
     """A difference and where in the run it is: tick of the tracker's life, seconds since the recording began."""
 
     tick: int
     time_s: float
     topic: str
     entity: str
-    difference: Difference
+    difference: MessageDifference
 
     def __str__(self) -> str:
         return f"tick {self.tick}, {self.time_s:.2f} s: {self.topic} {self.entity} {self.difference}"
@@ -66,7 +66,7 @@ class Comparison:
     missing: list[str] = field(default_factory=list)
     missing_count: int = 0
     differing: int = 0
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[RerunFinding] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
 
     @property
@@ -87,7 +87,7 @@ class Repetition:
     """
 
     def __init__(
-        self, source: Source, resolved: Mapping[str, Any], hear: Callable[[bytes], object] = lambda _said: None
+        self, source: Source, resolved: ResolvedField, hear: Callable[[bytes], object] = lambda _said: None
     ) -> None:
         self._hear = hear
         self.comparison = Comparison()
@@ -173,12 +173,12 @@ class Repetition:
             else:
                 self.comparison.same[topic] += 1
         for extra in recorded:
-            self._found(lived, topic, entity, Difference("message", type(extra).__name__, None))
+            self._found(lived, topic, entity, MessageDifference("message", type(extra).__name__, None))
 
-    def _found(self, lived: Lived, topic: str, entity: str, difference: Difference) -> None:
-        self._note_finding(Finding(lived.tick.entry.tick, lived.time_s, topic, entity, difference))
+    def _found(self, lived: Lived, topic: str, entity: str, difference: MessageDifference) -> None:
+        self._note_finding(RerunFinding(lived.tick.entry.tick, lived.time_s, topic, entity, difference))
 
-    def _note_finding(self, finding: Finding) -> None:
+    def _note_finding(self, finding: RerunFinding) -> None:
         self.comparison.differing += 1
         if len(self.comparison.findings) < _KEPT_DIFFERENCES:
             self.comparison.findings.append(finding)
@@ -188,8 +188,8 @@ class Repetition:
         for (topic, entity, stamp_ns), records in sorted(self.tape.said.items(), key=lambda item: item[0][2]):
             if not first_ns <= stamp_ns <= last_ns - _PLANNING_NS:
                 continue
-            difference = Difference("message", f"{len(records)} recorded", None)
-            self._note_finding(Finding(-1, (stamp_ns - self._began_ns) / 1e9, topic, entity, difference))
+            difference = MessageDifference("message", f"{len(records)} recorded", None)
+            self._note_finding(RerunFinding(-1, (stamp_ns - self._began_ns) / 1e9, topic, entity, difference))
 
 
 def _decoded(record: RawRecord) -> Message | None:

@@ -3,7 +3,8 @@
 import msgspec
 import numpy as np
 
-from groundstation.report.tracks import Array, EstimateTrack, TruthTrack
+from groundstation.arrays import Array
+from groundstation.report.tracks import EstimateTrack, TruthTrack
 
 RATE_HZ = 10.0
 STALE_S = 0.5

@@ -3,14 +3,14 @@
 from pathlib import Path
 
 from groundstation.report.gather import gather
-from groundstation.report.judge import Report, judge
+from groundstation.report.judge import RunReport, judge
 
 JSON_NAME = "report.json"
 HTML_NAME = "report.html"
 PLOT_NAME = "trajectories.png"
 
 
-def build_report(run_dir: Path, *, plot: bool = True) -> Report:
+def build_report(run_dir: Path, *, plot: bool = True) -> RunReport:
     """Judge a run and write its files; raises RecordingError when there is no recording."""
     data = gather(run_dir)
     report = judge(data, run_dir)
@@ -24,8 +24,9 @@ def build_report(run_dir: Path, *, plot: bool = True) -> Report:
     return report
 
 
-def _title(report: Report) -> str:
+def _title(report: RunReport) -> str:
     figures = report.figures
     error = "no tracking" if figures.target_rmse_m is None else f"target error {figures.target_rmse_m:.3f} m rms"
-    verdict = "passed" if report.passed else "FAILED" if report.valid else "INVALID"
-    return f"{report.run_dir.name}: {error} over {figures.tracked_s:.0f} s, {verdict}"
+    verdict = "passed" if report.passed else report.verdict.upper()
+    of = f" of {report.rerun.of}" if report.rerun else ""
+    return f"{report.run_dir.name}: {error} over {figures.tracked_s:.0f} s, {verdict}{of}"

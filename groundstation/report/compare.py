@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from groundstation.report.judge import Report
+from groundstation.report.judge import RunReport
 
 _FIGURES = (
     "tracked_s", "target_rmse_m", "target_lost_s", "min_separation_m", "max_fence_violation_m", "topology_switches",
@@ -13,7 +13,7 @@ _FIGURES = (
 )  # fmt: skip
 
 
-class Difference(msgspec.Struct, frozen=True):
+class FigureDifference(msgspec.Struct, frozen=True):
     """One figure of two runs; None where a run has none. change: second minus first."""
 
     figure: str
@@ -26,24 +26,36 @@ class Difference(msgspec.Struct, frozen=True):
         return None if self.first is None or self.second is None else self.second - self.first
 
 
-def differences(first: Report, second: Report) -> list[Difference]:
+def differences(first: RunReport, second: RunReport) -> list[FigureDifference]:
     """Return every figure that at least one of the runs has."""
     left, right = dict(_figures(first)), dict(_figures(second))
     names = list(dict.fromkeys([*left, *right]))
-    return [Difference(name, left.get(name), right.get(name)) for name in names]
+    return [FigureDifference(name, left.get(name), right.get(name)) for name in names]
 
 
-def as_json(first: Report, second: Report) -> bytes:
+def labels(first: RunReport, second: RunReport) -> tuple[str, str]:
+    """Return what the two are called in a comparison: a re-run says that it is one."""
+    marks = [f" ({report.verdict})" if report.rerun else "" for report in (first, second)]
+    return f"first{marks[0]}", f"second{marks[1]}"
+
+
+def as_json(first: RunReport, second: RunReport) -> bytes:
     """Return the comparison as JSON."""
     rows = [
         {"figure": row.figure, "first": row.first, "second": row.second, "change": row.change}
         for row in differences(first, second)
     ]
-    runs = {name: str(report.run_dir) for name, report in (("first", first), ("second", second))}
-    return msgspec.json.format(msgspec.json.encode({"schema_version": 1, **runs, "figures": rows}), indent=2)
+    runs = {"first": first, "second": second}
+    content = {
+        "schema_version": 1,
+        **{name: str(report.run_dir) for name, report in runs.items()},
+        "reruns": {name: report.rerun for name, report in runs.items()},
+        "figures": rows,
+    }
+    return msgspec.json.format(msgspec.json.encode(content), indent=2)
 
 
-def _figures(report: Report) -> Iterator[tuple[str, float | None]]:
+def _figures(report: RunReport) -> Iterator[tuple[str, float | None]]:
     figures: dict[str, Any] = msgspec.to_builtins(report.figures)
     for name in _FIGURES:
         yield name, figures[name]

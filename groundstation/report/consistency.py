@@ -6,9 +6,10 @@ import msgspec
 import numpy as np
 from scipy.stats import chi2
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Innovation, Verdict
 from groundstation.report.accuracy import STALE_S
-from groundstation.report.tracks import Array, EstimateTrack, RunData, Timed, TruthTrack
+from groundstation.report.tracks import EstimateTrack, RunData, TimedMessage, TruthTrack
 
 CONFIDENCE = 0.95
 WINDOW_S = 1.0
@@ -97,7 +98,7 @@ def nees_per_dof(time_s: Array, truth: TruthTrack, estimate: EstimateTrack) -> A
 
 
 def windowed_nis(
-    innovations: list[Timed[Innovation]], start_s: float, end_s: float
+    innovations: list[TimedMessage[Innovation]], start_s: float, end_s: float
 ) -> tuple[Array, Array, Array, Array]:
     """Return window middles, NIS per degree of freedom, and its lower and upper bound (all m) in windows of 1 s."""
     windows = max(1, round((end_s - start_s) / WINDOW_S))

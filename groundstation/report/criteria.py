@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import msgspec
 
-from groundstation.report.arena import Arena
-from groundstation.report.metrics import Figures
+from groundstation.field.resolved import ResolvedField
+from groundstation.report.metrics import RunFigures
 from groundstation.report.run_facts import RunFacts
 
 MAX_TARGET_RMSE_M = 0.20
@@ -32,43 +32,46 @@ class Criterion(msgspec.Struct, frozen=True):
     ok: bool
 
 
-def criteria_of(figures: Figures, arena: Arena, facts: RunFacts) -> list[Criterion]:
+def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> list[Criterion]:
     """Return all criteria that apply: those against the truth need a simulator."""
     criteria = [
         *_promises(figures, facts),
         _below("planner_p99_ms", figures.planner_p99_ms, MAX_PLANNER_P99_MS),
         _under("tracker_missed_percent", figures.tracker_missed_percent, MAX_MISSED_PERCENT),
-        _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * arena.estimator.rate_hz),
+        _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * field.estimator.rate_hz),
     ]
     if figures.sim_overrun_percent is not None or figures.target is not None:
-        criteria = [*_against_truth(figures, arena), *_of_the_demo(figures, facts), *criteria]
+        criteria = [*_against_truth(figures, field), *_of_the_demo(figures, facts), *criteria]
         criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, MAX_CPU_CORES))
         criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
     return criteria
 
 
-def is_valid(figures: Figures) -> bool:
+def is_valid(figures: RunFigures) -> bool:
     """Return whether the simulator kept real time, so that the figures mean anything."""
     return figures.sim_overrun_percent is None or figures.sim_overrun_percent <= MAX_SIM_OVERRUN_PERCENT
 
 
-def _against_truth(figures: Figures, arena: Arena) -> Iterator[Criterion]:
+def _against_truth(figures: RunFigures, field: ResolvedField) -> Iterator[Criterion]:
     yield _below("target_rmse_m", figures.target_rmse_m, MAX_TARGET_RMSE_M)
     yield _below("target_lost_s", figures.target_lost_s, MAX_TARGET_LOST_S)
     yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
-    if len(arena.drones) > 1:
-        yield _above("min_separation_m", figures.min_separation_m, arena.safety.min_separation_m)
+    if len(field.drones) > 1:
+        yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)
     yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
 
 
-def _of_the_demo(figures: Figures, facts: RunFacts) -> Iterator[Criterion]:
-    """Its path leaves the ceiling camera's view at both ends, so that both topologies must occur; see the README."""
+def _of_the_demo(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
+    """Its path leaves the ceiling camera's view at both ends, so that both topologies must occur.
+
+    Reason: docs/decisions/0046-topologies-judged-in-the-demo-only.md.
+    """
     for kind in ("flat", "string") if facts.mode == "demo" else ():
         seconds = figures.topology_seconds.get(kind, 0.0)
         yield Criterion(f"topology_seconds.{kind}", seconds, ">", 0.0, seconds > 0.0)
 
 
-def _promises(figures: Figures, facts: RunFacts) -> Iterator[Criterion]:
+def _promises(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
     if facts.tracking_s is not None:
         yield _above("tracked_s", figures.tracked_s, MIN_TRACKED_SHARE * facts.tracking_s)
     if facts.command_unix_ns:

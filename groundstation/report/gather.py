@@ -9,12 +9,13 @@ import numpy as np
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
+from groundstation.field.resolved import ResolvedField, field_from_json
+from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Record, RecordingError, open_parts, parts
-from groundstation.recording.selection import STATE
 from groundstation.report import run_facts
-from groundstation.report.arena import Arena, arena_from_json
-from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Timed, TruthTrack
+from groundstation.report.rerun import rerun_of
+from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
 
 _WANTED = frozenset(
     (topic.plane, topic.name)
@@ -30,13 +31,14 @@ def gather(run_dir: Path) -> RunData:
     paths = parts(run_dir, STATE)
     if not paths:
         raise RecordingError(f"{run_dir}: no {STATE}.mcap in this folder; is it a run folder?")
-    data = RunData(Arena(), run_facts.read(run_dir))
+    data = RunData(UNKNOWN_FIELD, run_facts.read(run_dir))
     rows = _Rows(data)
     readable, unread = open_parts(paths)
     data.damage.extend(f"{path.name}: {why}" for path, why in unread.items())
     for recording in readable:
-        if FIELD_NAME in recording.attachments and not data.arena.drones:
-            data.arena = _arena(recording.attachments[FIELD_NAME], data.damage)
+        if FIELD_NAME in recording.attachments and not data.resolved.drones:
+            data.resolved = _field(recording.attachments[FIELD_NAME], data.damage)
+        data.rerun = data.rerun or rerun_of(recording.metadata)
         rows.take(recording.records(_is_wanted))
         data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()
@@ -47,12 +49,12 @@ def _is_wanted(topic: t.Topic) -> bool:
     return (topic.plane, topic.name) in _WANTED
 
 
-def _arena(attachment: bytes, damage: list[str]) -> Arena:
+def _field(attachment: bytes, damage: list[str]) -> ResolvedField:
     try:
-        return arena_from_json(attachment)
+        return field_from_json(attachment)
     except msgspec.DecodeError as error:
         damage.append(f"field.json: {error}")
-        return Arena()
+        return UNKNOWN_FIELD
 
 
 class _Rows:
@@ -92,17 +94,17 @@ class _Rows:
                 counts = (message.ticks, message.overruns, message.pictures, message.late_pictures)
                 self._sim.append((time_s, *map(float, counts)))
             case m.Command():
-                data.commands.append(Timed(time_s, message))
+                data.commands.append(TimedMessage(time_s, message))
             case m.CommandAck():
-                data.acks.append(Timed(time_s, message))
+                data.acks.append(TimedMessage(time_s, message))
             case m.Plan():
-                data.plans.append(Timed(time_s, message))
+                data.plans.append(TimedMessage(time_s, message))
             case m.Innovation():
-                data.innovations.append(Timed(time_s, message))
+                data.innovations.append(TimedMessage(time_s, message))
             case m.VehicleStatus():
-                data.vehicles.setdefault(message.header.entity, []).append(Timed(time_s, message))
+                data.vehicles.setdefault(message.header.entity, []).append(TimedMessage(time_s, message))
             case m.Event():
-                data.events.append(Timed(time_s, message))
+                data.events.append(TimedMessage(time_s, message))
 
     def finish(self) -> None:
         """Make the arrays; rows are sorted by time, since senders reach the recorder in no fixed order."""

@@ -8,7 +8,8 @@ import msgspec
 
 from groundstation.report.criteria import Criterion, criteria_of, is_valid
 from groundstation.report.findings import Findings, findings_of
-from groundstation.report.metrics import Figures, figures_of
+from groundstation.report.metrics import RunFigures, figures_of
+from groundstation.report.rerun import Rerun
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import RunData
 
@@ -17,21 +18,31 @@ _DAMAGE_LINES = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """A judged run. `valid`: the simulator kept real time; `passed`: valid and all criteria met."""
+class RunReport:
+    """A judged run. `valid`: the simulator kept real time; `rerun`: what it repeats, where it is no flight."""
 
     run_dir: Path
     facts: RunFacts
-    figures: Figures
+    figures: RunFigures
     criteria: tuple[Criterion, ...]
     findings: Findings
     valid: bool
     damage: tuple[str, ...]
+    rerun: Rerun | None = None
 
     @property
-    def passed(self) -> bool:
-        """Whether the run was what it should be."""
+    def passed(self) -> bool | None:
+        """Whether the run was what it should be: valid, and all criteria met; None for a re-run, which is no flight."""
+        if self.rerun is not None:
+            return None
         return self.valid and all(criterion.ok for criterion in self.criteria)
+
+    @property
+    def verdict(self) -> str:
+        """Return passed, failed or invalid; re-run or what-if where there is nothing to judge."""
+        if self.rerun is not None:
+            return self.rerun.kind
+        return "passed" if self.passed else "failed" if self.valid else "invalid"
 
     def as_json(self) -> bytes:
         """Return report.json: the figures at the top level, beside verdict, criteria and findings."""
@@ -39,6 +50,7 @@ class Report:
             "schema_version": SCHEMA_VERSION,
             "passed": self.passed,
             "valid": self.valid,
+            "rerun": self.rerun,
             "criteria": self.criteria,
             "run": self.facts,
             **msgspec.to_builtins(self.figures),
@@ -48,9 +60,9 @@ class Report:
         return msgspec.json.format(msgspec.json.encode(content), indent=2)
 
 
-def judge(data: RunData, run_dir: Path) -> Report:
+def judge(data: RunData, run_dir: Path) -> RunReport:
     """Return the report of a run's data; writes nothing."""
     figures = figures_of(data)
-    criteria = tuple(criteria_of(figures, data.arena, data.facts))
+    criteria = () if data.rerun else tuple(criteria_of(figures, data.resolved, data.facts))
     damage = tuple(data.damage[:_DAMAGE_LINES])
-    return Report(run_dir, data.facts, figures, criteria, findings_of(data), is_valid(figures), damage)
+    return RunReport(run_dir, data.facts, figures, criteria, findings_of(data), is_valid(figures), damage, data.rerun)

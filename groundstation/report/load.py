@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.report.tracks import Array, ProcessTrack, RunData
+from groundstation.arrays import Array
+from groundstation.report.tracks import ProcessTrack, RunData
 
 TRACKER = "tracker"
 _PID, _TICKS, _OVERRUNS, _OVERFLOWED = range(4)

@@ -12,7 +12,7 @@ from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData
 
 
-class Figures(msgspec.Struct, frozen=True, kw_only=True):
+class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     """What report.json says of a run; None where there was nothing to measure.
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error.
@@ -49,16 +49,16 @@ class Figures(msgspec.Struct, frozen=True, kw_only=True):
 _LOUD_EVENTS = 50
 
 
-def figures_of(data: RunData) -> Figures:
+def figures_of(data: RunData) -> RunFigures:
     """Return the figures of a run."""
     interval = tracking_interval(data)
     start, end = interval or (0.0, 0.0)
     targets, robots = _accuracies(data, interval)
     target = max(targets.values(), key=lambda one: one.rmse_m, default=None)
-    planner = load.planner_ms(data)
+    planner = None if data.rerun else load.planner_ms(data)  # a re-run's plans wait for no clock
     ticks, missed, rate = load.tracker_deadlines(data)
     cores = load.cpu_cores(data)
-    return Figures(
+    return RunFigures(
         tracked_s=round(end - start, 3),
         target_rmse_m=target.rmse_m if target else None,
         target_lost_s=max((one.lost_s for one in targets.values()), default=None),
@@ -95,7 +95,7 @@ def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[di
     grid = time_grid(*interval)
     targets = {
         name: accuracy(grid, data.truth[name], data.estimates.get(name), 2)
-        for name in data.arena.tracked
+        for name in data.tracked
         if name in data.truth
     }
     robots = {}

@@ -7,13 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from groundstation.arrays import Array, BoolArray
 from groundstation.report.accuracy import LOST_ERROR_M, errors_at, time_grid
 from groundstation.report.criteria import MAX_TARGET_RMSE_M
 from groundstation.report.interval import tracking_interval
 from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_style import INK, KIND_COLORS, MUTED, STYLE, color_of
 from groundstation.report.topology_use import kind_of, merged, segments
-from groundstation.report.tracks import Array, Flags, RunData
+from groundstation.report.tracks import RunData
 
 _SIZE_IN = (11.4, 13.0)
 _DPI = 110
@@ -44,11 +45,11 @@ def _interval(data: RunData) -> tuple[float, float]:
 def _draw_errors(axes: Axes, data: RunData) -> None:
     grid = time_grid(*_interval(data))
     top = 1.16 * LOST_ERROR_M
-    for name in (*data.drones, *data.arena.tracked):
+    for name in (*data.drones, *data.tracked):
         truth = data.truth.get(name)
         if truth is None:
             continue
-        is_target = name in data.arena.tracked
+        is_target = name in data.tracked
         errors = errors_at(grid, truth, data.estimates.get(name), 2 if is_target else 3)
         distance = np.linalg.norm(errors, axis=1)
         if not is_target:
@@ -68,7 +69,7 @@ def _draw_errors(axes: Axes, data: RunData) -> None:
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=5, borderpad=0.1)
 
 
-def _mark_missing(axes: Axes, grid: Array, missing: Flags) -> None:
+def _mark_missing(axes: Axes, grid: Array, missing: BoolArray) -> None:
     if missing.any():
         axes.fill_between(grid, 0, 1, where=missing, transform=axes.get_xaxis_transform(), color=KIND_COLORS["other"],
                           alpha=0.4, lw=0, label="no estimate of the target")  # fmt: skip
@@ -76,7 +77,7 @@ def _mark_missing(axes: Axes, grid: Array, missing: Flags) -> None:
 
 def _draw_heights(axes: Axes, data: RunData) -> None:
     start, end = _interval(data)
-    for height in data.arena.heights_m:
+    for height in data.heights_m:
         axes.axhline(height, color=MUTED, lw=0.8, ls=(0, (1, 3)), zorder=1)
     for name in data.drones:
         truth, estimate = data.truth.get(name), data.estimates.get(name)

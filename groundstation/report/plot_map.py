@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
+from groundstation.field.room import WorldCamera
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report.accuracy import STALE_S
 from groundstation.report.interval import tracking_interval
@@ -21,9 +22,9 @@ def draw_map(axes: Axes, data: RunData) -> None:
     """Draw the map with its legend."""
     _draw_room(axes, data)
     start, end = tracking_interval(data) or (0.0, max(data.end_s, 1.0))
-    for name in (*data.drones, *data.arena.tracked):
+    for name in (*data.drones, *data.tracked):
         _draw_entity(axes, data, name, start, end)
-    width, depth, _ = data.arena.room.size_m
+    width, depth, _ = data.resolved.room.size_m
     axes.set_xlim(-width / 2 - 0.15, width / 2 + 0.15)
     axes.set_ylim(-depth / 2 - 0.15, depth / 2 + 0.15)
     axes.set_aspect("equal")
@@ -35,15 +36,15 @@ def draw_map(axes: Axes, data: RunData) -> None:
 
 
 def _draw_room(axes: Axes, data: RunData) -> None:
-    width, depth, _ = data.arena.room.size_m
+    width, depth, _ = data.resolved.room.size_m
     axes.add_patch(Rectangle((-width / 2, -depth / 2), width, depth, fill=False, ec=INK, lw=1.6, zorder=2))
-    (x_low, x_high), (y_low, y_high) = data.arena.room.fence.x_m, data.arena.room.fence.y_m
+    (x_low, x_high), (y_low, y_high) = data.resolved.room.fence.x_m, data.resolved.room.fence.y_m
     if x_high - x_low < 1e6:
         fence = Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fill=False, ec="#b03a2e", lw=1.0, ls="--")
         axes.add_patch(fence)
-    for camera in data.arena.cameras.values():
-        for index, height in enumerate(data.arena.heights_m):
-            half_x, half_y = camera.footprint_half_m(height)
+    for camera in data.resolved.cameras.values():
+        for index, height in enumerate(data.heights_m):
+            half_x, half_y = _footprint_half_m(camera, height)
             x, y, _ = camera.position_m
             box = Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, fc=_CAMERA, alpha=0.06, lw=0, zorder=0)
             axes.add_patch(box)
@@ -53,6 +54,12 @@ def _draw_room(axes: Axes, data: RunData) -> None:
             side, ha = (1, "right") if index % 2 == 0 else (-1, "left")  # neighbours do not hide each other
             axes.annotate(f"{height:g} m", (x + side * half_x, y - half_y), xytext=(-3 * side, 3),
                           textcoords="offset points", ha=ha, va="bottom", fontsize=8, color=_CAMERA)  # fmt: skip
+
+
+def _footprint_half_m(camera: WorldCamera, height_m: float) -> tuple[float, float]:
+    """Return half the width and depth of what a camera sees at a height [m along world x, y]."""
+    below, lens = max(0.0, camera.position_m[2] - height_m), camera.calibration
+    return below * lens.width_px / (2 * lens.fx_px), below * lens.height_px / (2 * lens.fy_px)
 
 
 def _draw_entity(axes: Axes, data: RunData, name: str, start: float, end: float) -> None:
@@ -87,7 +94,7 @@ def _draw_estimate(axes: Axes, estimate: EstimateTrack, color: str, start: float
 
 def _legend(data: RunData) -> list[Line2D | Patch]:
     entities: list[Line2D | Patch] = [
-        Line2D([], [], color=color_of(name, data), lw=2.4, label=name) for name in (*data.drones, *data.arena.tracked)
+        Line2D([], [], color=color_of(name, data), lw=2.4, label=name) for name in (*data.drones, *data.tracked)
     ]
     return [
         *entities,

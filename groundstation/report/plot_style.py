@@ -36,5 +36,5 @@ def color_of(name: str, data: RunData) -> str:
     """Return the colour of a drone or a target."""
     if name in data.drones:
         return DRONE_COLORS[data.drones.index(name) % len(DRONE_COLORS)]
-    number = data.arena.tracked.index(name) if name in data.arena.tracked else 0
+    number = data.tracked.index(name) if name in data.tracked else 0
     return TARGET_COLORS[number % len(TARGET_COLORS)]

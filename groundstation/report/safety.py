@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from groundstation.report.arena import Fence
+from groundstation.field.room import Fence
 from groundstation.report.tracks import RunData, TruthTrack
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
@@ -26,7 +26,7 @@ def fence_violation_m(track: TruthTrack, fence: Fence) -> float:
 def max_fence_violation_m(data: RunData) -> float | None:
     """Return the worst of all drones, or None without truth."""
     tracks = [data.truth[name] for name in data.drones if name in data.truth]
-    return max((fence_violation_m(track, data.arena.room.fence) for track in tracks), default=None)
+    return max((fence_violation_m(track, data.resolved.room.fence) for track in tracks), default=None)
 
 
 def min_separation_m(data: RunData) -> float | None:

@@ -5,16 +5,19 @@ from rich.table import Table
 from rich.text import Text
 
 from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
-from groundstation.report.compare import differences
+from groundstation.report.compare import differences, labels
 from groundstation.report.criteria import Criterion, Value
-from groundstation.report.judge import Report
+from groundstation.report.judge import RunReport
 
 _UNITS = (("_m", "m"), ("_s", "s"), ("_ms", "ms"), ("_percent", "%"), ("_hz", "Hz"), ("_cores", "cores"))
 
 
-def summary(report: Report) -> RenderableType:
+def summary(report: RunReport) -> RenderableType:
     """Return verdict, criteria and what else matters, for rich to print."""
-    parts: list[RenderableType] = [_verdict(report), _criteria(report.criteria), _details(report)]
+    parts: list[RenderableType] = [_verdict(report)]
+    if report.criteria:
+        parts.append(_criteria(report.criteria))
+    parts.append(_details(report))
     for line in report.figures.loud_events[-5:]:
         parts.append(Text(f"  {line}", style="yellow"))
     for line in report.damage[:3]:
@@ -23,20 +26,30 @@ def summary(report: Report) -> RenderableType:
     return Group(*parts)
 
 
-def comparison(first: Report, second: Report) -> RenderableType:
+def comparison(first: RunReport, second: RunReport) -> RenderableType:
     """Return the figures of two runs beside each other, for rich to print."""
     table = Table(box=None, pad_edge=True, header_style="dim")
     table.add_column("figure", no_wrap=True)
-    for title in ("first", "second", "change"):
+    for title in (*labels(first, second), "change"):
         table.add_column(title, justify="right")
     for row in differences(first, second):
         table.add_row(
             row.figure, *(_text(value) if value is not None else "–" for value in (row.first, row.second, row.change))
         )
-    return Group(Text(f" first: {first.run_dir.name}, second: {second.run_dir.name}", style="dim"), table)
+    names = f" first: {first.run_dir.name}, second: {second.run_dir.name}"
+    notes = [
+        Text(f" {label}: {report.rerun.sentence}", style="bold yellow")
+        for label, report in (("first", first), ("second", second))
+        if report.rerun
+    ]
+    return Group(Text(names, style="dim"), *notes, table)
 
 
-def _verdict(report: Report) -> Text:
+def _verdict(report: RunReport) -> Text:
+    if report.rerun is not None:
+        return Text(
+            f"{report.verdict.upper()}{report.rerun.sentence.removeprefix(report.verdict)}", style="bold yellow"
+        )
     if report.passed:
         return Text("PASSED", style="bold green")
     if not report.valid:
@@ -56,7 +69,7 @@ def _criteria(criteria: tuple[Criterion, ...]) -> Table:
     return table
 
 
-def _details(report: Report) -> Text:
+def _details(report: RunReport) -> Text:
     figures = report.figures
     seconds = ", ".join(
         f"{text} {value:.0f} s" for text, value in figures.topology_seconds.items() if "_" in text and value >= 0.5

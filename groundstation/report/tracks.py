@@ -6,12 +6,15 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.arrays import Array, BoolArray
 from groundstation.bus.messages import Command, CommandAck, Event, Innovation, Plan, VehicleStatus
-from groundstation.report.arena import Arena
+from groundstation.field.behaviour import PlannerValues, SafetyValues
+from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import Fence, Room
+from groundstation.field.targets import SingleTarget, TargetMarker
+from groundstation.report.rerun import Rerun
 from groundstation.report.run_facts import RunFacts
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 T = TypeVar("T")
 
 
@@ -22,7 +25,7 @@ class TruthTrack:
     time_s: Array
     position_m: Array
     yaw_rad: Array
-    on_ground: Flags
+    on_ground: BoolArray
 
     def position_at(self, time_s: Array) -> Array:
         """Return interpolated positions (m, 3); held at both ends."""
@@ -32,11 +35,11 @@ class TruthTrack:
         """Return interpolated yaw (m), unwrapped."""
         return np.interp(time_s, self.time_s, np.unwrap(self.yaw_rad))
 
-    def airborne_at(self, time_s: Array) -> Flags:
+    def airborne_at(self, time_s: Array) -> BoolArray:
         """Return whether the body flew (m); False outside the track."""
         index = np.searchsorted(self.time_s, time_s, side="right") - 1
         inside = (index >= 0) & (time_s <= self.time_s[-1] + 0.5)
-        flying: Flags = inside & ~self.on_ground[np.clip(index, 0, len(self.time_s) - 1)]
+        flying: BoolArray = inside & ~self.on_ground[np.clip(index, 0, len(self.time_s) - 1)]
         return flying
 
 
@@ -57,7 +60,7 @@ class EstimateTrack:
 
 
 @dataclass(frozen=True, slots=True)
-class Timed(Generic[T]):
+class TimedMessage(Generic[T]):
     """A message and when it was."""
 
     time_s: float
@@ -73,11 +76,27 @@ class ProcessTrack:
     counters: Array
 
 
+_ANYWHERE = (-1e9, 1e9)
+UNKNOWN_FIELD = ResolvedField(
+    site="",
+    room=Room(size_m=(8.0, 6.0, 4.0), fence=Fence(x_m=_ANYWHERE, y_m=_ANYWHERE, z_m=_ANYWHERE)),
+    cameras={},
+    drones={},
+    target=SingleTarget(name="turtlebot", marker=TargetMarker()),
+    planner=PlannerValues(level_heights_m=()),
+    safety=SafetyValues(min_separation_m=0.0),
+)
+"""Stands in for the field of a recording that has none that can be read."""
+
+
 @dataclass(slots=True)
 class RunData:
-    """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last."""
+    """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
-    arena: Arena
+    rerun: what it repeats, where it is no recorded flight.
+    """
+
+    resolved: ResolvedField
     facts: RunFacts
     start_unix_ns: int = 0
     end_s: float = 0.0
@@ -85,15 +104,27 @@ class RunData:
     estimates: dict[str, EstimateTrack] = field(default_factory=dict)
     processes: dict[str, ProcessTrack] = field(default_factory=dict)
     sim_counters: Array | None = None
-    commands: list[Timed[Command]] = field(default_factory=list)
-    acks: list[Timed[CommandAck]] = field(default_factory=list)
-    plans: list[Timed[Plan]] = field(default_factory=list)
-    innovations: list[Timed[Innovation]] = field(default_factory=list)
-    events: list[Timed[Event]] = field(default_factory=list)
-    vehicles: dict[str, list[Timed[VehicleStatus]]] = field(default_factory=dict)
+    commands: list[TimedMessage[Command]] = field(default_factory=list)
+    acks: list[TimedMessage[CommandAck]] = field(default_factory=list)
+    plans: list[TimedMessage[Plan]] = field(default_factory=list)
+    innovations: list[TimedMessage[Innovation]] = field(default_factory=list)
+    events: list[TimedMessage[Event]] = field(default_factory=list)
+    vehicles: dict[str, list[TimedMessage[VehicleStatus]]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
+    rerun: Rerun | None = None
 
     @property
     def drones(self) -> tuple[str, ...]:
         """Return the names of all drones of the field."""
-        return tuple(self.arena.drones)
+        return tuple(self.resolved.drones)
+
+    @property
+    def tracked(self) -> tuple[str, ...]:
+        """Return the names of the targets."""
+        return tuple(self.resolved.tracked)
+
+    @property
+    def heights_m(self) -> tuple[float, ...]:
+        """Return the distinct heights of levels that this team can use, lowest first."""
+        rows = self.resolved.planner.level_heights_m[: len(self.drones)]
+        return tuple(sorted({height for row in rows for height in row}))

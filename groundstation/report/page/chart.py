@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from groundstation.report.tracks import Array
+from groundstation.arrays import Array
 
 _MOST_POINTS = 3000
 

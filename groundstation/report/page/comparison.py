@@ -5,53 +5,52 @@ from pathlib import Path
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.report.accuracy import errors_at, time_grid
-from groundstation.report.compare import differences
+from groundstation.report.compare import differences, labels
 from groundstation.report.interval import tracking_interval
-from groundstation.report.judge import Report
+from groundstation.report.judge import RunReport
 from groundstation.report.page.chart import Chart, Curve, held, points, thin, times
-from groundstation.report.page.document import holders, page
+from groundstation.report.page.document import holders, page, rerun_note
 from groundstation.report.page.flight_charts import semi_axis_m
 from groundstation.report.page.tables import number, table
 from groundstation.report.plot_style import DRONE_COLORS
-from groundstation.report.tracks import Array, RunData
+from groundstation.report.tracks import RunData
 
 NAME = "comparison.html"
 _PLAN_HOLDS_S = 0.5
 
 
-def write_comparison(runs: tuple[tuple[RunData, Report], tuple[RunData, Report]], path: Path) -> None:
+def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunReport]], path: Path) -> None:
     """Write the page that sets two runs side by side."""
     first, second = runs[0][1], runs[1][1]
-    charts = [chart for chart in (_errors(runs), _beliefs(runs), _costs(runs)) if chart.curves]
+    called = labels(first, second)
+    charts = [chart for chart in (_errors(runs, called), _beliefs(runs, called), _costs(runs, called)) if chart.curves]
     names = [escape(report.run_dir.name) for report in (first, second)]
     rows = [
         (row.figure, number(row.first), number(row.second), number(row.change)) for row in differences(first, second)
     ]
     sections = [
-        ("Figures", table(("figure", "first", "second", "change"), rows, "Neither run has figures.")),
+        ("Figures", table(("figure", *called, "change"), rows, "Neither run has figures.")),
         ("Over time", holders(charts, 0)),
     ]
-    lead = f"<p>first: <b>{names[0]}</b> ({_verdict(first)}), second: <b>{names[1]}</b> ({_verdict(second)})</p>"
+    lead = f"<p>first: <b>{names[0]}</b> ({first.verdict}), second: <b>{names[1]}</b> ({second.verdict})</p>"
+    lead += "".join(rerun_note(report) for report in (first, second))
     path.write_text(page(f"{first.run_dir.name} and {second.run_dir.name}", lead, sections, charts), encoding="utf-8")
 
 
-def _verdict(report: Report) -> str:
-    return "passed" if report.passed else "failed" if report.valid else "invalid"
-
-
-def _grids(runs: tuple[tuple[RunData, Report], ...]) -> tuple[Array, list[float]]:
+def _grids(runs: tuple[tuple[RunData, RunReport], ...]) -> tuple[Array, list[float]]:
     """Return the common time axis [s since tracking began] and where it begins in each recording."""
     spans = [tracking_interval(data) or (0.0, max(data.end_s, 1.0)) for data, _ in runs]
     grid = time_grid(0.0, max(end - start for start, end in spans))
     return grid[thin(len(grid))], [start for start, _ in spans]
 
 
-def _errors(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
+def _errors(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:
     grid, starts = _grids(runs)
     curves = []
-    for color, label, start, (data, _) in zip(DRONE_COLORS, ("first", "second"), starts, runs, strict=False):
-        for rank, name in enumerate(data.arena.tracked):
+    for color, label, start, (data, _) in zip(DRONE_COLORS, called, starts, runs, strict=False):
+        for rank, name in enumerate(data.tracked):
             truth = data.truth.get(name)
             if truth is not None:
                 errors = errors_at(grid + start, truth, data.estimates.get(name), 2)
@@ -61,10 +60,10 @@ def _errors(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
 
 
 def _label(run: str, target: str, data: RunData) -> str:
-    return run if len(data.arena.tracked) == 1 else f"{run}, {target}"
+    return run if len(data.tracked) == 1 else f"{run}, {target}"
 
 
-def _beliefs(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
+def _beliefs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:
     grid, starts = _grids(runs)
     curves = [
         Curve(
@@ -73,18 +72,18 @@ def _beliefs(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
             points(semi_axis_m(data.estimates[name], grid + start)),
             dashed=rank > 0,
         )
-        for color, label, start, (data, _) in zip(DRONE_COLORS, ("first", "second"), starts, runs, strict=False)
-        for rank, name in enumerate(data.arena.tracked)
+        for color, label, start, (data, _) in zip(DRONE_COLORS, called, starts, runs, strict=False)
+        for rank, name in enumerate(data.tracked)
         if name in data.estimates
     ]
     note = "larger semi-axis of the target's 95 % ellipse"
     return Chart("Believed uncertainty of the target", "m", note, times(grid), curves)
 
 
-def _costs(runs: tuple[tuple[RunData, Report], ...]) -> Chart:
+def _costs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:
     grid, starts = _grids(runs)
     curves = []
-    for color, label, start, (data, _) in zip(DRONE_COLORS, ("first", "second"), starts, runs, strict=False):
+    for color, label, start, (data, _) in zip(DRONE_COLORS, called, starts, runs, strict=False):
         own, cost = [plan.time_s for plan in data.plans], [plan.message.cost for plan in data.plans]
         curves.append(Curve(label, color, points(held(grid + start, own, cost, _PLAN_HOLDS_S), 6)))
     return Chart("Plan cost", "m²", "of the chosen topology", times(grid), curves)

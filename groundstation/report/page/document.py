@@ -10,7 +10,7 @@ import msgspec
 from matplotlib.figure import Figure
 
 from groundstation.report.interval import tracking_interval
-from groundstation.report.judge import Report
+from groundstation.report.judge import RunReport
 from groundstation.report.page import tables
 from groundstation.report.page.chart import Chart
 from groundstation.report.page.flight_charts import flight_charts
@@ -20,7 +20,7 @@ from groundstation.report.plot_style import STYLE
 from groundstation.report.tracks import RunData
 
 
-def write_page(data: RunData, report: Report, path: Path) -> None:
+def write_page(data: RunData, report: RunReport, path: Path) -> None:
     """Write the page of a run."""
     start_s, end_s = tracking_interval(data) or (0.0, max(data.end_s, 1.0))
     findings = report.findings
@@ -73,8 +73,8 @@ def holders(charts: list[Chart], first: int) -> str:
     )
 
 
-def _lead(report: Report) -> str:
-    verdict = "passed" if report.passed else "failed" if report.valid else "invalid"
+def _lead(report: RunReport) -> str:
+    verdict = report.verdict
     facts = report.facts
     known = {
         "mode": facts.mode, "field": facts.field, "scenario": facts.scenario,
@@ -82,7 +82,17 @@ def _lead(report: Report) -> str:
     }  # fmt: skip
     words = " · ".join(f"{name} {escape(value)}" for name, value in known.items() if value)
     why = "" if report.valid else " The simulator did not keep real time: the figures mean nothing."
-    return f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
+    if report.rerun:
+        words = f"recorded flight: {words}"
+    badge = f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
+    return badge + rerun_note(report)
+
+
+def rerun_note(report: RunReport) -> str:
+    """Return what marks a re-run as such, "" for a flight."""
+    if report.rerun is None:
+        return ""
+    return f'<p class="rerun"><b>{escape(report.run_dir.name)}</b> is a {escape(report.rerun.sentence)}.</p>'
 
 
 def _room(data: RunData) -> str:

@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report.accuracy import STALE_S, errors_at, time_grid
 from groundstation.report.page.chart import Chart, Curve, Span, held, points, thin, times
 from groundstation.report.plot_style import KIND_COLORS, MUTED, TARGET_COLOR, color_of
 from groundstation.report.topology_use import kind_of, merged, segments
-from groundstation.report.tracks import Array, EstimateTrack, RunData
+from groundstation.report.tracks import EstimateTrack, RunData
 
 _PLAN_HOLDS_S = 0.5
 
@@ -28,7 +29,7 @@ def _spans(data: RunData, grid: Array) -> list[Span]:
 
 
 def _names(data: RunData) -> tuple[str, ...]:
-    return (*data.arena.tracked, *data.drones)
+    return (*data.tracked, *data.drones)
 
 
 def _errors(data: RunData, grid: Array) -> Chart:
@@ -36,7 +37,7 @@ def _errors(data: RunData, grid: Array) -> Chart:
     for name in _names(data):
         truth = data.truth.get(name)
         if truth is not None:
-            size = 2 if name in data.arena.tracked else 3
+            size = 2 if name in data.tracked else 3
             distance = np.linalg.norm(errors_at(grid, truth, data.estimates.get(name), size), axis=1)
             if size == 3:
                 distance[~truth.airborne_at(grid)] = np.nan

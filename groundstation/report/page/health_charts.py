@@ -4,12 +4,13 @@ from itertools import cycle
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import VehicleStatus
 from groundstation.report.accuracy import time_grid
 from groundstation.report.consistency import bounds, nees_per_dof, windowed_nis
 from groundstation.report.page.chart import Chart, Curve, held, points, thin, times
 from groundstation.report.plot_style import DRONE_COLORS, MUTED, TARGET_COLOR, color_of
-from groundstation.report.tracks import Array, RunData
+from groundstation.report.tracks import RunData
 
 _STATUS_HOLDS_S = 1.5
 _LATENCY_PERCENTILE = 95
@@ -38,7 +39,7 @@ def _nis(data: RunData, start_s: float, end_s: float) -> Chart:
 
 def _nees(data: RunData, grid: Array) -> Chart:
     curves = []
-    for name in (*data.arena.tracked, *data.drones):
+    for name in (*data.tracked, *data.drones):
         truth, estimate = data.truth.get(name), data.estimates.get(name)
         if truth is not None and estimate is not None and len(estimate.time_s):
             values = nees_per_dof(grid, truth, estimate)

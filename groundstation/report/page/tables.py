@@ -5,7 +5,7 @@ from html import escape
 
 from groundstation.report.criteria import Value
 from groundstation.report.findings import Findings
-from groundstation.report.judge import Report
+from groundstation.report.judge import RunReport
 from groundstation.report.load import process_loads
 from groundstation.report.tracks import RunData
 
@@ -30,16 +30,17 @@ def number(value: Value, digits: int = 3) -> str:
     return f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
 
 
-def criteria_table(report: Report) -> str:
+def criteria_table(report: RunReport) -> str:
     """Return verdict, value and limit of each criterion."""
     rows = [
         ("met" if item.ok else "MISSED", item.name, number(item.value), f"{item.relation} {number(item.limit)}")
         for item in report.criteria
     ]
-    return table(("", "criterion", "value", "limit"), rows, "No criterion applies.")
+    empty = "A re-run is no flight: no criterion applies." if report.rerun else "No criterion applies."
+    return table(("", "criterion", "value", "limit"), rows, empty)
 
 
-def accuracy_table(report: Report) -> str:
+def accuracy_table(report: RunReport) -> str:
     """Return errors and consistency of every entity over the tracking interval."""
     entities = {**report.figures.targets, **report.figures.robots}
     rows = [

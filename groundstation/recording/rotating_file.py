@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from groundstation.bus.clock import NS_PER_MS, NS_PER_S
 from groundstation.recording.capture import Entry
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.part_names import numbered_parts, part_path
 from groundstation.recording.preamble import Preamble
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # At every second turn of the recorder (66 ms): a kill -9 costs about the last 0.2 s.
 FLUSH_PERIOD_NS = 120 * NS_PER_MS

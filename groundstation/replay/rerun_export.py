@@ -14,8 +14,9 @@ from groundstation.recording.reader import RawRecord, RecordingError, open_recor
 from groundstation.recording.timeline import Timeline
 from groundstation.replay import versions
 from groundstation.replay.source import Source
-from groundstation.replay.ticks import OUTPUTS
+from groundstation.replay.tick_log import OUTPUTS
 from groundstation.replay.verify import Lived, Repetition
+from groundstation.report.rerun import Rerun
 
 _FACTS = "run.json"
 _REPLACED = frozenset((topic.plane, topic.name) for topic in (*OUTPUTS, JOURNAL))
@@ -37,7 +38,7 @@ def live_again(source: Source, repetition: Repetition, folder: Path, field: byte
     opened = open_recording(source.state[0])
     attachments = {name: (opened.media_types.get(name, ""), data) for name, data in opened.attachments.items()}
     attachments[FIELD_NAME] = ("application/json", field)
-    note = {"replay": {"of": source.name, "changes": changes}, "versions": {**source.versions, **versions.current()}}
+    note = {**Rerun(source.name, changes).as_metadata(), "versions": {**source.versions, **versions.current()}}
     created = int(source.run.get("created_unix_ns", "0"))
     if _FACTS in opened.attachments:
         (folder / _FACTS).write_bytes(opened.attachments[_FACTS])

@@ -24,15 +24,14 @@ from groundstation.bus.topics import (
     VEHICLE_STATUS,
     Topic,
 )
-from groundstation.console.scene import scene_from_field
-from groundstation.console.section import port_of
+from groundstation.console.room import scene_from_field
 from groundstation.console.server import ConsoleServer, claim_port
 from groundstation.errors import MessageError
 from groundstation.monitor.state import cast_from_field
 from groundstation.recording.chunks import RawRecord
 from groundstation.recording.reader import RecordingError, payload
+from groundstation.replay.arrival_order import among
 from groundstation.replay.playback import Playback
-from groundstation.replay.reel import among
 
 _LATCHED = (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS, TRUTH, LEASE)
 _TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
@@ -55,12 +54,13 @@ class Show:
         bus = MemoryBus(self._exchange, source.run.get("site", "lab"), "replay")
         try:
             field = source.resolved
-            cast = cast_from_field(source.field)
+            cast = cast_from_field(field)
             scene = scene_from_field(field, TRUTH.name in self._reel.topics)
-        except (KeyError, ValueError, TypeError) as error:
-            raise RecordingError(f"{source.name}: its field is none that the console can draw ({error!r})") from error
+        except ValueError as error:
+            raise RecordingError(f"{source.name}: its field is none that this program knows ({error})") from error
         scene["replay"] = self._about()
-        self.server = ConsoleServer(bus, cast, scene, field, claim_port(port or port_of(source.field)), playback)
+        listener = claim_port(port or field.console.port)
+        self.server = ConsoleServer(bus, cast, scene, field, listener, "replay", playback)
         self.undecodable = 0
         self._at_s = time.monotonic()
 

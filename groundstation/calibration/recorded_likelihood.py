@@ -4,7 +4,7 @@ No planner, no truth: only what the tracker took in, tick by tick.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +13,9 @@ import numpy as np
 from groundstation.bus.messages import Message, RelativeObservation
 from groundstation.errors import OperatorMistake
 from groundstation.estimation.measurement import Correction
+from groundstation.field.resolved import ResolvedField
 from groundstation.replay.source import Source
-from groundstation.replay.ticks import Tape
+from groundstation.replay.tick_log import Tape
 from groundstation.tracker import tracker_from_field
 
 # A correction counts like one of Student's distribution with so many degrees of freedom: outliers must not decide.
@@ -61,9 +62,7 @@ def flown_of(source: Source) -> Flown:
     return Flown(tuple(longest), clock, cameras)
 
 
-def corrections(
-    flown: Flown, resolved: Mapping[str, Any], change: Change = lambda message: message
-) -> list[Correction]:
+def corrections(flown: Flown, resolved: ResolvedField, change: Change = lambda message: message) -> list[Correction]:
     """Return what became of each observation once the filter has settled."""
     tracker = tracker_from_field(resolved, flown.clock, 1)
     settled_ns = flown.ticks[0][0] + _SETTLING_NS
@@ -86,7 +85,7 @@ class Surprise:
     not surprised either. `enough`: there is something to judge by.
     """
 
-    def __init__(self, flown: Flown, resolved: Mapping[str, Any], observer: str) -> None:
+    def __init__(self, flown: Flown, resolved: ResolvedField, observer: str) -> None:
         self._flown, self._observer = flown, observer
         seen = [c for c in corrections(flown, resolved) if c.observer == observer and c.nis is not None]
         self.enough = len(seen) >= _LEAST_SEEN
@@ -95,7 +94,7 @@ class Surprise:
             mine = [np.reshape(c.covariance, (kind[1], kind[1])) for c in seen if (c.subject, len(c.residual)) == kind]
             self._weights[kind] = np.linalg.inv(np.median(mine, axis=0))
 
-    def of(self, resolved: Mapping[str, Any], change: Change = lambda message: message) -> float:
+    def of(self, resolved: ResolvedField, change: Change = lambda message: message) -> float:
         """Return it for these settings and changed messages."""
         total = 0.0
         for c in corrections(self._flown, resolved, change):

@@ -3,11 +3,11 @@
 import shutil
 from pathlib import Path
 
-from groundstation.bus.clock import NS_PER_S
+from groundstation.recording.compatibility import RecordingError
 from groundstation.recording.copies import cut
-from groundstation.recording.origin import RecordingError
 from groundstation.recording.outputs import new_folder, require_absent
 from groundstation.recording.run import RecordedRun, open_run
+from groundstation.time_units import NS_PER_S
 
 # What reports and replays look for beside the files of a run.
 _COMPANIONS = ("run.json", "resolved.yaml")

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimation.parabola import least
-
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
+from groundstation.geometry.parabola import least
 
 # Differences over so long are compared: what drifts more slowly does not count.
 _WINDOW_S = 1.0

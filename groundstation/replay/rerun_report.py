@@ -8,9 +8,10 @@ from typing import Any
 
 import msgspec
 
+from groundstation.field.resolved import ResolvedField
 from groundstation.recording.reader import RecordingError
 from groundstation.replay import counterfactual, versions
-from groundstation.replay.rewrite import live_again, require_new
+from groundstation.replay.rerun_export import live_again, require_new
 from groundstation.replay.source import Source
 from groundstation.replay.verify import Comparison, Repetition
 from groundstation.report.gather import gather
@@ -27,8 +28,8 @@ class Again:
     def __init__(
         self,
         source: Source,
-        field: dict[str, Any],
-        changed: dict[str, Any],
+        field: ResolvedField,
+        changed: ResolvedField,
         changes: Sequence[str],
         output: Path | None,
     ) -> None:

@@ -1,0 +1,38 @@
+"""A recorded flight that a tracker has processed once more: nothing flew, so nothing is judged."""
+
+from collections.abc import Mapping
+
+import msgspec
+
+_RECORD = "replay"
+
+
+class Rerun(msgspec.Struct, frozen=True):
+    """What a re-run repeats. changes: what was set otherwise, in words ("": nothing but the tracker's version)."""
+
+    of: str
+    changes: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Return the one word for it."""
+        return "what-if" if self.changes else "re-run"
+
+    @property
+    def sentence(self) -> str:
+        """Return what it is and what its figures are worth."""
+        how = f"with {self.changes}" if self.changes else "with its own settings"
+        return (
+            f"{self.kind} of {self.of} {how}: no flight, so nothing is judged; estimates and plans were computed, "
+            "vehicles, safety and processes are those of the recorded flight"
+        )
+
+    def as_metadata(self) -> dict[str, dict[str, str]]:
+        """Return the metadata record that marks a recording as this re-run."""
+        return {_RECORD: {"of": self.of, "changes": self.changes}}
+
+
+def rerun_of(metadata: Mapping[str, Mapping[str, str]]) -> Rerun | None:
+    """Return which re-run a recording is, by its metadata; None for a flight."""
+    record = metadata.get(_RECORD)
+    return None if record is None else Rerun(record.get("of", "a recording"), record.get("changes", ""))

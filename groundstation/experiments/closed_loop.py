@@ -5,15 +5,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array, IntArray
 from groundstation.experiments.filter import PlanarBelief, correct, initial_belief, predict
 from groundstation.experiments.paths import Path
+from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.strategies import Strategy
-from groundstation.planning.planar.parameters import PlanarParameters
-
-Array = NDArray[np.float64]
-Levels = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +35,13 @@ class SimulationSettings:
     fuse_all: bool = False
 
 
-class Step(NamedTuple):
+class SimulatedStep(NamedTuple):
     """One step of a run: truth and mean of robots and target (n + 1, 2), covariance, decision, what it cost."""
 
     truth: Array
     mean: Array
     covariance: Array
-    level: Levels
+    level: IntArray
     trace: float
     error_m: float
     readings: int
@@ -59,7 +56,7 @@ def run(
     parameters: PlanarParameters,
     settings: SimulationSettings,
     generator: np.random.Generator,
-) -> list[Step]:
+) -> list[SimulatedStep]:
     """Return all steps of a closed-loop run from robot positions (n, 2); the same for the same generator state."""
     truth = np.vstack([start, path(0.0)])
     belief = initial_belief(truth, settings.initial_variance, settings.target_velocity)
@@ -82,7 +79,7 @@ def run(
         belief, readings = observe(belief, truth, decision.level, parameters, settings, generator)
         error = float(np.hypot(*(belief.mean[belief.robots] - truth[-1])))
         steps.append(
-            Step(
+            SimulatedStep(
                 truth.copy(),
                 belief.positions.copy(),
                 belief.position_covariance,
@@ -100,7 +97,7 @@ def run(
 def forget_target(belief: PlanarBelief) -> PlanarBelief:
     """Return the belief with the target's block reset to a variance of 4 m^2.
 
-    PAPER: its kidnap test announces the jump to the filter in this way.
+    PAPER (docs/explanation/method.md 7): its kidnap test announces the jump to the filter in this way.
     """
     covariance = belief.covariance.copy()
     covariance[belief.robots :, :] = 0.0
@@ -110,7 +107,7 @@ def forget_target(belief: PlanarBelief) -> PlanarBelief:
     return PlanarBelief(belief.mean, covariance, belief.robots)
 
 
-def edges_of(level: Levels) -> list[tuple[int, int]]:
+def edges_of(level: IntArray) -> list[tuple[int, int]]:
     """Return the (observer, subject) pairs of a level vector; -1 is the global sensor, n the target."""
     ends = [-1, *level.tolist(), int(level.max()) + 1]
     return [(a - 1, b - 1) for a, upper in enumerate(ends) for b, lower in enumerate(ends) if lower == upper + 1]
@@ -125,14 +122,14 @@ def all_pairs(robots: int) -> list[tuple[int, int]]:
 def observe(
     belief: PlanarBelief,
     truth: Array,
-    level: Levels,
+    level: IntArray,
     parameters: PlanarParameters,
     settings: SimulationSettings,
     generator: np.random.Generator,
 ) -> tuple[PlanarBelief, int]:
     """Fuse one reading for every edge of the topology whose ends are within range; return how many there were.
 
-    PAPER: the filter uses the edges of the selected topology only; with `fuse_all` it uses whatever is seen.
+    PAPER (docs/explanation/method.md 7): the filter uses edges of the selected topology; with `fuse_all` all readings.
     """
     readings = 0
     for observer, subject in all_pairs(len(level)) if settings.fuse_all else edges_of(level):

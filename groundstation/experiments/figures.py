@@ -17,12 +17,9 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
 
-from groundstation.experiments.closed_loop import Step, edges_of
-from groundstation.planning.planar.parameters import PlanarParameters
-
-Array = NDArray[np.float64]
+from groundstation.experiments.closed_loop import SimulatedStep, edges_of
+from groundstation.experiments.planar.parameters import PlanarParameters
 
 # Colour-blind safe (Okabe, Ito 2008): one per level, the target in black.
 LEVEL_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
@@ -42,14 +39,14 @@ def level_colour(level: int) -> str:
     return LEVEL_COLOURS[level % len(LEVEL_COLOURS)]
 
 
-def information(step: Step, parameters: PlanarParameters, observer: int, subject: int) -> float:
+def information(step: SimulatedStep, parameters: PlanarParameters, observer: int, subject: int) -> float:
     """Return what an edge's reading would carry at the mean [1/m^2]; the global sensor is observer -1."""
     offset = step.mean[subject] - (step.mean[observer] if observer >= 0 else 0.0)
     exponent = min((float(np.hypot(*offset)) - parameters.range_m) / parameters.softness_m, 40.0)
     return float(1.0 / (parameters.sigma_m**2 * (1.0 + np.exp(exponent))))
 
 
-def draw_map(axes: Axes, step: Step, parameters: PlanarParameters, range_m: float) -> None:
+def draw_map(axes: Axes, step: SimulatedStep, parameters: PlanarParameters, range_m: float) -> None:
     """Draw one step: edges as thick as their information, robots by level with ellipses, target true and estimated."""
     most = 1.0 / parameters.sigma_m**2
     axes.add_patch(Circle((0.0, 0.0), range_m, color="#F0F0F0", zorder=0))
@@ -69,13 +66,13 @@ def draw_map(axes: Axes, step: Step, parameters: PlanarParameters, range_m: floa
     axes.plot(*step.mean[target], marker="x", color=ESTIMATE, markersize=6, markeredgewidth=2, zorder=7)
 
 
-def _ellipse(axes: Axes, step: Step, entity: int, colour: str) -> None:
+def _ellipse(axes: Axes, step: SimulatedStep, entity: int, colour: str) -> None:
     """Draw the 3 sigma ellipse of a position: a circle, because the planar filter is isotropic."""
     radius = _SIGMAS * float(np.sqrt(step.covariance[entity, entity]))
     axes.add_patch(Circle(tuple(step.mean[entity]), radius, facecolor=colour, alpha=0.22, edgecolor=colour, zorder=3))
 
 
-def draw_levels(axes: Axes, step: Step, parameters: PlanarParameters) -> None:
+def draw_levels(axes: Axes, step: SimulatedStep, parameters: PlanarParameters) -> None:
     """Draw the topology as the paper does: global sensor on top, target at the bottom, links by information."""
     most, depth = 1.0 / parameters.sigma_m**2, int(step.level.max()) + 2
     place = {-1: (0.0, 0.0), len(step.level): (0.0, -float(depth))}
@@ -110,13 +107,13 @@ def _legend(figure: Any, levels: int) -> None:
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False)
 
 
-def _limits(steps: Sequence[Step], margin: float = 0.12) -> tuple[tuple[float, float], tuple[float, float]]:
+def _limits(steps: Sequence[SimulatedStep], margin: float = 0.12) -> tuple[tuple[float, float], tuple[float, float]]:
     points = np.vstack([*(step.truth for step in steps), np.zeros((1, 2))])
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
 
-def save_topologies(path: Path, steps: Sequence[Step], parameters: PlanarParameters, range_m: float) -> None:
+def save_topologies(path: Path, steps: Sequence[SimulatedStep], parameters: PlanarParameters, range_m: float) -> None:
     """Save the run at four moments: levels above, map below (the paper's Fig. 1).
 
     The first and third decision, then where the target is farthest in the first half and in the whole run.
@@ -147,7 +144,7 @@ def save_topologies(path: Path, steps: Sequence[Step], parameters: PlanarParamet
         save_figure(figure, path)
 
 
-def save_trajectories(path: Path, steps: Sequence[Step], title: str) -> None:
+def save_trajectories(path: Path, steps: Sequence[SimulatedStep], title: str) -> None:
     """Save where everything went: truth, estimate with ellipses, robots, and levels, error and trace over time."""
     truth = np.array([step.truth[-1] for step in steps])
     mean = np.array([step.mean[-1] for step in steps])
@@ -169,7 +166,7 @@ def save_trajectories(path: Path, steps: Sequence[Step], title: str) -> None:
         save_figure(figure, path)
 
 
-def _histories(figure: Any, grid: Any, steps: Sequence[Step]) -> None:
+def _histories(figure: Any, grid: Any, steps: Sequence[SimulatedStep]) -> None:
     levels = [int(step.level.max()) + 1 for step in steps]
     error = [step.error_m for step in steps]
     sigma = [_SIGMAS * float(np.sqrt(step.trace / 2.0)) for step in steps]
@@ -183,7 +180,7 @@ def _histories(figure: Any, grid: Any, steps: Sequence[Step]) -> None:
     axes.set_xlabel("step")
 
 
-def save_animation(path: Path, steps: Sequence[Step], parameters: PlanarParameters, range_m: float) -> None:
+def save_animation(path: Path, steps: Sequence[SimulatedStep], parameters: PlanarParameters, range_m: float) -> None:
     """Save the run as an animated GIF, at most about 100 frames."""
     shown = steps[:: max(1, len(steps) // 90)]
     x, y = _limits(steps)

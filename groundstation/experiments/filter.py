@@ -6,9 +6,8 @@ State per axis: n robots, the target, and (if it is modelled) the target's veloc
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

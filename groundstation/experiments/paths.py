@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
+
 Path = Callable[[float], Array]
 
 
@@ -19,7 +19,7 @@ def receding(start_m: float, speed_m_s: float, angle_rad: float = 0.0) -> Path:
 def figure_eight(radius_m: float = 0.5, speed_m_s: float = 0.3) -> Path:
     """Return two loops joined by straight lines that cross at the origin at right angles, from the origin.
 
-    PAPER: radius 0.5 m gives an extent of 1.21 m by 0.5 m and a length of 6.71 m, 224 steps of 0.1 s at 0.3 m/s.
+    PAPER (docs/explanation/method.md 7): radius 0.5 m: 1.21 m by 0.5 m, 6.71 m long, 224 steps of 0.1 s at 0.3 m/s.
     """
     arc = 1.5 * math.pi * radius_m
     lap = 2.0 * (arc + 2.0 * radius_m)

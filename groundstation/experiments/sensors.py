@@ -10,19 +10,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array, IntArray
 from groundstation.experiments.closed_loop import edges_of
 from groundstation.experiments.paths import receding
-from groundstation.planning.planar.parameters import FIGURE_1
-from groundstation.planning.planar.planner import Mode, PlanarPlanner, SearchOptions
-
-Array = NDArray[np.float64]
-Levels = NDArray[np.int64]
+from groundstation.experiments.planar.parameters import FIGURE_1
+from groundstation.experiments.planar.planner import PlanarPlanner, SearchMode, SearchOptions
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
+class PlanarSensor:
     """A robot's sensor: `kind` is position, bearing or range; the global sensor always reads positions.
 
     noise: std of a reading [m; rad for bearings]; growth: variance grows by 1 + growth d^4; ahead_m: the disc of view
@@ -43,21 +40,21 @@ class Sensor:
 
 
 SENSORS = (
-    Sensor("range 0.3 m", range_m=0.3),
-    Sensor("range 0.5 m"),
-    Sensor("range 0.8 m", range_m=0.8),
-    Sensor("unlimited", range_m=math.inf),
-    Sensor("growing noise", range_m=math.inf, growth=625.0),
-    Sensor("bearing only", kind="bearing", range_m=0.8, noise=0.05),
-    Sensor("range only", kind="range", range_m=0.8),
-    Sensor("displaced disc", range_m=0.5, noise=0.03, growth=25.0, ahead_m=0.2),
+    PlanarSensor("range 0.3 m", range_m=0.3),
+    PlanarSensor("range 0.5 m"),
+    PlanarSensor("range 0.8 m", range_m=0.8),
+    PlanarSensor("unlimited", range_m=math.inf),
+    PlanarSensor("growing noise", range_m=math.inf, growth=625.0),
+    PlanarSensor("bearing only", kind="bearing", range_m=0.8, noise=0.05),
+    PlanarSensor("range only", kind="range", range_m=0.8),
+    PlanarSensor("displaced disc", range_m=0.5, noise=0.03, growth=25.0, ahead_m=0.2),
 )
 _STEPS = 60
 _START_M, _SPEED_M_S = 0.95, 0.02
 _GPS_RANGE_M = 0.5
 
 
-def radial_compositions(robots: int) -> Levels:
+def radial_compositions(robots: int) -> IntArray:
     """Return all topologies whose levels follow the distance to the global sensor (2^(n - 1), n)."""
     rows = []
     for cuts in range(2 ** (robots - 1)):
@@ -66,7 +63,7 @@ def radial_compositions(robots: int) -> Levels:
     return np.array(rows, dtype=np.int64)
 
 
-def reading_model(sensor: Sensor, offset: Array, ahead: Array) -> tuple[Array, Array, Array] | None:
+def reading_model(sensor: PlanarSensor, offset: Array, ahead: Array) -> tuple[Array, Array, Array] | None:
     """Return (reading, Jacobian (k, 2), covariance (k, k)) of an offset [m], or None when it is out of view."""
     distance = float(np.hypot(*(offset - sensor.ahead_m * ahead)))
     if distance > sensor.range_m:
@@ -81,7 +78,7 @@ def reading_model(sensor: Sensor, offset: Array, ahead: Array) -> tuple[Array, A
     return offset, np.eye(2), variance * np.eye(2)
 
 
-def run_sensor(sensor: Sensor, level: Levels, seed: int) -> dict[str, Any]:
+def run_sensor(sensor: PlanarSensor, level: IntArray, seed: int) -> dict[str, Any]:
     """Return mean trace [m^2], RMSE [m] and readings per step of a team on a fixed topology, target receding."""
     robots, generator = len(level), np.random.default_rng([seed, len(level)])
     parameters = replace(
@@ -89,7 +86,7 @@ def run_sensor(sensor: Sensor, level: Levels, seed: int) -> dict[str, Any]:
         range_m=sensor.planned_range_m,
         sigma_m=sensor.noise if sensor.kind == "position" else FIGURE_1.sigma_m,
     )
-    planner = PlanarPlanner(robots, parameters, SearchOptions(mode=Mode.FIXED))
+    planner = PlanarPlanner(robots, parameters, SearchOptions(mode=SearchMode.FIXED))
     path, dt = receding(_START_M, _SPEED_M_S), parameters.step_s
     place = np.linspace(0.0, _START_M, robots + 2)[1:-1]
     truth = np.vstack([np.column_stack([place, 0.0 * place]) + generator.normal(0.0, 0.05, (robots, 2)), path(0.0)])
@@ -112,7 +109,7 @@ def run_sensor(sensor: Sensor, level: Levels, seed: int) -> dict[str, Any]:
 
 
 def _fuse(
-    sensor: Sensor, level: Levels, truth: Array, mean: Array, covariance: Array, generator: np.random.Generator
+    sensor: PlanarSensor, level: IntArray, truth: Array, mean: Array, covariance: Array, generator: np.random.Generator
 ) -> tuple[Array, Array, int]:
     """Fuse one reading per edge in view; whether it is in view, and its noise, is decided by the truth."""
     gps = replace(sensor, kind="position", range_m=_GPS_RANGE_M, noise=FIGURE_1.sigma_m, growth=0.0, ahead_m=0.0)
@@ -145,7 +142,7 @@ def _fuse(
     return mean, covariance, seen
 
 
-def _curvature(sensor: Sensor, offset: Array, relative: Array) -> float:
+def _curvature(sensor: PlanarSensor, offset: Array, relative: Array) -> float:
     """Return the variance that the second derivative of a bearing or range adds where the offset is uncertain.
 
     Without it, robots that come close to what they see make the filter certain of a wrong position.
@@ -157,7 +154,7 @@ def _curvature(sensor: Sensor, offset: Array, relative: Array) -> float:
     return 0.5 * ratio**2 * (1.0 if sensor.kind == "bearing" else square)
 
 
-def compare(robots: int, seeds: Sequence[int], sensors: Sequence[Sensor] = SENSORS) -> list[dict[str, Any]]:
+def compare(robots: int, seeds: Sequence[int], sensors: Sequence[PlanarSensor] = SENSORS) -> list[dict[str, Any]]:
     """Return one row per sensor and radial topology, cheapest first within a sensor; `wins` marks the best.
 
     cost: mean trace over seeds [m^2]; levels: sizes from the global sensor outwards, as `2-3`.

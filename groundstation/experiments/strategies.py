@@ -4,23 +4,20 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array, IntArray
 from groundstation.experiments.filter import PlanarBelief
-from groundstation.planning.planar.parameters import PlanarParameters
-from groundstation.planning.planar.planner import Mode, PlanarPlanner, SearchOptions
-from groundstation.planning.planar.scenarios import layout_levels
-
-Array = NDArray[np.float64]
-Levels = NDArray[np.int64]
+from groundstation.experiments.planar.parameters import PlanarParameters
+from groundstation.experiments.planar.planner import PlanarPlanner, SearchMode, SearchOptions
+from groundstation.experiments.planar.scenarios import layout_levels
 
 STRATEGIES = ("paper", "certified", "global", "fixed-string", "fixed-flat", "fixed-two-level", "random")
 
 
-class Decision(NamedTuple):
+class TeamDecision(NamedTuple):
     """Levels (n) and velocities (n, 2) [m/s] to hold until the next decision, their cost [m^2] and solver figures."""
 
-    level: Levels
+    level: IntArray
     velocity_m_s: Array
     cost: float
     evaluations: int
@@ -47,15 +44,15 @@ class Strategy:
             name.removeprefix("fixed-") if name.startswith("fixed-") else start, robots, generator
         )
         self._generator = generator
-        mode = Mode(name) if name in ("paper", "certified", "global") else Mode.CERTIFIED
+        mode = SearchMode(name) if name in ("paper", "certified", "global") else SearchMode.CERTIFIED
         fixed = name.startswith("fixed-") or name == "random"
-        options = SearchOptions(mode=mode, hysteresis=0.0 if mode is Mode.PAPER else hysteresis)
-        self._planner = PlanarPlanner(robots, parameters, replace(options, mode=Mode.FIXED) if fixed else options)
+        options = SearchOptions(mode=mode, hysteresis=0.0 if mode is SearchMode.PAPER else hysteresis)
+        self._planner = PlanarPlanner(robots, parameters, replace(options, mode=SearchMode.FIXED) if fixed else options)
 
-    def decide(self, belief: PlanarBelief) -> Decision:
+    def decide(self, belief: PlanarBelief) -> TeamDecision:
         """Return what to do for this belief."""
         if self.name == "random":
             self.level = layout_levels("random", belief.robots, self._generator)
         plan = self._planner.plan(belief.positions, belief.position_covariance, self.level, belief.target_velocity)
         self.level = plan.level
-        return Decision(plan.level, plan.velocity_m_s[0], plan.cost, plan.evaluations, len(plan.certificate))
+        return TeamDecision(plan.level, plan.velocity_m_s[0], plan.cost, plan.evaluations, len(plan.certificate))

@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.experiments.closed_loop import SimulationSettings, Step, run
+from groundstation.experiments.closed_loop import SimulatedStep, SimulationSettings, run
 from groundstation.experiments.paths import Path, figure_eight, receding
+from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParameters
 from groundstation.experiments.strategies import Strategy
-from groundstation.planning.planar.parameters import FIGURE_1, PlanarParameters
-
-Array = NDArray[np.float64]
 
 LOST_M = 0.5
 
@@ -66,7 +64,7 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class ExperimentSetup:
     """What an experiment fixes: planner's parameters, world, length, where the target goes and the robots begin."""
 
     parameters: PlanarParameters
@@ -80,9 +78,9 @@ class Setup:
 
 
 SETUPS = {
-    "figure1": Setup(FIGURE_1, SimulationSettings(187, initial_variance=1e-3), 0.95, 0.02),
-    "teams": Setup(FIGURE_1, SimulationSettings(60, initial_variance=1e-3), 1.2, 0.02),
-    "figure-eight": Setup(
+    "figure1": ExperimentSetup(FIGURE_1, SimulationSettings(187, initial_variance=1e-3), 0.95, 0.02),
+    "teams": ExperimentSetup(FIGURE_1, SimulationSettings(60, initial_variance=1e-3), 1.2, 0.02),
+    "figure-eight": ExperimentSetup(
         FIGURE_EIGHT,
         SimulationSettings(224, noise_growth=25.0, initial_variance=1e-4, target_q=0.04, target_velocity=True),
         0.0,
@@ -91,7 +89,8 @@ SETUPS = {
 }
 _SCATTER_M = 0.05
 
-# What `certified` and `global` do beyond the paper. PAPER: greedy switching, edges of the topology only, hard range.
+# Departures of `certified` and `global`.
+# PAPER (docs/explanation/method.md 7): greedy switching, edges of the topology only, hard range.
 DEPARTURES: dict[str, dict[str, Any]] = {
     "figure1": {"hysteresis": 0.005},
     "teams": {"hysteresis": 0.005},
@@ -99,7 +98,7 @@ DEPARTURES: dict[str, dict[str, Any]] = {
 }
 
 
-def simulate(task: Task) -> list[Step]:
+def simulate(task: Task) -> list[SimulatedStep]:
     """Return all steps of a task; raises ValueError for an unknown experiment or strategy."""
     if task.experiment not in SETUPS:
         raise ValueError(f"unknown experiment {task.experiment!r}: choose one of {', '.join(SETUPS)}")
@@ -114,7 +113,7 @@ def simulate(task: Task) -> list[Step]:
     return run(strategy, start, setup.path(float(angle)), parameters, _settings(task, setup), generator)
 
 
-def _settings(task: Task, setup: Setup) -> SimulationSettings:
+def _settings(task: Task, setup: ExperimentSetup) -> SimulationSettings:
     own = setup.settings
     return replace(
         own,
@@ -132,7 +131,7 @@ def execute(task: Task) -> dict[str, Any]:
     return row_of(task, simulate(task))
 
 
-def row_of(task: Task, steps: Sequence[Step]) -> dict[str, Any]:
+def row_of(task: Task, steps: Sequence[SimulatedStep]) -> dict[str, Any]:
     """Return the row of a finished run."""
     error = np.array([step.error_m for step in steps])
     trace = np.array([step.trace for step in steps])
@@ -155,7 +154,7 @@ def row_of(task: Task, steps: Sequence[Step]) -> dict[str, Any]:
     return {"task": asdict(task), "merits": merits, "timing": timing}
 
 
-def figure1_merits(steps: Sequence[Step], levels: NDArray[np.int64]) -> dict[str, Any]:
+def figure1_merits(steps: Sequence[SimulatedStep], levels: NDArray[np.int64]) -> dict[str, Any]:
     """Return after how many decisions there were two levels, and the share of steps beyond 1.5 m with three."""
     distance = np.array([float(np.hypot(*step.truth[-1])) for step in steps])
     two = np.flatnonzero(levels == 2)

@@ -10,11 +10,10 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.errors import OperatorMistake
 
-Array = NDArray[np.float64]
 ROBOTS = range(1, 6)
 
 

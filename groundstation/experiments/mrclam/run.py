@@ -5,18 +5,18 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.fixed_lag import NS_PER_S, FixedLagFilter
-from groundstation.estimation.measurement import Measurement, Motion, Reading
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.measurement import Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models import CommandedRobot, FixedMount, Landmark, MountedCamera, RangeBearingSensor
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.experiments.mrclam.dataset import Dataset
-from groundstation.experiments.mrclam.scenarios import CAMERA_STD_M, CAMERA_STD_RAD, Scenario, camera_sightings
+from groundstation.experiments.mrclam.scenarios import CAMERA_STD_M, CAMERA_STD_RAD, SensingScenario, camera_sightings
+from groundstation.time_units import NS_PER_S
 
-Array = NDArray[np.float64]
 LOST_M = 1.5
 _CAMERA_HEIGHT_M = 3.0
 _JUDGED_S = 0.2
@@ -25,7 +25,7 @@ _ORIGIN_S = 1000.0  # of the filter's clock, which must not begin at zero: a lag
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class ModelFigures:
     """What readings are worth and how robots drive: one set for all scenarios and all sets.
 
     A distance told by the size of a barcode's picture is good to a share of itself; both errors repeat for about
@@ -44,7 +44,7 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class ScenarioErrors:
     """Errors over all robots: RMSE [m, deg], the largest [m], ANEES per degree of freedom of (x, y, yaw)."""
 
     scenario: str
@@ -62,7 +62,7 @@ class Result:
         return self.largest_m > LOST_M
 
 
-def filter_for(dataset: Dataset, figures: Figures) -> FixedLagFilter:
+def filter_for(dataset: Dataset, figures: ModelFigures) -> FixedLagFilter:
     """Return a filter over five robots, the landmarks, and a camera on the ceiling."""
     robots = {_name(number): figures.robot for number in dataset.robots}
     landmarks = {_name(number): Landmark((*place, 0.0)) for number, place in dataset.landmarks.items()}
@@ -77,10 +77,10 @@ def filter_for(dataset: Dataset, figures: Figures) -> FixedLagFilter:
     return FixedLagFilter(parameters)
 
 
-class Feed:
+class DatasetFeed:
     """Brings one set's data to a filter; times are those of the set [s]."""
 
-    def __init__(self, dataset: Dataset, figures: Figures) -> None:
+    def __init__(self, dataset: Dataset, figures: ModelFigures) -> None:
         self.joint = filter_for(dataset, figures)
         self._figures = figures
         self._start_s = dataset.start_s
@@ -98,14 +98,14 @@ class Feed:
     def command(self, number: int, t: float, values: tuple[float, ...]) -> None:
         """Pass on what a robot was commanded: forward speed, turn rate."""
         forward, rate = values
-        motion = Motion(self.ns(t), (forward, 0.0, 0.0), yaw_rate_rad_s=rate)
+        motion = OdometrySample(self.ns(t), (forward, 0.0, 0.0), yaw_rate_rad_s=rate)
         self.joint.add_motion(_name(number), motion, self.ns(t))
 
     def reading(self, number: int, t: float, values: tuple[float, ...]) -> None:
         """Pass on what a robot read: subject, range, bearing."""
         subject, distance, bearing = values
         covariance = self._figures.covariance(distance)
-        reading = Reading(self.ns(t), _name(number), _name(int(subject)), (distance, bearing), covariance)
+        reading = SensorReading(self.ns(t), _name(number), _name(int(subject)), (distance, bearing), covariance)
         self.joint.add_observation(reading, f"{number}/{subject:.0f}", self.ns(t))
 
     def sighting(self, number: int, t: float, values: tuple[float, ...]) -> None:
@@ -126,7 +126,7 @@ def _name(number: int) -> str:
 Item = tuple[float, str, int, tuple[float, ...]]
 
 
-def stream(dataset: Dataset, scenario: Scenario, robot_readings: bool, seed: int) -> list[Item]:
+def stream(dataset: Dataset, scenario: SensingScenario, robot_readings: bool, seed: int) -> list[Item]:
     """Return all that arrives as (t, method of Feed, robot, values), by time."""
     items: list[Item] = []
     for number, robot in dataset.robots.items():
@@ -142,15 +142,15 @@ def stream(dataset: Dataset, scenario: Scenario, robot_readings: bool, seed: int
 
 
 def run_scenario(
-    dataset: Dataset, scenario: Scenario, robot_readings: bool, figures: Figures | None = None, seed: int = 1,
-    span: tuple[float, float] = (0.0, 1.0),
-) -> Result:  # fmt: skip
+    dataset: Dataset, scenario: SensingScenario, robot_readings: bool, figures: ModelFigures | None = None,
+    seed: int = 1, span: tuple[float, float] = (0.0, 1.0),
+) -> ScenarioErrors:  # fmt: skip
     """Return how well the filter did over a share of the set's time; seed: of the emulated camera's noise.
 
     Causal: a belief is judged with nothing that came after it. It starts at the true poses; nothing of the truth is
     told after that.
     """
-    feed, score = Feed(dataset, figures or Figures()), Score(dataset)
+    feed, score = DatasetFeed(dataset, figures or ModelFigures()), ScenarioScore(dataset)
     length = dataset.end_s - dataset.start_s
     begin, end = dataset.start_s + span[0] * length, dataset.start_s + span[1] * length
     feed.joint.advance(feed.ns(begin))
@@ -169,7 +169,7 @@ def run_scenario(
     return score.result(scenario.name, robot_readings)
 
 
-class Score:
+class ScenarioScore:
     """Collects errors of all robots at equal intervals."""
 
     def __init__(self, dataset: Dataset) -> None:
@@ -189,12 +189,12 @@ class Score:
             self._nees.append(float(error @ np.linalg.solve(P, error)) / 3.0)
         self._errors.append(errors)
 
-    def result(self, scenario: str, robot_readings: bool) -> Result:
+    def result(self, scenario: str, robot_readings: bool) -> ScenarioErrors:
         """Return the figures."""
         errors = np.array(self._errors)
         squares = np.sum(errors[:, :, :2] ** 2, axis=2)
         total = max(self.verdicts.total(), 1)
-        return Result(
+        return ScenarioErrors(
             scenario,
             robot_readings,
             math.sqrt(squares.mean()),

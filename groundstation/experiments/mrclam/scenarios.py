@@ -3,17 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.experiments.mrclam.dataset import ROBOTS, Dataset
 
-Array = NDArray[np.float64]
 CAMERA_STD_M, CAMERA_STD_RAD, CAMERA_HZ = 0.03, float(np.radians(1.5)), 5.0
 DARK_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)
-class Scenario:
+class SensingScenario:
     """landmark_robots: who reads landmarks; camera: over which share of the room; dark: with two spells of DARK_S."""
 
     name: str
@@ -23,15 +22,15 @@ class Scenario:
 
 
 SCENARIOS = (
-    Scenario("all landmarks", tuple(ROBOTS)),
-    Scenario("robot 1 only", (1,)),
-    Scenario("half-room camera", camera=0.5),
-    Scenario("camera with dark spells", camera=1.0, dark=True),
-    Scenario("half-room camera with dark spells", camera=0.5, dark=True),
+    SensingScenario("all landmarks", tuple(ROBOTS)),
+    SensingScenario("robot 1 only", (1,)),
+    SensingScenario("half-room camera", camera=0.5),
+    SensingScenario("camera with dark spells", camera=1.0, dark=True),
+    SensingScenario("half-room camera with dark spells", camera=0.5, dark=True),
 )
 
 
-def camera_sightings(dataset: Dataset, scenario: Scenario, seed: int) -> dict[int, Array]:
+def camera_sightings(dataset: Dataset, scenario: SensingScenario, seed: int) -> dict[int, Array]:
     """Return each robot's sightings (n, 4) t, x, y, yaw by a camera over a share of the room, from its largest y on.
 
     Truth with noise: the sets hold no ceiling camera. Dark: nothing during two spells, a third and two thirds on.

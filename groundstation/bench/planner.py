@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.experiments.peer_process import PeerProcess, peak_memory_mb
-from groundstation.planning.planar.parameters import PlanarParameters
-from groundstation.planning.planar.planner import Fate, PlanarPlan, PlanarPlanner, SearchOptions
-from groundstation.planning.planar.scenarios import bench_belief
+from groundstation.bench.planner_peer_process import PeerProcess, peak_memory_mb
+from groundstation.experiments.planar.parameters import PlanarParameters
+from groundstation.experiments.planar.planner import Fate, PlanarPlan, PlanarPlanner, SearchOptions
+from groundstation.experiments.planar.scenarios import bench_belief
 
 # Beliefs, candidates and tolerance are the same for all; `wide` alone adds the radial cuts and merges.
 OURS = {

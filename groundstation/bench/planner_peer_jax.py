@@ -9,12 +9,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from groundstation.planning.peers.step import PeerStep, edges_of, neighbours_of, never
-from groundstation.planning.planar.parameters import PlanarParameters
+from groundstation.arrays import Array
+from groundstation.bench.planner_peers.step import PeerStep, edges_of, neighbours_of, never
+from groundstation.experiments.planar.parameters import PlanarParameters
 
-Array = NDArray[np.float64]
 _ITERATIONS = 100
 _STEPS = tuple(0.5**k for k in range(8))
 

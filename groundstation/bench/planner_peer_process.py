@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from groundstation.planning.planar.parameters import PlanarParameters
+from groundstation.experiments.planar.parameters import PlanarParameters
 
 # A solve of the naive peer is estimated instead of run when one topology alone would take this share of its time.
 _SHARE = 0.5
@@ -86,9 +86,9 @@ def _serve(name: str, pipe: Connection, limit_s: float) -> None:
 
 
 def _measure(name: str, robots: int, layout: str, seed: int, parameters: PlanarParameters, limit_s: float) -> Measured:
-    from groundstation.experiments import peer_jax
-    from groundstation.planning.peers import naive, numpy_adjoint
-    from groundstation.planning.planar.scenarios import bench_belief
+    from groundstation.bench import planner_peer_jax
+    from groundstation.bench.planner_peers import naive, numpy_adjoint
+    from groundstation.experiments.planar.scenarios import bench_belief
 
     mean, covariance, level = bench_belief(robots, layout, seed, parameters)
     levels = tuple(int(k) for k in level)
@@ -96,7 +96,7 @@ def _measure(name: str, robots: int, layout: str, seed: int, parameters: PlanarP
         guess = _naive_guess(mean, covariance, levels, parameters, limit_s)
         if guess is not None:
             return guess
-    solve = {"naive": naive.solve, "numpy": numpy_adjoint.solve, "jax": peer_jax.solve}[name]
+    solve = {"naive": naive.solve, "numpy": numpy_adjoint.solve, "jax": planner_peer_jax.solve}[name]
     if name == "jax":
         solve(mean, covariance, levels, parameters)  # compiles
     before, begin = time.process_time(), time.monotonic()
@@ -121,8 +121,8 @@ def _naive_guess(mean: Any, covariance: Any, levels: Any, parameters: Any, limit
     """
     import numpy as np
 
-    from groundstation.planning.peers import naive, numpy_adjoint
-    from groundstation.planning.peers.step import edges_of
+    from groundstation.bench.planner_peers import naive, numpy_adjoint
+    from groundstation.bench.planner_peers.step import edges_of
 
     full, zero = np.kron(covariance, np.eye(2)), np.zeros(2 * len(levels))
     edges, once = edges_of(levels), np.inf

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.bench.estimator_team import CAMERA_HZ, ODOMETRY_HZ, BenchTeam, sighting
 from groundstation.bus import codec, keys
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import (
@@ -22,8 +23,7 @@ from groundstation.bus.messages import (
 )
 from groundstation.bus.topics import OBSERVATION, ODOMETRY, VEHICLE_STATUS, Topic
 from groundstation.estimation.fixed_lag import FixedLagFilter
-from groundstation.estimation.intake import Intake
-from groundstation.experiments.estimator_team import CAMERA_HZ, ODOMETRY_HZ, Team, sighting
+from groundstation.estimation.ingest import Intake
 from groundstation.runtime.announcer import Announcer
 
 MS = 1_000_000
@@ -36,7 +36,7 @@ _ODOMETRY_LATE_MS, _DETECTION_LATE_MS = 2, 4  # in order: what a wire and a deco
 Arrival = tuple[int, keys.Key, str, bytes]
 
 
-def flight(team: Team, duration_ms: int, late_ms: int, heights: bool, rng: np.random.Generator) -> list[Arrival]:
+def flight(team: BenchTeam, duration_ms: int, late_ms: int, heights: bool, rng: np.random.Generator) -> list[Arrival]:
     """Return what arrives in a flight as (time, key, its text, payload), in order; cameras have phases of their own.
 
     late_ms: of the observations, odometry is in time; heights: whether odometry carries one.
@@ -71,7 +71,7 @@ def _status(name: str, seq: int) -> VehicleStatus:
     return VehicleStatus(header=_header(name, _START_NS, seq), flight_state=FlightState.FLYING, mode="flying")
 
 
-def _odometry(team: Team, name: str, stamp_ns: int, seq: int, heights: bool, rng: np.random.Generator) -> Odometry:
+def _odometry(team: BenchTeam, name: str, stamp_ns: int, seq: int, heights: bool, rng: np.random.Generator) -> Odometry:
     place = team.truth[team.tables.part(team.index(name))]
     noise = rng.normal(size=4)
     return Odometry(
@@ -86,7 +86,7 @@ def _odometry(team: Team, name: str, stamp_ns: int, seq: int, heights: bool, rng
 
 
 def _observation(
-    team: Team, edge: tuple[str, str], stamp_ns: int, seq: int, rng: np.random.Generator
+    team: BenchTeam, edge: tuple[str, str], stamp_ns: int, seq: int, rng: np.random.Generator
 ) -> RelativeObservation:
     m = sighting(team, edge, stamp_ns, rng)
     return RelativeObservation(
@@ -115,7 +115,7 @@ class _Kept(MemoryBus):
 class Path:
     """The tracker's part from payloads to payloads, without planning."""
 
-    def __init__(self, team: Team) -> None:
+    def __init__(self, team: BenchTeam) -> None:
         self.filter = FixedLagFilter(team.parameters)
         self._intake = Intake(self.filter, team.parameters.sensors, _CLOCK)
         self._bus = _Kept()
@@ -135,7 +135,7 @@ class Path:
         self._announcer.innovations(self.filter.take_corrections(), now_ns)
 
 
-def fly(team: Team, duration_ms: int, late_ms: int, heights: bool, seed: int) -> dict[str, Any]:
+def fly(team: BenchTeam, duration_ms: int, late_ms: int, heights: bool, seed: int) -> dict[str, Any]:
     """Return CPU time per observation [us], odometry and all else included, and what the run was."""
     path, explained, before = Path(team), 0, time.process_time()
     for now_ns, arrived in ticks(flight(team, duration_ms, late_ms, heights, np.random.default_rng(seed))):
@@ -157,7 +157,7 @@ def fly(team: Team, duration_ms: int, late_ms: int, heights: bool, seed: int) ->
     }
 
 
-def _worst_error(team: Team, joint: FixedLagFilter) -> float:
+def _worst_error(team: BenchTeam, joint: FixedLagFilter) -> float:
     belief = joint.belief()
     places = [(belief.mean_of(name)[:2], team.truth[team.tables.part(team.index(name))][:2]) for name in team.robots]
     return max((math.dist(a, b) for a, b in places), default=math.nan)

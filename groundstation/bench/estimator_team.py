@@ -4,15 +4,14 @@
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.belief import Array
-from groundstation.estimation.event_log import observation_columns
+from groundstation.arrays import Array
+from groundstation.estimation.event_log import observation_values, write_event
+from groundstation.estimation.filter_state import Belief, State, Tables
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.models import (
     ConstantVelocityTarget,
@@ -24,8 +23,11 @@ from groundstation.estimation.models import (
 )
 from groundstation.estimation.models.camera import measure_relative_pose
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
-from groundstation.estimation.tables import State, Tables, empty_state, tables_from_parameters
+from groundstation.estimation.records import EntityMemory, EventRow, Prediction
+from groundstation.estimation.tables import empty_state, tables_from_parameters
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.kernel import Rows
 
 CEILING, TARGET = "ceiling", "target"
 ODOMETRY_HZ, CAMERA_HZ = 200, 30
@@ -36,7 +38,7 @@ _GATE = 1.0 - 1e-9  # the peers have none
 
 
 @dataclass(frozen=True, slots=True)
-class Team:
+class BenchTeam:
     """Parameters and tables, where everything truly is (mean, n), and who sees whom."""
 
     parameters: EstimatorParameters
@@ -62,12 +64,13 @@ def minimal_parameters(robots: int) -> EstimatorParameters:
     return EstimatorParameters(entities, sensors, gate_probability=_GATE)
 
 
-def product_parameters(robots: int, resolved: Mapping[str, Any]) -> EstimatorParameters:
+def product_parameters(robots: int, resolved: ResolvedField) -> EstimatorParameters:
     """Return a team of copies of the first drone and the first camera of a resolved field, as they are flown."""
-    drone, camera = next(iter(resolved["drones"].values())), next(iter(resolved["cameras"].values()))
-    target = {**resolved["target"], "name": TARGET}
+    drone, camera = next(iter(resolved.drones.values())), next(iter(resolved.cameras.values()))
     drones = dict.fromkeys(robot_names(robots), drone)
-    return parameters_from_field({**resolved, "drones": drones, "target": target, "cameras": {CEILING: camera}})
+    flown = parameters_from_field(msgspec.structs.replace(resolved, drones=drones, cameras={CEILING: camera}))
+    entities = {TARGET if name in resolved.tracked else name: model for name, model in flown.entities.items()}
+    return replace(flown, entities=entities)
 
 
 def robot_names(robots: int) -> tuple[str, ...]:
@@ -75,7 +78,7 @@ def robot_names(robots: int) -> tuple[str, ...]:
     return tuple(f"robot_{i + 1}" for i in range(robots))
 
 
-def team_of(parameters: EstimatorParameters) -> Team:
+def team_of(parameters: EstimatorParameters) -> BenchTeam:
     """Return the team of some parameters, hovering in two rows that look at each other and at the target."""
     tables = tables_from_parameters(parameters)
     robots = tuple(name for name in parameters.entities if name not in (TARGET, CEILING))
@@ -83,7 +86,7 @@ def team_of(parameters: EstimatorParameters) -> Team:
     truth = np.zeros(tables.dim)
     for i, (name, model) in enumerate(parameters.entities.items()):
         place = truth[tables.part(i)]
-        place[:] = tables.priors[i, 0, : len(model.labels)]
+        place[:] = tables.priors["mean"][i, : len(model.labels)]
         if name == TARGET:
             place[:2] = 4.0, 0.0
         elif name != CEILING:
@@ -91,49 +94,54 @@ def team_of(parameters: EstimatorParameters) -> Team:
             across = 0.4 * (row.index(name) - 0.5 * (len(row) - 1))
             place[:4] = (0.0, across, 2.0, 0.1) if row is upper else (2.0, across, 1.2, -0.1)
     edges = [(CEILING, name) for name in upper] + [(a, b) for a in upper for b in lower]
-    return Team(parameters, tables, truth, robots, (*edges, *((name, TARGET) for name in lower or upper)))
+    return BenchTeam(parameters, tables, truth, robots, (*edges, *((name, TARGET) for name in lower or upper)))
 
 
-def sighting(team: Team, edge: tuple[str, str], stamp_ns: int, rng: np.random.Generator) -> Measurement:
+def sighting(team: BenchTeam, edge: tuple[str, str], stamp_ns: int, rng: np.random.Generator) -> Measurement:
     """Return what an observer sees of a subject, with noise; a heading only of robots."""
     observer, subject = map(team.index, edge)
     rows = 3 if edge[1] == TARGET else 4
-    event, h, H = np.zeros(s.EVENT_COLUMNS), np.zeros(4), np.zeros((2, 4, s.MAX_BLOCK))
-    event[s.EVENT_OBSERVER], event[s.EVENT_SUBJECT] = observer, subject
+    event, prediction = EventRow.row(observer=observer, subject=subject), Prediction.row(size=rows)
     tables = team.tables
     sensor = tables.sensors[list(team.parameters.sensors).index(edge[0])]
-    measure_relative_pose(team.truth, tables.entities[0], tables.parameters[0], sensor, event, rows, h, H[0], H[1])
+    measure_relative_pose(belief_at(tables, team.truth), sensor, event, prediction)
     deviations = np.array([POSITION_STD_M] * 3 + [YAW_STD_RAD])[:rows]
-    z = h[:rows] + deviations * rng.normal(size=rows)
+    z = prediction["h"][:rows] + deviations * rng.normal(size=rows)
     x, y, depth, *yaw = z.tolist()
     covariance = tuple(np.diag(deviations**2).ravel().tolist())
     return Measurement(stamp_ns, *edge, (x, y, depth), yaw[0] if yaw else None, covariance)
 
 
-def frame_of(team: Team, rng: np.random.Generator) -> Array:
-    """Return the event rows (edges, EVENT_COLUMNS) of one sighting along every edge, all at time 0."""
-    events = np.zeros((len(team.edges), s.EVENT_COLUMNS))
-    sensors = list(team.parameters.sensors)
-    for row, edge in zip(events, team.edges, strict=True):
+def belief_at(tables: Tables, mean: Array) -> Belief:
+    """Return a belief of one mean, for what needs no covariance."""
+    return Belief(mean, np.zeros((0, 0)), tables.entities[0], EntityMemory.rows(len(tables.priors)))
+
+
+def frame_of(team: BenchTeam, rng: np.random.Generator) -> Rows[EventRow]:
+    """Return the events (edges) of one sighting along every edge, all at time 0."""
+    events = EventRow.rows(len(team.edges))
+    as_bytes, sensors = np.asarray(events).view(np.uint8).data, list(team.parameters.sensors)
+    for row, edge in enumerate(team.edges):
         m = sighting(team, edge, 0, rng)
-        columns = observation_columns(m, 0.0, 0, team.index(edge[0]), team.index(edge[1]), sensors.index(edge[0]))
-        row[: len(columns)] = columns
+        values = observation_values(m, 0.0, 0, team.index(edge[0]), team.index(edge[1]), sensors.index(edge[0]))
+        write_event(as_bytes, row, values)
     return events
 
 
-def joined_state(team: Team, rng: np.random.Generator) -> State:
+def joined_state(team: BenchTeam, rng: np.random.Generator) -> State:
     """Return a state in which all have joined, are correlated with each other, and move as their odometry says."""
     tables, n = team.tables, team.tables.dim
-    state = empty_state(tables, np.ones(len(team.parameters.entities)))
+    state = empty_state(tables, [True] * len(team.parameters.entities))
     root = rng.normal(size=(n, n)) / math.sqrt(n)
     deviations = np.full(n, _PRIOR_STD)
     for i in range(len(team.parameters.entities)):
         part = tables.part(i)
-        deviations[part.start + 4 : part.stop] = np.sqrt(tables.priors[i, 1, 4 : part.stop - part.start])
+        deviations[part.start + 4 : part.stop] = np.sqrt(tables.priors["variances"][i, 4 : part.stop - part.start])
     P = deviations[:, None] * (0.5 * root @ root.T + 0.5 * np.eye(n)) * deviations
     state.covariances[0, :n, :n] = 0.5 * (P + P.T)
     state.means[0, :n] = team.truth
-    state.aux[:, s.ACTIVE] = 1.0
+    state.memory["active"] = 1
     for name in team.robots:
-        state.aux[team.index(name), [s.HELD_VX, s.HELD_VY, s.YAW_RATE]] = SPEED_M_S, -0.5 * SPEED_M_S, TURN_RAD_S
+        memory = state.memory[team.index(name)]
+        memory["held_vx"], memory["held_vy"], memory["yaw_rate"] = SPEED_M_S, -0.5 * SPEED_M_S, TURN_RAD_S
     return state

@@ -12,19 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.estimation import slots as s
-from groundstation.experiments.estimator_path import fly
-from groundstation.experiments.estimator_peers import FILTERPY_MISSING, Contestant, Ours, contestants, difference
-from groundstation.experiments.estimator_team import (
+from groundstation.bench.estimator_path import fly
+from groundstation.bench.estimator_peers import FILTERPY_MISSING, Contestant, Ours, contestants, difference
+from groundstation.bench.estimator_team import (
     CAMERA_HZ,
     ODOMETRY_HZ,
-    Team,
+    BenchTeam,
     frame_of,
     joined_state,
     minimal_parameters,
     product_parameters,
     team_of,
 )
+from groundstation.estimation.records import ACCEPTED
+from groundstation.field.resolved import ResolvedField
 
 Tell = Callable[[str], None]
 SAME_BELIEF = 1e-9
@@ -44,7 +45,7 @@ _OURS = "ours"
 
 
 @dataclass(slots=True)
-class Timed:
+class LeastTime:
     """The least CPU time seen of one filter [us]."""
 
     predict_us: float = np.inf
@@ -67,7 +68,7 @@ class Timed:
 
 def run_bench(
     robots: Sequence[int],
-    resolved: Mapping[str, Any],
+    resolved: ResolvedField,
     rounds: int = 30,
     duration_ms: int = 1000,
     seed: int = 1,
@@ -94,7 +95,7 @@ def run_bench(
     return result | {"targets": targets(result), "missing": missing, "load": list(os.getloadavg()), "seed": seed}
 
 
-def same_belief(team: Team, seed: int) -> dict[str, float]:
+def same_belief(team: BenchTeam, seed: int) -> dict[str, float]:
     """Return how far each peer is from ours after two frames and the ticks before them; raises if ours took not all.
 
     `numpy-batch` linearises a whole frame at one point and so differs by more than rounding.
@@ -105,7 +106,7 @@ def same_belief(team: Team, seed: int) -> dict[str, float]:
     for frame in events:
         ours.predict(1.0 / ODOMETRY_HZ, _TICKS)
         ours.correct(frame)
-        if set(ours.outcomes[:, s.OUT_VERDICT]) != {float(s.ACCEPTED)}:
+        if (ours.outcomes["verdict"] != ACCEPTED).any():
             raise RuntimeError("the bench's own frame was not accepted: the filters cannot be compared")
         for peer in peers.values():
             peer.predict(1.0 / ODOMETRY_HZ, _TICKS)
@@ -113,10 +114,10 @@ def same_belief(team: Team, seed: int) -> dict[str, float]:
     return {name: difference(ours, peer) for name, peer in peers.items()}
 
 
-def _kernel_rows(team: Team, with_peers: bool, rounds: int, seed: int) -> list[dict[str, Any]]:
+def _kernel_rows(team: BenchTeam, with_peers: bool, rounds: int, seed: int) -> list[dict[str, Any]]:
     rng = np.random.default_rng(seed)
     start, events = joined_state(team, rng), frame_of(team, rng)
-    timed = {_OURS: Timed()} | ({name: Timed() for name in contestants(team, start)} if with_peers else {})
+    timed = {_OURS: LeastTime()} | ({name: LeastTime() for name in contestants(team, start)} if with_peers else {})
     for turn in range(rounds):
         state = joined_state(team, np.random.default_rng(seed))
         filters = contestants(team, state) if with_peers and turn < max(2, rounds // 10) else {}
@@ -138,7 +139,7 @@ def _kernel_rows(team: Team, with_peers: bool, rounds: int, seed: int) -> list[d
     ]
 
 
-def _path_rows(team: Team, product: bool, duration_ms: int, seed: int) -> list[dict[str, Any]]:
+def _path_rows(team: BenchTeam, product: bool, duration_ms: int, seed: int) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for heights in (False, True) if product else (False,):
         in_order, late = (

@@ -1,0 +1,1 @@
+"""Benchmarks: CPU time, latency and ratios to named peers; nothing here flies."""

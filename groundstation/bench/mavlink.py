@@ -1,0 +1,245 @@
+"""What driving many vehicles costs and how late it is, beside pymavlink's own receiver on the same frames."""
+
+import math
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from drivers.host import VehicleHost, sleep_serving
+from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of, share_interpreter
+from drivers.mavlink.links.seam import Heard, MavlinkLink
+from drivers.mavlink.settings import MavlinkDriverSettings
+from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
+from drivers.mavlink.wire.frames import Message
+from drivers.mavlink.wire.telemetry import HighresImu
+from groundstation.bench.mavlink_vehicles import FIRST_SYSTEM
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import Command, EntityEstimate, Estimate, Lease, Severity, VelocitySetpoint, Verb
+from groundstation.bus.topics import COMMAND, ESTIMATE, IMU, LEASE, SETPOINT, Topic
+from groundstation.errors import DriverError
+
+_START_S = 25.0
+_SETTLE_S = 1.0
+_SETPOINT_S = 0.05
+_STANDING = (1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4)
+
+
+class _Host:
+    """The process around the driver, reduced to what the driver asks of it."""
+
+    name, section = "mavlink", "{}"
+    stop_requested, supervisor_alive, supervisor_fresh = False, True, True
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus: Bus = bus
+        self._woken = threading.Event()
+
+    def beat(self) -> None: ...
+    def ready(self, detail: str = "") -> None: ...
+    def degrade(self, detail: str) -> None: ...
+    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
+    def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None: ...
+    def sleep_until(self, deadline_ns: int) -> bool:
+        """Sleep; never asked to stop."""
+        self._woken.wait(max(0, deadline_ns - clock.now_ns()) / 1e9)
+        self._woken.clear()
+        return True
+
+    def wake(self) -> None:
+        """End a sleep early."""
+        self._woken.set()
+
+
+class _TimedBus(MemoryBus):
+    """Notes when IMU samples are published; `sent_ns` knows when the frame of a receipt was sent."""
+
+    def __init__(self, exchange: MemoryExchange) -> None:
+        super().__init__(exchange, "lab", "mavlink")
+        self.sent_ns: dict[int, int] = {}
+        self.late_ms: list[float] = []
+
+    def publish(self, topic: Topic, message: Any) -> None:
+        super().publish(topic, message)
+        if topic is IMU and (sent := self.sent_ns.pop(message.header.stamp_ns, None)) is not None:
+            self.late_ms.append((clock.now_ns() - sent) / 1e6)
+
+
+class _TimedLink:
+    """A link that notes when frames were sent, and how old a set-point is when it goes out."""
+
+    def __init__(self, link: MavlinkLink, bus: _TimedBus) -> None:
+        self.link, self.rejected, self._bus = link, link.rejected, bus
+        self.told_ns: dict[int, int] = {}
+        self.late_ms: list[float] = []
+        self.frames = 0
+
+    def receive(self) -> list[Heard]:
+        heard = self.link.receive()
+        self.frames += len(heard)
+        for stamp_ns, frame in heard:
+            if isinstance(frame.message, HighresImu):
+                self._bus.sent_ns[stamp_ns] = frame.message.time_usec * 1000
+        return heard
+
+    def send(self, system: int, message: Message) -> None:
+        self.link.send(system, message)
+        if isinstance(message, SetPositionTargetLocalNed) and (told := self.told_ns.pop(system, None)) is not None:
+            self.late_ms.append((clock.now_ns() - told) / 1e6)
+
+    def close(self) -> None:
+        self.link.close()
+
+
+class _Tracker(threading.Thread):
+    """Publishes estimates and, when asked to, set-points at 20 Hz, out of step with the driver."""
+
+    def __init__(self, exchange: MemoryExchange, names: Sequence[str], link: _TimedLink) -> None:
+        super().__init__(daemon=True)
+        self._bus, self._names, self._link = MemoryBus(exchange, "lab", "tracker"), names, link
+        self.closing = threading.Event()
+
+    def order(self, verb: Verb) -> None:
+        expires_ns, header = clock.now_ns() + 10**10, self._bus.header("team")
+        self._bus.publish(LEASE, Lease(header=header, holder="bench", expires_ns=expires_ns))
+        self._bus.publish(
+            COMMAND, Command(header=header, id=verb, verb=verb, scope=(), issuer="bench", expires_ns=expires_ns)
+        )
+
+    def run(self) -> None:
+        while not self.closing.wait(_SETPOINT_S * 1.017):
+            entities = tuple(
+                EntityEstimate(
+                    name=name, kind="robot", mean=(0.0, 0.0, 1.0, 0.0), covariance=_STANDING,
+                    velocity_m_s=(0.0, 0.0, 0.0), converged=True, age_s=0.0,
+                )
+                for name in self._names
+            )  # fmt: skip
+            self._bus.publish(ESTIMATE, Estimate(header=self._bus.header("team"), entities=entities, epoch=1))
+            for number, name in enumerate(self._names):
+                setpoint = VelocitySetpoint(
+                    header=self._bus.header(name), velocity_m_s=(0.1, 0.0, 0.0), yaw_rate_rad_s=0.0,
+                    lifetime_ms=300, epoch=1,
+                )  # fmt: skip
+                self._link.told_ns[FIRST_SYSTEM + number] = clock.now_ns()
+                self._bus.publish(SETPOINT, setpoint)
+
+
+def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
+    """Return CPU [cores], delays [ms] and start-up [s] of the driver; raises DriverError when it never flies them."""
+    port = free_port()
+    exchange = MemoryExchange()
+    bus = _TimedBus(exchange)
+    names = [f"v{n}" for n in range(count)]
+    vehicles = [{"name": name, "system_id": FIRST_SYSTEM + n, "flavour": "px4"} for n, name in enumerate(names)]
+    settings = MavlinkDriverSettings.model_validate(
+        {"link": {"kind": kind, "target": f"udpin:127.0.0.1:{port}"}, "vehicles": vehicles}
+    )
+    share_interpreter(settings)
+    host = _Host(bus)
+    fleet = Fleet(host, settings)
+    link = _TimedLink(fleet.link, bus)
+    fleet.link = link
+    for vehicle in fleet.vehicles.values():
+        vehicle.use(link)
+    tracker = _Tracker(exchange, names, link)
+    talking = talk(port, count, _START_S + seconds + 5)
+    try:
+        return _flown(host, fleet, hosts_of(host, fleet, settings), tracker, link, bus, seconds)
+    finally:
+        talking.kill()
+        talking.wait()
+        tracker.closing.set()
+        fleet.close()
+
+
+def _flown(
+    host: _Host, fleet: Fleet, hosts: Sequence[VehicleHost], tracker: _Tracker, link: _TimedLink, bus: _TimedBus,
+    seconds: float,
+) -> dict[str, Any]:  # fmt: skip
+    begin = clock.now_ns()
+    found_s: float | None = None
+    deadline_ns = begin
+    stages = iter((("LANDED", Verb.TAKEOFF), ("HOVER", Verb.TRACK), ("TRACK", None)))
+    stage, order = next(stages)
+    measured: tuple[int, float, int] | None = None
+    while True:
+        now_ns = clock.now_ns()
+        fleet.turn(now_ns)
+        for each in hosts:
+            each.turn(now_ns)
+        if found_s is None and all(v.telemetry.heartbeat_ns for v in fleet.vehicles.values()):
+            found_s = (now_ns - begin) / 1e9
+            tracker.start()
+        if all(h.watchdog.mode == stage and not h.watchdog.vehicle.not_ready for h in hosts) and measured is None:
+            if order is not None:
+                tracker.order(order)
+                stage, order = next(stages)
+            else:
+                measured = (now_ns + round(_SETTLE_S * 1e9), 0.0, 0)
+        if measured is None and now_ns - begin > _START_S * 1e9:
+            raise DriverError(f"the vehicles are not in {stage}: {hosts[0].watchdog.vehicle.not_ready}")
+        if measured is not None and not measured[1] and now_ns >= measured[0]:
+            measured = (now_ns, time.process_time(), link.frames)
+            link.late_ms.clear()
+            bus.late_ms.clear()
+        if measured is not None and measured[1] and now_ns - measured[0] >= seconds * 1e9:
+            break
+        deadline_ns = max(deadline_ns + round(1e9 / RATE_HZ), now_ns)
+        sleep_serving(host, hosts, deadline_ns)
+    elapsed_s, cpu_s = (clock.now_ns() - measured[0]) / 1e9, time.process_time() - measured[1]
+    frames = link.frames - measured[2]
+    return {
+        "discovery_s": round(found_s or math.nan, 2),
+        "cores": round(cpu_s / elapsed_s, 3),
+        "frames_per_s": round(frames / elapsed_s),
+        "us_per_frame": round(1e6 * cpu_s / max(1, frames), 1),
+        "telemetry_to_bus_ms": quantiles(bus.late_ms),
+        "setpoint_to_wire_ms": quantiles(link.late_ms),
+    }
+
+
+def peer(count: int, seconds: float) -> dict[str, float]:
+    """Return what pymavlink's mavutil takes to receive the same frames, and do nothing with them."""
+    os.environ["MAVLINK20"] = "1"
+    from pymavlink import mavutil
+
+    port = free_port()
+    connection = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
+    talking = talk(port, count, seconds + 5)
+    try:
+        connection.recv_match(blocking=True, timeout=5)
+        begin, cpu, frames = time.monotonic(), time.process_time(), 0
+        while time.monotonic() - begin < seconds:
+            frames += connection.recv_match(blocking=True, timeout=0.5) is not None
+        cpu = time.process_time() - cpu
+    finally:
+        talking.kill()
+        talking.wait()
+        connection.close()
+    return {"us_per_frame": round(1e6 * cpu / max(1, frames), 1), "cores": round(cpu / seconds, 3)}
+
+
+def talk(port: int, count: int, seconds: float) -> "subprocess.Popen[bytes]":
+    """Start the vehicles that talk."""
+    module = [sys.executable, "-m", "groundstation.bench.mavlink_vehicles"]
+    return subprocess.Popen([*module, str(port), str(count), str(seconds)])
+
+
+def free_port() -> int:
+    """Return a UDP port of loopback that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind(("127.0.0.1", 0))
+        return int(udp.getsockname()[1])
+
+
+def quantiles(late_ms: list[float]) -> dict[str, float]:
+    """Return median and 99th percentile."""
+    ordered = sorted(late_ms) or [math.nan]
+    return {"p50": round(ordered[len(ordered) // 2], 2), "p99": round(ordered[int(len(ordered) * 0.99)], 2)}

@@ -1,0 +1,76 @@
+"""The planar planning problem's constants."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarParameters:
+    """Sensor, motion and cost constants; defaults are the bench scenario of the planning study.
+
+    sigma_m: std of a relative position reading; range_m, softness_m: where and how softly readings end;
+    epsilon_m: rounds the distance at zero; robot_noise_m2_s, target_noise_m2_s: process variance rates;
+    step_s, steps, discount: the horizon; max_speed_m_s: bound per axis; target_velocity_m_s: predicted mean motion.
+    tail: share of a reading's information that is pretended to decay slowly, as r^2 / (r^2 + d^2), so that what is
+    out of range still attracts.
+    PAPER (docs/explanation/method.md 7): no tail; with 0 a lost target or robot gives no gradient.
+    Raises ValueError for values without meaning.
+    """
+
+    sigma_m: float = 0.05
+    range_m: float = 0.5
+    softness_m: float = 0.03
+    epsilon_m: float = 1e-3
+    robot_noise_m2_s: float = 1e-3
+    target_noise_m2_s: float = 4e-3
+    step_s: float = 0.2
+    steps: int = 5
+    discount: float = 0.9
+    max_speed_m_s: float = 0.25
+    target_velocity_m_s: tuple[float, float] = (0.0, 0.0)
+    tail: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive = ("sigma_m", "range_m", "softness_m", "robot_noise_m2_s", "target_noise_m2_s", "step_s", "discount")
+        for name in (*positive, "max_speed_m_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be positive and finite (got {value})")
+        if not (0.0 <= self.tail < 1.0 and 0.0 <= self.epsilon_m < math.inf):
+            raise ValueError(
+                f"tail must lie in [0, 1) and epsilon_m not be negative (got {self.tail}, {self.epsilon_m})"
+            )
+        if self.steps < 1:
+            raise ValueError(f"steps must be at least 1 (got {self.steps})")
+
+    def packed(self) -> Array:
+        """Return the constants in the order the kernels read them."""
+        vx, vy = self.target_velocity_m_s
+        return np.array(
+            [
+                self.sigma_m,
+                self.range_m,
+                self.softness_m,
+                self.epsilon_m,
+                self.step_s,
+                self.discount,
+                self.max_speed_m_s,
+                vx,
+                vy,
+                self.tail,
+            ]
+        )
+
+    def process_variance(self, robots: int) -> Array:
+        """Return the per-step process variance of each entity, target last (robots + 1) [m^2]."""
+        variance = np.full(robots + 1, self.robot_noise_m2_s * self.step_s)
+        variance[-1] = self.target_noise_m2_s * self.step_s
+        return variance
+
+
+# The parameters with which the paper's Fig. 1 is reproduced (sensor cut at 0.5 m, planned with a margin).
+FIGURE_1 = PlanarParameters(sigma_m=0.02, range_m=0.45, softness_m=0.02, robot_noise_m2_s=2e-3, target_noise_m2_s=1e-3)

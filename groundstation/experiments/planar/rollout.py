@@ -1,0 +1,161 @@
+"""Covariance rollout in information form, and its adjoint.
+
+Per axis the joint covariance is an (n + 1, n + 1) matrix P (isotropic sensors), target last, then padding. With
+D = Q^-1: L_i = Lm_i + Laplacian(w_i), Lm_{i+1} = D - D (L_i + D)^-1 D, cost = sum_i 2 gamma^i / chol(L_i)[t, t]^2.
+"""
+
+import numpy as np
+from numba import njit
+
+from groundstation.experiments.planar.dense import cholesky_upper, negative_inverse, subtract_products
+from groundstation.experiments.planar.edges import add_laplacian
+
+
+@njit("void(f8[:, ::1], i8)", cache=True, nogil=True)
+def _mirror(matrix, size):  # type: ignore[no-untyped-def]
+    for a in range(size):
+        for b in range(a):
+            matrix[a, b] = matrix[b, a]
+
+
+@njit("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])", cache=True, nogil=True)
+def predicted_information(covariance, variance, out, panel):  # type: ignore[no-untyped-def]
+    """Write (P + Q)^-1 into `out` (m, m), identity in the padding; False when P + Q is not positive definite."""
+    size = covariance.shape[0]
+    out[:, :] = 0.0
+    for a in range(out.shape[0]):
+        out[a, a] = -1.0
+    for a in range(size):
+        for b in range(size):
+            out[a, b] = covariance[a, b]
+        out[a, a] += variance[a]
+    for a in range(size, out.shape[0]):
+        out[a, a] = 1.0
+    if not negative_inverse(out, panel):
+        return False
+    for a in range(size):
+        for b in range(a, size):
+            out[a, b] = -out[a, b]
+            out[b, a] = out[a, b]
+    return True
+
+
+@njit("b1(f8[:, :, ::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1])", cache=True, nogil=True, fastmath={"contract"})
+def _predict(prior, i, variance, size, work, panel):  # type: ignore[no-untyped-def]
+    """Write Lm_{i+1} from L_i, which stands in `work`."""
+    for a in range(size):
+        work[a, a] += 1.0 / variance[a]
+    if not negative_inverse(work, panel):
+        return False
+    for b in range(size):
+        panel[0, b] = 1.0 / variance[b]
+    for a in range(size):
+        da = panel[0, a]
+        for b in range(np.uint64(a & ~7), np.uint64(size)):
+            prior[i + 1, a, b] = da * work[a, b] * panel[0, b]
+        prior[i + 1, a, a] += da
+    return True
+
+
+@njit("b1(f8[:, :, ::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1])", cache=True, nogil=True)
+def _predict_through_covariance(prior, i, variance, size, work, panel):  # type: ignore[no-untyped-def]
+    """Do the same as (L_i^-1 + Q)^-1.
+
+    The short form loses digits when the process noise is tiny against P: eps * max(D P).
+    """
+    if not negative_inverse(work, panel):
+        return False
+    for a in range(size):
+        for b in range(a, size):
+            work[a, b] = -work[a, b]
+        work[a, a] += variance[a]
+    for a in range(size, work.shape[0]):
+        work[a, a] = 1.0
+    if not negative_inverse(work, panel):
+        return False
+    for a in range(size):
+        for b in range(a, size):
+            prior[i + 1, a, b] = -work[a, b]
+    return True
+
+
+@njit("void(f8[:, :, ::1], i8, f8[:, :, ::1])", cache=True, nogil=True)
+def _copy(source, i, target):  # type: ignore[no-untyped-def]
+    """Copy the upper triangle of one matrix of a stack."""
+    m = np.uint64(source.shape[1])
+    for a in range(source.shape[1]):
+        for b in range(np.uint64(a & ~7), m):
+            target[i, a, b] = source[i, a, b]
+
+
+@njit("void(f8[:, :, ::1], i8, f8[:, ::1])", cache=True, nogil=True)
+def _copy_one(source, i, target):  # type: ignore[no-untyped-def]
+    m = np.uint64(source.shape[1])
+    for a in range(source.shape[1]):
+        for b in range(np.uint64(a & ~7), m):
+            target[a, b] = source[i, a, b]
+
+
+@njit(
+    "f8(f8[:, :, ::1], f8[:, :, ::1], u8[:, ::1], f8[:, ::1], f8[::1], f8, b1, f8[:, ::1], f8[:, ::1])",
+    cache=True,
+    nogil=True,
+)
+def rollout_cost(prior, factor, rows, information, variance, discount, stable, work, panel):  # type: ignore[no-untyped-def]
+    """Return the discounted trace of the target's covariance [m^2], or -1 when a matrix is not positive definite.
+
+    prior[0] holds Lm_1; prior and factor (h, m, m) are filled for the adjoint (upper triangles);
+    information (h, edges).
+    """
+    steps, size = prior.shape[0], variance.shape[0]
+    target = size - 1
+    cost, weight = 0.0, 1.0
+    for i in range(steps):
+        _copy(prior, i, factor)
+        add_laplacian(factor[i], rows, information, i)
+        if i + 1 < steps:
+            _copy_one(factor, i, work)
+        if not cholesky_upper(factor[i]):
+            return -1.0
+        weight *= discount
+        cost += 2.0 * weight / (factor[i, target, target] * factor[i, target, target])
+        if i + 1 < steps:
+            if stable:
+                if not _predict_through_covariance(prior, i, variance, size, work, panel):
+                    return -1.0
+            elif not _predict(prior, i, variance, size, work, panel):
+                return -1.0
+    return cost
+
+
+@njit(
+    "void(f8[:, :, ::1], f8[:, :, ::1], f8[::1], f8, f8[:, :, ::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    fastmath={"contract", "reassoc"},
+)
+def adjoint_columns(prior, factor, variance, discount, columns):  # type: ignore[no-untyped-def]
+    """Write the rank-one adjoints: columns[i, 0..h-1-i] = Y_i, so that dc/dw_ab,i = -sum_c (Y[c, b] - Y[c, a])^2.
+
+    Each step adds L_i^-1 e_t; older columns go from step i to i - 1 by L_{i-1}^-1 Lm_i = 1 - Q Lm_i, which is cheaper
+    than a solve and needs nothing but Lm_i.
+    """
+    steps, m, target = prior.shape[0], prior.shape[1], variance.shape[0] - 1
+    for i in range(steps - 1, -1, -1):
+        own = steps - 1 - i
+        if i + 1 < steps:
+            _mirror(prior[i + 1], target + 1)
+            columns[i, :own, :] = 0.0
+            subtract_products(columns[i], prior[i + 1], columns[i + 1], own)
+            for c in range(own):
+                for a in range(target + 1):
+                    columns[i, c, a] = columns[i + 1, c, a] + variance[a] * columns[i, c, a]
+        for a in range(m):
+            columns[i, own, a] = 0.0
+        columns[i, own, target] = np.sqrt(2.0 * discount ** (i + 1)) / factor[i, target, target] ** 2
+        for a in range(target - 1, -1, -1):
+            total = 0.0
+            for b in range(np.uint64(a + 1), np.uint64(target + 1)):
+                total += factor[i, a, b] * columns[i, own, b]
+            columns[i, own, a] = -total / factor[i, a, a]

@@ -33,7 +33,7 @@ def main() -> int:
 def _serve(spec: Path) -> int:
     from groundstation.process.child import Child, ChildSpec
     from sim_bridge.harness import Harness
-    from sim_bridge.order import read_order
+    from sim_bridge.launch_spec import read_order
 
     order = read_order(spec)
     with Child(ChildSpec(**order.child)) as child:

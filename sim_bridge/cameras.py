@@ -13,7 +13,7 @@ from multiprocessing.context import SpawnProcess
 import numpy as np
 
 from groundstation.errors import GroundStationError
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import (
@@ -21,21 +21,21 @@ from groundstation.geometry.rotations import (
     base_from_tilted_optical,
     world_from_downward_optical,
 )
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
+from sim_bridge.devices.ardrone_firmware import FIRMWARES
 from sim_bridge.devices.ardrone_video import VideoMode
-from sim_bridge.faults import CAMERA_FAULTS
 from sim_bridge.render.spec import (
     BoardSpec,
     BodyShape,
-    CameraScenario,
     FloorKind,
     Mount,
     Outage,
     OutageKind,
+    PictureQuality,
     RenderSpec,
     StreamKind,
 )
-from sim_bridge.scenario import FaultKind, Scenario
+from sim_bridge.scenario import CAMERA_FAULTS, FaultKind, Scenario
 from sim_bridge.site import Lens, Site
 
 Stream = tuple[str, int]
@@ -60,6 +60,7 @@ def render_specs(
             address=address,
             port=port,
             kind=_kind(site, name),
+            video_header_bytes=FIRMWARES[scenario.drones.firmware_of(name)].video_header_bytes,
             scenario=_camera_scenario(scenario, name),
             seed=seed,
             room_size_m=site.room.size_m,
@@ -114,13 +115,15 @@ def _boards(site: Site) -> tuple[BoardSpec, ...]:
     return drones + targets
 
 
-def _board(body: str, printed: Board | Tag, place: tuple[float, float, float], shape: BodyShape) -> BoardSpec:
-    if isinstance(printed, Tag):
+def _board(
+    body: str, printed: Checkerboard | SquareTag, place: tuple[float, float, float], shape: BodyShape
+) -> BoardSpec:
+    if isinstance(printed, SquareTag):
         return BoardSpec(body, 0, 0.0, place, shape, printed)
     return BoardSpec(body, printed.code, printed.square_mm, place, shape)
 
 
-def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
+def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
     kinds = {FaultKind.CAMERA_CUT: OutageKind.CUT, FaultKind.CAMERA_STALL: OutageKind.STALL}
     outages = tuple(
         Outage(kinds[fault.kind], fault.start_s, fault.end_s)
@@ -128,7 +131,7 @@ def _camera_scenario(scenario: Scenario, name: str) -> CameraScenario:
         if fault.kind in CAMERA_FAULTS and fault.entity == name
     )
     figures = scenario.cameras.model_dump(exclude={"floor"})
-    return CameraScenario(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages)
+    return PictureQuality(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages)
 
 
 def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:

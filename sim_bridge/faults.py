@@ -2,31 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 
-from groundstation.errors import SettingsError
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.mavlink import MavlinkEmulator
-from sim_bridge.scenario import Fault, FaultKind
-from sim_bridge.site import SiteDrone
+from sim_bridge.scenario import CAMERA_FAULTS, Fault, FaultKind
 from sim_bridge.world.world import World
 
 Emulator = ArDroneEmulator | MavlinkEmulator
-CAMERA_FAULTS = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL})
-_ARDRONE_FAULTS = frozenset({FaultKind.PROPELLER_BLOCKED})
-
-
-def check_faults(faults: Iterable[Fault], drones: Mapping[str, SiteDrone], cameras: Iterable[str]) -> None:
-    """Raise SettingsError naming every fault of an entity that does not exist, or cannot have it."""
-    cameras = sorted(cameras)
-    problems = []
-    for number, fault in enumerate(faults):
-        if fault.kind in CAMERA_FAULTS:
-            known = cameras
-        else:
-            known = sorted(n for n, d in drones.items() if d.kind == "ardrone" or fault.kind not in _ARDRONE_FAULTS)
-        if fault.entity not in known:
-            problems.append(f"scenario: faults.{number}.entity: {fault.entity!r} is none of {', '.join(known)}")
-    if problems:
-        raise SettingsError(problems)
 
 
 class FaultSchedule:

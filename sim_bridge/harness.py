@@ -9,13 +9,13 @@ from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
-from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import FIRMWARES
 from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.faults import FaultSchedule
-from sim_bridge.order import Order
+from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.stage import Stage
+from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.unicycle import Unicycle
 from sim_bridge.world.world import World
 
@@ -28,7 +28,7 @@ _LANDING_LIMIT_S = 20.0
 class Harness:
     """World, emulators and truth of one run. `close` releases everything, in any state."""
 
-    def __init__(self, child: Child, order: Order) -> None:
+    def __init__(self, child: Child, order: LaunchSpec) -> None:
         self._child, self._order = child, order
         self.world = World(order.site, order.scenario, order.seed)
         self._stage = Stage(self.world)

@@ -10,8 +10,8 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from groundstation.errors import SettingsError
-from groundstation.geometry.board import Board
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.board import Checkerboard
+from groundstation.geometry.tag import SquareTag
 from sim_bridge.scenario import describe_problems
 
 
@@ -19,7 +19,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
 
-class Room(_Part):
+class SimulatedRoom(_Part):
     """Size along x, y, z; the origin is on the floor in the middle."""
 
     size_m: tuple[float, float, float]
@@ -37,7 +37,7 @@ class Lens(_Part):
     distortion: tuple[float, float, float, float, float]
 
 
-class Print(_Part):
+class MarkerPrint(_Part):
     """What is printed on a marker: a checkerboard, or (kind aruco) a tag."""
 
     kind: Literal["checkerboard", "aruco"] = "checkerboard"
@@ -48,20 +48,20 @@ class Print(_Part):
     size_mm: float | None = None
 
     @property
-    def printed(self) -> Board | Tag:
+    def printed(self) -> Checkerboard | SquareTag:
         """Return the marker's layout."""
         if self.dictionary is not None and self.id is not None and self.size_mm is not None:
-            return Tag(self.dictionary, self.id, self.size_mm)
-        return Board(-1 if self.code is None else self.code, self.square_mm)
+            return SquareTag(self.dictionary, self.id, self.size_mm)
+        return Checkerboard(-1 if self.code is None else self.code, self.square_mm)
 
 
-class Marker(Print):
+class MarkerOfDrone(MarkerPrint):
     """The marker of a drone."""
 
     position_m: tuple[float, float, float]
 
 
-class OnboardCamera(_Part):
+class EmulatedCamera(_Part):
     """A drone's camera [base]; source: where its driver looks for the pictures, which says how they travel."""
 
     source: str = ""
@@ -88,13 +88,19 @@ class SiteDrone(_Part):
     mavlink: MavlinkIdentity | None = None
     pad_m: tuple[float, float]
     pad_yaw_deg: float = 0.0
-    marker: Marker
-    camera: OnboardCamera | None = None
+    marker: MarkerOfDrone
+    camera: EmulatedCamera | None = None
 
     @property
     def pad_yaw_rad(self) -> float:
         """Return the heading on the pad [rad; world]."""
         return math.radians(self.pad_yaw_deg)
+
+    def require_mavlink(self) -> MavlinkIdentity:
+        """Return who a MAVLink vehicle is; raises SettingsError where nothing says so."""
+        if self.mavlink is None:
+            raise SettingsError([f"kind: {self.kind} has no mavlink section"])
+        return self.mavlink
 
 
 class SiteCamera(_Part):
@@ -106,7 +112,7 @@ class SiteCamera(_Part):
     rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-class TargetMarker(Print):
+class TargetMarker(MarkerPrint):
     """The marker of the target, flat, `height_m` above the floor."""
 
     height_m: float
@@ -128,7 +134,7 @@ class Site(_Part):
     """Room, drones, cameras of a resolved field, and its target or, by name, its targets."""
 
     site: str
-    room: Room
+    room: SimulatedRoom
     cameras: dict[str, SiteCamera] = {}
     drones: dict[str, SiteDrone]
     target: SingleTarget | None = None

@@ -12,9 +12,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from groundstation.arrays import Array
 
 FIELDS = ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw", "wx", "wy", "wz", "on_ground")
 WIDTH = len(FIELDS)

@@ -6,16 +6,16 @@ import socket
 from contextlib import suppress
 
 from groundstation.errors import GroundStationError
-from sim_bridge.devices.ardrone_audience import Listener
 from sim_bridge.devices.ardrone_control import FlightControl
-from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_navdata import NavdataState, NavdataWriter
 from sim_bridge.devices.ardrone_ports import Ports, open_udp
 from sim_bridge.devices.ardrone_state import control_state, state_word
-from sim_bridge.world.autopilot import Phase
-from sim_bridge.world.motors import flight_pwm, ramp_pwm
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
+from sim_bridge.devices.ardrone_subscribers import Listener
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_autopilot import Phase
+from sim_bridge.world.ardrone_motors import flight_pwm, ramp_pwm
+from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.world import TICK_NS
 
 NAVDATA_PORT = 5554
@@ -42,7 +42,7 @@ class ArDroneEmulator:
         drone: Quadrotor,
         onboard: Onboard,
         navdata_hz: float = 200.0,
-        firmware: Firmware = FIRMWARES[DEFAULT],
+        firmware: ArdroneFirmware = FIRMWARES[DEFAULT],
     ) -> None:
         self.name = name
         self.silent = False

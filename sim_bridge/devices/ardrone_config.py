@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from drivers.ardrone.wire.configuration import CONFIGURATION, Access, Category, Key, Scalar, parse_value
+from drivers.ardrone.wire.configuration import CONFIGURATION, Access, Category, ConfigKey, Scalar, parse_value
 from drivers.ardrone.wire.errors import WireError
-from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 
 DEFAULT_ID = "00000000"
 Ids = tuple[str, str, str]  # session, user, application: the order of CONFIG_IDS
@@ -26,7 +26,7 @@ _MOST_SETS = 32
 class Configuration:
     """Keys and values of one drone: one set that is common to all, and sets by id for the other categories."""
 
-    def __init__(self, firmware: Firmware = FIRMWARES[DEFAULT]) -> None:
+    def __init__(self, firmware: ArdroneFirmware = FIRMWARES[DEFAULT]) -> None:
         self._firmware = firmware
         self._keys = {
             name: key for name, key in CONFIGURATION.items() if key.generation in (0, firmware.generation)
@@ -91,21 +91,21 @@ class Configuration:
         self._follow(name)
         return True
 
-    def _may_write(self, key: Key, ids: Ids | None) -> bool:
+    def _may_write(self, key: ConfigKey, ids: Ids | None) -> bool:
         if key.name in _SWITCHES or not self._firmware.multi_configuration:
             return True
         active = self.active_ids
-        # WIRE: a write to a set that is not the active one is ignored (sheet 5.3).
+        # WIRE: a write to a set that is not the active one is ignored (docs/reference/ardrone.md 5.3).
         if key.category is not Category.COMMON and tuple(map(str.lower, ids or NO_IDS)) != active:
             return False
         return key.access is not Access.CUSTOM or active != NO_IDS
 
-    def _value(self, key: Key) -> Scalar:
+    def _value(self, key: ConfigKey) -> Scalar:
         if key.name in _SWITCHES:
             return self._active[_SWITCHES[key.name]]
         return self._set_of(key)[key.name]
 
-    def _set_of(self, key: Key) -> dict[str, Scalar]:
+    def _set_of(self, key: ConfigKey) -> dict[str, Scalar]:
         if key.category is Category.COMMON:
             return self._common
         return self._sets[key.category][self._active[key.category]]

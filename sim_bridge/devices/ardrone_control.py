@@ -4,14 +4,14 @@ import math
 
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.errors import WireError
-from sim_bridge.devices.ardrone_audience import Audience
 from sim_bridge.devices.ardrone_config import Configuration, Ids
-from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
-from sim_bridge.devices.ardrone_session import COM_LOST_NS, LAND_AFTER_LOST_NS, Session
-from sim_bridge.world.autopilot import FlightLimits, Motion, Phase
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
-from sim_bridge.world.stunts import FLIPS, Animation, default_duration_s
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
+from sim_bridge.devices.ardrone_session import COM_LOST_NS, LAND_AFTER_LOST_NS, CommandSession
+from sim_bridge.devices.ardrone_subscribers import Audience
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_animations import FLIPS, Animation, default_duration_s
+from sim_bridge.world.ardrone_autopilot import FlightLimits, MotionReferences, Phase
+from sim_bridge.world.ardrone_sensors import Onboard
 
 BATTERY_LOW = 0.20
 BATTERY_NO_TAKE_OFF = 0.10
@@ -23,10 +23,10 @@ _COMBINED_YAW_ALLOWED = 1
 class FlightControl:
     """Obeys the commands that reach one drone; `blocked` is a propeller that something holds (a fault)."""
 
-    def __init__(self, drone: Quadrotor, onboard: Onboard, firmware: Firmware = FIRMWARES[DEFAULT]) -> None:
+    def __init__(self, drone: Quadrotor, onboard: Onboard, firmware: ArdroneFirmware = FIRMWARES[DEFAULT]) -> None:
         self.firmware = firmware
         self.configuration = Configuration(firmware)
-        self.session = Session()
+        self.session = CommandSession()
         self.audience = Audience()
         self.pcmd_sequence = 0
         self.combined_yaw = False
@@ -138,7 +138,7 @@ class FlightControl:
         # WIRE: phi > 0 right, theta > 0 backward, yaw > 0 clockwise; the world's axes are forward, left, up.
         limits = autopilot.limits
         autopilot.move(
-            Motion(
+            MotionReferences(
                 right * limits.tilt_rad,
                 forward * limits.tilt_rad,
                 motion.gaz * limits.climb_m_s,

@@ -1,8 +1,8 @@
 """FTP as far as clients of an AR.Drone go: anonymous, passive, reading `version.txt`.
 
 WIRE: port 5551 serves `version.txt` ("2.3.3"), by which the SDK tells the generations apart; port 21 the data
-partition, which PS-Drone only wants to see open (AR.Drone sheet 1). A server of a library would want a thread and
-write access of its own; this one shares the emulator's loop and has nothing to write to.
+partition, which PS-Drone only wants to see open (docs/reference/ardrone.md 1). A server of a library would want a
+thread and write access of its own; this one shares the emulator's loop and has nothing to write to.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,7 +34,8 @@ class _Dialogue:
         self._data: Connection | None = None
         self._outgoing: bytes | None = None
         self._replies: dict[str, Callable[[str], str]] = {
-            "USER": lambda _: "331 any password will do",
+            # WIRE (Parrot's SDK): asked for a password, it repeats its USER for ever.
+            "USER": lambda _: "230 logged in",
             "PASS": lambda _: "230 logged in",
             "SYST": lambda _: "215 UNIX Type: L8",
             "FEAT": lambda _: "211 no features",

@@ -1,7 +1,7 @@
 """Navdata as an AR.Drone writes it: a template packet of its firmware with the living fields written in place.
 
 This file writes native units and axes (mdeg, mm, mg; forward-right-down) by itself and by offsets of its own, taken
-from the protocol sheet: it shares neither the driver's conversions nor the layouts that the driver decodes with.
+from docs/reference/ardrone.md 4: it shares neither conversions nor layouts with the driver.
 """
 
 import math
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
-from sim_bridge.world.airframe import GRAVITY_M_S2
-from sim_bridge.world.onboard import Onboard
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
+from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2
+from sim_bridge.world.ardrone_sensors import Onboard
 
 DEFAULT_OPTIONS = 65537  # DEMO and VISION_DETECT
 _DEMO, _TIME, _RAW, _PHYS, _EULER, _REFERENCES, _PWM, _ALTITUDE = 0, 1, 2, 3, 5, 6, 9, 10
@@ -58,7 +58,7 @@ class NavdataState:
 class _Packet:
     """A buffer with the given options, zero but for constants, and the offset of each."""
 
-    def __init__(self, firmware: Firmware, mask: int) -> None:
+    def __init__(self, firmware: ArdroneFirmware, mask: int) -> None:
         sizes = firmware.sizes
         tags = [tag for tag in sorted(sizes) if mask >> tag & 1]
         self.at: dict[int, int] = {}
@@ -103,7 +103,7 @@ _CONSTANTS: tuple[tuple[int, int, str, tuple[float, ...]], ...] = (
 class NavdataWriter:
     """Writes the packets of one drone; the returned buffers are reused by the next call."""
 
-    def __init__(self, firmware: Firmware = FIRMWARES[DEFAULT]) -> None:
+    def __init__(self, firmware: ArdroneFirmware = FIRMWARES[DEFAULT]) -> None:
         self._firmware = firmware
         self._status = _Packet(firmware, 0)
         self._full = _Packet(firmware, -1)

@@ -8,7 +8,7 @@ from drivers.ardrone.wire.configuration import format_custom_dump, format_dump
 from groundstation.errors import GroundStationError
 from sim_bridge.devices.ardrone_config import Configuration
 from sim_bridge.devices.ardrone_ftp import FtpServer
-from sim_bridge.devices.ardrone_tcp import Connection, Selector, TcpPort, taken
+from sim_bridge.devices.ardrone_tcp import Connection, Selector, TcpPort, refused
 
 CONTROL_PORT = 5559
 VERSION_PORT = 5551
@@ -111,7 +111,7 @@ def open_udp(name: str, address: str, port: int) -> socket.socket:
         udp.bind((address, port))
     except OSError as error:
         udp.close()
-        raise taken(name, address, port, "UDP", error) from error
+        raise refused(name, address, port, socket.SOCK_DGRAM, error) from error
     # Set after binding: nobody else gets this address, but old clients, which want the same port on all addresses of
     # the host, get theirs if they ask for sharing, too.
     udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

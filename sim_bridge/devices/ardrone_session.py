@@ -9,7 +9,7 @@ LAND_AFTER_LOST_NS = 500_000_000
 ACK_PACKETS = 2
 
 
-class Link(Enum):
+class CommandLink(Enum):
     """How long the client has been silent."""
 
     ALIVE = auto()
@@ -17,7 +17,7 @@ class Link(Enum):
     LOST = auto()
 
 
-class Session:
+class CommandSession:
     """Whoever sends commands; times are of the emulator's clock [ns]."""
 
     def __init__(self) -> None:
@@ -44,12 +44,12 @@ class Session:
         self.at_sequence = sequence
         return True
 
-    def link(self, now_ns: int) -> Link:
+    def link(self, now_ns: int) -> CommandLink:
         """Return how long the client has been silent."""
         silence = self.silence_ns(now_ns)
         if silence > COM_LOST_NS:
-            return Link.LOST
-        return Link.LATE if silence > COM_WATCHDOG_NS else Link.ALIVE
+            return CommandLink.LOST
+        return CommandLink.LATE if silence > COM_WATCHDOG_NS else CommandLink.ALIVE
 
     def silence_ns(self, now_ns: int) -> int:
         """Return the time since the last AT datagram; for ever if there was none."""

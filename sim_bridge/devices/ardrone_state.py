@@ -11,9 +11,9 @@ from drivers.ardrone.wire.state import (
     join_control_state,
 )
 from sim_bridge.devices.ardrone_control import BATTERY_LOW, FlightControl
-from sim_bridge.devices.ardrone_session import Link
-from sim_bridge.world.autopilot import Phase
-from sim_bridge.world.quadrotor import Quadrotor
+from sim_bridge.devices.ardrone_session import CommandLink
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_autopilot import Phase
 
 _MAJOR = {
     Phase.LANDED: ControlState.LANDED,
@@ -46,9 +46,9 @@ def state_word(drone: Quadrotor, control: FlightControl, now_ns: int, bootstrap:
         word |= StateBit.NAVDATA_DEMO
     if drone.battery <= BATTERY_LOW:
         word |= StateBit.VBAT_LOW
-    if link is not Link.ALIVE:
+    if link is not CommandLink.ALIVE:
         word |= StateBit.COM_WATCHDOG
-        if link is Link.LOST:
+        if link is CommandLink.LOST:
             word |= StateBit.COM_LOST
     if autopilot.phase is Phase.CUT:
         word |= StateBit.EMERGENCY | (StateBit.CUTOUT if control.cut_out else StateBit.USER_EL)
@@ -66,6 +66,6 @@ def control_state(drone: Quadrotor, control: FlightControl, now_ns: int) -> int:
     elif phase is Phase.HOVERING:
         if autopilot.calibrating:
             minor = HOVERING_MAGNETO_CALIB
-        elif control.session.link(now_ns) is Link.LOST:
+        elif control.session.link(now_ns) is CommandLink.LOST:
             minor = HOVERING_LOST_COM
     return join_control_state(_MAJOR[phase], minor)

@@ -1,7 +1,7 @@
 """The video port of an emulated AR.Drone 2: H.264 in PaVE frames over TCP 5555.
 
-WIRE (AR.Drone sheet 6): the stream begins when a client connects, and what the client says is of no interest; an IDR
-with its parameter sets every 15 pictures; when a reader is late, frames are dropped up to the next IDR.
+WIRE (docs/reference/ardrone.md 6): the stream begins when a client connects, whatever the client sends; an IDR with
+its parameter sets every 15 pictures; for a late reader, frames are dropped up to the next IDR.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ import numpy as np
 from av.video.frame import PictureType
 from numpy.typing import NDArray
 
-from drivers.ardrone.wire.pave import Frame, FrameType, encode_frame
+from drivers.ardrone.wire.pave import FrameType, PaveFrame, encode_frame
 from sim_bridge.devices.stream_server import Client, StreamServer
 
 PORT = 5555
@@ -23,11 +23,11 @@ _IDR_PERIOD = 15
 _START_CODE = b"\x00\x00\x00\x01"
 _SHORT_CODE = b"\x00\x00\x01"
 _SEI = 6
-# WIRE (AR.Drone sheet 5.4): values of video:video_codec whose live stream is 720p; the others are 360p.
+# WIRE (docs/reference/ardrone.md 5.4): values of video:video_codec whose live stream is 720p; the others are 360p.
 _CODECS_720P = frozenset({0x83})
 _BOTTOM = 1
 _MANUAL_BITRATE = 2
-# WIRE (AR.Drone sheet 6): pictures as the sensor sees them are of limited range: 16 to 235.
+# WIRE (docs/reference/ardrone.md 6): pictures as the sensor sees them are of limited range: 16 to 235.
 _LIMITED = np.rint(16 + np.arange(256) * (219 / 255)).astype(np.uint8)
 
 
@@ -80,8 +80,9 @@ class EncodedPicture:
 class VideoEncoder:
     """Grey pictures of one mode to PaVE frames; `number` and `position` go on from one encoder to the next."""
 
-    def __init__(self, mode: VideoMode, fps: float, number: int = 0, position: int = 0) -> None:
+    def __init__(self, mode: VideoMode, fps: float, header_bytes: int, number: int = 0, position: int = 0) -> None:
         self.mode, self.number, self.position = mode, number, position
+        self._header_bytes = header_bytes
         self._index = 0
         self._codec = _codec(mode, fps)
         width, height = mode.size
@@ -102,7 +103,7 @@ class VideoEncoder:
         payload = _without_remarks(payload, sum(sizes))
         width, height = self.mode.size
         self.number += 1
-        pave = Frame(
+        pave = PaveFrame(
             _AVC,
             width,
             height,
@@ -113,7 +114,7 @@ class VideoEncoder:
             stream=self.mode.stream,
             parameter_sizes=sizes,
         )
-        data = encode_frame(pave, self.position)
+        data = encode_frame(pave, self.position, self._header_bytes)
         self.position += len(data)
         return EncodedPicture(data, packet.is_keyframe)
 

@@ -7,16 +7,18 @@ from contextlib import suppress
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, Decoder, Encoder, Frame, Message, Signing, split
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.names import Flavour
+from drivers.mavlink.wire.verification import Signing
 from groundstation.errors import GroundStationError
+from groundstation.process.ports import why_refused
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
-from sim_bridge.devices.mavlink_firmware import Firmware
+from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
 from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_px4 import Px4
 from sim_bridge.devices.mavlink_services import Services
-from sim_bridge.world.copter import Copter
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS
 
 PORT = 14550
@@ -38,18 +40,19 @@ class MavlinkEmulator:
     """
 
     def __init__(
-        self, name: str, address: Address, flavour: Flavour, system: int, copter: Copter, *, configured: bool = True,
-        calls: Address | None = None, video: t.VideoStreamInformation | None = None, signing: Signing | None = None,
+        self, name: str, address: Address, flavour: Flavour, system: int, copter: MavlinkCopter, *,
+        configured: bool = True, calls: Address | None = None, video: t.VideoStreamInformation | None = None,
+        signing: Signing | None = None,
     ) -> None:  # fmt: skip
         self.name = name
         self.silent = False
         self.deaf = False
         self.rejected: Counter[str] = Counter()
         parameters = Parameters(flavour, system, configured)
-        self.firmware: Firmware = (Px4 if flavour is Flavour.PX4 else ArduCopter)(copter, parameters)
+        self.firmware: AutopilotFirmware = (Px4 if flavour is Flavour.PX4 else ArduCopter)(copter, parameters)
         self.speaker = Speaker(self.firmware)
         self.services = Services(system, self.firmware, self.speaker, video)
-        self._encoder, self._decoder = Encoder(system, 1, signing), Decoder(signing)
+        self._encoder, self._decoder = FrameEncoder(system, 1, signing), FrameDecoder(signing)
         self._calls = calls
         self._clients: dict[Address, int] = {}
         self._ground_ns: int | None = None
@@ -85,7 +88,7 @@ class MavlinkEmulator:
         except WireError as error:
             self.rejected[error.reason] += 1
 
-    def _take(self, frame: Frame, source: Address) -> None:
+    def _take(self, frame: ReceivedFrame, source: Address) -> None:
         if source not in self._clients:
             if len(self._clients) >= _CLIENTS:
                 del self._clients[min(self._clients, key=lambda address: self._clients[address])]
@@ -169,8 +172,6 @@ def _open(name: str, address: Address) -> socket.socket:
         udp.bind(address)
     except OSError as error:
         udp.close()
-        place = f"{address[0]}:{address[1]}"
-        raise GroundStationError(
-            f"emulated {name}: cannot listen on {place} (UDP): is another run using this address? ({error})"
-        ) from error
+        place, why = f"{address[0]}:{address[1]}", why_refused(error, *address, socket.SOCK_DGRAM)
+        raise GroundStationError(f"emulated {name}: cannot listen on {place} (UDP): {why}") from error
     return udp

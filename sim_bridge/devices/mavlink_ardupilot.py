@@ -1,11 +1,11 @@
-"""ArduCopter 4.6 as far as a ground station meets it (mavlink.md 1, 5.3)."""
+"""ArduCopter 4.6 as far as a ground station meets it (docs/reference/mavlink.md 1, 5.3)."""
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import Copter as Mode
-from drivers.mavlink.wire.names import Flavour, Landed, Result
-from sim_bridge.devices.mavlink_firmware import Answer, Firmware
+from drivers.mavlink.wire.names import CopterMode as Mode
+from drivers.mavlink.wire.names import Flavour, Landed, MavResult
+from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.world.copter import Copter, Steering
+from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 _SPOOL_S = 3.3
 _CLIMB_M_S = 0.5
@@ -17,17 +17,17 @@ _LEVEL = (Mode.STABILIZE, Mode.ALT_HOLD)
 _GCS_ACTIONS = frozenset({1, 3, 5, 7})
 
 
-class ArduCopter(Firmware):
+class ArduCopter(AutopilotFirmware):
     """GUIDED obeys velocities until GUID_TIMEOUT, and stays GUIDED when it brakes."""
 
     flavour = Flavour.ARDUPILOT
     guided = Mode.GUIDED
     landing = Mode.LAND
     frames = frozenset({1, 7, 8, 9})
-    arming_refusal = Result.FAILED
+    arming_refusal = MavResult.FAILED
     disarmed_text = "Disarming motors"
 
-    def __init__(self, copter: Copter, parameters: Parameters) -> None:
+    def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
         super().__init__(copter, parameters, Mode.STABILIZE)
         self._climb_to_m: float | None = None
         self._take_off_s = 0.0
@@ -55,15 +55,15 @@ class ArduCopter(Firmware):
         needs_position = self.knows(mode) and mode not in (*_LEVEL, Mode.LAND, Mode.GUIDED_NOGPS)
         if needs_position and not self.located:
             self.say(4, f"Mode change to {Mode(mode).name} failed: requires position")
-            return Result.FAILED, "requires position"
+            return MavResult.FAILED, "requires position"
         return super().set_mode(mode)
 
     def take_off(self, height_m: float) -> Answer:
         """Climb: only armed, on the floor, in GUIDED."""
         if not self.armed or self.mode != Mode.GUIDED or self.copter.airborne or not 0.1 < height_m < 100:
-            return Result.FAILED, "cannot take off now"
+            return MavResult.FAILED, "cannot take off now"
         self._climb_to_m, self._take_off_s = height_m, self.now_s
-        return Result.ACCEPTED, ""
+        return MavResult.ACCEPTED, ""
 
     def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
         """WIRE: an invalid frame or mask makes it stop where it is."""
@@ -95,7 +95,7 @@ class ArduCopter(Firmware):
 
     @property
     def landed(self) -> Landed:
-        """Return what the landing detector says; WIRE (mavlink.md 1): 3 until the height is reached."""
+        """Return what the landing detector says; WIRE (docs/reference/mavlink.md 1): 3 until the height is reached."""
         climbing = self._climb_to_m is not None and self.armed and self.now_s - self._take_off_s >= _SPOOL_S
         return Landed.TAKE_OFF if climbing else super().landed
 

@@ -15,20 +15,20 @@ from drivers.mavlink.wire.names import (
     VELOCITY_ONLY,
     Flavour,
     Landed,
-    Result,
+    MavResult,
 )
 from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.world.copter import Copter, Steering
+from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
-Answer = tuple[Result, str]
+Answer = tuple[MavResult, str]
 _MASKS = frozenset({VELOCITY_AND_YAW_RATE, VELOCITY_AND_YAW, VELOCITY_ONLY})
 _YAW_GAIN = 2.0
 _AIDED_S = 1.0
 _BATTERY_MIN = 0.15
-_OK: Answer = (Result.ACCEPTED, "")
+_OK: Answer = (MavResult.ACCEPTED, "")
 
 
-class Firmware:
+class AutopilotFirmware:
     """One autopilot around a body of the world; flavours override what differs. texts: (severity, line) to send."""
 
     flavour: Flavour
@@ -36,7 +36,7 @@ class Firmware:
     landing: int
     frames: frozenset[int]
 
-    def __init__(self, copter: Copter, parameters: Parameters, start_mode: int) -> None:
+    def __init__(self, copter: MavlinkCopter, parameters: Parameters, start_mode: int) -> None:
         self.copter, self.parameters = copter, parameters
         self.armed = False
         self.mode = start_mode
@@ -65,7 +65,7 @@ class Firmware:
     def disarm(self, code: float) -> Answer:
         """Stop the motors; in the air only by force."""
         if self.copter.airborne and code != FORCE:
-            return Result.FAILED if self.flavour is Flavour.ARDUPILOT else Result.DENIED, "not landed"
+            return MavResult.FAILED if self.flavour is Flavour.ARDUPILOT else MavResult.DENIED, "not landed"
         self.armed = False
         self.copter.steer(Steering.OFF)
         return _OK
@@ -73,7 +73,7 @@ class Firmware:
     def set_mode(self, mode: int) -> Answer:
         """Change the mode on request."""
         if not self.knows(mode):
-            return Result.DENIED, f"mode {mode:#x} unknown"
+            return MavResult.DENIED, f"mode {mode:#x} unknown"
         self.enter(mode)
         return _OK
 
@@ -87,7 +87,10 @@ class Firmware:
         raise NotImplementedError
 
     def fly(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Take a set-point; WIRE (mavlink.md 5.1): frames and masks that are not understood are refused aloud."""
+        """Take a set-point.
+
+        WIRE (docs/reference/mavlink.md 5.1): frames and masks that are not understood are refused aloud.
+        """
         if setpoint.coordinate_frame not in self.frames or setpoint.type_mask & 0xDFF not in {
             m & 0xDFF for m in _MASKS
         }:
@@ -182,7 +185,7 @@ class Firmware:
 
     # -- flavours -----------------------------------------------------------------------------------------------------
 
-    arming_refusal = Result.DENIED
+    arming_refusal = MavResult.DENIED
     disarmed_text = "Disarmed"
 
     def arming_fault(self) -> str:

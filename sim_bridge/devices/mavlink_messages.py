@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable
 
 from drivers.mavlink.wire import telemetry as t
-from drivers.mavlink.wire.flight import Odometry
+from drivers.mavlink.wire.flight import OdometryMessage
 from drivers.mavlink.wire.frames import Message
-from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, Sensor
+from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, SensorBits
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
-from sim_bridge.devices.mavlink_firmware import Firmware
+from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
 
 _MG = 1000.0 / 9.80665
 _NO_CELL = 65535
@@ -21,7 +21,7 @@ _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
 class Speaker:
     """Builds the messages of one vehicle."""
 
-    def __init__(self, firmware: Firmware) -> None:
+    def __init__(self, firmware: AutopilotFirmware) -> None:
         self._firmware = firmware
         self._copter, self._estimate = firmware.copter, firmware.copter.estimate
         self.boot_us = 0
@@ -40,7 +40,7 @@ class Speaker:
             t.AutopilotVersion: self.version,
         }
         if firmware.flavour is Flavour.PX4:
-            self.builders[Odometry] = self.odometry
+            self.builders[OdometryMessage] = self.odometry
         else:
             self.builders[t.EkfStatusReport] = self.ekf
 
@@ -58,12 +58,12 @@ class Speaker:
 
     def sys_status(self) -> Message:
         """Return health and battery."""
-        healthy = Sensor.GYRO | Sensor.ACCELEROMETER | Sensor.MAGNETOMETER
+        healthy = SensorBits.GYRO | SensorBits.ACCELEROMETER | SensorBits.MAGNETOMETER
         if self._firmware.located:
-            healthy |= Sensor.VISION_POSITION
+            healthy |= SensorBits.VISION_POSITION
         if isinstance(self._firmware, ArduCopter) and not self._firmware.prearm_fault():
-            healthy |= Sensor.PREARM_CHECK
-        present = healthy | Sensor.VISION_POSITION | Sensor.PREARM_CHECK
+            healthy |= SensorBits.PREARM_CHECK
+        present = healthy | SensorBits.VISION_POSITION | SensorBits.PREARM_CHECK
         return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
 
     @property
@@ -123,14 +123,14 @@ class Speaker:
         return t.RawImu(self.boot_us, *force, _whole(wx * 1000), _whole(wy * 1000), _whole(wz * 1000))
 
     def odometry(self) -> Message | None:
-        """WIRE (mavlink.md 2): PX4 sends its velocity in NED and says so by child frame 1."""
+        """WIRE (docs/reference/mavlink.md 2): PX4 sends its velocity in NED and says so by child frame 1."""
         if not self._estimate.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
         pose = _diagonal(0.01, 0.01, 0.01, 0.001, 0.001, 0.003)
         velocity = _diagonal(0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
         q = self._quaternion()
-        return Odometry(self.boot_us, 1, 1, x, -y, -z, q, vx, -vy, -vz, *self._rates(), pose, velocity, 0, 8, 0)
+        return OdometryMessage(self.boot_us, 1, 1, x, -y, -z, q, vx, -vy, -vz, *self._rates(), pose, velocity, 0, 8, 0)
 
     def battery(self) -> Message:
         """Return the battery."""

@@ -6,9 +6,9 @@ from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import VideoStreamInformation
 from sim_bridge.devices.camera_stream import PATH
 from sim_bridge.devices.mavlink import MavlinkEmulator
-from sim_bridge.order import Order
+from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.site import Lens, SiteDrone
-from sim_bridge.world.copter import Copter
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 
 # WIRE (VIDEO_STREAM_TYPE, VIDEO_STREAM_ENCODING): JPEGs over HTTP have neither a type nor an encoding of their own.
 # MPEG over TCP, encoding unknown, is nearest, and the address says the rest; RTSP, 0, would mislead a client.
@@ -22,13 +22,12 @@ def announced(name: str, lens: Lens, fps: float, uri: str) -> VideoStreamInforma
     return VideoStreamInformation(1, 1, _TCP_MPEG, _RUNNING, fps, *size, 0, 0, hfov, name, uri, _UNKNOWN_ENCODING)
 
 
-def open_vehicle(name: str, drone: SiteDrone, copter: Copter, order: Order) -> MavlinkEmulator:
+def open_vehicle(name: str, drone: SiteDrone, copter: MavlinkCopter, order: LaunchSpec) -> MavlinkEmulator:
     """Return the listening emulator of a MAVLink vehicle.
 
     Where the field's driver waits for its vehicles (`listen`), the vehicle calls it.
     """
-    identity = drone.mavlink
-    assert identity is not None
+    identity = drone.require_mavlink()
     flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
     video = None
     if name in order.streams and drone.camera is not None:

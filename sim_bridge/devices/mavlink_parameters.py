@@ -1,6 +1,6 @@
 """Parameters of the emulated autopilots: the factory's values, and what indoor flight has them changed to.
 
-Written from mavlink.md, not taken from the driver: what the driver needs must be found missing here.
+Written from docs/reference/mavlink.md 1, 2, not taken from the driver, so that its omissions show.
 """
 
 from drivers.mavlink.wire.names import Flavour

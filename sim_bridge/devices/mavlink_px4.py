@@ -1,10 +1,10 @@
-"""PX4 1.16 as far as a ground station meets it (mavlink.md 2, 5.2)."""
+"""PX4 1.16 as far as a ground station meets it (docs/reference/mavlink.md 2, 5.2)."""
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import Flavour, Px4Auto, Px4Main, Result, px4_mode
-from sim_bridge.devices.mavlink_firmware import Answer, Firmware
+from drivers.mavlink.wire.names import Flavour, MavResult, Px4Auto, Px4Main, px4_mode
+from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.world.copter import Copter, Steering
+from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 HOLD = px4_mode(Px4Main.AUTO, Px4Auto.HOLD)
 LAND = px4_mode(Px4Main.AUTO, Px4Auto.LAND)
@@ -19,7 +19,7 @@ _LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAN
 _LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL))
 
 
-class Px4(Firmware):
+class Px4(AutopilotFirmware):
     """OFFBOARD needs a stream of set-points to arm and to stay in."""
 
     flavour = Flavour.PX4
@@ -28,7 +28,7 @@ class Px4(Firmware):
     frames = frozenset({1, 8})
     disarmed_text = "Disarmed by landing"
 
-    def __init__(self, copter: Copter, parameters: Parameters) -> None:
+    def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
         super().__init__(copter, parameters, HOLD)
 
     def knows(self, mode: int) -> bool:
@@ -41,14 +41,14 @@ class Px4(Firmware):
         if fault:
             return f"Arming denied: {fault}"
         if self.mode != OFFBOARD:
-            # WIRE (mavlink.md 2): Hold needs a global position, which there is none of indoors.
+            # WIRE (docs/reference/mavlink.md 2): Hold needs a global position, which there is none of indoors.
             return "Arming denied: Resolve system health failures first"
         return "" if self.streams else "Arming denied: no offboard signal"
 
     def take_off(self, height_m: float) -> Answer:
         """Refuse: without a global position there is no AUTO.TAKEOFF."""
         self.say(2, "Takeoff denied: no global position")
-        return Result.TEMPORARILY_REJECTED, "no global position"
+        return MavResult.TEMPORARILY_REJECTED, "no global position"
 
     def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
         """Say what is wrong with a set-point."""

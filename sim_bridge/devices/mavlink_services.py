@@ -1,7 +1,7 @@
 """What an emulated autopilot answers: commands, parameters, rates, clocks, and the poses that it is fed. No sockets.
 
-WIRE (mavlink.md 4): an unknown command is answered UNSUPPORTED, never with silence; a request for another vehicle is
-none of ours; the answer names who asked.
+WIRE (docs/reference/mavlink.md 4): an unknown command is answered UNSUPPORTED, never with silence; a request for
+another vehicle is none of ours; the answer names who asked.
 """
 
 import math
@@ -11,20 +11,20 @@ from drivers.mavlink.wire import flight as f
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import CLASSES, Frame, Message, id_of
-from drivers.mavlink.wire.names import Command, Flavour, Result, px4_mode
+from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, id_of
+from drivers.mavlink.wire.names import Flavour, MavCmd, MavResult, px4_mode
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
-from sim_bridge.devices.mavlink_firmware import Answer, Firmware
+from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_time import SenderClock
 
 TICK_HZ = 200.0
 _PX4_RATES: dict[type[Message], float] = {
-    t.HighresImu: 50, t.LocalPositionNed: 30, f.Odometry: 30, t.Attitude: 100, t.AttitudeQuaternion: 50,
+    t.HighresImu: 50, t.LocalPositionNed: 30, f.OdometryMessage: 30, t.Attitude: 100, t.AttitudeQuaternion: 50,
     t.SysStatus: 5, t.ExtendedSysState: 5, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
 }  # fmt: skip
-_UNSUPPORTED: Answer = (Result.UNSUPPORTED, "")
-_OK: Answer = (Result.ACCEPTED, "")
+_UNSUPPORTED: Answer = (MavResult.UNSUPPORTED, "")
+_OK: Answer = (MavResult.ACCEPTED, "")
 _NAK, _FTP_FAIL = 129, 1
 _FRESH_S = 0.5
 
@@ -33,7 +33,7 @@ class Services:
     """Handles one frame after the other; `take` returns what to answer to its sender."""
 
     def __init__(
-        self, system: int, firmware: Firmware, speaker: Speaker, stream: t.VideoStreamInformation | None
+        self, system: int, firmware: AutopilotFirmware, speaker: Speaker, stream: t.VideoStreamInformation | None
     ) -> None:
         self._system, self._firmware, self._speaker, self._stream = system, firmware, speaker, stream
         px4 = firmware.flavour is Flavour.PX4
@@ -44,7 +44,7 @@ class Services:
         self.listing: dict[tuple[str, int], list[str]] = {}
         self._by_id = {id_of(kind): kind for kind in CLASSES.values()}
 
-    def take(self, frame: Frame, now_ns: int) -> list[Message]:
+    def take(self, frame: ReceivedFrame, now_ns: int) -> list[Message]:
         """Obey a frame and return the answers."""
         message = frame.message
         target = getattr(message, "target_system", 0)
@@ -63,7 +63,7 @@ class Services:
                 self._firmware.set_mode(message.custom_mode)
             case f.SetPositionTargetLocalNed():
                 self._firmware.fly(message)
-            case f.VisionPositionEstimate() | f.Odometry():
+            case f.VisionPositionEstimate() | f.OdometryMessage():
                 self._vision(message, now_ns)
             case s.SetGpsGlobalOrigin():
                 return self._set_origin(message)
@@ -73,30 +73,30 @@ class Services:
 
     # -- commands -----------------------------------------------------------------------------------------------------
 
-    def _command(self, frame: Frame, command: int, p: tuple[float, ...]) -> list[Message]:
+    def _command(self, frame: ReceivedFrame, command: int, p: tuple[float, ...]) -> list[Message]:
         (result, _), more = self._obey(command, p)
-        return [f.CommandAck(command, result, 0, 0, frame.system, frame.component), *more]
+        return [f.CommandAckMessage(command, result, 0, 0, frame.system, frame.component), *more]
 
     def _obey(self, command: int, p: tuple[float, ...]) -> tuple[Answer, list[Message]]:
         firmware = self._firmware
         match command:
-            case Command.COMPONENT_ARM_DISARM:
+            case MavCmd.COMPONENT_ARM_DISARM:
                 return (firmware.arm(p[1] == 21196.0) if p[0] == 1.0 else firmware.disarm(p[1])), []
-            case Command.DO_SET_MODE:
+            case MavCmd.DO_SET_MODE:
                 return self._set_mode(p), []
-            case Command.NAV_TAKEOFF:
+            case MavCmd.NAV_TAKEOFF:
                 return firmware.take_off(p[6] if math.isfinite(p[6]) else 0.0), []
-            case Command.NAV_LAND:
+            case MavCmd.NAV_LAND:
                 return firmware.land(), []
-            case Command.SET_MESSAGE_INTERVAL:
+            case MavCmd.SET_MESSAGE_INTERVAL:
                 return self._set_interval(p), []
-            case Command.REQUEST_MESSAGE:
+            case MavCmd.REQUEST_MESSAGE:
                 return self._request(_number(p[0]), _number(p[1]))
-            case Command.REQUEST_AUTOPILOT_CAPABILITIES:
+            case MavCmd.REQUEST_AUTOPILOT_CAPABILITIES:
                 return _OK, [self._speaker.version()]
-            case Command.GET_HOME_POSITION:
+            case MavCmd.GET_HOME_POSITION:
                 return self._request(id_of(t.HomePosition))
-            case Command.DO_SET_HOME:
+            case MavCmd.DO_SET_HOME:
                 return _OK, []
             case _:
                 return _UNSUPPORTED, []
@@ -111,7 +111,7 @@ class Services:
         if kind is None or kind not in self._speaker.builders or not math.isfinite(interval_us):
             ardupilot = self._firmware.flavour is Flavour.ARDUPILOT
             self._firmware.say(4, f"No ap_message for mavlink id ({number})") if ardupilot else None
-            return (Result.DENIED if ardupilot else Result.UNSUPPORTED), ""
+            return (MavResult.DENIED if ardupilot else MavResult.UNSUPPORTED), ""
         if interval_us < 0:
             self.intervals.pop(kind, None)
         elif interval_us > 0:
@@ -125,7 +125,7 @@ class Services:
             return _OK, [self._stream]
         build = self._speaker.builders.get(kind) if kind is not None else None
         message = build() if build is not None else None
-        return (_OK, [message]) if message is not None else ((Result.DENIED, ""), [])
+        return (_OK, [message]) if message is not None else ((MavResult.DENIED, ""), [])
 
     # -- parameters and the rest --------------------------------------------------------------------------------------
 
@@ -136,7 +136,7 @@ class Services:
         carried = carried_from_value(self._firmware.flavour, parameters[name], kind)
         return s.ParamValue(name, carried, kind, len(parameters.names), parameters.names.index(name))
 
-    def _small(self, frame: Frame, message: Message, now_ns: int) -> Iterator[Message]:
+    def _small(self, frame: ReceivedFrame, message: Message, now_ns: int) -> Iterator[Message]:
         names = self._firmware.parameters.names
         match message:
             case s.ParamRequestRead():
@@ -170,7 +170,7 @@ class Services:
             return
         parameters.values[message.param_id] = value
 
-    def _ftp_refusal(self, frame: Frame, message: s.FileTransferProtocol) -> Message:
+    def _ftp_refusal(self, frame: ReceivedFrame, message: s.FileTransferProtocol) -> Message:
         # WIRE (MAVLink FTP): sequence + 1, opcode NAK, the request's opcode, error FAIL.
         request = message.payload
         sequence = (request[0] | request[1] << 8) + 1 & 0xFFFF
@@ -185,7 +185,7 @@ class Services:
     # -- position from outside ----------------------------------------------------------------------------------------
 
     def _set_origin(self, message: s.SetGpsGlobalOrigin) -> list[Message]:
-        # WIRE (mavlink.md 1.1): ignored until the estimator runs.
+        # WIRE (docs/reference/mavlink.md 1.1): ignored until the estimator runs.
         if self._speaker.boot_us < 2_000_000:
             return []
         if self._firmware.flavour is Flavour.ARDUPILOT:
@@ -195,10 +195,10 @@ class Services:
         self._firmware.origin = (message.latitude, message.longitude, message.altitude)
         return [t.GpsGlobalOrigin(*self._firmware.origin, self._speaker.boot_us)]
 
-    def _vision(self, message: f.VisionPositionEstimate | f.Odometry, now_ns: int) -> None:
+    def _vision(self, message: f.VisionPositionEstimate | f.OdometryMessage, now_ns: int) -> None:
         if not self._firmware.parameters.indoor:
             return
-        if isinstance(message, f.Odometry):
+        if isinstance(message, f.OdometryMessage):
             usec = message.time_usec
             yaw = self._yaw_of(message)
         else:
@@ -216,8 +216,9 @@ class Services:
         position = (message.x + vx * age_s, -message.y + vy * age_s, -message.z + vz * age_s)
         estimate.aid(position, yaw, message.reset_counter)
 
-    def _yaw_of(self, message: f.Odometry) -> float | None:
-        # WIRE (mavlink.md 1.1, 5.5): ArduPilot takes local FRD with body FRD only, in silence; PX4 NED as well.
+    def _yaw_of(self, message: f.OdometryMessage) -> float | None:
+        # WIRE (docs/reference/mavlink.md 1.1, 5.5): ArduPilot takes local FRD with body FRD only, in silence; PX4 NED
+        # as well.
         frames = (message.frame_id, message.child_frame_id)
         allowed = {(20, 12)} if self._firmware.flavour is Flavour.ARDUPILOT else {(1, 12), (1, 1), (20, 12), (20, 20)}
         if frames not in allowed:

@@ -7,14 +7,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.arrays import Array, Image
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from sim_bridge.render.card import Card
 from sim_bridge.render.lens_table import PAD, LensTable
 
-Array = NDArray[np.float64]
 Float32 = NDArray[np.float32]
-Picture = NDArray[np.uint8]
 
 _MIP_TEXELS = (64, 32, 16, 8, 4)
 _OVERSAMPLING = 2
@@ -51,7 +50,7 @@ class BoardPainter:
 
     def draw(
         self,
-        picture: Picture,
+        picture: Image,
         optical_from_marker: Pose,
         flaws: Flaws,
         random: np.random.Generator,
@@ -120,7 +119,7 @@ class BoardPainter:
         return (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale, (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
 
 
-def _with_coverage(picture: Picture, texel_from_square: Array) -> tuple[Picture, Array]:
+def _with_coverage(picture: Image, texel_from_square: Array) -> tuple[Image, Array]:
     return np.dstack((picture, np.full_like(picture, 255))), texel_from_square
 
 
@@ -169,7 +168,7 @@ def smear_kernel(smear_px: tuple[float, float]) -> Float32 | None:
     return kernel
 
 
-def _blend(picture: Picture, window: tuple[int, int, int, int], patch: Float32) -> None:
+def _blend(picture: Image, window: tuple[int, int, int, int], patch: Float32) -> None:
     left, top, right, bottom = window
     inner = patch[PAD : PAD + bottom - top, PAD : PAD + right - left]
     below = picture[top:bottom, left:right]

@@ -4,14 +4,11 @@ from typing import Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array, Image
 from groundstation.geometry import board
-from groundstation.geometry.tag import QUIET_MODULES, Tag
+from groundstation.geometry.tag import QUIET_MODULES, SquareTag
 from sim_bridge.render.spec import BoardSpec
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 
 class Card(Protocol):
@@ -20,7 +17,7 @@ class Card(Protocol):
     unit_m: float
     extent: tuple[float, float, float, float]
 
-    def raster(self, texels_per_unit: float) -> tuple[Picture, Array]:
+    def raster(self, texels_per_unit: float) -> tuple[Image, Array]:
         """Return the print as a grey picture, and texel_from_unit (3, 3); texel i covers [i - 0.5, i + 0.5]."""
 
 
@@ -28,11 +25,11 @@ class BoardCard:
     """A checkerboard with its bar."""
 
     def __init__(self, code: int, square_mm: float) -> None:
-        self._code = board.Board(code, square_mm).code
+        self._code = board.Checkerboard(code, square_mm).code
         self.unit_m = square_mm / 1000.0
         self.extent = board.EXTENT
 
-    def raster(self, texels_per_unit: float) -> tuple[Picture, Array]:
+    def raster(self, texels_per_unit: float) -> tuple[Image, Array]:
         """Return the print as a grey picture, and texel_from_unit."""
         return board.raster(self._code, texels_per_unit)
 
@@ -40,7 +37,7 @@ class BoardCard:
 class TagCard:
     """An ArUco or AprilTag tag with its quiet zone."""
 
-    def __init__(self, tag: Tag) -> None:
+    def __init__(self, tag: SquareTag) -> None:
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, tag.dictionary))
         black = dictionary.generateImageMarker(tag.id, tag.modules, borderBits=1) == 0
         self._cells = np.pad(np.where(black, board.BLACK, board.WHITE), 1, constant_values=board.WHITE).astype(np.uint8)
@@ -48,7 +45,7 @@ class TagCard:
         half = tag.modules / 2 + QUIET_MODULES
         self.extent = (-half, half, -half, half)
 
-    def raster(self, texels_per_unit: float) -> tuple[Picture, Array]:
+    def raster(self, texels_per_unit: float) -> tuple[Image, Array]:
         """Return the print as a grey picture, and texel_from_unit; whole texels per module."""
         texels = max(1, round(texels_per_unit))
         picture = self._cells.repeat(texels, axis=0).repeat(texels, axis=1)

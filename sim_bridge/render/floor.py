@@ -4,11 +4,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.arrays import Image
 from groundstation.geometry.pose import Pose
 from sim_bridge.render.lens_table import LensTable
 from sim_bridge.render.spec import FloorKind
-
-Picture = NDArray[np.uint8]
 
 _TEXEL_M = 0.008
 _BEYOND_M = 1.0
@@ -16,7 +15,7 @@ _WALL_GREY = 150
 _FARTHEST_M = 40.0
 
 
-def texture(kind: FloorKind, size_m: tuple[float, float], seed: int) -> Picture:
+def texture(kind: FloorKind, size_m: tuple[float, float], seed: int) -> Image:
     """Return a floor (8 mm per texel) that reaches 1 m beyond the room; row 0 is the +y edge."""
     random = np.random.default_rng(seed)
     width, height = (round((side + 2 * _BEYOND_M) / _TEXEL_M) for side in size_m)
@@ -71,7 +70,7 @@ def _lay_tiles(tone: NDArray[np.float32]) -> None:
     tone += np.where((rows[:, None] + columns[None]) % 2 == 0, 70.0, -70.0).astype(np.float32)
 
 
-def _strew(floor: Picture, random: np.random.Generator, joints: bool) -> None:
+def _strew(floor: Image, random: np.random.Generator, joints: bool) -> None:
     """Draw what lies about in a lab: joints of carpet tiles, cables, tape, stains."""
     height, width = floor.shape
     if joints:
@@ -96,12 +95,12 @@ def _strew(floor: Picture, random: np.random.Generator, joints: bool) -> None:
 class Floor:
     """Draws the floor plane z = 0 for a camera pose."""
 
-    def __init__(self, texture: Picture, size_m: tuple[float, float], table: LensTable) -> None:
+    def __init__(self, texture: Image, size_m: tuple[float, float], table: LensTable) -> None:
         self._texture = texture
         self._half = (size_m[0] / 2 + _BEYOND_M, size_m[1] / 2 + _BEYOND_M)
         self._table = table
 
-    def draw(self, world_from_optical: Pose, rolling: tuple[Pose, Pose] | None = None) -> Picture:
+    def draw(self, world_from_optical: Pose, rolling: tuple[Pose, Pose] | None = None) -> Image:
         """Return the picture of the bare floor; what lies beyond its edge is wall.
 
         rolling: the camera's pose when the first and the last row are exposed.

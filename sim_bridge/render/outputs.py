@@ -7,21 +7,20 @@ from typing import Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder, VideoMode
 from sim_bridge.devices.camera_stream import CameraStream
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import Mount, RenderSpec, StreamKind
 
-States = NDArray[np.float64]
-_NS_PER_MS = 1_000_000
 # The drone was switched on a little before the world began.
 _POWER_ON_MS = 20_000
-# WIRE (AR.Drone sheet 6): calibration of a real bottom camera, 320x240 enlarged to 640x360.
+# WIRE (docs/reference/ardrone.md 6): calibration of a real bottom camera, 320x240 enlarged to 640x360.
 _BOTTOM_LENS = CameraIntrinsics(640, 360, 700.5, 701.7, 319.5, 218.7)
 _BOTTOM_M = (0.0, 0.0, -0.03)
 
@@ -36,7 +35,7 @@ class Output(Protocol):
     def set_accepting(self, accepting: bool) -> None:
         """Cut all clients and refuse new ones (False), or serve (True)."""
 
-    def show(self, states: States, exposure_ns: int, release_ns: int) -> None:
+    def show(self, states: Array, exposure_ns: int, release_ns: int) -> None:
         """Draw the true states and send the picture at a time [ns]."""
 
     def close(self) -> None:
@@ -63,7 +62,7 @@ class MjpegOutput:
         """Return how many are looking."""
         return self._stream.clients
 
-    def show(self, states: States, exposure_ns: int, release_ns: int) -> None:
+    def show(self, states: Array, exposure_ns: int, release_ns: int) -> None:
         """Draw the true states and send the picture at a time [ns]."""
         jpeg = cv2.imencode(".jpg", self._renderer.render(states), self._quality)[1].tobytes()
         self._stream.send_at(release_ns, jpeg)
@@ -75,7 +74,7 @@ class ArDroneOutput:
     def __init__(self, spec: RenderSpec, modes: Connection | None) -> None:
         self._spec, self._modes = spec, modes
         self._renderers: dict[tuple[bool, tuple[int, int]], Renderer] = {}
-        self._encoder = VideoEncoder(VideoMode(), spec.scenario.fps)
+        self._encoder = VideoEncoder(VideoMode(), spec.scenario.fps, spec.video_header_bytes)
         self._renderer = self._renderer_of(VideoMode())
         self._first_ns = 0
         self._server = ArDroneVideoServer(spec.address, spec.port)
@@ -87,11 +86,11 @@ class ArDroneOutput:
         """Return how many are looking."""
         return self._server.clients
 
-    def show(self, states: States, exposure_ns: int, release_ns: int) -> None:
+    def show(self, states: Array, exposure_ns: int, release_ns: int) -> None:
         """Draw the true states and send the picture at a time [ns]."""
         self._follow_configuration()
         self._first_ns = self._first_ns or exposure_ns
-        timestamp_ms = _POWER_ON_MS + (exposure_ns - self._first_ns) // _NS_PER_MS
+        timestamp_ms = _POWER_ON_MS + (exposure_ns - self._first_ns) // NS_PER_MS
         picture = self._renderer.render(states)
         encoded = self._encoder.encode(picture, timestamp_ms, want_idr=self._server.take_newcomers())
         self._server.send_at(release_ns, encoded)
@@ -104,7 +103,10 @@ class ArDroneOutput:
             except EOFError:
                 self._modes = None
         if mode != self._encoder.mode:
-            self._encoder = VideoEncoder(mode, self._spec.scenario.fps, self._encoder.number, self._encoder.position)
+            spec, before = self._spec, self._encoder
+            self._encoder = VideoEncoder(
+                mode, spec.scenario.fps, spec.video_header_bytes, before.number, before.position
+            )
             self._renderer = self._renderer_of(mode)
 
     def _renderer_of(self, mode: VideoMode) -> Renderer:

@@ -12,13 +12,12 @@ from types import FrameType
 import cv2
 import numpy as np
 
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 from sim_bridge.render.outputs import Output, open_output
 from sim_bridge.render.spec import Outage, OutageKind, RenderSpec, StreamKind
 from sim_bridge.truth import TruthBoard
 
 _log = logging.getLogger(__name__)
-_NS = 1_000_000_000
-_NS_PER_MS = 1_000_000
 _IDLE_S = 0.05
 # TCP: what is lost is sent again when its time-out has passed, at least 200 ms on Linux (RFC 6298 asks for more), and
 # what comes after it waits.
@@ -52,7 +51,7 @@ def _obey_signals(stop: threading.Event) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-class Link:
+class FrameDelay:
     """What the network does to frames: a delay with jitter that keeps their order, and loss.
 
     A frame of an AR.Drone's video is never missing: what is lost of it comes late, and so does what waits behind it.
@@ -71,7 +70,7 @@ class Link:
         if lost and not self._repeats:
             return None
         delay_ms = max(0.0, self._scenario.video_delay_ms + jitter_ms) + lost * _REPEATED_AFTER_MS
-        self._last_ns = max(self._last_ns, exposure_ns + round(delay_ms * _NS_PER_MS))
+        self._last_ns = max(self._last_ns, exposure_ns + round(delay_ms * NS_PER_MS))
         return self._last_ns
 
 
@@ -89,22 +88,22 @@ class _Exposures:
 
     def __init__(self, spec: RenderSpec, truth: TruthBoard, output: Output, tally: MutableSequence[int]) -> None:
         self._spec, self._truth, self._output, self._tally = spec, truth, output, tally
-        self._link = Link(spec)
+        self._link = FrameDelay(spec)
         self._first_ns = 0
         self._last_ns = 0
 
     def run(self, stop: threading.Event) -> None:
         """Expose until told to stop."""
-        period_ns = round(_NS / self._spec.scenario.fps)
+        period_ns = round(NS_PER_S / self._spec.scenario.fps)
         next_ns = time.monotonic_ns()
         while not stop.is_set() and self._parent_lives():
-            wait_s = (next_ns - time.monotonic_ns()) / _NS
+            wait_s = (next_ns - time.monotonic_ns()) / NS_PER_S
             if wait_s > 0.0:
                 stop.wait(min(wait_s, _IDLE_S))
                 continue
             self._expose()
             next_ns += period_ns
-            if time.monotonic_ns() - next_ns > _NS:  # frozen for a while: never make up for it
+            if time.monotonic_ns() - next_ns > NS_PER_S:  # frozen for a while: never make up for it
                 next_ns = time.monotonic_ns()
 
     def _parent_lives(self) -> bool:
@@ -116,7 +115,7 @@ class _Exposures:
             return
         self._first_ns = self._first_ns or exposure_ns
         self._last_ns = exposure_ns
-        outage = active_outage(self._spec.scenario.outages, (exposure_ns - self._first_ns) / _NS)
+        outage = active_outage(self._spec.scenario.outages, (exposure_ns - self._first_ns) / NS_PER_S)
         self._output.set_accepting(outage is not OutageKind.CUT)
         release_ns = self._link.release_ns(exposure_ns)
         if release_ns is None or outage is not None or not self._output.clients:

@@ -4,17 +4,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.arrays import Image
 from groundstation.geometry.pose import Pose
 from sim_bridge.render.board_painter import BoardPainter, Flaws, smear_kernel
 from sim_bridge.render.card import card_of
 from sim_bridge.render.floor import Floor, texture
 from sim_bridge.render.lens_table import LensTable
-from sim_bridge.render.scene import Scene, Sight, compose_scene
-from sim_bridge.render.sensor import Sensor
+from sim_bridge.render.scene import CameraScene, Sight, compose_scene
+from sim_bridge.render.sensor import ImageSensor
 from sim_bridge.render.shapes import draw_body
 from sim_bridge.render.spec import RenderSpec
-
-Picture = NDArray[np.uint8]
 
 
 class Renderer:
@@ -28,7 +27,7 @@ class Renderer:
         # The carpet is the room's: every camera of one run sees the same floor.
         self._floor = Floor(texture(spec.scenario.floor, room, spec.seed), room, table)
         self._painters = {board: BoardPainter(card_of(board), intrinsics, table) for board in spec.boards}
-        self._sensor = Sensor(intrinsics.width_px, intrinsics.height_px, spec.scenario, self._random)
+        self._sensor = ImageSensor(intrinsics.width_px, intrinsics.height_px, spec.scenario, self._random)
         fixed = not spec.mount.body
         self._background = self._blurred(self._floor.draw(spec.mount.parent_from_optical)) if fixed else None
 
@@ -37,7 +36,7 @@ class Renderer:
         """Return what is drawn."""
         return self._spec
 
-    def render(self, states: NDArray[np.float64]) -> Picture:
+    def render(self, states: NDArray[np.float64]) -> Image:
         """Return the picture (h, w) of the true states (n, 13) of the spec's bodies."""
         scene = compose_scene(self._spec, states)
         picture = self._draw_floor(scene)
@@ -47,7 +46,7 @@ class Renderer:
             painter.draw(picture, sight.optical_from_marker, self._flaws(sight), self._random, sight.rolling)
         return self._sensor.expose(picture, self._random)
 
-    def _draw_floor(self, scene: Scene) -> Picture:
+    def _draw_floor(self, scene: CameraScene) -> Image:
         if self._background is not None:
             return self._background.copy()
         floor = self._blurred(self._floor.draw(scene.world_from_optical, scene.rolling))
@@ -62,7 +61,7 @@ class Renderer:
         still = self._spec.intrinsics.project(np.array([0.0, 0.0, 1.0]))
         return (float(moved[0] - still[0]), float(moved[1] - still[1])) if np.isfinite(moved).all() else (0.0, 0.0)
 
-    def _blurred(self, picture: Picture) -> Picture:
+    def _blurred(self, picture: Image) -> Image:
         sigma = self._spec.scenario.blur_px
         return np.asarray(cv2.GaussianBlur(picture, (3, 3), sigma), dtype=np.uint8) if sigma > 0.0 else picture
 

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import rotation_from_euler
 from sim_bridge.render.spec import BoardSpec, Mount, RenderSpec
 
-Array = NDArray[np.float64]
 _POSITION, _VELOCITY, _ATTITUDE, _RATES = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 
 
@@ -47,7 +46,7 @@ class Sight:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class CameraScene:
     """A camera pose and the boards before it, farthest first; `rolling` as in Sight, `smear` as begin and end."""
 
     world_from_optical: Pose
@@ -63,7 +62,7 @@ def camera_pose(mount: Mount, bodies: tuple[str, ...], states: Array) -> Pose:
     return world_from_base(states[bodies.index(mount.body)]).compose(mount.parent_from_optical)
 
 
-def compose_scene(spec: RenderSpec, states: Array) -> Scene:
+def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
     """Return what the camera has before it; a camera never sees its own carrier."""
     half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
     camera = camera_pose(spec.mount, spec.bodies, states)
@@ -90,7 +89,7 @@ def compose_scene(spec: RenderSpec, states: Array) -> Scene:
             )
             rows = first, last
         sights.append(Sight(board, optical_from_base, optical_from_base.compose(on_body), begin, end, rows))
-    return Scene(camera, tuple(sorted(sights, key=lambda sight: -sight.depth_m)), smear, rolling)
+    return CameraScene(camera, tuple(sorted(sights, key=lambda sight: -sight.depth_m)), smear, rolling)
 
 
 def _point_moved(state: Array, base: Pose, point: Array, seconds: float) -> Array:

@@ -2,20 +2,19 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from sim_bridge.render.spec import CameraScenario
+from groundstation.arrays import Image
+from sim_bridge.render.spec import PictureQuality
 
-Picture = NDArray[np.uint8]
 _SPARE = 128
 # The tile holds noise of this rms, so that scaled noise is not all quantisation.
 _TILE_RMS = 24.0
 
 
-class Sensor:
+class ImageSensor:
     """Turns what falls onto it into grey levels, without drawing random numbers per pixel and frame."""
 
-    def __init__(self, width: int, height: int, scenario: CameraScenario, random: np.random.Generator) -> None:
+    def __init__(self, width: int, height: int, scenario: PictureQuality, random: np.random.Generator) -> None:
         self._size = (height, width)
         grey = np.arange(256, dtype=np.float64)
         self._light = None if scenario.light == 1.0 else np.clip(grey * scenario.light, 0, 255).astype(np.uint8)
@@ -34,7 +33,7 @@ class Sensor:
         self._up = np.clip(noise, 0, 255).astype(np.uint8)
         self._down = np.clip(-noise, 0, 255).astype(np.uint8)
 
-    def expose(self, picture: Picture, random: np.random.Generator) -> Picture:
+    def expose(self, picture: Image, random: np.random.Generator) -> Image:
         """Return the picture as the sensor gives it."""
         if self._light is not None:
             picture = np.asarray(cv2.LUT(picture, self._light), dtype=np.uint8)

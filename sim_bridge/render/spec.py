@@ -5,7 +5,7 @@ from enum import StrEnum
 
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
 
 
 class BodyShape(StrEnum):
@@ -38,7 +38,7 @@ class BoardSpec:
     square_mm: float
     position_m: tuple[float, float, float]
     shape: BodyShape = BodyShape.DRONE
-    tag: Tag | None = None
+    tag: SquareTag | None = None
 
 
 class FloorKind(StrEnum):
@@ -74,7 +74,7 @@ class Outage:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraScenario:
+class PictureQuality:
     """How good the camera and its link are.
 
     video_delay_ms +- video_jitter_ms (uniform) from exposure to arrival; frame_loss: share of frames never sent, or,
@@ -106,7 +106,7 @@ class RenderSpec:
 
     truth_name: shared memory of the TruthBoard; bodies: its bodies in order; room_size_m: (x, y, z), the floor is
     centred at the origin; address, port, kind: where and how the stream is served; parent_pid: exit when it is gone
-    (0: never).
+    (0: never). video_header_bytes: of each frame of an AR.Drone's video, by its firmware.
     """
 
     camera: str
@@ -117,8 +117,9 @@ class RenderSpec:
     bodies: tuple[str, ...]
     address: str
     port: int
-    scenario: CameraScenario = CameraScenario()
+    scenario: PictureQuality = PictureQuality()
     seed: int = 1
     room_size_m: tuple[float, float, float] = (8.0, 6.0, 4.5)
     parent_pid: int = 0
     kind: StreamKind = StreamKind.MJPEG
+    video_header_bytes: int = 68

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.process import numba_cache
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.study.summary import summary
@@ -18,17 +19,19 @@ _EXAMPLES = """examples:
   python -m sim_bridge.study vision --help"""
 
 
-def resolved_field(path: str, overrides: list[str]) -> dict[str, Any]:
-    """Return a field file resolved by the ground station's command line: nothing else here reads YAML."""
-    command = [sys.executable, "-m", "groundstation.cli.main", "config", "show", path, "--resolved", "--json"]
+def resolved_field(name: str, overrides: list[str]) -> ResolvedField:
+    """Return a field (a path, or a shipped one's name) as the ground station's command line resolves it.
+
+    Nothing else here reads YAML.
+    """
+    command = [sys.executable, "-m", "groundstation.cli.main", "config", "show", name, "--resolved", "--json"]
     for override in overrides:
         command += ["--set", override]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         sys.stderr.write(result.stderr or result.stdout)
         raise SystemExit(result.returncode)
-    field: dict[str, Any] = json.loads(result.stdout)
-    return field
+    return field_from_json(result.stdout.encode())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -36,8 +39,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m sim_bridge.study", epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("study", choices=["demo"], help="demo: all drones of the field track the target")
-    default = Path(__file__).parents[2] / "config" / "lab.yaml"
-    parser.add_argument("--field", default=str(default), help="field file (default: %(default)s)")
+    parser.add_argument("--field", default="lab", help="field file, or a shipped one's name (default: %(default)s)")
     parser.add_argument("--scenario", help="scenario as JSON file (default: the honest one)")
     parser.add_argument("--set", action="append", default=[], metavar="A.B=C", help="override one setting of the field")
     parser.add_argument("--seed", type=int, default=1)

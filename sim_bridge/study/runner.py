@@ -5,21 +5,22 @@ import itertools
 import math
 import time
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from groundstation.bus.messages import Message
+from groundstation.field.resolved import ResolvedField
 from groundstation.tracker import Tracker, tracker_from_field
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
-from sim_bridge.study.copter_link import CopterLink
-from sim_bridge.study.eye import Eye
-from sim_bridge.study.pilot import Pilot
-from sim_bridge.study.score import Score
-from sim_bridge.study.telemetry import Telemetry
+from sim_bridge.study.ardrone_pilot import Pilot
+from sim_bridge.study.camera_model import Eye
+from sim_bridge.study.mavlink_copter import CopterLink
+from sim_bridge.study.score import FlightScore
+from sim_bridge.study.telemetry import TelemetryPublisher
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
@@ -47,38 +48,38 @@ class StudyOptions:
 class Study:
     """A run in progress; `run` flies it to its end and returns the figures."""
 
-    def __init__(self, field: Mapping[str, Any], scenario: Scenario, options: StudyOptions) -> None:
+    def __init__(self, field: ResolvedField, scenario: Scenario, options: StudyOptions) -> None:
         self.options = options
-        self.site = parse_site(field)
+        self.site = parse_site(msgspec.to_builtins(field))
         self.world = World(self.site, scenario, options.seed)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
-        self.score = Score(_SCORE_TICKS * TICK_NS / 1e9, field["estimator"]["gate_probability"])
+        self.score = FlightScore(_SCORE_TICKS * TICK_NS / 1e9, field.estimator.gate_probability)
         self.cpu_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(options.seed, "study")
         self._scenario = scenario
         self._queue: list[tuple[int, int, str, Message]] = []
         self._order = itertools.count()
-        self._tick_every = round(1e9 / field["estimator"]["rate_hz"]) // TICK_NS
-        self._plan_every = round(1e9 / field["planner"]["rate_hz"]) // TICK_NS
+        self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
+        self._plan_every = round(1e9 / field.planner.rate_hz) // TICK_NS
         world = self.world
         for onboard in world.onboard.values():
             onboard.trim()  # as the driver does at connect
-        lifetime = field["safety"]["setpoint_lifetime_ms"] / 1000
+        lifetime = field.safety.setpoint_lifetime_ms / 1000
         self._links = {n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.copters.items()}
-        self._telemetry: dict[str, Telemetry | CopterLink] = {
-            n: Telemetry(n, d, world.onboard[n], CLOCK) for n, d in world.ardrones.items()
+        self._telemetry: dict[str, TelemetryPublisher | CopterLink] = {
+            n: TelemetryPublisher(n, d, world.onboard[n], CLOCK) for n, d in world.ardrones.items()
         }
         self._telemetry |= self._links
         self._pilots = {
-            name: Pilot(drone, world.onboard[name], field["drones"][name]["odometry"]["velocity_scale"], lifetime)
+            name: Pilot(drone, world.onboard[name], field.drones[name].odometry.velocity_scale, lifetime)
             for name, drone in world.ardrones.items()
         }
         self._eyes = self._build_eyes(field)
-        fence = field["room"]["fence"]
-        self._fence = np.array([fence["x_m"], fence["y_m"], fence["z_m"]])
+        fence = field.room.fence
+        self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])
         self.fence_violation_m = 0.0
 
-    def _build_eyes(self, field: Mapping[str, Any]) -> list[Eye]:
+    def _build_eyes(self, field: ResolvedField) -> list[Eye]:
         site, cameras, outliers = self.site, self._scenario.cameras, self.options.outliers
         seed = self.options.seed
         eyes = [
@@ -90,10 +91,10 @@ class Study:
                 cameras,
                 outliers,
                 generator_of(seed, f"{name}/eye"),
-                (math.radians(known["attitude_std_deg"]), known["position_std_m"]),
+                (math.radians(known.attitude_std_deg), known.position_std_m),
             )
             for name, c in site.cameras.items()
-            for known in [field["cameras"][name]]
+            for known in [field.cameras[name]]
         ]
         eyes += [
             Eye(name, d.camera.calibration, d, site, cameras, outliers, generator_of(seed, f"{name}/eye"))

@@ -8,22 +8,21 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.gating import gate
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
 
-Array = NDArray[np.float64]
 _MISSING_M, _LOST_M = 1.0, 0.5
 _USED = (Verdict.ACCEPTED, Verdict.INFLATED)
 _DIVERGED = 33.4  # chi-square of 4 degrees of freedom, probability 1e-6
 
 
 @dataclass
-class Score:
+class FlightScore:
     """Collects errors at 10 Hz and corrections as they come; `report` turns them into figures."""
 
     period_s: float

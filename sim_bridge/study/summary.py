@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.estimation.targets import targets_of
+from groundstation.field.resolved import ResolvedField
 
 _NORMAL_95 = 1.96
 
@@ -47,9 +47,9 @@ def nis(report: Mapping[str, Any], observers: Iterable[str]) -> float:
     return float(np.mean(found)) if found else math.nan
 
 
-def summary(reports: Sequence[Mapping[str, Any]], field: Mapping[str, Any]) -> dict[str, Interval]:
+def summary(reports: Sequence[Mapping[str, Any]], field: ResolvedField) -> dict[str, Interval]:
     """Return what decides whether the belief is good and as good as it says, over the flights of one field."""
-    robots, targets, cameras = tuple(field["drones"]), tuple(targets_of(field)), tuple(field["cameras"])
+    robots, targets, cameras = tuple(field.drones), tuple(field.tracked), tuple(field.cameras)
     values = {
         "target_rmse_m": [report["target_rmse_m"] for report in reports],
         "target_lost_s": [report["target_lost_s"] for report in reports],

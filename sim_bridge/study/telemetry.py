@@ -3,9 +3,9 @@
 import math
 
 from groundstation.bus.messages import FlightState, Header, Odometry, VehicleStatus
-from sim_bridge.world.autopilot import Phase
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_autopilot import Phase
+from sim_bridge.world.ardrone_sensors import Onboard
 
 _STATES = {
     Phase.LANDED: FlightState.LANDED,
@@ -21,7 +21,7 @@ _JUMP_RAD = math.radians(20.0)
 _COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.01)
 
 
-class Telemetry:
+class TelemetryPublisher:
     """Builds odometry and status messages of one drone; counts heading jumps as resets, as a driver does."""
 
     def __init__(self, name: str, drone: Quadrotor, onboard: Onboard, clock: str) -> None:

@@ -3,17 +3,18 @@
 import itertools
 import math
 from collections.abc import Mapping
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_bridge.scenario import Scenario
-from sim_bridge.site import MavlinkIdentity, Site, SiteDrone
+from sim_bridge.site import Site, SiteDrone
 from sim_bridge.truth import WIDTH
-from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_sensors import Onboard
+from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.noise import generator_of
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
 from sim_bridge.world.unicycle import Unicycle
 
 TICK_S = 0.005
@@ -33,17 +34,10 @@ class World:
     def __init__(self, site: Site, scenario: Scenario, seed: int) -> None:
         self.bodies = site.bodies
         self.ticks = 0
-        self.drones: dict[str, Quadrotor | Copter] = {}
+        self.drones: dict[str, Quadrotor | MavlinkCopter] = {}
         self.onboard: dict[str, Onboard] = {}
         for name, drone in site.drones.items():
-            if drone.mavlink is not None:
-                self.drones[name] = _copter(drone, drone.mavlink, scenario, generator_of(seed, name))
-                continue
-            body = Quadrotor(drone.pad_m, drone.pad_yaw_rad, scenario.drones, TICK_S, generator_of(seed, name))
-            self.drones[name] = body
-            sensors = generator_of(seed, f"{name}/onboard")
-            magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
-            self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
+            self.drones[name] = self._drone(name, drone, scenario, seed)
         paths = scenario.of_targets(site.tracked)
         self.targets = {name: Unicycle(path, TICK_S, generator_of(seed, name)) for name, path in paths.items()}
         self._depart_after_s = {name: path.departs_after_team_s or 0.0 for name, path in paths.items()}
@@ -53,6 +47,21 @@ class World:
         self._disturbed: frozenset[str] = frozenset()
         self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         self._states = np.zeros((len(self.bodies), WIDTH))
+
+    def _drone(self, name: str, drone: SiteDrone, scenario: Scenario, seed: int) -> Quadrotor | MavlinkCopter:
+        place, rng = (drone.pad_m, drone.pad_yaw_rad), generator_of(seed, name)
+        match drone.kind:
+            case "ardrone":
+                body = Quadrotor(*place, scenario.drones, TICK_S, rng)
+                sensors = generator_of(seed, f"{name}/onboard")
+                magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
+                self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
+                return body
+            case "mavlink":
+                response = PX4_RESPONSE if drone.require_mavlink().flavour == "px4" else ARDUPILOT_RESPONSE
+                return MavlinkCopter(*place, scenario.mavlink, response, TICK_S, rng)
+            case other:
+                assert_never(other)
 
     @property
     def time_s(self) -> float:
@@ -73,7 +82,7 @@ class World:
         for name, drone in drones.items():
             drone.step(wakes.get(name, _STILL_AIR))
             drone.airframe.confine(*self._half_room)
-            if isinstance(drone, Copter):
+            if isinstance(drone, MavlinkCopter):
                 drone.estimate.step(drone.airframe, drone.motors_on)
             else:
                 self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed)
@@ -99,9 +108,9 @@ class World:
                 target.parked = target.parked and self._together_s < self._depart_after_s[name]
 
     @property
-    def copters(self) -> dict[str, Copter]:
+    def copters(self) -> dict[str, MavlinkCopter]:
         """Return the MAVLink vehicles."""
-        return {name: drone for name, drone in self.drones.items() if isinstance(drone, Copter)}
+        return {name: drone for name, drone in self.drones.items() if isinstance(drone, MavlinkCopter)}
 
     @property
     def ardrones(self) -> dict[str, Quadrotor]:
@@ -128,8 +137,3 @@ def _disturbed(drones: Mapping[str, Quadrotor]) -> frozenset[str]:
         if drone.ultrasound_code == other.ultrasound_code and math.hypot(a.x - b.x, a.y - b.y) < CROSSTALK_M:
             near |= {name, other_name}
     return frozenset(near)
-
-
-def _copter(drone: SiteDrone, identity: MavlinkIdentity, scenario: Scenario, rng: np.random.Generator) -> Copter:
-    response = PX4_RESPONSE if identity.flavour == "px4" else ARDUPILOT_RESPONSE
-    return Copter(drone.pad_m, drone.pad_yaw_rad, scenario.mavlink, response, TICK_S, rng)

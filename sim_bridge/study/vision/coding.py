@@ -5,18 +5,17 @@ from fractions import Fraction
 import av
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
+from groundstation.arrays import Image
 
 
-def through_jpeg(picture: Picture, quality: int) -> Picture:
+def through_jpeg(picture: Image, quality: int) -> Image:
     """Return a picture after JPEG."""
     coded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
     return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
 
 
-def through_h264(picture: Picture, quantiser: int) -> Picture:
+def through_h264(picture: Image, quantiser: int) -> Image:
     """Return a picture after H.264 baseline at a constant quantiser (0..51), as the picture after a key picture."""
     height, width = picture.shape
     encoder = av.CodecContext.create("libx264", "w")

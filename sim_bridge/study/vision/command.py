@@ -15,7 +15,7 @@ import numpy as np
 from drivers.camera.search import search
 from groundstation.geometry.board import VALID_CODES
 from sim_bridge.study.vision.load import team_load
-from sim_bridge.study.vision.measure import Tally, cpu_ms, measured, peer_search
+from sim_bridge.study.vision.measure import DetectionTally, cpu_ms, measured, peer_search
 from sim_bridge.study.vision.scenes import CONDITIONS, Condition, shots
 
 RANGES_M = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
@@ -64,7 +64,7 @@ def _at(range_m: float, condition: Condition, pictures: int, seed: int, searchin
 
 def _identities(readings: int, seed: int) -> Row:
     """Return how many of so many bars, of all codes from 1 to 4 m, were read for certain, and how many wrongly."""
-    total = Tally()
+    total = DetectionTally()
     for range_m in (1.0, 2.0, 3.0, 4.0):
         tally = measured(shots(readings // 4, range_m, _REAL, seed + 2, VALID_CODES), seed, searching=False)
         total.pictures += tally.pictures

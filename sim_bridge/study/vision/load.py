@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 
 from drivers.camera.convert import stabilized_from_optical
-from drivers.camera.foresight import Foresight, Predictions
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.pose import Gravity
+from drivers.camera.prediction import Foresight, Predictions
 from drivers.camera.settings import DetectorSettings, MarkerKind, MarkerSettings, MountSettings
 from groundstation.bus.messages import EntityEstimate, Estimate, Header
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 from sim_bridge.study.vision.measure import cpu_ms
 from sim_bridge.study.vision.scenes import BOARD_M, FRONT, SQUARE_MM
 
@@ -61,7 +61,7 @@ class _Camera:
         world = Pose(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 4.2]))
         lens = FRONT if carried else CEILING
         mount = Mount(Pose(tilt, np.array([0.09, 0.0, 0.0])), name) if carried else Mount(world)
-        spec = RenderSpec(name, mount, lens, _boards(), "", _BODIES, "", 0, CameraScenario(), seed)
+        spec = RenderSpec(name, mount, lens, _boards(), "", _BODIES, "", 0, PictureQuality(), seed)
         self._renderer, self._name, self._carried = Renderer(spec), name, carried
         self._mount = (
             MountSettings(parent=name, position_m=(0.09, 0.0, 0.0), tilt_down_deg=45.0)

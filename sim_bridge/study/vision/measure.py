@@ -9,21 +9,20 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.camera import pose
 from drivers.camera.convert import stabilized_from_optical
 from drivers.camera.detect import Find, find_board, refined, spacing_px
-from drivers.camera.foresight import Foresight, Prediction
 from drivers.camera.markers import read_bar
+from drivers.camera.prediction import Foresight, Prediction
 from drivers.camera.search import find_in, search
 from drivers.camera.settings import DetectorSettings, MarkerKind, MarkerSettings, MountSettings
 from drivers.camera.tracks import Track
+from groundstation.arrays import Array
 from groundstation.bus.messages import EntityEstimate, Estimate, Header
 from groundstation.geometry.angles import wrap
-from sim_bridge.study.vision.scenes import FRONT, SQUARE_MM, TILT_DOWN_DEG, Shot, points
+from sim_bridge.study.vision.scenes import FRONT, SQUARE_MM, TILT_DOWN_DEG, TestPicture, points
 
-Array = NDArray[np.float64]
 _RIGHT_PX = 3.0
 _FRAME_NS = 66_666_667
 _MOUNT = MountSettings(parent="drone_1", tilt_down_deg=TILT_DOWN_DEG)
@@ -39,7 +38,7 @@ def cpu_ms(work: Callable[[], Any]) -> tuple[float, Any]:
     return 1000.0 * (time.process_time() - begin), result
 
 
-def predicted(shot: Shot, random: np.random.Generator) -> tuple[Prediction | None, tuple[float, float]]:
+def predicted(shot: TestPicture, random: np.random.Generator) -> tuple[Prediction | None, tuple[float, float]]:
     """Return where a noisy belief expects the board, and the observer's measured roll and pitch."""
     robot, centre = shot.states[0], shot.centre
     # The bench lifts boards off the floor to keep their distance: their height is known, their place is not.
@@ -65,7 +64,7 @@ def predicted(shot: Shot, random: np.random.Generator) -> tuple[Prediction | Non
 
 
 @dataclass
-class Tally:
+class DetectionTally:
     """What came of some pictures; lists hold one figure per board that was followed.
 
     followed: found in the window of a track; acquired: in the window of a cold belief; searched: in the whole picture.
@@ -116,9 +115,9 @@ def _of(values: list[float], statistic: Callable[[list[float]], Any]) -> float |
     return float(statistic(values)) if values else None
 
 
-def measured(shots: Iterable[Shot], seed: int, searching: bool = True) -> Tally:
+def measured(shots: Iterable[TestPicture], seed: int, searching: bool = True) -> DetectionTally:
     """Return what the detector makes of the pictures: in a track's window, in a cold belief's, and searching all."""
-    random, tally = np.random.default_rng(seed), Tally()
+    random, tally = np.random.default_rng(seed), DetectionTally()
     for shot in shots:
         tally.pictures += 1
         prediction, attitude = predicted(shot, random)
@@ -136,7 +135,9 @@ def measured(shots: Iterable[Shot], seed: int, searching: bool = True) -> Tally:
     return tally
 
 
-def _follow(tally: Tally, shot: Shot, random: np.random.Generator, attitude: tuple[float, float]) -> None:
+def _follow(
+    tally: DetectionTally, shot: TestPicture, random: np.random.Generator, attitude: tuple[float, float]
+) -> None:
     """Look where a track of the last picture expects the board: a few pixels off, its size 15 % wrong."""
     centre = shot.corners.mean(axis=0)
     last = centre + (shot.corners - centre) * random.uniform(0.87, 1.15) + random.uniform(-6.0, 6.0, 2)
@@ -151,11 +152,11 @@ def _follow(tally: Tally, shot: Shot, random: np.random.Generator, attitude: tup
         _judge(tally, shot, find, attitude)
 
 
-def _is_right(find: Find | None, shot: Shot) -> bool:
+def _is_right(find: Find | None, shot: TestPicture) -> bool:
     return find is not None and float(np.abs(find.corners - shot.corners).max()) < _RIGHT_PX
 
 
-def _judge(tally: Tally, shot: Shot, find: Find, attitude: tuple[float, float]) -> None:
+def _judge(tally: DetectionTally, shot: TestPicture, find: Find, attitude: tuple[float, float]) -> None:
     reading = read_bar(shot.picture, find, FRONT)
     if reading is not None and reading.is_sure(_DETECTOR.identity_margin):
         tally.sure += 1
@@ -184,7 +185,7 @@ def _judge(tally: Tally, shot: Shot, find: Find, attitude: tuple[float, float]) 
     tally.heading_deg.append(abs(math.degrees(heading)))
 
 
-def _is_flip(turn: Array, best: pose.PlanarPose, shot: Shot) -> bool:
+def _is_flip(turn: Array, best: pose.PlanarPose, shot: TestPicture) -> bool:
     spread = pose.pose_covariance(best, points(), FRONT, _DETECTOR.corner_floor_px)[:3, :3]
     return float(turn @ np.linalg.solve(spread, turn)) > 30.0
 
@@ -193,7 +194,7 @@ def _rotation_vector(rotation: Array) -> Array:
     return np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64).ravel()
 
 
-def peer_search(shot: Shot) -> bool:
+def peer_search(shot: TestPicture) -> bool:
     """Return whether OpenCV's sector-based finder sees the board in the whole picture (its corners refined)."""
     found, corners = cv2.findChessboardCornersSB(shot.picture, (4, 3))
     if not found or corners is None:

@@ -6,24 +6,21 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from groundstation.geometry.board import Board
+from groundstation.arrays import Array, Image
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 from sim_bridge.study.vision.coding import through_h264, through_jpeg
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
 SQUARE_MM, TILT_DOWN_DEG, HEIGHT_M, BOARD_M = 44.0, 45.0, 2.2, 0.4
-CLEAN = CameraScenario(corner_noise_px=0.0, exposure_ms=0.0)
-REAL = CameraScenario(exposure_ms=0.0)
+CLEAN = PictureQuality(corner_noise_px=0.0, exposure_ms=0.0)
+REAL = PictureQuality(exposure_ms=0.0)
 _BORDER_PX = 12.0
 _MOST_TRIES = 20_000
 
@@ -33,7 +30,7 @@ class Condition:
     """A picture quality: scenario, smear of the board [px], quality of JPEG or quantiser of H.264."""
 
     name: str
-    scenario: CameraScenario
+    scenario: PictureQuality
     smear_px: float = 0.0
     jpeg: int | None = None
     h264: int | None = None
@@ -62,10 +59,10 @@ CONDITIONS = _conditions()
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class TestPicture:
     """A picture, its code, the true optical_from_marker, states of carrier and subject, true corners [px]."""
 
-    picture: Picture
+    picture: Image
     code: int
     truth: Pose
     states: Array
@@ -79,7 +76,7 @@ class Shot:
 
 def points() -> Array:
     """Return the corners of the bench's board (12, 3) [m]."""
-    return Board(1, SQUARE_MM).corners()
+    return Checkerboard(1, SQUARE_MM).corners()
 
 
 @cache
@@ -98,7 +95,7 @@ def shots(
     seed: int,
     codes: tuple[int, ...] = (5,),
     steepness_deg: tuple[float, float] = (0.0, 60.0),
-) -> Iterator[Shot]:
+) -> Iterator[TestPicture]:
     """Yield pictures with the whole board in view, anywhere in the picture, any heading, tilted by about 4 deg.
 
     steepness_deg: angle between the board's normal and the line of sight.
@@ -122,7 +119,7 @@ def _shot(
     random: np.random.Generator,
     code: int,
     steepness_deg: tuple[float, float],
-) -> Shot | None:
+) -> TestPicture | None:
     spec, states = renderer.spec, np.zeros((2, 13))
     states[0, 2], states[0, 8] = HEIGHT_M, random.uniform(-math.pi, math.pi)
     wide = steepness_deg[1] > 60.0
@@ -135,7 +132,7 @@ def _shot(
     truth = compose_scene(spec, states).sights[0].optical_from_marker
     sight = truth.translation / np.linalg.norm(truth.translation)
     steepness = math.degrees(math.acos(float(np.clip(-truth.rotation[:, 2] @ sight, -1.0, 1.0))))
-    card = FRONT.project(truth.apply(Board(code, SQUARE_MM).outline()))
+    card = FRONT.project(truth.apply(Checkerboard(code, SQUARE_MM).outline()))
     if not steepness_deg[0] <= steepness <= steepness_deg[1] or not FRONT.contains(card, _BORDER_PX).all():
         return None
     if condition.smear_px:
@@ -149,4 +146,4 @@ def _shot(
         picture = through_jpeg(picture, condition.jpeg)
     if condition.h264 is not None:
         picture = through_h264(picture, condition.h264)
-    return Shot(picture, code, truth, states, FRONT.project(truth.apply(points())))
+    return TestPicture(picture, code, truth, states, FRONT.project(truth.apply(points())))

@@ -1,7 +1,8 @@
 """What a modern autopilot believes of its own motion: inertial sensors, aided by poses that are fed from outside.
 
 Without them it knows nothing of its position; when they stop, it coasts on its accelerometers and drifts. The frame is
-that of the poses. Gains stand for those of the firmwares' filters: 1-3 cm of error for 1 cm of noise (mavlink.md 1.1).
+that of the poses. Gains stand for those of the firmwares' filters: 1-3 cm of error for 1 cm of noise
+(docs/reference/mavlink.md 1.1).
 """
 
 import math
@@ -9,7 +10,7 @@ import math
 import numpy as np
 
 from sim_bridge.scenario import CopterScenario
-from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 
 Vector3 = tuple[float, float, float]

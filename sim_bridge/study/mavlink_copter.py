@@ -7,7 +7,7 @@ odometry. Nothing of the driver's code is used here.
 import math
 
 from groundstation.bus.messages import EntityEstimate, FlightState, Header, Odometry, VehicleStatus
-from sim_bridge.world.copter import Copter, Steering
+from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 from sim_bridge.world.world import TICK_S
 
 Vector3 = tuple[float, float, float]
@@ -23,7 +23,7 @@ _STILL: Vector3 = (0.0, 0.0, 0.0)
 class CopterLink:
     """One vehicle's driver in short; call `step` once per tick. landed: it came down because no camera saw it."""
 
-    def __init__(self, name: str, copter: Copter, clock: str, lifetime_s: float) -> None:
+    def __init__(self, name: str, copter: MavlinkCopter, clock: str, lifetime_s: float) -> None:
         self._name, self._copter, self._clock, self._lifetime_s = name, copter, clock, lifetime_s
         self._until_s = -math.inf
         self._ticks = self._seq = self._resets = 0

@@ -3,10 +3,10 @@
 import numpy as np
 
 from sim_bridge.scenario import DroneScenario
-from sim_bridge.world.airframe import Airframe
-from sim_bridge.world.autopilot import Autopilot
+from sim_bridge.world.ardrone_airframe import Airframe
+from sim_bridge.world.ardrone_autopilot import Autopilot
+from sim_bridge.world.downwash import wake_between
 from sim_bridge.world.noise import GaussMarkov, standard_normals
-from sim_bridge.world.wake import wake_between
 
 _UNREST_CORRELATION_S = 0.8
 

@@ -1,6 +1,6 @@
 """Ticks on an absolute schedule of the boot clock, and the count of those that came late."""
 
-from groundstation.bus.clock import NS_PER_MS
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.world.world import TICK_NS
 
 LATE_NS = 10 * NS_PER_MS

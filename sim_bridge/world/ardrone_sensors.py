@@ -1,7 +1,7 @@
 """What an AR.Drone believes about its own motion: true state in, navdata-like readings out.
 
-Figures of a real flight against motion capture (estimation.md, section 2). Units and frames are SI and FLU; the
-emulator turns them into what stands on the wire.
+Figures of a real flight against motion capture (docs/explanation/estimation.md 9.2). Units and frames are SI and FLU;
+the emulator turns them into what stands on the wire.
 """
 
 import math
@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from sim_bridge.scenario import DroneScenario
-from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
 
 LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.ardrone_animations import FLIP_KICK_M_S2, FLIP_KICK_S, FLIP_TURN_S, FLIPS, Animation, motion_at
 from sim_bridge.world.noise import DelayLine, Draw, GaussMarkov
-from sim_bridge.world.stunts import FLIP_KICK_M_S2, FLIP_KICK_S, FLIP_TURN_S, FLIPS, Animation, motion_at
 
 # Profile of a recorded take-off: the motors' ramp carries the drone from 2.9 s on; 0.27 m at 3.35 s, 0.62 m at 3.77 s,
 # peak 0.82 m, settled at 0.76 m.
@@ -54,7 +54,7 @@ class FlightLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class MotionReferences:
     """References while FLYING [rad, rad, m/s, rad/s; FLU]; coordinated: turns bank like an aircraft's."""
 
     roll_rad: float
@@ -73,8 +73,8 @@ class Autopilot:
         self._airframe = airframe
         self._tick_s = tick_s
         self._since_s = 0.0
-        self._wanted: Motion | None = None
-        self._delayed: DelayLine[Motion | None] = DelayLine(COMMAND_DELAY_S, tick_s, None)
+        self._wanted: MotionReferences | None = None
+        self._delayed: DelayLine[MotionReferences | None] = DelayLine(COMMAND_DELAY_S, tick_s, None)
         self._held_height_m: float | None = None
         self._drift = (0.0, 0.0)
         self._stunt: Animation | None = None
@@ -118,10 +118,10 @@ class Autopilot:
         if self.phase is Phase.CUT and self._airframe.on_ground:
             self._enter(Phase.LANDED)
 
-    def move(self, motion: Motion) -> None:
+    def move(self, motion: MotionReferences) -> None:
         """Fly with these references (clamped to the limits) until told otherwise."""
         limits = self.limits
-        self._wanted = Motion(
+        self._wanted = MotionReferences(
             _clamp(motion.roll_rad, limits.tilt_rad),
             _clamp(motion.pitch_rad, limits.tilt_rad),
             _clamp(motion.climb_m_s, limits.climb_m_s),
@@ -197,7 +197,7 @@ class Autopilot:
         if body.on_ground:
             self._enter(Phase.LANDED)
 
-    def _step_flight(self, motion: Motion | None, push: tuple[float, float, float]) -> None:
+    def _step_flight(self, motion: MotionReferences | None, push: tuple[float, float, float]) -> None:
         body = self._airframe
         if self._stunt is not None:
             motion = self._perform(self._stunt)
@@ -217,13 +217,13 @@ class Autopilot:
         if body.on_ground:
             self._enter(Phase.LANDED)
 
-    def _perform(self, stunt: Animation) -> Motion | None:
+    def _perform(self, stunt: Animation) -> MotionReferences | None:
         """Return the references of an animation, None at its end."""
         self._stunt_s += self._tick_s
         if self._stunt_s > self._stunt_end_s:
             self._stunt = self._wanted = None
             return None
-        return Motion(*motion_at(stunt, self._stunt_s))
+        return MotionReferences(*motion_at(stunt, self._stunt_s))
 
     def _step_flip(self, push: tuple[float, float, float]) -> None:
         body, stunt = self._airframe, self._stunt

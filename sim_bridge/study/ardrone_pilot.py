@@ -2,9 +2,9 @@
 
 import math
 
-from sim_bridge.world.autopilot import Motion
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_autopilot import MotionReferences
+from sim_bridge.world.ardrone_sensors import Onboard
 
 _GRAVITY = 9.81
 _GAIN, _DRAG = 2.4, 0.45  # 1/s
@@ -41,4 +41,4 @@ class Pilot:
         ay = _GAIN * (vy - self._scale * self._onboard.vy) + _DRAG * vy
         pitch = max(-_MAX_TILT, min(_MAX_TILT, math.atan(ax / _GRAVITY)))
         roll = max(-_MAX_TILT, min(_MAX_TILT, -math.atan(ay / _GRAVITY)))
-        self._drone.autopilot.move(Motion(roll, pitch, vz, rate))
+        self._drone.autopilot.move(MotionReferences(roll, pitch, vz, rate))

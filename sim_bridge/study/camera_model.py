@@ -4,25 +4,24 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Header, RelativeObservation
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
     rotation_from_euler,
     world_from_downward_optical,
 )
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
 from sim_bridge.world.world import World
 
-Array = NDArray[np.float64]
-
 _BORDER_PX = 6.0
-# Pixels per square that the detector needs: with a window predicted from the last sighting, and without (vision.md).
+# Pixels per square that the detector needs: with a window predicted from the last sighting, and without
+# (docs/reference/vision.md 2).
 _TRACKED_PX, _SEARCH_PX = 5.5, 8.5
 _SEARCH_SHARE = 2.0 / 15.0  # full searches run at 2 Hz
 _FORGET_S = 0.4
@@ -39,13 +38,13 @@ class Carried:
     """A board on a body: where its centre is [base]."""
 
     body: str
-    board: Board | Tag
+    board: Checkerboard | SquareTag
     position: Array
 
 
-def _square_m(printed: Board | Tag) -> float:
+def _square_m(printed: Checkerboard | SquareTag) -> float:
     """Return the square of the checkerboard that is seen as far as a marker is (a tag of 168 mm: 44 mm)."""
-    return printed.square_m if isinstance(printed, Board) else printed.size_mm / 3800.0
+    return printed.square_m if isinstance(printed, Checkerboard) else printed.size_mm / 3800.0
 
 
 def boards_of(site: Site) -> tuple[Carried, ...]:

@@ -1,4 +1,4 @@
-"""`python -m sim_bridge.hangar 127.0.0.2 127.0.0.3`: emulated AR.Drones alone, for programs of others.
+"""`python -m sim_bridge.standalone 127.0.0.2 127.0.0.3`: emulated AR.Drones alone, for programs of others.
 
 Each address gets a drone of its own with the ports of a real one, 2 m from the next in an empty room; no bus, no
 ground station. With `--truth`, a line of JSON every 0.1 s says where each really is and what it does. Exit codes:
@@ -16,19 +16,19 @@ from collections.abc import Callable, Sequence
 
 from groundstation.errors import GroundStationError
 from sim_bridge.cameras import render_specs
-from sim_bridge.clockwork import Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
-from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, Firmware
+from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_video import PORT
 from sim_bridge.scenario import DroneScenario, Scenario, Standstill, TargetScenario
 from sim_bridge.site import Site
 from sim_bridge.stage import Stage
+from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.world import TICK_NS, World
 
 _SPACING_M = 2.0
 _TRUTH_TICKS = 20
 _MODE_TICKS = 20
-# WIRE (AR.Drone sheet 6): calibration of a real front camera at 640x360.
+# WIRE (docs/reference/ardrone.md 6): calibration of a real front camera at 640x360.
 _FRONT = {
     "width_px": 640, "height_px": 360, "fx_px": 569.9, "fy_px": 568.0, "cx_px": 331.4, "cy_px": 135.9,
     "distortion": (-0.527, 0.274, 0.021, -0.006, 0.0),
@@ -61,7 +61,7 @@ def site_of(addresses: Sequence[str]) -> Site:
 class Hangar:
     """The drones and their ports; `close` releases them."""
 
-    def __init__(self, addresses: Sequence[str], firmware: Firmware, seed: int = 1) -> None:
+    def __init__(self, addresses: Sequence[str], firmware: ArdroneFirmware, seed: int = 1) -> None:
         self._site, self._seed = site_of(addresses), seed
         parked = TargetScenario(path=Standstill(position_m=(6.0, 0.0)))
         self._scenario = Scenario(drones=DroneScenario(firmware=firmware.name), target=parked)
@@ -132,7 +132,7 @@ def _address(text: str) -> str:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m sim_bridge.hangar", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m sim_bridge.standalone", description=__doc__)
     parser.add_argument("addresses", nargs="+", type=_address, metavar="ADDRESS", help="loopback address of a drone")
     parser.add_argument("--firmware", choices=FIRMWARES, default=DEFAULT, help="of all drones (default: %(default)s)")
     parser.add_argument(

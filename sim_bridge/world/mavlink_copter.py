@@ -1,7 +1,8 @@
 """A quadrotor with a velocity-controlled autopilot (PX4- or ArduPilot-like): how it moves when told a velocity.
 
-Step responses as measured on real firmwares (mavlink.md 1, 2): ArduCopter t10 0.31, t63 0.74, t90 1.23-1.41 s, all of
-the speed; PX4 t10 0.22, t63 0.67, t90 1.35 s, 14-20 % under the command for seconds. Frames are FLU and world.
+Step responses as measured on real firmwares (docs/reference/mavlink.md 1, 2): ArduCopter t10 0.31, t63 0.74, t90
+1.23-1.41 s, all of the speed; PX4 t10 0.22, t63 0.67, t90 1.35 s, 14-20 % under the command for seconds. Frames are FLU
+and world.
 """
 
 import math
@@ -11,10 +12,10 @@ from enum import Enum, auto
 import numpy as np
 
 from sim_bridge.scenario import CopterScenario
-from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
-from sim_bridge.world.inertial import InertialEstimate
+from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.downwash import wake_between
+from sim_bridge.world.mavlink_estimator import InertialEstimate
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
-from sim_bridge.world.wake import wake_between
 
 Vector3 = tuple[float, float, float]
 _STILL: Vector3 = (0.0, 0.0, 0.0)
@@ -53,7 +54,7 @@ PX4_RESPONSE = Response(dead_s=0.06, rate=3.3, damping=0.92, gain=0.85)
 ARDUPILOT_RESPONSE = Response(dead_s=0.13, rate=3.5, damping=1.0, gain=1.0)
 
 
-class Copter:
+class MavlinkCopter:
     """A drone standing on its pad. `steering` and the methods take the requests, `airframe` holds the true state."""
 
     def __init__(
@@ -78,7 +79,7 @@ class Copter:
         self._held: Vector3 | None = None
 
     @property
-    def autopilot(self) -> "Copter":
+    def autopilot(self) -> "MavlinkCopter":
         """Return itself: what asks whether motors turn need not know which firmware it is."""
         return self
 

@@ -1,6 +1,7 @@
 """What the bridge is started with: `python -m sim_bridge --spec FILE`."""
 
 import json
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,10 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import SettingsError
-from sim_bridge.faults import check_faults
-from sim_bridge.scenario import Scenario, describe_problems, parse_scenario
-from sim_bridge.site import Site, parse_site
+from sim_bridge.scenario import CAMERA_FAULTS, Fault, FaultKind, Scenario, describe_problems, parse_scenario
+from sim_bridge.site import Site, SiteDrone, parse_site
+
+_ARDRONE_FAULTS = frozenset({FaultKind.PROPELLER_BLOCKED})
 
 
 class _Envelope(BaseModel):
@@ -25,7 +27,7 @@ class _Envelope(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class LaunchSpec:
     """A checked start order.
 
     child: fields of the ChildSpec; addresses: loopback address of each drone; streams: address and port of each
@@ -40,7 +42,7 @@ class Order:
     seed: int
 
 
-def read_order(path: Path) -> Order:
+def read_order(path: Path) -> LaunchSpec:
     """Return the order in a file; raises SettingsError with every problem of the part that is wrong."""
     try:
         envelope = _Envelope.model_validate_json(path.read_bytes())
@@ -50,7 +52,7 @@ def read_order(path: Path) -> Order:
         raise SettingsError(describe_problems(str(path), error)) from None
     site = parse_site(envelope.field)
     scenario = parse_scenario(json.dumps(envelope.scenario))
-    check_faults(scenario.faults, site.drones, envelope.streams)
+    _check_faults(scenario.faults, site.drones, envelope.streams)
     strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
     if strangers:
         names = ", ".join(site.drones)
@@ -62,4 +64,19 @@ def read_order(path: Path) -> Order:
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])
     seed = scenario.seed if envelope.seed is None else envelope.seed
-    return Order(envelope.child, site, scenario, envelope.addresses, envelope.streams, seed)
+    return LaunchSpec(envelope.child, site, scenario, envelope.addresses, envelope.streams, seed)
+
+
+def _check_faults(faults: Iterable[Fault], drones: Mapping[str, SiteDrone], cameras: Iterable[str]) -> None:
+    """Raise SettingsError naming every fault of an entity that does not exist, or cannot have it."""
+    cameras = sorted(cameras)
+    problems = []
+    for number, fault in enumerate(faults):
+        if fault.kind in CAMERA_FAULTS:
+            known = cameras
+        else:
+            known = sorted(n for n, d in drones.items() if d.kind == "ardrone" or fault.kind not in _ARDRONE_FAULTS)
+        if fault.entity not in known:
+            problems.append(f"scenario: faults.{number}.entity: {fault.entity!r} is none of {', '.join(known)}")
+    if problems:
+        raise SettingsError(problems)

@@ -1,7 +1,7 @@
 """Flight animations of an AR.Drone: what each does to attitude, climb and heading. Pure.
 
-WIRE: numbers and default durations of the SDK 2.0.1 (AR.Drone sheet 2.4). How far each goes is not documented: the
-names say the angles, the rest is made up to look alike.
+WIRE: numbers and default durations of the SDK 2.0.1 (docs/reference/ardrone.md 2.4). How far each goes is not
+documented: the names say the angles, the rest is made up to look alike.
 """
 
 import math

@@ -1,7 +1,7 @@
 """The airframe of an AR.Drone: what tilt, climb and turn references do to its motion.
 
-Figures of real flights (protocol sheet, section 7): 10 / 63 / 90 % of the tilt peak 90 / 180 / 270 ms after a command,
-8 % overshoot; 12 degrees of tilt bring 2.7 m/s after 2 s.
+Figures of real flights (docs/reference/ardrone.md 7): 10 / 63 / 90 % of the tilt peak 90 / 180 / 270 ms after a
+command, 8 % overshoot; 12 degrees of tilt bring 2.7 m/s after 2 s.
 """
 
 import math
@@ -14,7 +14,7 @@ _TILT_RATE = 12.5
 _TILT_DAMPING = 0.627
 _DRAG_LINEAR = 0.08
 _DRAG_QUADRATIC = 0.17
-# First-order rate 10 /s (tum_ardrone's identified model, reliability.md 5).
+# First-order rate 10 /s (tum_ardrone's identified model, docs/reference/ardrone.md 7).
 _YAW_RATE = 10.0
 
 

@@ -1,8 +1,38 @@
 """Errors that cross package borders; an operator's mistake is always one of these, never a bare traceback."""
 
+import re
+
+_WORD_WITH_AT = re.compile(r"""[^\s"'<>]*@[^\s"'<>]*""")
+_PLACE = re.compile(r"(\[[^\]@]*\]|[^@:]*)(:\d{0,5})?")
+
+
+def without_password(source: str) -> str:
+    """Return a source's address without the user and password that it may carry.
+
+    In what is no proper address, whatever stands before an @ may be part of a password and goes as well.
+    """
+    scheme, mark, rest = source.partition("://")
+    if not mark:
+        before, _, after = source.rpartition("@")
+        return after if ":" in before and not before.startswith("/") else source
+    place = re.split("[/?#]", rest, maxsplit=1)[0]
+    if "@" in place:
+        hidden = place.rpartition("@")[0] + "@"
+    else:
+        hidden = "" if _PLACE.fullmatch(place) else "".join(rest.rpartition("@")[:2])
+    return f"{scheme}{mark}{rest[len(hidden) :]}"
+
+
+def without_passwords(text: str) -> str:
+    """Return a message or log line in which no address carries a user and password."""
+    return _WORD_WITH_AT.sub(lambda word: without_password(word.group()), text)
+
 
 class GroundStationError(Exception):
-    """Base of every error with a message meant for the operator."""
+    """Base of every error with a message meant for the operator, which never holds a camera's password."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(without_passwords(text))
 
 
 class OperatorMistake(GroundStationError):
@@ -14,7 +44,7 @@ class SettingsError(GroundStationError):
 
     def __init__(self, problems: list[str]) -> None:
         super().__init__("\n".join(problems))
-        self.problems = problems
+        self.problems = [without_passwords(problem) for problem in problems]
 
 
 class MessageError(GroundStationError):

@@ -4,30 +4,29 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
+from groundstation.bus.notice import Notice
+from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
-from groundstation.control.safety import Limited, limit_setpoint
-from groundstation.control.seeking import spread_m
+from groundstation.control.search import spread_m
 from groundstation.control.setpoints import HOVER, setpoints_from_plan
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
-from groundstation.estimation.intake import REASONS, Intake
+from groundstation.estimation.ingest import REASONS, Intake
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
+from groundstation.field.resolved import ResolvedField
 from groundstation.planning import parameters as planning
 from groundstation.planning.plan import Planner, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,27 +41,17 @@ class TrackerParameters:
     string_first: bool = False
 
 
-def tracker_from_field(resolved: Mapping[str, Any], clock: str, epoch: int) -> "Tracker":
-    """Return the tracker for a resolved field (decoded JSON of groundstation.settings.schema.Field)."""
+def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker":
+    """Return the tracker for a resolved field."""
     parameters = TrackerParameters(
-        estimation.parameters_from_field(resolved),
-        planning.parameters_from_field(resolved),
-        sensors_from_field(resolved),
-        control_from_field(resolved),
-        safety_from_field(resolved),
-        resolved["planner"]["initial_topology"] == "string",
+        estimation.parameters_from_field(field),
+        planning.parameters_from_field(field),
+        sensors_from_field(field),
+        control_from_field(field),
+        safety_from_field(field),
+        field.planner.initial_topology == "string",
     )
     return Tracker(parameters, clock, epoch)
-
-
-@dataclass(frozen=True, slots=True)
-class Notice:
-    """Something an operator should know, about an entity ("" = the tracker)."""
-
-    severity: Severity
-    text: str
-    remedy: str = ""
-    entity: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,5 @@
 """A Foxglove WebSocket server on loopback that says what a recording would hold, and the scene. Extra [foxglove]."""
 
-from typing import Any
-
 import foxglove
 
 from groundstation.bus import codec, keys
@@ -9,6 +7,7 @@ from groundstation.bus.api import Sample
 from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
 from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_schema
 from groundstation.errors import MessageError, OperatorMistake
+from groundstation.field.resolved import ResolvedField
 from groundstation.recording.capture import Capture, Entry
 from groundstation.recording.derived import ViewerChannels, camera_frames
 from groundstation.recording.timeline import Timeline
@@ -23,11 +22,11 @@ _DRAWN = frozenset(topic.name for topic in (ESTIMATE, PLAN, SETPOINT))
 class FoxgloveView:
     """Serves until closed; viewers come and go. It takes no orders: no services, nothing can be published to it."""
 
-    def __init__(self, name: str, field: dict[str, Any], timeline: Timeline, port: int) -> None:
+    def __init__(self, name: str, field: ResolvedField | None, timeline: Timeline, port: int) -> None:
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
         self._capture = Capture(timeline)
-        self._viewers = ViewerChannels(camera_frames(field))
+        self._viewers = ViewerChannels(camera_frames(field) if field else ())
         self._scene = FoxgloveScene(field)
         self._scene_channel = foxglove.Channel(
             SCENE_CHANNEL, schema=scene_schema(), message_encoding="protobuf", context=self._context

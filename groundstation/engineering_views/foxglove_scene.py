@@ -8,10 +8,12 @@ import numpy as np
 from foxglove import Schema
 from foxglove import messages as fm
 
+from groundstation.arrays import Array
 from groundstation.bus import messages as m
-from groundstation.bus.clock import NS_PER_S
-from groundstation.engineering_views.scene import LINK_COLOUR, Array, Body, Link, Rgb, Scene
+from groundstation.engineering_views.scene import LINK_COLOUR, Body, Rgb, SensingLink, ViewScene
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import quaternion_from_euler
+from groundstation.time_units import NS_PER_S
 
 _PERIOD_NS = NS_PER_S // 10
 _FRAME = "world"
@@ -28,10 +30,10 @@ def scene_schema() -> Schema:
 class FoxgloveScene:
     """Follows the messages and gives a new scene at most ten times a second."""
 
-    def __init__(self, field: dict[str, Any]) -> None:
-        self._scene = Scene(field)
+    def __init__(self, field: ResolvedField | None) -> None:
+        self._scene = ViewScene(field)
         self._static = _static(field)
-        self._links: list[Link] = []
+        self._links: list[SensingLink] = []
         self._arrows: dict[str, tuple[Array, Array]] = {}
         self._next_ns = 0
 
@@ -61,7 +63,8 @@ class FoxgloveScene:
         arrows = [_arrow(*arrow, self._scene.colour(name)) for name, arrow in self._arrows.items()]
         drawn = [self._body(entity, body) for body in bodies]
         parts = [entity("room", lines=self._static), *drawn, entity("links", lines=links)]
-        return fm.SceneUpdate(entities=[*parts, entity("commanded", arrows=arrows)]).encode()
+        update: bytes = fm.SceneUpdate(entities=[*parts, entity("commanded", arrows=arrows)]).encode()
+        return update
 
     def _body(self, entity: Callable[..., fm.SceneEntity], body: Body) -> fm.SceneEntity:
         colour = self._scene.colour(body.name)
@@ -78,12 +81,11 @@ class FoxgloveScene:
         return entity(body.name, cubes=[cube], texts=[label], lines=[ring])
 
 
-def _static(field: dict[str, Any]) -> list[fm.LinePrimitive]:
-    room = field.get("room")
-    if not room:
+def _static(field: ResolvedField | None) -> list[fm.LinePrimitive]:
+    if field is None:
         return []
-    x, y, z = (float(size) for size in room["size_m"])
-    fence = [room["fence"][axis] for axis in ("x_m", "y_m", "z_m")]
+    (x, y, z), own = field.room.size_m, field.room.fence
+    fence = [own.x_m, own.y_m, own.z_m]
     whole = [(-x / 2, x / 2), (-y / 2, y / 2), (0.0, z)]
     return [*_box(whole, _ROOM_COLOUR), *_box(fence, _FENCE_COLOUR)]
 

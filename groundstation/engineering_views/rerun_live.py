@@ -3,7 +3,6 @@
 import subprocess
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import rerun as rr
 
@@ -13,6 +12,7 @@ from groundstation.bus.keys import Key
 from groundstation.engineering_views.rerun_file import APPLICATION
 from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
 from groundstation.errors import GroundStationError, MessageError
+from groundstation.field.resolved import ResolvedField
 from groundstation.recording.schemas import is_picture
 from groundstation.recording.timeline import Timeline
 
@@ -62,7 +62,7 @@ class RerunView:
     def __init__(
         self,
         name: str,
-        field: dict[str, Any],
+        field: ResolvedField | None,
         timeline: Timeline,
         start_ns: int,
         server: RerunServer | None,

@@ -12,10 +12,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.bus import messages as m
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.topics import Topic
-from groundstation.engineering_views.scene import LINK_COLOUR, TARGET_COLOUR, Body, Scene
+from groundstation.engineering_views.scene import LINK_COLOUR, TARGET_COLOUR, Body, ViewScene
+from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import Room
 from groundstation.geometry.angles import quaternion_from_euler
+from groundstation.recording.viewers import Transform
+from groundstation.time_units import NS_PER_S
 
 # Faster than this nobody looks, and each log call costs tens of microseconds.
 _PERIOD_NS = NS_PER_S // 10
@@ -27,9 +30,9 @@ _LEVELS = {"INFO": "INFO", "WARNING": "WARN", "ERROR": "ERROR"}
 class RerunScene:
     """Feeds one recording stream, message by message, in order of time."""
 
-    def __init__(self, stream: rr.RecordingStream, field: dict[str, Any], start_ns: int) -> None:
+    def __init__(self, stream: rr.RecordingStream, field: ResolvedField | None, start_ns: int) -> None:
         self._stream = stream
-        self._scene = Scene(field)
+        self._scene = ViewScene(field)
         self._start_ns = start_ns
         self._next_ns: dict[str, int] = {}
         self._camera_paths: dict[str, str] = {}
@@ -83,32 +86,33 @@ class RerunScene:
     def _log_static(self) -> None:
         field = self._scene.field
         self._log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        if field.get("room"):
-            self._log_room(field["room"])
+        if field is None:
+            return
+        self._log_room(field.room)
         for camera in self._scene.cameras:
-            self._log_camera(camera)
+            self._log_camera(camera, field)
 
-    def _log_room(self, room: dict[str, Any]) -> None:
-        x, y, z = room["size_m"]
+    def _log_room(self, room: Room) -> None:
+        x, y, z = room.size_m
         wire = rr.components.FillMode.MajorWireframe
         walls = rr.Boxes3D(sizes=[[x, y, z]], centers=[[0, 0, z / 2]], colors=[[90] * 3], fill_mode=wire)
-        low, high = (np.array([room["fence"][axis][end] for axis in ("x_m", "y_m", "z_m")]) for end in (0, 1))
+        low, high = np.array([room.fence.x_m, room.fence.y_m, room.fence.z_m]).T
         fence = rr.Boxes3D(mins=[low], sizes=[high - low], colors=[TARGET_COLOUR], fill_mode=wire)
         self._log("world/room", walls, static=True)
         self._log("world/fence", fence, static=True)
 
-    def _log_camera(self, camera: Any) -> None:
-        field, name = self._scene.field, camera.child
-        source = field["cameras"][name] if camera.parent == "world" else field["drones"][camera.parent]["camera"]
-        lens = source["calibration"]
+    def _log_camera(self, camera: Transform, field: ResolvedField) -> None:
+        name = camera.child
+        source = field.cameras[name] if camera.parent == "world" else field.drones[camera.parent].camera
+        lens = source.calibration
         path = f"world/{name}" if camera.parent == "world" else f"world/{camera.parent}/camera"
         self._camera_paths[name] = path
         w, x, y, z = camera.rotation_wxyz
         pose = rr.Transform3D(translation=camera.position_m, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
         pinhole = rr.Pinhole(
-            focal_length=[lens["fx_px"], lens["fy_px"]],
-            principal_point=[lens["cx_px"], lens["cy_px"]],
-            resolution=[lens["width_px"], lens["height_px"]],
+            focal_length=[lens.fx_px, lens.fy_px],
+            principal_point=[lens.cx_px, lens.cy_px],
+            resolution=[lens.width_px, lens.height_px],
             image_plane_distance=_PICTURE_DISTANCE_M,
         )
         self._log(path, pose, pinhole, static=True)
@@ -175,9 +179,9 @@ class RerunScene:
         self._log(f"log/{message.header.entity}", rr.TextLog(text, level=_LEVELS[message.severity]))
 
 
-def blueprint(field: dict[str, Any]) -> rrb.Blueprint:
+def blueprint(field: ResolvedField | None) -> rrb.Blueprint:
     """Return the layout: room and pictures on the left, plots and log on the right."""
-    cameras = Scene(field).cameras
+    cameras = ViewScene(field).cameras
     paths = [f"world/{one.child}" if one.parent == "world" else f"world/{one.parent}/camera" for one in cameras]
     pictures = [rrb.Spatial2DView(origin=path, name=one.child) for path, one in zip(paths, cameras, strict=True)]
     plots = [

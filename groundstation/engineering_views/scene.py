@@ -1,20 +1,17 @@
 """What there is to draw, without saying with what: bodies, 95 % ellipses, links, arrows, in the world frame."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from groundstation.arrays import Array
 from groundstation.bus import messages as m
-from groundstation.estimation.targets import targets_of
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.recording.derived import camera_frames
 from groundstation.recording.viewers import Transform
 
-Array = NDArray[np.float64]
 Rgb = tuple[int, int, int]
 
 _RING_POINTS = 40
@@ -40,7 +37,7 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class SensingLink:
     """An edge of the topology as a line whose half-width [m] grows with its information."""
 
     name: str
@@ -49,16 +46,15 @@ class Link:
     half_width_m: float
 
 
-class Scene:
+class ViewScene:
     """Where everything is, as far as the messages so far say."""
 
-    def __init__(self, field: Mapping[str, Any]) -> None:
+    def __init__(self, field: ResolvedField | None) -> None:
         self.field = field
-        self.cameras: tuple[Transform, ...] = camera_frames(dict(field))
-        self._target_heights_m = {
-            name: float(target.get("marker", {}).get("height_m", 0.0)) for name, target in targets_of(field).items()
-        }
-        self._names = sorted(field.get("drones", {}))
+        self.cameras: tuple[Transform, ...] = camera_frames(field) if field else ()
+        targets = field.tracked if field else {}
+        self._target_heights_m = {name: target.marker.height_m for name, target in targets.items()}
+        self._names = sorted(field.drones) if field else []
         self._places = {one.child: one.position_m for one in self.cameras if one.parent == "world"}
         self.bodies: dict[str, Body] = {}
 
@@ -84,14 +80,14 @@ class Scene:
         std = math.sqrt(max(0.0, float(covariance[0, 0] + covariance[1, 1])))
         return Body(entity.name, not has_pose, position, mean[3] if has_pose else 0.0, ring, std)
 
-    def links(self, plan: m.Plan) -> list[Link]:
+    def links(self, plan: m.Plan) -> list[SensingLink]:
         """Return the edges of a plan between what has a known place."""
         found = []
         for edge in plan.edges:
             begin, end = self._place(edge.observer), self._place(edge.subject)
             if begin is not None and end is not None:
                 width = 0.004 * (1.0 + math.log10(1.0 + max(0.0, edge.information)))
-                found.append(Link(f"{edge.observer} sees {edge.subject}", begin, end, width))
+                found.append(SensingLink(f"{edge.observer} sees {edge.subject}", begin, end, width))
         return found
 
     def _place(self, name: str) -> tuple[float, float, float] | None:

@@ -7,14 +7,14 @@ from typing import Protocol
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Sample
 from groundstation.bus.topics import IMU, JOURNAL, ODOMETRY
-from groundstation.recording.selection import IMAGE_TOPICS, STATE_TOPICS
+from groundstation.recording.file_topics import IMAGE_TOPICS, STATE_TOPICS
 
 _PERIOD_S = 0.05
 # Nobody looks at hundreds of samples a second; recordings have them.
 _SHOWN = tuple(topic for topic in STATE_TOPICS if topic not in (IMU, ODOMETRY, JOURNAL))
 
 
-class View(Protocol):
+class LiveView(Protocol):
     """Something that shows samples."""
 
     @property
@@ -28,7 +28,7 @@ class View(Protocol):
         """End it, handing over what is left."""
 
 
-def watch(bus: Bus, view: View, goes_on: Callable[[], bool]) -> int:
+def watch(bus: Bus, view: LiveView, goes_on: Callable[[], bool]) -> int:
     """Show what comes until `goes_on` says no or the view is gone; returns how many samples were dropped."""
     queues = (bus.subscribe(_SHOWN, capacity=4096), bus.subscribe(IMAGE_TOPICS, capacity=64))
     while view.alive and goes_on():

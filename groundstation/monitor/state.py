@@ -9,30 +9,11 @@ import msgspec
 
 from groundstation.bus import messages as m
 from groundstation.bus.api import Received
+from groundstation.field.resolved import ResolvedField
 
 _EVENTS = 50
 _COMMANDS = 8
 T = TypeVar("T")
-
-
-class _Limits(msgspec.Struct, frozen=True):
-    battery_min: float = 0.15
-
-
-class _Drone(msgspec.Struct, frozen=True):
-    limits: _Limits = _Limits()
-
-
-class _Target(msgspec.Struct, frozen=True):
-    name: str = ""
-
-
-class _Field(msgspec.Struct, frozen=True):
-    site: str = ""
-    drones: dict[str, _Drone] = {}
-    cameras: dict[str, msgspec.Raw] = {}
-    target: _Target | None = _Target()
-    targets: dict[str, msgspec.Raw] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +26,14 @@ class Cast:
     cameras: tuple[str, ...] = ()
 
 
-def cast_from_field(data: bytes) -> Cast:
-    """Return the cast of a resolved field's JSON."""
-    resolved = msgspec.json.decode(data, type=_Field)
+def cast_from_field(resolved: ResolvedField) -> Cast:
+    """Return the cast of a resolved field."""
     drones = {name: drone.limits.battery_min for name, drone in resolved.drones.items()}
-    single = (resolved.target.name,) if resolved.target and resolved.target.name else ()
-    return Cast(resolved.site, drones, tuple(resolved.targets) or single, tuple(resolved.cameras))
+    return Cast(resolved.site, drones, tuple(resolved.tracked), tuple(resolved.cameras))
 
 
 @dataclass(frozen=True, slots=True)
-class Seen(Generic[T]):
+class StampedMessage(Generic[T]):
     """A message and its stamp on this host's boot clock [ns]."""
 
     stamp_ns: int
@@ -72,16 +51,16 @@ class MonitorState:
     cast: Cast = field(default_factory=Cast)
     hint: str = ""
     started_ns: int = 0
-    vehicles: dict[str, Seen[m.VehicleStatus]] = field(default_factory=dict)
-    cameras: dict[str, Seen[m.CameraStatus]] = field(default_factory=dict)
-    processes: dict[str, Seen[m.ProcessStatus]] = field(default_factory=dict)
+    vehicles: dict[str, StampedMessage[m.VehicleStatus]] = field(default_factory=dict)
+    cameras: dict[str, StampedMessage[m.CameraStatus]] = field(default_factory=dict)
+    processes: dict[str, StampedMessage[m.ProcessStatus]] = field(default_factory=dict)
     sightings: dict[tuple[str, str], int] = field(default_factory=dict)
-    events: deque[Seen[m.Event]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
-    estimate: Seen[m.Estimate] | None = None
-    plan: Seen[m.Plan] | None = None
-    lease: Seen[m.Lease] | None = None
-    sim: Seen[m.SimStatus] | None = None
-    command: Seen[m.Command] | None = None
+    events: deque[StampedMessage[m.Event]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
+    estimate: StampedMessage[m.Estimate] | None = None
+    plan: StampedMessage[m.Plan] | None = None
+    lease: StampedMessage[m.Lease] | None = None
+    sim: StampedMessage[m.SimStatus] | None = None
+    command: StampedMessage[m.Command] | None = None
     answers: dict[str, dict[str, m.CommandAck]] = field(default_factory=dict)
 
     def ingest(self, received: Iterable[Received]) -> None:
@@ -98,7 +77,7 @@ class MonitorState:
     def as_json(self, now_ns: int) -> bytes:
         """Return the newest messages by kind and entity, each with its age."""
 
-        def by_name(group: Mapping[str, Seen[Any]]) -> dict[str, Any]:
+        def by_name(group: Mapping[str, StampedMessage[Any]]) -> dict[str, Any]:
             return {name: {"age_s": seen.age_s(now_ns), "message": seen.message} for name, seen in group.items()}
 
         single = {"estimate": self.estimate, "plan": self.plan, "lease": self.lease, "sim": self.sim}
@@ -114,25 +93,25 @@ class MonitorState:
     def _take(self, entity: str, stamp_ns: int, message: m.Message) -> None:
         match message:
             case m.VehicleStatus():
-                self.vehicles[entity] = Seen(stamp_ns, message)
+                self.vehicles[entity] = StampedMessage(stamp_ns, message)
             case m.CameraStatus():
-                self.cameras[entity] = Seen(stamp_ns, message)
+                self.cameras[entity] = StampedMessage(stamp_ns, message)
             case m.ProcessStatus():
-                self.processes[entity] = Seen(stamp_ns, message)
+                self.processes[entity] = StampedMessage(stamp_ns, message)
             case m.RelativeObservation():
                 self.sightings[message.observer, message.subject] = stamp_ns
             case m.Event():
-                self.events.append(Seen(stamp_ns, message))
+                self.events.append(StampedMessage(stamp_ns, message))
             case m.Estimate():
-                self.estimate = Seen(stamp_ns, message)
+                self.estimate = StampedMessage(stamp_ns, message)
             case m.Plan():
-                self.plan = Seen(stamp_ns, message)
+                self.plan = StampedMessage(stamp_ns, message)
             case m.Lease():
-                self.lease = Seen(stamp_ns, message)
+                self.lease = StampedMessage(stamp_ns, message)
             case m.SimStatus():
-                self.sim = Seen(stamp_ns, message)
+                self.sim = StampedMessage(stamp_ns, message)
             case m.Command():
-                self.command = Seen(stamp_ns, message)
+                self.command = StampedMessage(stamp_ns, message)
             case m.CommandAck():
                 # An answer may overtake its command: they come from different senders.
                 self.answers.setdefault(message.command_id, {})[entity] = message

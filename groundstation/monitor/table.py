@@ -1,18 +1,26 @@
 """The state as a rich renderable; pure: the same state and time give the same picture."""
 
-from rich.console import Group, RenderableType
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.table import Table
 from rich.text import Text
 
 from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.monitor.alarms import alarms_of
-from groundstation.monitor.state import MonitorState, Seen
+from groundstation.monitor.state import MonitorState, StampedMessage
 
 _SEEN_S = 0.6
 _EVENTS = 6
 _ALARMS = 5
 _COMMAND_SHOWN_S = 10.0
+_MODE, _POSITION, _ELLIPSE, _SEEN_BY = "mode", "position [m]", "95 % ellipse\n[m]", "seen by"
+_COLUMNS = ("", _MODE, "vehicle", "battery", "link", "age", _POSITION, _ELLIPSE, _SEEN_BY)
+# What a narrow terminal goes without, in this order: alarms tell of links that fail.
+_SPARED = ("vehicle", "link", _ELLIPSE, _SEEN_BY, "age", "battery", _POSITION)
+_GAP, _AMPLE = 2, 10_000
 _MODE_STYLES = {
     "TRACK": "bold green",
     "HOVER": "cyan",
@@ -36,7 +44,7 @@ def render(state: MonitorState, now_ns: int) -> RenderableType:
     parts: list[RenderableType] = [_title(state, now_ns)]
     for alarm in alarms_of(state, now_ns)[:_ALARMS]:
         parts.append(Text(f" {alarm.text} ", style="bold white on red" if alarm.grave else "black on yellow"))
-    parts += [Text(), _entities(state, now_ns), Text(), _plan(state, now_ns)]
+    parts += [Text(), _Entities(state, now_ns), Text(), _plan(state, now_ns)]
     if state.cameras:
         parts.append(_cameras(state, now_ns))
     if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
@@ -55,19 +63,56 @@ def _title(state: MonitorState, now_ns: int) -> Text:
     return text
 
 
-def _entities(state: MonitorState, now_ns: int) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 2, 0, 0))
-    for title in ("", "mode", "vehicle"):
-        table.add_column(title, no_wrap=True)
-    for title in ("battery", "link", "age", "position [m]", "95 % ellipse [m]"):
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("seen by", no_wrap=True)
-    names = dict.fromkeys([*state.cast.drones, *state.vehicles])
-    for name in names:
-        table.add_row(name, *_vehicle(state, name, now_ns), *_belief(state, name, now_ns))
-    for name in state.cast.targets:
-        table.add_row(Text(name, style="bold"), "", "target", "", "", *_belief(state, name, now_ns))
-    return table
+@dataclass(frozen=True, slots=True)
+class _Entities:
+    """Drones and targets, with as many columns as the terminal has room for; nothing is shortened.
+
+    Which columns these are depends on what does not change during a flight, so that none comes and goes.
+    """
+
+    state: MonitorState
+    now_ns: int
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for spared in range(len(_SPARED) + 1):
+            rigid = self._table((*_SPARED[:spared], _SEEN_BY))
+            width = console.measure(rigid, options=options.update_width(_AMPLE)).maximum
+            if width + self._observers_width(spared) <= options.max_width:
+                break
+        yield self._table(_SPARED[:spared])
+        if spared:
+            yield Text(f"too narrow for {', '.join(_SPARED[:spared])}".replace("\n", " "), style="dim")
+
+    def _observers_width(self, spared: int) -> int:
+        """Return the room for the names of observers, one below the other if need be."""
+        names = (*self.state.cast.drones, *self.state.cast.cameras, _SEEN_BY)
+        return 0 if _SEEN_BY in _SPARED[:spared] else _GAP + max(len(name) + 1 for name in names)
+
+    def _table(self, spared: tuple[str, ...]) -> Table:
+        table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, _GAP, 0, 0))
+        kept = [index for index, title in enumerate(_COLUMNS) if title not in spared]
+        for index in kept:
+            title = _COLUMNS[index]
+            table.add_column(
+                Text(title),  # brackets in a plain string would be taken for markup
+                justify="right" if 3 <= index <= 7 else "left",
+                overflow="fold",
+                no_wrap=len(kept) > 2 and title != _SEEN_BY,
+                min_width=max(map(len, _MODE_STYLES)) if title == _MODE else None,
+            )
+        for row in self._rows():
+            table.add_row(*(row[index] for index in kept))
+        return table
+
+    def _rows(self) -> Iterator[tuple[Text, ...]]:
+        state, now_ns = self.state, self.now_ns
+        for name in dict.fromkeys([*state.cast.drones, *state.vehicles]):
+            yield Text(name), *_vehicle(state, name, now_ns), *_belief(state, name, now_ns)
+        for name in state.cast.targets:
+            yield (
+                *(Text(name, style="bold"), Text(), Text("target"), Text(), Text()),
+                *_belief(state, name, now_ns),
+            )
 
 
 def _vehicle(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Text, Text]:
@@ -192,7 +237,7 @@ def _events(state: MonitorState, now_ns: int) -> list[Text]:
     return [_event(seen, now_ns, styles[seen.message.severity]) for seen in list(state.events)[-_EVENTS:]]
 
 
-def _event(seen: Seen[Event], now_ns: int, style: str) -> Text:
+def _event(seen: StampedMessage[Event], now_ns: int, style: str) -> Text:
     event = seen.message
     text = Text(f"{seen.age_s(now_ns):4.0f} s ago  ", style="dim", no_wrap=True, overflow="ellipsis")
     text.append(f"{event.header.entity}: {event.text}", style=f"not dim {style}".strip())

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from groundstation.geometry import board
-from groundstation.geometry.tag import QUIET_MODULES, Tag
+from groundstation.geometry.tag import QUIET_MODULES, SquareTag
 from groundstation.printing.pdf import Page
 
 # Width and height [mm], upright.
@@ -27,7 +27,7 @@ Rectangle = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Print:
+class Sheet:
     """What one page shows, about the marker's origin [mm; x right, y up]: rectangles x0 x1 y0 y1."""
 
     label: str
@@ -36,16 +36,16 @@ class Print:
     black: tuple[Rectangle, ...]
 
 
-def checkerboard(code: int, square_mm: float) -> Print:
+def checkerboard(code: int, square_mm: float) -> Sheet:
     """Return the print of one checkerboard; raises ValueError for a code or a size that cannot be."""
-    marker = board.Board(code, square_mm)
+    marker = board.Checkerboard(code, square_mm)
     black = tuple(_scaled(r, square_mm) for r in _joined(board.dark_rectangles(marker.code)))
     label = f"marker {code} - square {square_mm:g} mm, five {board.SQUARES_X * square_mm:.1f} mm - bar forward >"
     check = f"marker {code}: the row of five squares must measure {board.SQUARES_X * square_mm:.1f} mm"
-    return Print(label, check, _scaled(board.EXTENT, square_mm), black)
+    return Sheet(label, check, _scaled(board.EXTENT, square_mm), black)
 
 
-def tag(marker: Tag, black_cells: list[list[bool]]) -> Print:
+def tag(marker: SquareTag, black_cells: list[list[bool]]) -> Sheet:
     """Return the print of one tag; black_cells: its modules by rows from the top, border included."""
     side, half = marker.size_mm / marker.modules, marker.size_mm / 2
     black = []
@@ -60,10 +60,10 @@ def tag(marker: Tag, black_cells: list[list[bool]]) -> Print:
     edge = half + QUIET_MODULES * side
     label = f"{marker.dictionary} id {marker.id} - {marker.size_mm:g} mm - forward >"
     check = f"{marker.dictionary} id {marker.id}: the side of the black square must measure {marker.size_mm:.1f} mm"
-    return Print(label, check, (-edge, edge, -edge, edge), tuple(black))
+    return Sheet(label, check, (-edge, edge, -edge, edge), tuple(black))
 
 
-def page(item: Print, paper: tuple[float, float]) -> Page:
+def page(item: Sheet, paper: tuple[float, float]) -> Page:
     """Return a page with a marker in its middle, upright or sideways; raises ValueError when it does not fit."""
     width, height = _size(item.card)
     ways = [way for way in (paper, paper[::-1]) if _fits(item, way)]
@@ -85,17 +85,17 @@ def page(item: Print, paper: tuple[float, float]) -> Page:
     return sheet
 
 
-def largest(size_mm: float, item: Print, paper: tuple[float, float]) -> float:
+def largest(size_mm: float, item: Sheet, paper: tuple[float, float]) -> float:
     """Return the largest size [whole mm] of the same kind that fits, given one print and its size."""
     for size in range(int(size_mm), 0, -1):
         scale = size / size_mm
-        smaller = Print("", "", _scaled(item.card, scale), tuple(_scaled(r, scale) for r in item.black))
+        smaller = Sheet("", "", _scaled(item.card, scale), tuple(_scaled(r, scale) for r in item.black))
         if any(_fits(smaller, way) for way in (paper, paper[::-1])):
             return float(size)
     return 0.0
 
 
-def notes(items: list[Print], paper: tuple[float, float]) -> Page:
+def notes(items: list[Sheet], paper: tuple[float, float]) -> Page:
     """Return the page to read first: how to check the scale, cut out and mount."""
     sheet = Page(*paper)
     line = [paper[1] - 22.0]
@@ -147,7 +147,7 @@ def _cutting_marks(sheet: Page, left: float, low: float, right: float, high: flo
             sheet.line(x, y + outward_y * _MARK_GAP_MM, x, y + outward_y * (_MARK_GAP_MM + _MARK_MM))
 
 
-def _fits(item: Print, way: tuple[float, float]) -> bool:
+def _fits(item: Sheet, way: tuple[float, float]) -> bool:
     """Return whether the card is no larger than the paper and nothing black lies where printers do not print."""
     width, height = _size(item.card)
     if width > way[0] + 0.05 or height > way[1] + 0.05:

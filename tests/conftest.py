@@ -1,20 +1,62 @@
-"""What all tests share: compiled kernels come from a cache that knows the state of their sources."""
+"""What all tests share: the kernel cache of these sources, shipped settings, and the evidence that tests look at."""
 
+import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import NoReturn
 
 import pytest
 
+from groundstation.field.resolved import ResolvedField
 from groundstation.process import numba_cache
 
 numba_cache.activate(numba_cache.EVERYTHING)
 
-CONFIG = Path(__file__).parents[1] / "config"
+ROOT = Path(__file__).parents[1]
+CONFIG = ROOT / "config"
 
 
 @pytest.fixture(scope="session")
-def lab_field() -> dict[str, Any]:
-    """The shipped field, resolved, as the tracker's section holds it."""
+def lab_field() -> ResolvedField:
+    """The shipped field."""
     from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import resolved_field
 
-    return load_field(CONFIG / "lab.yaml").model_dump(mode="json")
+    return resolved_field(load_field(CONFIG / "lab.yaml"))
+
+
+def _absent(reason: str) -> NoReturn:
+    if os.environ.get("CI"):
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def absent() -> Callable[[str], NoReturn]:
+    """End a test that this machine cannot run: skipped with the reason, but failed where CI is set."""
+    return _absent
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Callable[[str], Path]:
+    """Return the path of real data by its name in $GROUNDSTATION_DATA, else in ../shared/data."""
+    folder = Path(os.environ.get("GROUNDSTATION_DATA") or ROOT.parent / "shared" / "data")
+
+    def find(name: str) -> Path:
+        path = folder / name
+        if not path.exists():
+            _absent(f"no {path}: real data are not in the repository; let GROUNDSTATION_DATA name their folder")
+        return path
+
+    return find
+
+
+@pytest.fixture(scope="session")
+def golden_packet() -> Callable[[str], bytes]:
+    """Return a packet assembled by hand, by its name in tests/fixtures/ardrone."""
+
+    def read(name: str) -> bytes:
+        text = (ROOT / "tests" / "fixtures" / "ardrone" / f"{name}.hex").read_text(encoding="utf-8")
+        return bytes.fromhex("".join(line.partition("#")[0] for line in text.splitlines()))
+
+    return read

@@ -11,11 +11,19 @@ from typing import Any
 
 import pytest
 
+import groundstation
+
 ROOT = Path(__file__).parents[2]
 TOP_LEVEL = {
     *("pyproject.toml", "README.md", "groundstation", "drivers", "sim_bridge", "tests", "config"),
-    *("Makefile", "constraints.txt", "LICENSE", "CHANGELOG.md"),
+    *("Makefile", "constraints.txt", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "docs"),
 }
+
+CI_TARGETS = [
+    *(".venv/.installed-check", ".venv/.installed-test-slow", "interop", "check", "docs", "test", "test-slow", "demo"),
+]
+MAKE_EXTRAS = ("test", "test-slow", "check", "docs")
+HEAVY = ("distributed", "foxglove-sdk", "playwright", "pyarrow", "rerun-sdk")  # 0.9 of 2.1 GB
 
 
 def project() -> dict[str, Any]:
@@ -64,20 +72,41 @@ def test_distribution() -> None:
         "sim_bridge",
     ]
     assert settings["project"]["scripts"]["groundstation"] == "groundstation.cli.main:main"
+    assert "Typing :: Typed" in settings["project"]["classifiers"]
+
+
+def test_the_version_has_its_dated_entry() -> None:
+    version = project()["project"]["version"]
+    assert groundstation.__version__ == version
+    newest = re.search(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
+    assert newest and re.fullmatch(rf"{re.escape(version)} \(20\d\d-\d\d-\d\d\)|not yet released", newest[1])
 
 
 def test_dependencies_have_lower_bounds_and_exact_pins() -> None:
     settings = project()["project"]
-    wanted = settings["dependencies"] + settings["optional-dependencies"]["dev"]
+    extras = settings["optional-dependencies"]
+    wanted = settings["dependencies"] + [each for name in MAKE_EXTRAS for each in extras[name]]
     pins = dict(
         line.split("==") for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines() if "==" in line
     )
     pinned = {re.sub(r"[-_.]+", "-", name).lower() for name in pins}
     for requirement in wanted:
+        if requirement.startswith(settings["name"]):
+            continue  # another extra
         name = re.split(r"[<>=!~\[; ]", requirement)[0]
         assert re.search(r">=\s*\d", requirement), f"{requirement}: give a lower bound"
         assert "<" not in requirement, f"{requirement}: no upper cap in a library"
         assert re.sub(r"[-_.]+", "-", name).lower() in pinned, f"{name} is not pinned in constraints.txt"
+
+
+def test_each_command_installs_what_it_uses() -> None:
+    """The Makefile names extras that exist; the heavy ones are for the slow suite, whose tests alone may need them."""
+    settings = project()["project"]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert set(re.findall(r"\$\(STAMP\)-([a-z-]+)$", makefile, re.M)) == set(MAKE_EXTRAS)
+    for name in ("dependencies", "test", "check", "docs"):
+        listed = settings["dependencies"] if name == "dependencies" else settings["optional-dependencies"][name]
+        assert not [each for each in listed if each.startswith(HEAVY)], name
 
 
 def test_constraints_hold_no_addresses() -> None:
@@ -133,6 +162,7 @@ def test_wheel_contents(tmp_path: Path) -> None:
     }
     assert "groundstation/settings/shipped/lab.yaml" in names
     assert "groundstation/settings/shipped/cameras/ceiling.yaml" in names
+    assert {"groundstation/py.typed", "drivers/py.typed", "sim_bridge/py.typed"} <= names
 
 
 def test_the_continuous_integration_run_is_sound(tmp_path: Path) -> None:
@@ -142,15 +172,14 @@ def test_the_continuous_integration_run_is_sound(tmp_path: Path) -> None:
     script.write_bytes((ROOT / ".ci" / "run").read_bytes())
     script.chmod(0o755)
     makefile = tmp_path / "Makefile"
-    makefile.write_text(
-        ".venv/.installed interop check test test-slow demo:\n\t@echo did $@ $(DEMO_ARGS)\n", encoding="utf-8"
-    )
+    makefile.write_text(f"{' '.join(CI_TARGETS)}:\n\t@echo did $@ $(DEMO_ARGS)\n", encoding="utf-8")
     good = subprocess.run([str(script)], capture_output=True, text=True, timeout=60, check=False)
     assert good.returncode == 0, good.stdout + good.stderr
     done = [line for line in good.stdout.splitlines() if line.startswith("did ")]
-    assert [line.split()[1] for line in done] == [".venv/.installed", "interop", "check", "test", "test-slow", "demo"]
+    assert [line.split()[1] for line in done] == CI_TARGETS
     assert done[-1].startswith("did demo --headless --duration")
-    makefile.write_text("check:\n\t@false\n.venv/.installed interop test test-slow demo:\n", encoding="utf-8")
+    passing = " ".join(name for name in CI_TARGETS if name != "check")
+    makefile.write_text(f"check:\n\t@false\n{passing}:\n", encoding="utf-8")
     bad = subprocess.run([str(script)], capture_output=True, text=True, timeout=60, check=False)
     assert bad.returncode == 1
     assert bad.stdout.splitlines()[-1] == "== failed: check"
@@ -161,5 +190,5 @@ def test_the_continuous_integration_run_is_bounded() -> None:
     script = ROOT / ".ci" / "run"
     assert script.stat().st_mode & 0o111
     limits = [int(limit) for limit in re.findall(r"^step \S+ (\d+) ", script.read_text(encoding="utf-8"), re.M)]
-    assert len(limits) == 6
+    assert len(limits) == 7
     assert sum(limits) + 30 * len(limits) <= 4800

@@ -11,10 +11,11 @@ MAY_NAME_IT = (
     "groundstation/bus",
     "groundstation/report",
     "groundstation/console",
+    "groundstation/bench",
     "groundstation/experiments",
     "groundstation/engineering_views",
     "groundstation/recording/synthetic.py",
-    "groundstation/replay/show.py",
+    "groundstation/replay/playback_server.py",
 )
 
 

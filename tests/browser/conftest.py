@@ -3,7 +3,9 @@
 import shutil
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -54,9 +56,15 @@ class Stage:
     def url(self) -> str:
         return f"http://127.0.0.1:{self.port}/"
 
-    def start_console(self, truth: bool = True) -> "subprocess.Popen[bytes]":
-        self.console = start_console(self.flight.endpoint, self.port, truth, field=self.field)
+    def start_console(self, truth: bool = True, run: str = "run-1") -> "subprocess.Popen[bytes]":
+        self.console = start_console(self.flight.endpoint, self.port, truth, field=self.field, run=run)
         return self.console
+
+    def answers(self) -> bool:
+        """Whether a console serves at the port."""
+        with suppress(OSError), urllib.request.urlopen(f"{self.url}token", timeout=2):
+            return True
+        return False
 
     def open(self, **options: Any) -> Seen:
         seen = open_seen(self.browser, self._contexts, self.url, **options)

@@ -48,10 +48,13 @@ class Seen:
     def there(self, testid: str) -> Any:
         return self.page.get_by_test_id(testid)
 
-    def shot(self, name: str) -> None:
+    def shots(self) -> Path:
         folder = Path(os.environ.get("CONSOLE_SCREENSHOTS", "") or HERE.parents[1] / ".pytest_cache" / "screenshots")
         folder.mkdir(parents=True, exist_ok=True)
-        self.page.screenshot(path=str(folder / f"{name}.png"), full_page=True)
+        return folder
+
+    def shot(self, name: str) -> None:
+        self.page.screenshot(path=str(self.shots() / f"{name}.png"), full_page=True)
 
 
 def open_seen(browser: Any, contexts: list[Any], url: str, **options: Any) -> Seen:

@@ -23,9 +23,9 @@ def field_json(port: int, name: str = "lab") -> dict[str, Any]:
 
 
 def start_console(
-    endpoint: str, port: int, truth: bool = True, loud: bool = False, field: str = "lab"
+    endpoint: str, port: int, truth: bool = True, loud: bool = False, field: str = "lab", run: str = "run-1"
 ) -> "subprocess.Popen[bytes]":
-    section = {"field": field_json(port, field), "run_dir": "", "epoch": 1, "truth": truth}
+    section = {"field": field_json(port, field), "run_dir": run, "truth": truth}
     spec = ChildSpec("console", "console", endpoint, "lab", section=msgspec.json.encode(section).decode())
     process = subprocess.Popen(
         [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"],

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from groundstation.bus import messages as m
-from groundstation.report.arena import Arena
 from groundstation.report.judge import judge
 from groundstation.report.page.document import write_page
 from groundstation.report.run_facts import RunFacts
-from groundstation.report.tracks import EstimateTrack, RunData, Timed, TruthTrack
+from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, RunData, TimedMessage, TruthTrack
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -26,12 +25,18 @@ def recorded() -> RunData:
     header = m.Header(0, "here", "team", "tracker", 0)
     solver = m.SolverReport("ok", 1, 0.001, 2, 1)
     plans = [
-        Timed(float(at), m.Plan(header=header, topology="a,b" if at < 10 else "a/b", cost=0.1 + 0.01 * math.sin(at),
-                                controls=(), edges=(), alternatives=(), solver=solver, mode="x"))
+        TimedMessage(float(at), m.Plan(header=header, topology="a,b" if at < 10 else "a/b",
+                                cost=0.1 + 0.01 * math.sin(at), controls=(), edges=(), alternatives=(), solver=solver,
+                                mode="x"))
         for at in time_s
     ]  # fmt: skip
     return RunData(
-        Arena(), RunFacts(), end_s=20.0, truth={"turtlebot": truth}, estimates={"turtlebot": estimate}, plans=plans
+        UNKNOWN_FIELD,
+        RunFacts(),
+        end_s=20.0,
+        truth={"turtlebot": truth},
+        estimates={"turtlebot": estimate},
+        plans=plans,
     )
 
 

@@ -57,8 +57,9 @@ class Witness:
 def kernels() -> None:
     """Compile the tracker's kernels before the run: on a busy machine that takes longer than a run waits for it."""
     script = (
-        "import json, sys; from groundstation.process import numba_cache; numba_cache.activate();"
-        "from groundstation.runtime.warm_up import warm_up; warm_up(json.load(sys.stdin))"
+        "import sys; from groundstation.process import numba_cache; numba_cache.activate();"
+        "from groundstation.field.resolved import field_from_json; from groundstation.runtime.warm_up import warm_up;"
+        "warm_up(field_from_json(sys.stdin.buffer.read()))"
     )
     field = json.dumps(field_json(8765)).encode()
     subprocess.run([sys.executable, "-c", script], input=field, timeout=280, check=True)
@@ -83,9 +84,17 @@ def flight(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 def served(flight: runtime_file.RuntimeRecord, free_port: int) -> Iterator[str]:
     command = [sys.executable, "-m", "groundstation.cli.main", "console", "--port", str(free_port)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=dict(os.environ))
-    yield f"http://127.0.0.1:{free_port}/"
+    url = f"http://127.0.0.1:{free_port}/"
+    eventually(lambda: _answers(url), 30.0, "the console answers")  # a page that is refused says so on its console
+    yield url
     process.terminate()
     process.wait(10)
+
+
+def _answers(url: str) -> bool:
+    with suppress(OSError), urllib.request.urlopen(f"{url}token", timeout=2):
+        return True
+    return False
 
 
 def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord, served: str, open_page: Any) -> None:
@@ -104,9 +113,9 @@ def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord
         page.there("land-all").click()
         eventually(lambda: _ordered_down(witness.look()), 5.0, "LAND on the wire")
         page.wait(lambda s: any(o["verb"] == "LAND" and o["state"] == "confirmed" for o in s["orders"]), 30.0)
+        assert not page.troubles, page.troubles  # the run ends with the landing; then the page asks for it in vain
         eventually(lambda: all(witness.look().grounded[name] for name in _DRONES), 20.0, "on the ground")
         page.shot("sitl_landed")
-        assert not page.troubles, page.troubles
     finally:
         bus.close()
         time.sleep(0.1)

@@ -8,7 +8,6 @@ import os
 import socket
 import struct
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -138,14 +137,6 @@ class Bench:
             found.append((tag, size))
             offset += size
         return found
-
-    @staticmethod
-    def real_packet(name: str) -> bytes:
-        folder = Path(os.environ.get("GROUNDSTATION_DATA") or Path(__file__).parents[3] / "shared" / "data")
-        path = folder / "ardrone" / name
-        if not path.exists():
-            pytest.skip(f"{path} is absent: recordings of real drones are not part of the repository")
-        return path.read_bytes()
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """The emulator's link over real loopback UDP: bootstrap, packets, ack bit, configuration, sequence rules, watchdogs.
 
-The bench (conftest.py) assembles and reads bytes by hand from the protocol sheet.
+The bench (conftest.py) assembles and reads bytes by hand (docs/reference/ardrone.md 2, 4).
 """
 
 import struct
@@ -48,21 +48,21 @@ def test_requests_every_100_ms_do_not_restart_the_session(bench: Any) -> None:
     assert not bench.state & BOOTSTRAP
 
 
-def test_full_mode_is_200_hz_with_the_options_of_a_real_drone(bench: Any) -> None:
+def test_full_mode_is_200_hz_with_the_options_of_the_sheet(bench: Any, golden_packet: Any) -> None:
     bench.connect()
     assert len(bench.tick(10)) == 10
     packet = bench.packets[-1]
     assert len(packet) == 1916
     assert not bench.state & (DEMO | BOOTSTRAP)
     assert struct.unpack_from("<I", packet, len(packet) - 4)[0] == sum(packet[:-8])
-    fixture = bench.real_packet("ar2-full-1916.bin")
-    assert bench.options(packet) == bench.options(fixture)
+    assert bench.options(packet) == bench.options(golden_packet("full-landed"))
 
 
-def test_a_landed_drone_says_what_a_real_one_said(bench: Any) -> None:
+def test_a_landed_drone_says_what_a_real_one_said(bench: Any, real_data: Any) -> None:
     bench.connect()
     bench.tick()
-    real, ours = bench.real_packet("ar2-full-1916.bin"), bench.packets[-1]
+    real, ours = real_data("ardrone/ar2-full-1916.bin").read_bytes(), bench.packets[-1]
+    assert bench.options(ours) == bench.options(real)
     assert struct.unpack_from("<I", ours, 20) == struct.unpack_from("<I", real, 20), "control state"
     assert struct.unpack_from("<i", ours, 40)[0] == struct.unpack_from("<i", real, 40)[0] == 0, "altitude"
     start = {}
@@ -82,7 +82,7 @@ def test_a_landed_drone_says_what_a_real_one_said(bench: Any) -> None:
         assert mine == pytest.approx(theirs, abs=tolerance), (tag, place)
 
 
-def test_demo_mode_is_15_hz_with_500_bytes(bench: Any) -> None:
+def test_demo_mode_is_15_hz_with_500_bytes(bench: Any, golden_packet: Any) -> None:
     bench.connect("TRUE")
     bench.keep(0.3)
     del bench.packets[:]
@@ -91,7 +91,7 @@ def test_demo_mode_is_15_hz_with_500_bytes(bench: Any) -> None:
     assert len(demo) == pytest.approx(1.56 * 200 / 13, abs=1)
     assert bench.options(demo[0]) == [(0, 148), (16, 328), (0xFFFF, 8)]
     assert bench.state & DEMO
-    assert bench.options(demo[0]) == bench.options(bench.real_packet("ar2-demo-inflight-500.bin"))
+    assert bench.options(demo[0]) == bench.options(golden_packet("demo-flying"))
 
 
 def test_navdata_options_choose_what_demo_mode_sends(bench: Any) -> None:

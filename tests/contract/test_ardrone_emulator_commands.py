@@ -1,6 +1,6 @@
 """The emulator's rarer commands over real loopback UDP: animations, calibration, trims, absolute control, emergencies.
 
-The bench (conftest.py) assembles and reads bytes by hand from the protocol sheet.
+The bench (conftest.py) assembles and reads bytes by hand (docs/reference/ardrone.md 2, 4).
 """
 
 import math

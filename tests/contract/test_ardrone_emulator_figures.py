@@ -1,6 +1,6 @@
-"""The emulated drone against the figures of real ones (protocol sheet, section 7), as they are seen on the wire.
+"""The emulated drone against the figures of real ones (docs/reference/ardrone.md 7), as they are seen on the wire.
 
-The bench (conftest.py) assembles and reads bytes by hand from the protocol sheet.
+The bench (conftest.py) assembles and reads bytes by hand (docs/reference/ardrone.md 2, 4).
 """
 
 import math

@@ -1,6 +1,6 @@
 """The emulator in flight over real loopback UDP: phases, signs, latches, lost links, emergencies, odd datagrams.
 
-The bench (conftest.py) assembles and reads bytes by hand from the protocol sheet.
+The bench (conftest.py) assembles and reads bytes by hand (docs/reference/ardrone.md 2, 4).
 """
 
 import itertools

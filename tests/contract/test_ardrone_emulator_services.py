@@ -1,7 +1,7 @@
 """The emulator's other ports over real loopback sockets: configuration dump, version file, pairing, sets of settings,
 firmwares, floods, garbage.
 
-The bench (conftest.py) assembles and reads bytes by hand from the protocol sheet.
+The bench (conftest.py) assembles and reads bytes by hand (docs/reference/ardrone.md 2, 4).
 """
 
 import ftplib
@@ -162,6 +162,19 @@ def test_version_file_by_a_common_ftp_client(bench: Any) -> None:
             break
     assert not problems, problems
     assert lines == ["6", "2.3.3", "version.txt"]
+
+
+def test_the_name_alone_logs_in(bench: Any) -> None:
+    """Parrot's SDK sends no password: asked for one, it would repeat its USER for ever."""
+    with connect(bench, 5551) as tcp:
+        assert heard(bench, tcp, b"\r\n").startswith(b"220 ")
+        tcp.send(b"USER anonymous\r\n")
+        assert heard(bench, tcp, b"\r\n").startswith(b"230 ")
+        tcp.send(b"PASV\r\n")
+        high, low = heard(bench, tcp, b"\r\n").rpartition(b"(")[2].split(b",")[4:]
+        with connect(bench, int(high) * 256 + int(low.split(b")")[0])) as data:
+            tcp.send(b"RETR version.txt\r\n")
+            assert heard(bench, data, b"\n") == b"2.3.3\n"
 
 
 def test_a_setting_right_behind_a_dump_is_taken(bench: Any) -> None:

@@ -1,4 +1,4 @@
-"""Each navdata option against offsets copied by hand from the protocol sheet (section 4.4): bytes in, fields out."""
+"""Each navdata option against offsets copied by hand from docs/reference/ardrone.md 4.4: bytes in, fields out."""
 
 import struct
 

@@ -1,15 +1,11 @@
 """PaVE frames: a real capture, frames assembled by hand, and damage."""
 
-import os
 import random
 import struct
-from pathlib import Path
 
 import pytest
 
-from drivers.ardrone.wire.pave import Frame, FrameReader, FrameType, encode_frame
-
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "ardrone"
+from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame, encode_frame
 
 
 def frame(payload, number=7, header_size=64, kind=1):
@@ -19,16 +15,14 @@ def frame(payload, number=7, header_size=64, kind=1):
     return head.ljust(header_size, b"\0") + payload
 
 
-def capture():
-    path = DATA / "pave68-node-24971.bin"
-    if not path.exists():
-        pytest.skip(f"no capture at {path}; set GROUNDSTATION_DATA")
-    return path.read_bytes()
+@pytest.fixture
+def capture(real_data):
+    return real_data("ardrone/pave68-node-24971.bin").read_bytes()
 
 
-def test_real_capture_has_five_h264_frames():
+def test_real_capture_has_five_h264_frames(capture):
     reader = FrameReader()
-    frames = reader.feed(capture())
+    frames = reader.feed(capture)
     assert reader.skipped == 0 and len(frames) >= 4
     assert [f.kind for f in frames].count(FrameType.IDR) == 1
     assert {(f.codec, f.width, f.height) for f in frames} == {(4, 640, 360)}
@@ -39,7 +33,7 @@ def test_real_capture_has_five_h264_frames():
 @pytest.mark.parametrize("size", [64, 68, 76])
 def test_the_payload_begins_where_the_header_says(size):
     (found,) = FrameReader().feed(frame(b"\0\0\0\1gpicture", header_size=size))
-    assert found == Frame(4, 640, 360, 7, 1234, FrameType.IDR, b"\0\0\0\1gpicture")
+    assert found == PaveFrame(4, 640, 360, 7, 1234, FrameType.IDR, b"\0\0\0\1gpicture")
 
 
 def test_frames_come_whole_from_any_cutting():
@@ -66,15 +60,13 @@ def test_random_bytes_neither_raise_nor_pile_up():
     assert len(reader._buffer) < 4_100_000
 
 
-def test_what_is_written_has_the_header_of_the_real_drone():
-    real = capture()
-    first = FrameReader().feed(real)[0]
+def test_what_is_written_has_the_header_of_the_real_drone(capture):
+    first = FrameReader().feed(capture)[0]
     assert (first.stream, first.slices, first.slice_index, first.parameter_sizes) == (1, 1, 0, (14, 10))
-    position = struct.unpack_from("<Q", real, 32)[0]
-    written = encode_frame(first, position)
-    assert written[:6] == real[:6] and written[8:52] == real[8:52]
-    assert struct.unpack_from("<H", written, 6) == (64,)
-    assert written[64:] == real[68 : 68 + len(first.payload)]
+    position = struct.unpack_from("<Q", capture, 32)[0]
+    written = encode_frame(first, position, 68)
+    assert written[:52] == capture[:52]
+    assert written[68:] == capture[68 : 68 + len(first.payload)]
 
 
 def test_a_frame_of_damaged_length_does_not_swallow_those_behind_it():

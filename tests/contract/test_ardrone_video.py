@@ -46,8 +46,8 @@ def number_of(grey):
     return round(((level - 16) * 255 / 219 - 30) / 4)
 
 
-def encoded(count, mode=None, fps=15.0):
-    encoder = VideoEncoder(mode or VideoMode(), fps)
+def encoded(count, mode=None, fps=15.0, header=68):
+    encoder = VideoEncoder(mode or VideoMode(), fps, header)
     size = encoder.mode.size
     return [encoder.encode(picture(k, size), 1000 + k * 66, want_idr=k == 0) for k in range(count)]
 
@@ -89,14 +89,15 @@ def shown(source, server, pictures, seconds=5.0):
     return packet
 
 
-def test_headers_field_by_field():
-    stream = encoded(17)
+@pytest.mark.parametrize("header", [64, 68])
+def test_headers_field_by_field(header):
+    stream = encoded(17, header=header)
     position = 0
     for index, one in enumerate(stream):
         data = one.data
         assert data[:6] == b"PaVE\x02\x04"
         header_size, payload_size = struct.unpack_from("<HI", data, 6)
-        assert (header_size, payload_size) == (64, len(data) - 64)
+        assert (header_size, payload_size) == (header, len(data) - header)
         assert struct.unpack_from("<4H", data, 12) == (640, 368, 640, 360)
         assert struct.unpack_from("<II", data, 20) == (index + 1, 1000 + index * 66)
         assert data[28:32] == bytes([1, 0, 1 if index % 15 == 0 else 3, 0])
@@ -106,11 +107,13 @@ def test_headers_field_by_field():
         assert struct.unpack_from("<I", data, 48) == (payload_size,)
         position += len(data)
         kinds = {0: b"\x67", 1: b"\x61"}
-        assert data[64:68] == b"\x00\x00\x00\x01"
-        assert data[68:69] == kinds[0] if one.is_idr else data[68] & 0x1F == 1
+        assert data[header : header + 4] == b"\x00\x00\x00\x01"
+        unit = data[header + 4 :]
+        assert unit[:1] == kinds[0] if one.is_idr else unit[0] & 0x1F == 1
     sps, pps = stream[0].data[44:46]
-    assert stream[0].data[64 + sps : 68 + sps] == b"\x00\x00\x00\x01" and stream[0].data[68 + sps] & 0x1F == 8
-    after = stream[0].data[64 + sps + pps :]
+    behind = stream[0].data[header + sps :]
+    assert behind[:4] == b"\x00\x00\x00\x01" and behind[4] & 0x1F == 8
+    after = behind[pps:]
     assert after.lstrip(b"\x00")[:1] == b"\x01" and after.lstrip(b"\x00")[1] & 0x1F == 5
     assert parameter_sizes(b"\x00\x00\x00\x01\x67ab") == (0, 0)
 
@@ -124,7 +127,7 @@ def test_sizes_are_those_of_a_real_drone():
 
 @pytest.mark.parametrize("mode", [VideoMode(), MODE_720P])
 def test_ffmpeg_reads_the_payloads_as_a_file(mode):
-    stream = b"".join(one.data[64:] for one in encoded(8, mode))
+    stream = b"".join(one.data[68:] for one in encoded(8, mode))
     with av.open(io.BytesIO(stream), format="h264") as container:
         frames = list(container.decode(video=0))
     assert [(frame.width, frame.height) for frame in frames] == [mode.size] * 8
@@ -139,16 +142,17 @@ def test_the_configuration_chooses_size_camera_and_rate():
     assert mode.bits_per_picture == pytest.approx(4_000_000 / 30)
 
 
-def test_what_is_drawn_is_what_the_driver_sees_with_its_time():
+@pytest.mark.parametrize("header", [64, 68])
+def test_what_is_drawn_is_what_the_driver_sees_with_its_time(header):
     with serving() as server, reading(server.port) as source:
         wait_for(lambda: server.clients == 1 and source.connected)
-        for index, one in enumerate(encoded(20)):
+        for index, one in enumerate(encoded(20, header=header)):
             packet = shown(source, server, [one])
             assert packet is not None and packet.picture.grey().shape == (360, 640)
             assert number_of(packet.picture.grey()) == index
             assert (packet.data, packet.number) == (b"", index + 1)
             (unit,) = source.take_video()
-            assert unit.data == one.data[64:] and unit.starts == one.is_idr
+            assert unit.data == one.data[header:] and unit.starts == one.is_idr
         assert cv2.imdecode(np.frombuffer(packet.picture.jpeg(), np.uint8), cv2.IMREAD_COLOR).shape == (360, 640, 3)
         assert not +source.rejected
 
@@ -164,7 +168,7 @@ def test_after_a_stall_only_the_newest_picture_is_shown():
         packet = source.take_newest(1.0)
         assert packet is not None and number_of(packet.picture.grey()) == 44 and packet.number == 45
         assert source.take_newest(0.01) is None
-        assert [unit.data for unit in source.take_video()] == [one.data[64:] for one in stream]
+        assert [unit.data for unit in source.take_video()] == [one.data[68:] for one in stream]
 
 
 def test_a_client_that_comes_late_begins_at_an_idr():
@@ -208,10 +212,10 @@ def test_a_slow_client_misses_pictures_up_to_an_idr_and_holds_up_nobody():
 def test_a_new_picture_size_comes_through():
     with serving() as server, reading(server.port) as source:
         wait_for(lambda: server.clients == 1)
-        small = VideoEncoder(VideoMode(), 15.0)
+        small = VideoEncoder(VideoMode(), 15.0, 68)
         packet = shown(source, server, [small.encode(picture(1), 0, want_idr=True)])
         assert packet is not None and packet.picture.grey().shape == (360, 640)
-        large = VideoEncoder(MODE_720P, 15.0, small.number, small.position)
+        large = VideoEncoder(MODE_720P, 15.0, 68, small.number, small.position)
         packet = shown(source, server, [large.encode(picture(2, (1280, 720)), 66, want_idr=False)])
         assert packet is not None and packet.picture.grey().shape == (720, 1280)
 

@@ -11,9 +11,10 @@ import pytest
 
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import Decoder, Encoder, Signing, dialect_faults, split
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, dialect, dialect_faults, split
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import INT32, REAL32, carried_from_value, value_from_carried
+from drivers.mavlink.wire.verification import Signing
 
 KEY = bytes(range(32))
 
@@ -74,7 +75,7 @@ CASES = [
         ),
     ),
     (
-        flight.Odometry(
+        flight.OdometryMessage(
             5, 1, 12, 1, 2, -3, (1, 0, 0, 0), 0.5, 0, 0, 0, 0, 0.25, (0.5, *(0.0,) * 20), (2.0, *(0.0,) * 20), 4, 2, 100
         ),
         frame(
@@ -93,8 +94,8 @@ CASES = [
 
 @pytest.mark.parametrize(("message", "golden"), CASES, ids=lambda case: type(case).__name__)
 def test_frames_are_those_assembled_by_hand(message, golden):
-    assert Encoder(1, 1).encode(message) == golden
-    decoded = Decoder().decode(golden)
+    assert FrameEncoder(1, 1).encode(message) == golden
+    decoded = FrameDecoder().decode(golden)
     assert decoded[:3] == (1, 1, 0)
     assert decoded.message == message
 
@@ -106,12 +107,12 @@ def test_our_messages_have_exactly_the_fields_of_the_dialect():
 def test_known_bytes_of_a_heartbeat():
     """A PX4 heartbeat as printed in the protocol's own examples: 9 bytes of payload, CRC_EXTRA 50."""
     raw = bytes.fromhex("fd09000000010100000000000000020c010303082d")
-    assert Decoder().decode(raw).message == telemetry.Heartbeat(2, 12, 1, 0, 3)
+    assert FrameDecoder().decode(raw).message == telemetry.Heartbeat(2, 12, 1, 0, 3)
 
 
 def test_many_frames_in_one_datagram_and_what_is_refused():
     whole = b"".join(golden for _, golden in CASES)
-    assert [Decoder().decode(raw).message for raw in split(whole)] == [message for message, _ in CASES]
+    assert [FrameDecoder().decode(raw).message for raw in split(whole)] == [message for message, _ in CASES]
     for data, reason in (
         (b"\xfe\x09\x00\x01\x01\x00", "mavlink_1"),
         (b"\x55\x01", "no_frame"),
@@ -124,24 +125,56 @@ def test_many_frames_in_one_datagram_and_what_is_refused():
         assert refused.value.reason == reason
 
 
+# Kinds that nothing here decodes: of ArduPilot's dialect (GPS_RAW_INT) and of another (STORM32_GIMBAL_MANAGER_STATUS).
+UNUSED = ((24, 24, b"\1" * 30), (60011, 183, b"\1" * 7))
+
+
+@pytest.mark.parametrize(("number", "extra", "payload"), UNUSED)
+def test_a_kind_that_is_not_used_is_verified_like_any_other(number, extra, payload):
+    assert FrameDecoder().decode(frame(number, payload, extra, 7)) == (1, 1, 7, None)
+    stamp = 30_000_000_000_000
+    link = FrameDecoder(Signing(KEY, stamp))
+    assert link.decode(signed(number, payload, extra, stamp + 1)).message is None
+    broken = bytearray(frame(number, payload, extra))
+    broken[12] ^= 2
+    for decoder, raw, reason in (
+        (FrameDecoder(), bytes(broken), "checksum"),
+        (FrameDecoder(), frame(number, payload, extra ^ 1), "checksum"),
+        (link, frame(number, payload, extra), "unsigned"),
+        (link, signed(number, payload, extra, stamp + 9, key=bytes(32)), "signature"),
+        (link, signed(number, payload, extra, stamp + 1), "replayed"),
+        (link, signed(number, payload, extra ^ 1, stamp + 9), "checksum"),
+    ):
+        with pytest.raises(WireError) as refused:
+            decoder.decode(raw)
+        assert refused.value.reason == reason
+
+
 def test_broken_checksum_and_unknown_kinds():
     broken = bytearray(CASES[0][1])
     broken[12] ^= 1
+    for raw, reason in ((bytes(broken), "checksum"), (frame(8, b"\1\2\3", 0), "unknown_kind")):
+        with pytest.raises(WireError) as refused:
+            FrameDecoder().decode(raw)
+        assert refused.value.reason == reason
+
+
+def test_no_environment_switches_the_checksum_off(monkeypatch):
+    """pymavlink reads MAV_IGNORE_CRC."""
+    monkeypatch.setattr(dialect, "MAVLINK_IGNORE_CRC", "1")
     with pytest.raises(WireError, match="checksum"):
-        Decoder().decode(bytes(broken))
-    # WIRE: ids of other dialects are skipped, not fatal.
-    assert Decoder().decode(frame(8, b"\1\2\3", 0)).message is None
+        FrameDecoder().decode(CASES[0][1][:-1] + bytes([CASES[0][1][-1] ^ 1]))
 
 
 def test_unknown_extension_bytes_are_ignored_and_missing_ones_are_zero():
     longer = frame(245, struct.pack("<BB", 0, 2) + b"\7\7", 130)
-    assert Decoder().decode(longer).message == telemetry.ExtendedSysState(0, 2)
+    assert FrameDecoder().decode(longer).message == telemetry.ExtendedSysState(0, 2)
 
 
 def test_signed_frames():
     payload = struct.pack("<IBBBBB", 0, 2, 3, 1, 3, 3)
     stamp = 30_000_000_000_000
-    link = Decoder(Signing(KEY, stamp))
+    link = FrameDecoder(Signing(KEY, stamp))
     assert link.decode(signed(0, payload, 50, stamp + 1)).message.autopilot == 3
     for raw, reason in (
         (signed(0, payload, 50, stamp + 1), "replayed"),
@@ -157,12 +190,12 @@ def test_signed_frames():
         link.decode(signed(0, payload, 50, stamp + 10**9, key=bytes(32)))
     assert link.decode(signed(0, payload, 50, stamp + 2)).message is not None
     # An unsigned link takes signed frames as well.
-    assert Decoder().decode(signed(0, payload, 50, 5)).message is not None
+    assert FrameDecoder().decode(signed(0, payload, 50, 5)).message is not None
 
 
 def test_what_we_sign_is_signed_as_described():
     stamp = 30_000_000_000_000
-    raw = Encoder(255, 190, Signing(KEY, stamp)).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
+    raw = FrameEncoder(255, 190, Signing(KEY, stamp)).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
     assert len(raw) == 34 and raw[2] == 1
     assert hashlib.sha256(KEY + raw[:-6]).digest()[:6] == raw[-6:]
     assert int.from_bytes(raw[-12:-6], "little") >= stamp
@@ -178,4 +211,4 @@ def test_parameters_travel_bytewise_in_px4_and_by_value_in_ardupilot():
 
 def test_values_that_do_not_fit_are_refused():
     with pytest.raises(WireError, match="unencodable"):
-        Encoder(1, 1).encode(telemetry.Heartbeat(999, 12, 0, 0, 4))
+        FrameEncoder(1, 1).encode(telemetry.Heartbeat(999, 12, 0, 0, 4))

@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from groundstation.bus.topics import IMAGE, TOPICS, VIDEO, Topic
+from groundstation.recording.file_topics import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
 from groundstation.recording.schemas import description_of, recorded_type, viewer_schema
-from groundstation.recording.selection import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
 
 ALL = list(TOPICS.values())
 

@@ -8,8 +8,10 @@ from groundstation.recording import viewers
 from groundstation.recording.protobuf import fields
 from groundstation.recording.viewers import Transform, viewer_descriptor
 
-foxglove = pytest.importorskip("foxglove", reason="the extra [foxglove] is not installed")
-from foxglove import messages as fm  # noqa: E402
+pytest.importorskip("foxglove", reason="the extra [foxglove] is not installed")
+from foxglove import messages as fm
+
+pytestmark = pytest.mark.slow  # the library is large: make test does without it
 
 TIME_NS = 1_700_000_001_250_000_000
 STAMP = fm.Timestamp(1_700_000_001, 250_000_000)

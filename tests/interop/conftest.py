@@ -7,9 +7,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -19,23 +19,24 @@ INTEROP = ROOT / ".interop"
 _addresses = itertools.count(1)
 
 
-def absent(what: str) -> None:
-    """Skip with the reason; in continuous integration, where it must run, fail."""
-    reason = f"{what}: run `make interop`"
-    if os.environ.get("CI"):
-        pytest.fail(reason)
-    pytest.skip(reason)
-
-
 class Hangar:
-    """Emulated drones served by `python -m sim_bridge.hangar`; `truth` holds all true states so far."""
+    """Emulated drones served by `python -m sim_bridge.standalone`; `truth` holds all true states so far."""
 
     def __init__(self, count: int, *options: str) -> None:
         pid = os.getpid()
         net = f"127.{60 + pid % 60}.{pid // 60 % 250}"
         self.addresses = [f"{net}.{next(_addresses)}" for _ in range(count)]
         options = tuple(o for o in options if o != "--video") + (() if "--video" in options else ("--no-video",))
-        command = [sys.executable, "-m", "sim_bridge.hangar", *self.addresses, "--truth", "--seconds", "170", *options]
+        command = [
+            sys.executable,
+            "-m",
+            "sim_bridge.standalone",
+            *self.addresses,
+            "--truth",
+            "--seconds",
+            "170",
+            *options,
+        ]
         self._output = tempfile.TemporaryFile("w+")  # noqa: SIM115  # a pipe would be full before anybody reads
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, cwd=ROOT, stdout=self._output, stderr=pipe, text=True)
@@ -73,15 +74,16 @@ def hangar() -> Iterator[Any]:
 class Programs:
     """Starts clients and collects the line of JSON that each prints."""
 
-    def __init__(self) -> None:
+    def __init__(self, absent: Callable[[str], NoReturn]) -> None:
+        self._absent = absent
         self._running: list[subprocess.Popen[str]] = []
 
     def node(self, script: str, *arguments: object) -> subprocess.Popen[str]:
         modules = INTEROP / "node" / "node_modules"
         if shutil.which("node") is None:
-            absent("node is not installed")
+            self._absent("node is not installed: run `make interop`")
         if not (modules / "ar-drone").is_dir():
-            absent("npm ar-drone is not installed")
+            self._absent("npm ar-drone is not installed: run `make interop`")
         binaries = INTEROP / "bin"
         path = f"{binaries}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "NODE_PATH": str(modules), "NODE_NO_WARNINGS": "1", "PATH": path}
@@ -90,7 +92,7 @@ class Programs:
     def pyardrone(self, script: str, *arguments: object) -> subprocess.Popen[str]:
         python = INTEROP / "pyardrone" / "bin" / "python"
         if not python.exists():
-            absent("PyPI pyardrone is not installed")
+            self._absent("PyPI pyardrone is not installed: run `make interop`")
         return self._start([str(python), str(HERE / script), *map(str, arguments)], dict(os.environ))
 
     def _start(self, command: list[str], environment: dict[str, str]) -> subprocess.Popen[str]:
@@ -114,7 +116,7 @@ class Programs:
 
 
 @pytest.fixture
-def programs() -> Iterator[Programs]:
-    made = Programs()
+def programs(absent: Callable[[str], NoReturn]) -> Iterator[Programs]:
+    made = Programs(absent)
     yield made
     made.close()

@@ -1,4 +1,4 @@
-"""Recordings and live views as the viewers' own programs find them; skipped where an extra is not installed."""
+"""Recordings and live views as the viewers' own programs find them."""
 
 import json
 import socket
@@ -12,24 +12,24 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.topics import ESTIMATE, IMAGE
+from groundstation.cli.main import groundstation
 from groundstation.engineering_views.rerun_file import write_rrd
 from groundstation.engineering_views.watch import watch
+from groundstation.field.resolved import field_from_json
 from groundstation.recording.run import open_run
 from groundstation.recording.synthetic import SyntheticRun, write_run
 from groundstation.recording.timeline import Timeline
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 
-pytestmark = pytest.mark.interop
-needs_rerun = pytest.mark.skipif(find_spec("rerun") is None, reason="the extra [rerun] is not installed")
-needs_foxglove = pytest.mark.skipif(find_spec("foxglove") is None, reason="the extra [foxglove] is not installed")
-needs_parquet = pytest.mark.skipif(find_spec("pyarrow") is None, reason="the extra [parquet] is not installed")
+pytestmark = [pytest.mark.interop, pytest.mark.slow]  # their programs are large: make test does without them
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,6 @@ def _rerun(*arguments: object) -> str:
     return done.stdout + done.stderr
 
 
-@needs_rerun
 def test_rerun_opens_our_recordings_with_pictures_frames_and_log(run_dir: Path, tmp_path: Path) -> None:
     for stem, found in (("raw", ("EncodedImage:blob",)), ("state", ("Transform3D:child_frame", "TextLog:text"))):
         _rerun("mcap", "convert", run_dir / f"{stem}.mcap", "-o", tmp_path / f"{stem}.rrd")
@@ -62,7 +61,6 @@ def test_rerun_opens_our_recordings_with_pictures_frames_and_log(run_dir: Path, 
         assert all(name in listed for name in found)
 
 
-@needs_rerun
 def test_exported_scene_is_whole_and_shows_everything(run_dir: Path, tmp_path: Path) -> None:
     count, unread = write_rrd(open_run(run_dir), tmp_path / "run.rrd")
     assert count > 2000 and unread == []
@@ -74,7 +72,6 @@ def test_exported_scene_is_whole_and_shows_everything(run_dir: Path, tmp_path: P
     assert [path for path in paths if f"{path} " not in listed] == []
 
 
-@needs_parquet
 def test_parquet_columns_are_typed_and_have_units(run_dir: Path, tmp_path: Path) -> None:
     import pyarrow.parquet as pq
 
@@ -88,7 +85,6 @@ def test_parquet_columns_are_typed_and_have_units(run_dir: Path, tmp_path: Path)
     assert table.column("time_s").to_pylist() == sorted(table.column("time_s").to_pylist())
 
 
-@needs_foxglove
 def test_the_copy_with_a_scene_holds_everything_else_too(run_dir: Path, tmp_path: Path) -> None:
     from mcap.reader import make_reader
 
@@ -108,6 +104,16 @@ def _free_port() -> int:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
+
+
+@pytest.mark.parametrize("kind", ["--rrd", "--foxglove-scene"])
+def test_an_export_never_touches_what_is_there(kind: str, run_dir: Path, tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    command = ["recording", "export", kind, str(run_dir), "--output", str(taken)]
+    result = CliRunner().invoke(groundstation, command, standalone_mode=False)
+    assert "exists already" in str(result.exception)
+    assert taken.read_text() == "mine"
 
 
 @pytest.fixture
@@ -148,12 +154,11 @@ def _viewer(address: str) -> ClientConnection:
     return connect(address, subprotocols=[Subprotocol("foxglove.sdk.v1")], max_size=None, close_timeout=1.0)
 
 
-@needs_foxglove
 def test_foxglove_is_served_on_loopback_beside_a_viewer_that_never_reads(flight: MemoryBus, field: str) -> None:
     from groundstation.engineering_views.foxglove_live import FoxgloveView
 
     port, over = _free_port(), threading.Event()
-    view = FoxgloveView("lab", json.loads(field), _timeline(), port)
+    view = FoxgloveView("lab", field_from_json(field.encode()), _timeline(), port)
     loop = threading.Thread(target=watch, args=(flight, view, lambda: not over.is_set()))
     loop.start()
     try:
@@ -180,7 +185,6 @@ def test_foxglove_is_served_on_loopback_beside_a_viewer_that_never_reads(flight:
     assert not loop.is_alive()
 
 
-@needs_foxglove
 def test_a_port_that_is_taken_is_named(field: str) -> None:
     from groundstation.engineering_views.foxglove_live import FoxgloveView
     from groundstation.errors import OperatorMistake
@@ -189,16 +193,15 @@ def test_a_port_that_is_taken_is_named(field: str) -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         with pytest.raises(OperatorMistake, match="--port"):
-            FoxgloveView("lab", json.loads(field), _timeline(), taken.getsockname()[1])
+            FoxgloveView("lab", field_from_json(field.encode()), _timeline(), taken.getsockname()[1])
 
 
-@needs_rerun
 def test_rerun_is_served_on_loopback_only_and_ends_with_us(flight: MemoryBus, field: str) -> None:
     from groundstation.engineering_views.rerun_live import RerunServer, RerunView
 
     port, page_port = _free_port(), _free_port()
     server = RerunServer(port, page_port)
-    view = RerunView("lab", json.loads(field), _timeline(), clock.now_ns(), server, None)
+    view = RerunView("lab", field_from_json(field.encode()), _timeline(), clock.now_ns(), server, None)
     over = time.monotonic() + 4.0
     try:
         watch(flight, view, lambda: time.monotonic() < over)
@@ -224,11 +227,10 @@ def _listening(port: int) -> set[str]:
     return found
 
 
-@needs_rerun
 def test_a_live_view_can_be_saved(flight: MemoryBus, field: str, tmp_path: Path) -> None:
     from groundstation.engineering_views.rerun_live import RerunView
 
-    view = RerunView("lab", json.loads(field), _timeline(), clock.now_ns(), None, tmp_path / "live.rrd")
+    view = RerunView("lab", field_from_json(field.encode()), _timeline(), clock.now_ns(), None, tmp_path / "live.rrd")
     over = time.monotonic() + 2.0
     watch(flight, view, lambda: time.monotonic() < over)
     view.close()

@@ -71,7 +71,13 @@ def mutate_commands(count: int, seed: int) -> None:
     """Damage a datagram of commands, again and again; decoding never raises, reading arguments only WireError."""
     rng = random.Random(seed)
     datagram = at.encode_datagram(
-        [at.ref(True), at.pcmd(at.Motion(1, 0.1, -0.2, 0.3, 0.4)), at.config("control:outdoor", "TRUE"), at.ctrl(5)], 9
+        [
+            at.ref(True),
+            at.pcmd(at.ProgressiveMotion(1, 0.1, -0.2, 0.3, 0.4)),
+            at.config("control:outdoor", "TRUE"),
+            at.ctrl(5),
+        ],
+        9,
     )
     for _ in range(count):
         mutated = bytearray(datagram)
@@ -137,7 +143,7 @@ def test_configuration_commands_survive(pairs, first):
 @given(st.integers(0, 7), st.tuples(*[st.floats(-1, 1, width=32)] * 4))
 @settings(max_examples=50, deadline=None)
 def test_motions_survive(flags, fractions):
-    motion = at.Motion(flags, *fractions)
+    motion = at.ProgressiveMotion(flags, *fractions)
     (command,) = at.decode_datagram(at.encode_datagram([at.pcmd(motion)], 1))
     assert at.decode_motion(command) == motion
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.fixed_lag import FixedLagFilter
-from groundstation.estimation.measurement import Measurement, Motion
+from groundstation.estimation.measurement import Measurement, OdometrySample
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.geometry.rotations import base_from_tilted_optical
@@ -51,7 +51,7 @@ def stream(seed: int):
             yaw = 0.002 * k + (2.0 if k > 50 else 0.0)
             height = 1.3 + 0.01 * float(rng.normal()) if k % 3 == 0 else None
             velocity = (speed + 0.02 * float(rng.normal()), 0.01, 0.0)
-            flight.append(("motion", (name, Motion(stamp, velocity, yaw, height, int(k > 50)))))
+            flight.append(("motion", (name, OdometrySample(stamp, velocity, yaw, height, int(k > 50)))))
     four, three = diagonal(1e-4, 1e-4, 4e-4, 1e-3), diagonal(1e-4, 1e-4, 4e-4)
     for k in range(1, 6):
         stamp = START + 65 * MS * k + int(rng.integers(0, 9 * MS))
@@ -150,8 +150,8 @@ def test_a_long_pause_is_survived() -> None:
         feed(joint, kind, arguments)
     joint.advance(NOW)
     later = NOW + 60_000 * MS
-    assert joint.add_motion("a", Motion(NOW + MS, (1.0, 0.0, 0.0), 0.0), later) is Verdict.LATE
-    assert joint.add_motion("a", Motion(later, (0.0, 0.0, 0.0), 0.0, 1.3), later) is Verdict.ACCEPTED
+    assert joint.add_motion("a", OdometrySample(NOW + MS, (1.0, 0.0, 0.0), 0.0), later) is Verdict.LATE
+    assert joint.add_motion("a", OdometrySample(later, (0.0, 0.0, 0.0), 0.0, 1.3), later) is Verdict.ACCEPTED
     joint.advance(later)
     assert joint.is_sound()
     belief = joint.belief()

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.planning.peers.step import edges_of, neighbours_of
-from groundstation.planning.planar.candidates import all_topologies, candidate_list, merges, neighbours, radial_cuts
-from groundstation.planning.planar.edges import sort_team
+from groundstation.bench.planner_peers.step import edges_of, neighbours_of
+from groundstation.experiments.planar.candidates import all_topologies, candidate_list, merges, neighbours, radial_cuts
+from groundstation.experiments.planar.edges import sort_team
 from groundstation.sensing.topology import LEAF, ROOT, Topology
 
 NAMES = "abcdefghijkl"

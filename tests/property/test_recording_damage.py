@@ -12,9 +12,9 @@ from mcap.reader import make_reader
 
 from groundstation.errors import OperatorMistake
 from groundstation.recording.copies import recover
+from groundstation.recording.cut import cut_run
 from groundstation.recording.info import info_of
 from groundstation.recording.run import open_run
-from groundstation.recording.stretch import cut_run
 from groundstation.recording.synthetic import write_run
 from groundstation.recording.table_files import CsvFile, write_tables
 from groundstation.settings.files import find_field

@@ -7,20 +7,18 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from groundstation.control.frames import world_from_stabilized
-from groundstation.control.modes import Phase
+from groundstation.arrays import Array
+from groundstation.control.flight_mode import FlightMode
+from groundstation.control.output_limiter import limit_setpoint
 from groundstation.control.parameters import SafetyParameters
-from groundstation.control.safety import limit_setpoint
 from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.layout import ROBOT_CORE, EntityKind, Layout
-
-Array = NDArray[np.float64]
+from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
+from groundstation.geometry.stabilized_frame import world_from_stabilized
 
 SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)))
-LAYOUT = Layout().with_entity("a", EntityKind.ROBOT, ROBOT_CORE).with_entity("b", EntityKind.ROBOT, ROBOT_CORE)
+LAYOUT = StateLayout().with_entity("a", EntityKind.ROBOT, ROBOT_CORE).with_entity("b", EntityKind.ROBOT, ROBOT_CORE)
 LAG_S = 0.5
 
 place = st.tuples(st.floats(-3.6, 3.6), st.floats(-2.6, 2.6), st.floats(0.1, 2.7), st.floats(-3.1, 3.1))
@@ -28,7 +26,7 @@ command = st.tuples(*[st.floats(-2, 2)] * 4)
 
 
 def setpoint(command: tuple[float, float, float, float]) -> Setpoint:
-    return Setpoint(command[:3], command[3], Phase.TRACK)
+    return Setpoint(command[:3], command[3], FlightMode.TRACK)
 
 
 def belief(poses: Array, std: float = 0.03) -> JointBelief:
@@ -90,6 +88,40 @@ def test_two_drones_flown_at_each_other_keep_the_separation(
     assert min(float(np.linalg.norm(p[0] - p[1])) for p in trail) >= SAFETY.min_separation_m
 
 
+@given(
+    st.one_of(st.just(0.0), st.floats(-12, 0.2).map(lambda power: 10.0**power)),
+    st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
+    command,
+    st.booleans(),
+)
+@example(0.0, (1.0, 0.0, 0.0), (0.6, 0.0, 0.0, 0.0), False)
+@example(1e-7, (1.0, 0.0, 0.0), (0.6, 0.0, 0.0, 0.0), True)
+@settings(max_examples=60, deadline=None)
+def test_nobody_closes_in_however_near_the_other_is_believed(
+    distance: float, towards: tuple[float, float, float], wish: tuple[float, float, float, float], known: bool
+) -> None:
+    direction = np.array(towards) / math.hypot(*towards)
+    poses = np.array([[0.0, 0.0, 1.4, 0.0], [*(np.array([0.0, 0.0, 1.4]) + distance * direction), 0.0]])
+    speeds = dict.fromkeys("ab", np.zeros(3)) if known else None
+    for name, sign in (("a", 1), ("b", -1)):
+        limited = limit_setpoint(name, setpoint(wish), belief(poses), 0, SAFETY, speeds)
+        velocity = np.array(limited.setpoint.velocity_m_s)
+        share_m_s = max(0.0, distance - SAFETY.min_separation_m) / (4.0 * SAFETY.reaction_s)
+        assert float(velocity @ direction) * sign <= share_m_s + 1e-6
+        if distance < 0.05:  # centres of two bodies cannot be so near: the other may be on any side
+            assert limited.limited_by == ("separation",)
+            assert not velocity.any() and limited.setpoint.yaw_rate_rad_s == 0.0
+
+
+def test_points_of_rest_that_coincide_open_no_way() -> None:
+    poses = np.array([[0.0, 0.0, 1.4, 0.0], [1.5, 0.0, 1.4, math.pi]])
+    speeds = {"a": np.array([1.5, 0.0, 0.0]), "b": np.array([-1.5, 0.0, 0.0])}
+    for name in "ab":
+        limited = limit_setpoint(name, setpoint((0.5, 0.1, 0.0, 0.0)), belief(poses), 0, SAFETY, speeds)
+        assert limited.setpoint.velocity_m_s == pytest.approx((0.0, 0.1, 0.0))
+        assert "separation" in limited.limited_by
+
+
 def test_one_above_the_other_does_not_descend_onto_it() -> None:
     states = np.array([[0.0, 0.0, 2.5, 0.0], [0.05, 0.0, 1.0, 0.0]])
     trail = stop_at_rest(states, np.zeros((2, 3)), 15.0, np.array([(0, 0, -0.4, 0), (0, 0, 0.0, 0)]), known=True)
@@ -97,7 +129,7 @@ def test_one_above_the_other_does_not_descend_onto_it() -> None:
 
 
 POSES = np.array([[0.0, 0.0, 1.3, 0.0], [2.0, 0.0, 1.3, 0.0]])
-WISH = Setpoint((0.3, 0.1, 0.1), 0.2, Phase.TRACK)
+WISH = Setpoint((0.3, 0.1, 0.1), 0.2, FlightMode.TRACK)
 
 
 def test_an_open_way_changes_nothing() -> None:

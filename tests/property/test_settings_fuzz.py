@@ -63,7 +63,8 @@ def outcome(text: str, options: tuple[str, ...] = ()) -> Field | list[str]:
 
 def judge(result: Field | list[str]) -> None:
     if isinstance(result, Field):
-        assert Field.model_validate_json(result.model_dump_json()) == result
+        written = result.model_dump_json()
+        assert Field.model_validate_json(written).model_dump_json() == written
 
 
 @settings(max_examples=40, deadline=None)

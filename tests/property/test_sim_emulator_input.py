@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from sim_bridge.devices.ardrone_control import FlightControl
 from sim_bridge.devices.ardrone_state import control_state, state_word
 from sim_bridge.scenario import DroneScenario
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.noise import generator_of
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
 
 TICK_S, TICK_NS = 0.005, 5_000_000
 

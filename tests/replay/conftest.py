@@ -2,15 +2,16 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
+
+from groundstation.field.resolved import ResolvedField
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 
 
 @pytest.fixture(scope="session")
-def flown(tmp_path_factory: pytest.TempPathFactory, lab_field: dict[str, Any]) -> Path:
+def flown(tmp_path_factory: pytest.TempPathFactory, lab_field: ResolvedField) -> Path:
     """A run folder: take-off and a second of tracking by two drones."""
     from flown_study import FlownStudy
 

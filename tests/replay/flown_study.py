@@ -2,7 +2,6 @@
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -11,6 +10,7 @@ from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.api import Sample
 from groundstation.bus.topics import Topic
+from groundstation.field.resolved import ResolvedField
 from groundstation.planning.plan import Planner
 from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
@@ -18,7 +18,7 @@ from groundstation.recording.preamble import Preamble, preamble_of_run
 from groundstation.recording.timeline import Timeline
 from groundstation.replay.rerun import JournalBus
 from groundstation.runtime.journal import Adoption
-from groundstation.runtime.tracking import Feed, TrackerSection, Tracking
+from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking
 from groundstation.tracker import PlanRequest
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import CLOCK, Study, StudyOptions
@@ -74,12 +74,12 @@ class Worker:
 class FlownStudy(Study):
     """Flies and records. small: less odometry, and a tenth of what is said 50 times a second."""
 
-    def __init__(self, field: dict[str, Any], folder: Path, options: StudyOptions, small: bool = False) -> None:
+    def __init__(self, field: ResolvedField, folder: Path, options: StudyOptions, small: bool = False) -> None:
         super().__init__(field, Scenario(), options)
         self._odometry_every, self._said_every, self._truth_every = (8, 10, 40) if small else (1, 1, 10)
         self._arrivals = Arrivals()
         self._bus = JournalBus(SITE, "tracker", CLOCK)
-        self._tracking = Tracking(self._bus, TrackerSection(field, "", 1), Feed(self._arrivals, Worker, CLOCK))
+        self._tracking = Tracking(self._bus, TrackerSection(field, "", 1), TrackerFeed(self._arrivals, Worker, CLOCK))
         self.tracker = self._tracking.tracker
         timeline = Timeline(CLOCK, UNIX_OFFSET_NS)
         self._capture = Capture(timeline)

@@ -17,10 +17,11 @@ def main() -> None:
     from flown_study import FlownStudy
 
     from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import resolved_field
     from sim_bridge.study.runner import StudyOptions
 
     FIXTURE.mkdir(parents=True, exist_ok=True)
-    field = load_field(ROOT / "config" / "lab.yaml").model_dump(mode="json")
+    field = resolved_field(load_field(ROOT / "config" / "lab.yaml"))
     FlownStudy(field, FIXTURE, StudyOptions(seed=5, duration_s=1.5), small=True).fly()
 
 

@@ -1,15 +1,15 @@
 """Delays told by a flight that dashes, turns and climbs to and fro under the ceiling camera, at message level."""
 
 import math
-from typing import Any
 
 import msgspec
 import pytest
 
 from groundstation.bus.messages import Message, RelativeObservation, Severity
 from groundstation.calibration.delay import Delay, delays
-from groundstation.calibration.flown import Flown
-from groundstation.runtime.picture_age import PictureAge
+from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.field.resolved import ResolvedField
+from groundstation.runtime.latency_watch import PictureAge
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import CLOCK, Study, StudyOptions
 from sim_bridge.world.world import TICK_NS
@@ -21,7 +21,7 @@ Ticks = list[tuple[int, tuple[tuple[str, Message], ...]]]
 class Manoeuvre(Study):
     """Drones that are commanded to and fro, and all that reached the tracker."""
 
-    def __init__(self, field: dict[str, Any], seed: int) -> None:
+    def __init__(self, field: ResolvedField, seed: int) -> None:
         super().__init__(field, Scenario(), StudyOptions(seed, DURATION_S, plan=False))
         self.ticks: Ticks = []
 
@@ -36,13 +36,13 @@ class Manoeuvre(Study):
 
 
 @pytest.fixture(scope="module")
-def manoeuvre(lab_field: dict[str, Any]) -> Manoeuvre:
+def manoeuvre(lab_field: ResolvedField) -> Manoeuvre:
     flight = Manoeuvre(lab_field, 2)
     flight.run()
     return flight
 
 
-def told_in_flight(field: dict[str, Any], ticks: Ticks, error_ms: float) -> tuple[PictureAge, list[str]]:
+def told_in_flight(field: ResolvedField, ticks: Ticks, error_ms: float) -> tuple[PictureAge, list[str]]:
     """Live the flight with a ceiling camera whose setting is too small by an error."""
     age, warnings = PictureAge(field, CLOCK), []
     for number, (_, inputs) in enumerate(ticks):
@@ -61,7 +61,7 @@ def told_in_flight(field: dict[str, Any], ticks: Ticks, error_ms: float) -> tupl
 
 @pytest.mark.parametrize(("error_ms", "than", "proposed"), [(40.0, "older", 160.0), (-40.0, "newer", 80.0)])
 def test_a_wrong_delay_is_told_in_flight_with_the_setting_that_mends_it(
-    lab_field: dict[str, Any], manoeuvre: Manoeuvre, error_ms: float, than: str, proposed: float
+    lab_field: ResolvedField, manoeuvre: Manoeuvre, error_ms: float, than: str, proposed: float
 ) -> None:
     age, warnings = told_in_flight(lab_field, manoeuvre.ticks, error_ms)
     (ceiling,) = [one for one in age.lateness() if one.sensor == "ceiling"]
@@ -73,7 +73,7 @@ def test_a_wrong_delay_is_told_in_flight_with_the_setting_that_mends_it(
     assert setting == pytest.approx(proposed, abs=15.0)
 
 
-def test_a_right_delay_raises_no_warning(lab_field: dict[str, Any], manoeuvre: Manoeuvre) -> None:
+def test_a_right_delay_raises_no_warning(lab_field: ResolvedField, manoeuvre: Manoeuvre) -> None:
     age, warnings = told_in_flight(lab_field, manoeuvre.ticks, 0.0)
     assert warnings == []
     assert abs(next(one for one in age.lateness() if one.sensor == "ceiling").offset_ms) < 10.0
@@ -82,7 +82,7 @@ def test_a_right_delay_raises_no_warning(lab_field: dict[str, Any], manoeuvre: M
 @pytest.mark.slow
 @pytest.mark.timeout(400)
 def test_velocities_are_dated_by_a_flight_that_dashes_to_and_fro(
-    lab_field: dict[str, Any], manoeuvre: Manoeuvre
+    lab_field: ResolvedField, manoeuvre: Manoeuvre
 ) -> None:
     found = {one.sensor: one for one in delays(Flown(tuple(manoeuvre.ticks), CLOCK, {}), lab_field)}
     tick_ms = TICK_NS / 1e6

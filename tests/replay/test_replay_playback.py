@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from rewritten import rewritten
 
-from groundstation.console.board import Board
 from groundstation.console.protocol import decode
-from groundstation.console.viewer import Viewer
+from groundstation.console.snapshot import Snapshot
+from groundstation.console.viewer import PageConnection
 from groundstation.recording.reader import RecordingError
 from groundstation.replay.playback import Playback
-from groundstation.replay.show import Show
+from groundstation.replay.playback_server import Show
 from groundstation.replay.source import open_source
 
 MS = 1_000_000
@@ -26,7 +26,7 @@ class Watched:
         self.playback = Playback(open_source([folder]))
         self.show = Show(self.playback, 38900)
         self.said: list[dict[str, Any]] = []
-        self.page = Viewer(1, Board(), _nothing, _nothing)
+        self.page = PageConnection(1, Snapshot(), _nothing, _nothing)
         self.page.say = lambda text: self.said.append(json.loads(text))  # type: ignore[method-assign]
         self.page.trusted = True
         self.turn()
@@ -142,8 +142,8 @@ def test_ends_are_ends(watched: Watched) -> None:
 @pytest.mark.parametrize(
     "order",
     [
-        {"type": "order", "verb": "LAND", "drones": [], "at_ms": 0, "ref": "a"},
-        {"type": "order", "verb": "TAKEOFF", "drones": [], "at_ms": 0, "ref": "a"},
+        {"type": "order", "verb": "LAND", "drones": [], "run": "", "at_ms": 0, "age_ms": 0, "ref": "a"},
+        {"type": "order", "verb": "TAKEOFF", "drones": [], "run": "", "at_ms": 0, "age_ms": 0, "ref": "a"},
         {"type": "takeover"},
         {"type": "drive", "speed_m_s": 1, "turn_rad_s": 0},
         {"type": "place", "x_m": 0, "y_m": 0},
@@ -175,5 +175,5 @@ def test_events_and_orders_are_marked_on_the_time_line(watched: Watched) -> None
 def test_a_replay_with_a_field_of_another_kind_says_so(flown: Path, tmp_path: Path) -> None:
     keep: Callable[..., bytes] = lambda record: record.data  # noqa: E731
     folder = rewritten(flown, tmp_path / "odd", keep, field=b'{"site": "lab"}')
-    with pytest.raises(RecordingError, match="its field is none that the console can draw"):
+    with pytest.raises(RecordingError, match="its field is none that this program knows"):
         Show(Playback(open_source([folder])), 38901)

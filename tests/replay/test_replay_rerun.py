@@ -16,6 +16,7 @@ from groundstation.recording.reader import open_recording
 from groundstation.replay.source import open_source
 from groundstation.replay.verify import Repetition
 from groundstation.settings.recorded import recorded_field
+from groundstation.settings.resolved import resolved_field
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "replay"
 SAID = {"estimate", "belief", "plan", "setpoint", "innovation"}
@@ -126,7 +127,7 @@ def test_other_settings_are_computed_the_same_twice(flown: Path, tmp_path: Path,
     assert 0.0 < figures["target rmse [m]"]["after"] < 0.5  # judged by the recorded truth
     # What was written is a run of its own: with its settings in it, it is repeated to the bit.
     assert code_of(tmp_path / "what-if", "--rerun", "tracker")[0] == 0
-    assert open_source([tmp_path / "what-if"]).resolved["planner"]["horizon_steps"] == 3
+    assert open_source([tmp_path / "what-if"]).resolved.planner.horizon_steps == 3
 
 
 def test_a_setting_that_is_none_of_the_trackers_changes_nothing(flown: Path, verdict: Any) -> None:
@@ -174,7 +175,7 @@ def test_a_foreign_version_is_said(flown: Path, monkeypatch: pytest.MonkeyPatch)
 def test_recordings_made_earlier_are_understood() -> None:
     """The stored recording: every message still has its meaning, and today's tracker believes nearly the same."""
     source = open_source([FIXTURE])
-    repetition = Repetition(source, recorded_field(source.field).model_dump(mode="json"))
+    repetition = Repetition(source, resolved_field(recorded_field(source.field)))
     now = {m.header.stamp_ns: m for lived in repetition.ticks() for _, m in lived.said if isinstance(m, Belief)}
     recording = open_recording(source.state[0])
     then = [record.message for record in recording.records(lambda topic: topic.name == "belief")]

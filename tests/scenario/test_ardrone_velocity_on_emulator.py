@@ -6,24 +6,24 @@ from functools import partial
 import pytest
 
 from drivers.ardrone.averages import MotionMean
+from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata
+from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.driver import RATE_HZ
-from drivers.ardrone.orders import orders_from_decision
-from drivers.ardrone.session import Session
-from drivers.ardrone.settings import ArDroneDriverSettings, OdometryCalibration
+from drivers.ardrone.session import ArdroneSession
+from drivers.ardrone.settings import ArDroneDriverSettings, VelocityScale
 from drivers.ardrone.velocity_loop import HOVER, VelocityLoop
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.options import DEMO
-from drivers.ardrone.wishes import ids_of, scale_from_settings, wishes
-from drivers.authority import Action
+from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
 from sim_bridge.devices.ardrone_control import FlightControl
 from sim_bridge.devices.ardrone_navdata import NavdataState, NavdataWriter
 from sim_bridge.devices.ardrone_state import control_state, state_word
 from sim_bridge.scenario import DroneScenario
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.noise import generator_of
-from sim_bridge.world.onboard import Onboard
-from sim_bridge.world.quadrotor import Quadrotor
 
 TICK_S = 0.005
 TICK_NS = 5_000_000
@@ -46,7 +46,7 @@ class Flight:
 
     def __init__(self, seed: int, **changes: float) -> None:
         self.settings = ArDroneDriverSettings(
-            name="drone_1", address="127.0.0.1", odometry=OdometryCalibration(velocity_scale=1.18)
+            name="drone_1", address="127.0.0.1", odometry=VelocityScale(velocity_scale=1.18)
         )
         scenario = DroneScenario().model_copy(update=changes)
         self.drone = Quadrotor((0.0, 0.0), 0.4, scenario, TICK_S, generator_of(seed, "drone"))
@@ -54,7 +54,7 @@ class Flight:
         self.control = FlightControl(self.drone, self.onboard)
         self.listener = self.control.audience.request(("127.0.0.1", 1), 0)
         self.writer, self.state = NavdataWriter(), NavdataState()
-        self.session = Session(partial(wishes, self.settings), ids_of("drone_1"), NoTcp())
+        self.session = ArdroneSession(partial(wishes, self.settings), ids_of("drone_1"), NoTcp())
         self.scale = scale_from_settings(self.settings)
         self.loop = VelocityLoop(self.settings.limits)
         self.ticks, self.next_send, self.sequence = 0, 0.0, 1

@@ -5,7 +5,6 @@ Run as a script it is the driver's process: `test_ardrone_wire_discipline.py ADD
 
 import itertools
 import multiprocessing
-import os
 import re
 import socket
 import struct
@@ -13,13 +12,10 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 
 SECONDS = 40.0
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data"))
-FULL = DATA / "ardrone" / "ar2-full-1916.bin"
 LINE = re.compile(r'AT\*[A-Z_]+=(\d+)(,(-?\d+|"[^"]{1,127}"))*')
 SO_TIMESTAMPNS = 35
 COMMAND, BOOTSTRAP = 1 << 6, 1 << 11
@@ -56,7 +52,7 @@ def burn(ends_s: float) -> None:
 class Recorder:
     """The drone's side: acknowledges what must be, streams 200 packets a second, notes when each datagram came."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, navdata: bytes) -> None:
         self.navdata, self.at = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
         self.at.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self.at.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
@@ -64,7 +60,7 @@ class Recorder:
         self.at.bind((address, 5556))
         for udp in (self.navdata, self.at):
             udp.setblocking(False)
-        self.body = bytearray(FULL.read_bytes()[:-8])
+        self.body = bytearray(navdata[:-8])
         self.state, self.number, self.client = BOOTSTRAP | 0x0F800000, 0, None
         self.came: list[tuple[int, bytes]] = []
 
@@ -100,11 +96,9 @@ def gaps_ms(stamps: list[int]) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("load", [0, 4], ids=["idle", "busy"])
-def test_form_and_numbers_of_every_datagram(load, record_property, capsys):
-    if not FULL.exists():
-        pytest.skip(f"no recorded packet at {FULL}; set GROUNDSTATION_DATA")
+def test_form_and_numbers_of_every_datagram(load, golden_packet, record_property, capsys):
     address = f"127.31.{load}.9"
-    drone = Recorder(address)
+    drone = Recorder(address, golden_packet("full-landed"))
     ends_s = time.monotonic() + SECONDS
     burners = [multiprocessing.get_context("spawn").Process(target=burn, args=(ends_s,)) for _ in range(load)]
     driver = subprocess.Popen([sys.executable, __file__, address])

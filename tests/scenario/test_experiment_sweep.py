@@ -10,14 +10,14 @@ from groundstation.cli.main import run
 from groundstation.experiments.runner import SweepError, run_tasks
 from groundstation.experiments.tasks import Task, execute
 
-distributed = pytest.importorskip("distributed")
-
 TASKS = [Task("teams", 4, "certified", seed, steps=30) for seed in range(1, 25)]
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
+    import distributed
+
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
     ) as cluster:

@@ -1,6 +1,5 @@
 """Planner, setpoints and safety close the loop over kinematic robots and hard sensors; no wire, no processes."""
 
-import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,23 +7,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from groundstation.control.frames import world_from_stabilized
+from groundstation.arrays import Array
+from groundstation.control.output_limiter import limit_setpoint
 from groundstation.control.parameters import control_from_field, safety_from_field
-from groundstation.control.safety import limit_setpoint
 from groundstation.control.setpoints import setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, Layout
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import wrap
+from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning.parameters import parameters_from_field
 from groundstation.planning.plan import Planner, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
 
-Array = NDArray[np.float64]
 CONFIG = Path(__file__).parents[2] / "config"
 STEP_S = 0.02
 LAG_S = 0.3
@@ -72,18 +72,18 @@ class Trace:
 class World:
     """Robots (x, y, z, yaw) with first-order velocity lag, a target on a path, and a plain EKF on hard sensors."""
 
-    def __init__(self, resolved: dict[str, Any], starts: Array, path: Array, seed: int) -> None:
+    def __init__(self, resolved: ResolvedField, starts: Array, path: Array, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
         self.sensors = sensors_from_field(resolved)
         self.parameters = parameters_from_field(resolved)
         self.control = control_from_field(resolved)
         self.safety = safety_from_field(resolved)
-        self.names = sorted(resolved["drones"])[: len(starts)]
-        self.target = resolved["target"]["name"]
+        self.names = sorted(resolved.drones)[: len(starts)]
+        self.target = next(iter(resolved.tracked))
         self.path = path
         self.x = starts.copy()
         self.v = np.zeros((len(starts), 4))
-        layout = Layout()
+        layout = StateLayout()
         for name in self.names:
             layout = layout.with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
         self.layout = layout.with_entity(self.target, EntityKind.TARGET, TARGET_CORE)
@@ -210,9 +210,8 @@ def fly(world: World, topology: Topology, sight_hz: float = 5.0) -> Trace:
     return trace
 
 
-def lab() -> dict[str, Any]:
-    resolved: dict[str, Any] = json.loads(load_field(CONFIG / "lab.yaml").model_dump_json())
-    return resolved
+def lab() -> ResolvedField:
+    return resolved_field(load_field(CONFIG / "lab.yaml"))
 
 
 def realistic_path(duration_s: float) -> Array:
@@ -226,7 +225,7 @@ def pads(world_height: float) -> Array:
 
 def flight(seed: int, duration_s: float = 70.0, start: str = "flat") -> Trace:
     resolved = lab()
-    height = resolved["planner"]["level_heights_m"][0][0]
+    height = resolved.planner.level_heights_m[0][0]
     world = World(resolved, pads(height), realistic_path(duration_s), seed)
     make = Topology.flat if start == "flat" else Topology.string
     return fly(world, make(world.names))
@@ -245,16 +244,16 @@ def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -
     assert (levels[settled & (away < 1.0)] == 1).mean() > 0.9
     assert (levels[settled & (away > 3.0)] == 2).mean() > 0.6
     assert trace.separation_m() >= 0.6
-    places, fence = np.array(trace.truth), lab()["room"]["fence"]
-    for axis, name in enumerate(("x_m", "y_m", "z_m")):
-        assert fence[name][0] <= places[:, :, axis].min() and places[:, :, axis].max() <= fence[name][1]
+    places, fence = np.array(trace.truth), lab().room.fence
+    for axis, (low, high) in enumerate((fence.x_m, fence.y_m, fence.z_m)):
+        assert low <= places[:, :, axis].min() and places[:, :, axis].max() <= high
 
 
 def test_a_target_that_jumps_away_is_found_again() -> None:
     resolved = lab()
     path = realistic_path(50.0)
     path[500:] = path[500:] * np.array([-0.5, 1.0])  # kidnapped after 10 s, to the other side
-    world = World(resolved, pads(resolved["planner"]["level_heights_m"][0][0]), path, seed=4)
+    world = World(resolved, pads(resolved.planner.level_heights_m[0][0]), path, seed=4)
     trace = fly(world, Topology.flat(world.names))
     late = np.array(trace.error)[-500:]
     assert late.max() < 0.6
@@ -263,7 +262,7 @@ def test_a_target_that_jumps_away_is_found_again() -> None:
 
 def test_drones_that_look_the_wrong_way_search_and_find() -> None:
     resolved = lab()
-    starts = pads(resolved["planner"]["level_heights_m"][0][0])
+    starts = pads(resolved.planner.level_heights_m[0][0])
     starts[:, 3] = math.pi
     world = World(resolved, starts, np.tile([1.6, 0.5], (2000, 1)), seed=5)
     world.mean[8:10], world.P[8, 8], world.P[9, 9] = 0.0, 9.0, 9.0

@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+from groundstation.field.resolved import ResolvedField
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.study.runner import Study, StudyOptions
@@ -17,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def flight(lab_field: dict[str, Any]) -> dict[str, Any]:
+def flight(lab_field: ResolvedField) -> dict[str, Any]:
     return Study(lab_field, Scenario(), StudyOptions(seed=3, duration_s=25.0)).run()
 
 
@@ -35,14 +37,14 @@ def test_robots_know_where_they_are(flight: dict[str, Any]) -> None:
     assert flight["verdicts"].get("LATE", 0) == 0
 
 
-def test_the_same_seed_gives_the_same_flight(lab_field: dict[str, Any]) -> None:
+def test_the_same_seed_gives_the_same_flight(lab_field: ResolvedField) -> None:
     reports = [Study(lab_field, Scenario(), StudyOptions(seed=5, duration_s=2.0)).run() for _ in range(2)]
     for report in reports:
         report.pop("cpu_s")
     assert reports[0] == reports[1]
 
 
-def test_grossly_wrong_sightings_do_no_harm(lab_field: dict[str, Any]) -> None:
+def test_grossly_wrong_sightings_do_no_harm(lab_field: ResolvedField) -> None:
     report = Study(lab_field, Scenario(), StudyOptions(seed=3, duration_s=15.0, outliers=0.02)).run()
     assert report["verdicts"]["IMPLAUSIBLE"] > 0
     assert max(report["robot_rmse_m"][name] for name in ("drone_1", "drone_2")) <= 0.12
@@ -50,7 +52,7 @@ def test_grossly_wrong_sightings_do_no_harm(lab_field: dict[str, Any]) -> None:
 
 def test_two_targets_are_found_and_held() -> None:
     scenario = parse_scenario(json.dumps(load_scenario(ROOT / "config/scenarios/two-targets.yaml")))
-    field = load_field(ROOT / "config/two-targets.yaml").model_dump(mode="json")
+    field = resolved_field(load_field(ROOT / "config/two-targets.yaml"))
     report = Study(field, scenario, StudyOptions(seed=1, duration_s=15.0)).run()
     for name, target in report["targets"].items():
         assert target["lost_s"] <= 4.0, name  # until it is found

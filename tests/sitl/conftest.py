@@ -22,18 +22,20 @@ from groundstation.supervisor import runtime_file
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 from wire_tap import WireTap
 
-COMMAND = [sys.executable, "-m", "groundstation.cli.main"]
+COMMAND = (sys.executable, "-m", "groundstation.cli.main")
 
 
 class SitlRun:
     """One run. `history` holds (time of arrival [s], message) by (topic, entity); `text` is all it printed."""
 
-    def __init__(self, folder: Path, *arguments: str, terminal: int | None = None) -> None:
+    def __init__(
+        self, folder: Path, *arguments: str, terminal: int | None = None, program: tuple[str, ...] = COMMAND
+    ) -> None:
         self.folder = folder
         self.output = folder / "output.txt"
         report = () if "--report" in arguments else ("--report", str(folder))
         screen = ("--headless",) if terminal is None else ()
-        command = [*COMMAND, *arguments, *screen, *report]
+        command = [*program, *arguments, *screen, *report]
         with self.output.open("wb") as sink:
             self.process = subprocess.Popen(
                 # With a terminal, `setsid --ctty` makes it the run's own: closing it hangs up.
@@ -198,11 +200,11 @@ def sitl(tmp_path: Path) -> Iterator[Callable[..., SitlRun]]:
     """Start a run: `sitl("--duration", "10")`; its field is the lab unless the first argument names a verb."""
     runs: list[SitlRun] = []
 
-    def start(*arguments: str, terminal: int | None = None) -> SitlRun:
+    def start(*arguments: str, terminal: int | None = None, program: tuple[str, ...] = COMMAND) -> SitlRun:
         folder = tmp_path / f"run{len(runs)}"
         folder.mkdir()
         verb = arguments if arguments[:1] == ("demo",) else ("sitl", "lab", *arguments)
-        runs.append(SitlRun(folder, *verb, terminal=terminal))
+        runs.append(SitlRun(folder, *verb, terminal=terminal, program=program))
         return runs[-1]
 
     yield start

@@ -14,8 +14,8 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.render.outputs import scaled
-from sim_bridge.render.process import Link, run
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec, StreamKind
+from sim_bridge.render.process import FrameDelay, run
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec, StreamKind
 from sim_bridge.truth import TruthBoard
 
 pytestmark = pytest.mark.sitl
@@ -34,7 +34,7 @@ def make_spec(truth_name, port, **scenario):
         bodies=BODIES,
         address="127.0.0.1",
         port=port,
-        scenario=CameraScenario(**scenario),
+        scenario=PictureQuality(**scenario),
         parent_pid=os.getpid(),
         kind=StreamKind.ARDRONE,
     )
@@ -110,7 +110,7 @@ def test_configuration_chooses_bottom_camera_and_size():
 
 def test_what_tcp_loses_comes_late_and_holds_up_what_follows():
     spec = make_spec("none", 0, frame_loss=0.3, video_jitter_ms=0.0, video_delay_ms=100.0)
-    link = Link(spec)
+    link = FrameDelay(spec)
     exposures = [k * 66_000_000 for k in range(400)]
     late_ms = [(link.release_ns(e) - e) / 1e6 for e in exposures]
     assert min(late_ms) == 100 and max(late_ms) == 300

@@ -16,7 +16,7 @@ from drivers.camera.sources.opening import open_source
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from sim_bridge.render.process import run
-from sim_bridge.render.spec import BoardSpec, CameraScenario, Mount, Outage, OutageKind, RenderSpec
+from sim_bridge.render.spec import BoardSpec, Mount, Outage, OutageKind, PictureQuality, RenderSpec
 from sim_bridge.truth import TruthBoard
 
 pytestmark = pytest.mark.sitl
@@ -38,7 +38,7 @@ def make_spec(truth_name, port, **scenario):
         bodies=BODIES,
         address="127.0.0.1",
         port=port,
-        scenario=CameraScenario(frame_loss=0.0, **scenario),
+        scenario=PictureQuality(frame_loss=0.0, **scenario),
         parent_pid=os.getpid(),
     )
 

@@ -91,20 +91,19 @@ def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
     assert emulator.firmware.parameters["GUID_TIMEOUT" if flavour == "ardupilot" else "COM_OF_LOSS_T"] == 0.75
 
 
-def mavproxy():
-    """Return the MAVProxy of `$GROUNDSTATION_MAVPROXY` or `make interop`, an environment of its own; or a skip."""
+@pytest.fixture
+def mavproxy(absent):
+    """The MAVProxy of `$GROUNDSTATION_MAVPROXY` or `make interop`, in an environment of its own."""
     program = os.environ.get("GROUNDSTATION_MAVPROXY") or str(_INTEROP / "mavproxy" / "bin" / "mavproxy.py")
     if not Path(program).exists():
-        reason = f"{program} is missing: run `make interop`"
-        pytest.fail(reason) if os.environ.get("CI") else pytest.skip(reason)
+        absent(f"{program} is missing: run `make interop`")
     return program
 
 
-def test_mavproxy_flies_our_ardupilot(hangar, tmp_path):
-    program = mavproxy()
+def test_mavproxy_flies_our_ardupilot(mavproxy, hangar, tmp_path):
     emulator, copter, (address, port) = hangar.add("ardupilot", 5, aided=True)
-    interpreter = Path(program).parent / "python"
-    command = [str(interpreter), program, f"--master=udpout:{address}:{port}", "--target-system=5"]
+    interpreter = Path(mavproxy).parent / "python"
+    command = [str(interpreter), mavproxy, f"--master=udpout:{address}:{port}", "--target-system=5"]
     command += ["--default-modules=mode,arm,cmdlong,param", "--state-basedir", str(tmp_path)]
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=tmp_path)

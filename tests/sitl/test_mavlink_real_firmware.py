@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.mavlink.link import open_link
+from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.probe import probe
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.setup import Setup
+from drivers.mavlink.setup import ParameterSetup
 from drivers.mavlink.wire.frames import dialect
 from drivers.mavlink.wire.names import Flavour
 from groundstation.bus.messages import Verb
@@ -127,7 +127,7 @@ def set_up(flavour, port):
     try:
         found = probe(link, 10.0)
         assert list(found) == [SYSTEM] and found[SYSTEM].flavour == flavour
-        setup = Setup(link, SYSTEM, Flavour[flavour.upper()], 255)
+        setup = ParameterSetup(link, SYSTEM, Flavour[flavour.upper()], 255)
         setup.connect()
         refused = [d.text for d in setup.differences() if not setup.apply(d.wanted)]
         assert refused == [] and [d.text for d in setup.differences()] == []

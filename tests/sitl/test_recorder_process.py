@@ -18,10 +18,13 @@ from groundstation.bus.messages import TruthState
 from groundstation.bus.topics import PROCESS_STATUS, RAW_RX, TRUTH
 from groundstation.process.child import ChildSpec
 from groundstation.recording.reader import open_recording
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
 
 pytestmark = pytest.mark.sitl
 REPOSITORY = Path(__file__).parents[2]
 SENT_S = 6.0
+FIELD = load_field(find_field("lab")).model_dump(mode="json")
 
 
 @pytest.fixture
@@ -35,7 +38,7 @@ def endpoint() -> Iterator[str]:
 
 
 def _start(endpoint: str, run_dir: Path) -> subprocess.Popen[bytes]:
-    section = {"field": {"site": "lab"}, "run_dir": str(run_dir), "epoch": 3}
+    section = {"field": FIELD, "run_dir": str(run_dir), "epoch": 3}
     spec = ChildSpec(name="recorder", role="recorder", endpoint=endpoint, site="lab", section=json.dumps(section))
     command = [sys.executable, "-m", "groundstation.process.entry", "recorder", "groundstation.runtime.recorder:run"]
     process = subprocess.Popen(command, cwd=REPOSITORY, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -81,4 +84,4 @@ def test_recording_is_readable_after(number: signal.Signals, endpoint: str, tmp_
         assert len(numbers) >= 0.95 * len(sent)
         assert bool(recording.damage) == (number is signal.SIGKILL)
     assert recording.metadata["run"]["epoch"] == "3"
-    assert json.loads(recording.attachments["field.json"]) == {"site": "lab"}
+    assert json.loads(recording.attachments["field.json"]) == FIELD

@@ -17,10 +17,10 @@ from groundstation.bus import clock, keys
 from groundstation.bus.messages import CommandAck
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE, ODOMETRY, SETPOINT, TOPICS
 from groundstation.bus.zenoh_bus import open_bus
+from groundstation.time_units import NS_PER_S
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(240)]
 Start = Callable[..., Any]
-NS_PER_S = 1_000_000_000
 _NESTED = b'{"header":' + b"[" * 5000
 GARBAGE = (
     b"",

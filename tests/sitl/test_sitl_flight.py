@@ -3,10 +3,12 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 
 import pytest
 
@@ -48,6 +50,27 @@ def test_land_from_another_shell(sitl: Start) -> None:
     assert answers["confirmed"] and set(answers["drones"]) == set(run.record.drones)
     run.until_landed(5)
     assert run.wait(30) == 0
+
+
+@FAULTS
+def test_other_shells_find_a_run_that_had_to_take_other_ports(sitl: Start) -> None:
+    with ExitStack() as others:
+        router = others.enter_context(
+            socket.create_server(("::", 0), family=socket.AF_INET6, dualstack_ipv6=True)
+        ).getsockname()[1]
+        with suppress(OSError):  # a web server may already be there
+            others.enter_context(socket.create_server(("0.0.0.0", 8080)))
+        run = sitl("--set", f"bus.port={router}")
+        run.until_tracking()
+        name = run.record.name
+        assert not run.record.endpoint.endswith(f":{router}")
+        state = cli("monitor", "--run", name, "--json")
+        assert set(json.loads(state.stdout)["vehicles"]) == set(run.record.drones), state.stderr
+        for verb in ("hold", "land"):
+            answer = cli(verb, "--run", name)
+            assert answer.returncode == 0, answer.stdout + answer.stderr
+        run.until_landed(5)
+        assert run.wait(30) == 0
 
 
 @FAULTS

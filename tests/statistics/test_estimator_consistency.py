@@ -4,58 +4,70 @@
 Errors within a flight last (a ceiling camera hangs wrong all along), so flights are the samples: judged is the mean
 over flights of a flight's mean NEES, or NIS, per degree of freedom. Its two-sided 95 % t-interval is stated; it must
 be narrow enough for the band 0.8..1.3 to mean something.
+
+The target is believed as gentle as the scenario's is (it never leaves its eight): a shipped field leaves it room for
+turns on the spot, and its covariance is then too large for an eight, by design.
 """
 
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from groundstation.field.resolved import ResolvedField
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import Study, StudyOptions
 from sim_bridge.study.summary import summary
 
 pytestmark = pytest.mark.statistics
+GENTLE_M_S2 = 0.3
 FLIGHTS, DURATION_S, OUTLIERS = 50, 25.0, 0.02
 LOW, HIGH, WIDEST = 0.8, 1.3, 0.3
 Reports = list[dict[str, Any]]
 
 
-def fly(field: dict[str, Any], seeds: range, duration_s: float, outliers: float) -> Reports:
+@pytest.fixture(scope="module")
+def gentle_field(lab_field: ResolvedField) -> ResolvedField:
+    assert lab_field.target is not None
+    return structs.replace(lab_field, target=structs.replace(lab_field.target, acceleration_std_m_s2=GENTLE_M_S2))
+
+
+def fly(field: ResolvedField, seeds: range, duration_s: float, outliers: float) -> Reports:
     return [Study(field, Scenario(), StudyOptions(seed, duration_s, outliers)).run() for seed in seeds]
 
 
-def judge(reports: Reports, field: dict[str, Any], names: tuple[str, ...]) -> None:
+def judge(reports: Reports, field: ResolvedField, names: tuple[str, ...]) -> None:
     found = summary(reports, field)
     stated = {name: f"{found[name]} (95 %, {found[name].flights} flights)" for name in names}
     print(stated)
     assert all(LOW <= found[name].mean <= HIGH and found[name].half <= WIDEST for name in names), stated
 
 
-def test_a_few_short_flights_are_near_consistent(lab_field: dict[str, Any]) -> None:
+def test_a_few_short_flights_are_near_consistent(gentle_field: ResolvedField) -> None:
     """4 flights of 12 s: a coarse alarm, wide enough for so few."""
-    found = summary(fly(lab_field, range(1, 5), 12.0, 0.0), lab_field)
+    found = summary(fly(gentle_field, range(1, 5), 12.0, 0.0), gentle_field)
     assert 0.3 <= found["anees robots"].mean <= 1.8
     assert 0.3 <= found["anees target"].mean <= 1.8
     assert 0.6 <= found["nis fixed cameras"].mean <= 1.5
 
 
 @pytest.fixture(scope="module")
-def fifty(lab_field: dict[str, Any]) -> Reports:
+def fifty(gentle_field: ResolvedField) -> Reports:
     """Some 2.3 s of CPU each. 25 s hold a whole approach, several changes of topology and 900 sightings per flight."""
-    return fly(lab_field, range(100, 100 + FLIGHTS), DURATION_S, OUTLIERS)
+    return fly(gentle_field, range(100, 100 + FLIGHTS), DURATION_S, OUTLIERS)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_fifty_flights_are_consistent_in_state(fifty: Reports, lab_field: dict[str, Any]) -> None:
-    judge(fifty, lab_field, ("anees robots", "anees robots xy", "anees target", "anees target xy"))
+def test_fifty_flights_are_consistent_in_state(fifty: Reports, gentle_field: ResolvedField) -> None:
+    judge(fifty, gentle_field, ("anees robots", "anees robots xy", "anees target", "anees target xy"))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_fifty_flights_are_consistent_in_innovation(fifty: Reports, lab_field: dict[str, Any]) -> None:
-    judge(fifty, lab_field, ("nis fixed cameras", "nis onboard cameras"))
+def test_fifty_flights_are_consistent_in_innovation(fifty: Reports, gentle_field: ResolvedField) -> None:
+    judge(fifty, gentle_field, ("nis fixed cameras", "nis onboard cameras"))
 
 
 @pytest.mark.slow

@@ -1,28 +1,25 @@
 """The joint filter on real data: UTIAS MRCLAM set 7, causal, one set of figures; the bars are those of real use."""
 
-import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from groundstation.experiments.mrclam.dataset import Dataset, read_dataset
-from groundstation.experiments.mrclam.run import Result, run_scenario
+from groundstation.experiments.mrclam.run import ScenarioErrors, run_scenario
 from groundstation.experiments.mrclam.scenarios import SCENARIOS
 
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "mrclam7"
 BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
-def dataset() -> Dataset:
-    if not DATA.is_dir():
-        pytest.skip(f"no data at {DATA}; set GROUNDSTATION_DATA")
-    return read_dataset(DATA)
+def dataset(real_data: Callable[[str], Path]) -> Dataset:
+    return read_dataset(real_data("mrclam7"))
 
 
-def both(dataset: Dataset, name: str) -> tuple[Result, Result]:
+def both(dataset: Dataset, name: str) -> tuple[ScenarioErrors, ScenarioErrors]:
     return run_scenario(dataset, BY_NAME[name], False), run_scenario(dataset, BY_NAME[name], True)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from groundstation.field.resolved import ResolvedField
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import Study, StudyOptions
 from sim_bridge.study.summary import anees, interval, summary
@@ -18,20 +19,22 @@ FED_BACK = ("drone_2", "drone_3")
 
 
 @pytest.fixture(scope="module")
-def field() -> dict[str, Any]:
-    """The planner at 4 Hz: it takes most of the time, and the loop under test goes by belief and odometry."""
+def field() -> ResolvedField:
+    """The planner at 4 Hz: it takes most of the time, and the loop under test goes by belief and odometry.
+
+    The target is believed as gentle as the scenario's is, as in test_estimator_consistency.
+    """
     from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import resolved_field
 
-    resolved = load_field(FIELD).model_dump(mode="json")
-    resolved["planner"]["rate_hz"] = 4.0
-    return resolved
+    return resolved_field(load_field(FIELD, ["planner.rate_hz=4", "target.acceleration_std_m_s2=0.3"]))
 
 
-def fly(field: dict[str, Any], seeds: range, duration_s: float) -> list[dict[str, Any]]:
+def fly(field: ResolvedField, seeds: range, duration_s: float) -> list[dict[str, Any]]:
     return [Study(field, Scenario(), StudyOptions(seed, duration_s)).run() for seed in seeds]
 
 
-def test_one_short_flight_is_near_consistent(field: dict[str, Any]) -> None:
+def test_one_short_flight_is_near_consistent(field: ResolvedField) -> None:
     """A coarse alarm: double counting would show as an error many times the believed one."""
     found = summary(fly(field, range(1, 2), 4.0), field)
     assert 0.2 <= found["anees robots"].mean <= 1.8
@@ -40,7 +43,7 @@ def test_one_short_flight_is_near_consistent(field: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_fifty_flights_with_the_loop_closed(field: dict[str, Any]) -> None:
+def test_fifty_flights_with_the_loop_closed(field: ResolvedField) -> None:
     """50 flights of 20 s, some 3 s of CPU each; band 0.8..1.3 for the means, +- 0.3 at most.
 
     Shorter flights would judge a parked target (15 s: 0.79): it departs 3 s after the slowest take-off.

@@ -8,7 +8,7 @@ import os
 
 import pytest
 
-from groundstation.planning.planar.verification import verify
+from groundstation.experiments.planar.verification import verify
 
 
 def test_same_answer_as_brute_force() -> None:

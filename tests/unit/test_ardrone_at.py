@@ -1,4 +1,4 @@
-"""AT datagrams: what Parrot's own codec does with sloppy ones (AR.Drone sheet 2.1), and what we refuse to send."""
+"""AT datagrams: sloppy ones, as Parrot's own codec reads them (docs/reference/ardrone.md 2.1), and refused ones."""
 
 import math
 
@@ -60,16 +60,16 @@ def test_bare_reference_bits_are_kept_as_sent():
 
 
 def test_motion_is_clamped_on_both_sides():
-    assert at.pcmd(at.Motion(1, phi=3.0)) == at.pcmd(at.Motion(1, phi=1.0))
+    assert at.pcmd(at.ProgressiveMotion(1, phi=3.0)) == at.pcmd(at.ProgressiveMotion(1, phi=1.0))
     wild = at.AtCommand("PCMD", (1, at.bits_from_float(1.65), at.bits_from_float(-9.0), 0, 0))
-    assert at.decode_motion(wild) == at.Motion(1, 1.0, -1.0)
+    assert at.decode_motion(wild) == at.ProgressiveMotion(1, 1.0, -1.0)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_numbers_that_are_none_are_neither_sent_nor_obeyed(value):
     if value != value:
         with pytest.raises(WireError):
-            at.pcmd(at.Motion(1, value))
+            at.pcmd(at.ProgressiveMotion(1, value))
     bits = {math.inf: 0x7F800000, -math.inf: -0x00800000}.get(value, 0x7FC00000)
     with pytest.raises(WireError):
         at.decode_motion(at.AtCommand("PCMD", (1, bits, 0, 0, 0)))
@@ -82,7 +82,7 @@ def test_strings_that_the_grammar_cannot_carry(text):
 
 
 def test_datagram_numbers_rise_by_one_and_its_length_is_bounded():
-    datagram = at.encode_datagram([at.comwdg(), at.ref(False), at.pcmd(at.Motion())], 41)
+    datagram = at.encode_datagram([at.comwdg(), at.ref(False), at.pcmd(at.ProgressiveMotion())], 41)
     assert [command.sequence for command in at.decode_datagram(datagram)] == [41, 42, 43]
     with pytest.raises(WireError):
         at.encode_datagram([at.config("k" * 100, "v" * 100)] * 5, 1)

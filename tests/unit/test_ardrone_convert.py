@@ -1,23 +1,23 @@
-"""Units, frames and signs of the AR.Drone, worked out by hand from section 4.5 of its sheet."""
+"""Units, frames and signs of the AR.Drone, worked out by hand from docs/reference/ardrone.md 4.5."""
 
 import math
 
 import pytest
 
+from drivers.ardrone.commands import motion_from_attitude, orders_from_decision
 from drivers.ardrone.convert import (
     HeadingWatch,
-    Motion,
+    NavdataMotion,
     flight_state_from_navdata,
     motion_from_navdata,
 )
-from drivers.ardrone.orders import motion_from_attitude, orders_from_decision
-from drivers.ardrone.velocity_loop import HOVER, Attitude
+from drivers.ardrone.desired_config import Scale
+from drivers.ardrone.velocity_loop import HOVER, AttitudeRequest
 from drivers.ardrone.wire import at, options
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.state import ControlState, StateBit, join_control_state
-from drivers.ardrone.wishes import Scale
-from drivers.authority import Action
+from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import rotation_from_euler
@@ -153,7 +153,7 @@ def test_quaternion_is_the_rotation_of_the_angles(angles):
 
 def turning(yaw_deg, rate_deg_s=0.0, height=1.0):
     rates = (0.0, 0.0, math.radians(rate_deg_s))
-    return Motion((0.0, 0.0, 0.0), 0.0, 0.0, math.radians(yaw_deg), height, rates, (0.0, 0.0, 9.8))
+    return NavdataMotion((0.0, 0.0, 0.0), 0.0, 0.0, math.radians(yaw_deg), height, rates, (0.0, 0.0, 9.8))
 
 
 def count_resets(samples, period_ms=5):
@@ -187,13 +187,13 @@ SCALE = Scale(tilt_rad=0.2, climb_m_s=0.5, yaw_rate_rad_s=1.0)
 
 
 def test_forward_left_up_and_counter_clockwise_in_the_drones_signs():
-    forward = motion_from_attitude(Attitude(pitch_rad=0.1), SCALE)
+    forward = motion_from_attitude(AttitudeRequest(pitch_rad=0.1), SCALE)
     assert (forward.flags, forward.theta, forward.phi) == (1, pytest.approx(-0.5), 0.0), "theta < 0 flies forward"
-    left = motion_from_attitude(Attitude(roll_rad=-0.1), SCALE)
+    left = motion_from_attitude(AttitudeRequest(roll_rad=-0.1), SCALE)
     assert left.phi == pytest.approx(-0.5), "phi < 0 flies left"
-    other = motion_from_attitude(Attitude(climb_m_s=0.25, yaw_rate_rad_s=0.5), SCALE)
+    other = motion_from_attitude(AttitudeRequest(climb_m_s=0.25, yaw_rate_rad_s=0.5), SCALE)
     assert (other.gaz, other.yaw) == (pytest.approx(0.5), pytest.approx(-0.5)), "yaw < 0 turns counter-clockwise"
-    assert motion_from_attitude(HOVER, SCALE) == at.Motion()
+    assert motion_from_attitude(HOVER, SCALE) == at.ProgressiveMotion()
 
 
 def orders(action, attitude=HOVER, state=0, flight_state=FlightState.HOVERING):
@@ -225,7 +225,7 @@ def test_reference_bits(action, state, flight_state, bits):
 
 
 def test_only_fly_moves():
-    tilted = Attitude(pitch_rad=0.1)
+    tilted = AttitudeRequest(pitch_rad=0.1)
     for action in Action:
         flag = orders(action, tilted)["PCMD"][0]
         assert flag == (1 if action is Action.FLY else 0)

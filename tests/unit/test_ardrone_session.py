@@ -1,16 +1,16 @@
-"""Bootstrap and configuration against a drone that acknowledges as the sheet says, with every delay."""
+"""Bootstrap and configuration against a drone that acknowledges with every delay (docs/reference/ardrone.md 5.1)."""
 
 import math
 
 import pytest
 
+from drivers.ardrone.desired_config import Ids, Wish, ids_of, scale_from_settings, wishes
 from drivers.ardrone.identity import Identity, Model
 from drivers.ardrone.link import SequenceFilter
-from drivers.ardrone.session import Phase, Session
-from drivers.ardrone.settings import ArDroneDriverSettings, ArDroneLimits, Flight, Video
+from drivers.ardrone.session import ArdroneSession, SessionPhase
+from drivers.ardrone.settings import ArDroneDriverSettings, ArDroneLimits, FlightConfiguration, Video
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.state import StateBit
-from drivers.ardrone.wishes import Ids, Wish, ids_of, scale_from_settings, wishes
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -98,10 +98,10 @@ class Drone:
 
 
 def session_for(drone, **tcp):
-    return Session(wanted, IDS, Tcp(drone, **tcp))
+    return ArdroneSession(wanted, IDS, Tcp(drone, **tcp))
 
 
-def run(session, drone, ticks=400, every=1, until=Phase.READY):
+def run(session, drone, ticks=400, every=1, until=SessionPhase.READY):
     seen = drone.downlink[0]
     for i in range(ticks):
         commands = session.step(i * TICK, seen, 0)
@@ -146,14 +146,14 @@ def test_what_was_acknowledged_but_not_stored_is_found_by_reading_back():
 def test_a_limit_that_the_drone_does_not_take_keeps_it_on_the_ground_with_the_reason():
     drone = Drone(control__altitude_max=1000)
     session = session_for(drone)
-    assert run(session, drone, until=Phase.FAILED) is not None
+    assert run(session, drone, until=SessionPhase.FAILED) is not None
     assert drone.order.count("control:altitude_max") == 3, "bounded"
     assert session.detail == "control:altitude_max is 500 on the drone, and 3000 was written"
     assert [notice.severity for notice in session.news] == ["ERROR"]
     drone.deaf_to.clear()
     for i in range(1000, 1600):
         drone.downlink = [drone.turn(session.step(i * TICK, drone.downlink[0], 0))]
-    assert session.phase is Phase.READY, "it tries on"
+    assert session.phase is SessionPhase.READY, "it tries on"
 
 
 def test_a_wish_that_is_not_taken_is_told_and_does_not_ground():
@@ -201,10 +201,10 @@ def test_a_drone_that_was_restarted_is_configured_again(bit):
     ready = run(session, drone)
     for i in range(20):
         session.step((ready + i) * TICK, int(bit), 0)
-    assert session.phase is Phase.READY, "a drone may say so for a while"
+    assert session.phase is SessionPhase.READY, "a drone may say so for a while"
     for i in range(20, 40):
         session.step((ready + i) * TICK, int(bit), 0)
-    assert session.phase is Phase.CONFIGURING
+    assert session.phase is SessionPhase.CONFIGURING
     assert session.detail == "configuring general:navdata_demo"
 
 
@@ -217,7 +217,7 @@ def test_silence_asks_again_after_1_s_and_starts_over_after_2_s():
     assert not session.request_due(100 * MS, 1190 * MS)
     assert session.request_due(120 * MS, 1210 * MS)
     assert session.step(99 * S, 0, 2100 * MS) == []
-    assert session.phase is Phase.SEARCHING
+    assert session.phase is SessionPhase.SEARCHING
     assert session.request_due(300 * MS, 0)
 
 
@@ -225,7 +225,7 @@ SETTINGS = ArDroneDriverSettings(
     name="drone_1",
     address="127.0.0.1",
     limits=ArDroneLimits(max_tilt_deg=10, max_climb_m_s=0.1, max_yaw_rate_deg_s=20),
-    flight=Flight(ultrasound_freq=7, altitude_max_m=2.5),
+    flight=FlightConfiguration(ultrasound_freq=7, altitude_max_m=2.5),
     video=Video(codec="h264_720p", channel="bottom", bitrate=3000),
 )
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from groundstation.geometry import board
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 
-BOARD = Board(code=5, square_mm=44.0)
+BOARD = Checkerboard(code=5, square_mm=44.0)
 
 
 def test_inner_corners_of_a_44_mm_board():
@@ -57,7 +57,7 @@ def test_golden_code_words():
 def test_there_are_sixteen_codes(code):
     assert list(board.VALID_CODES) == list(range(16))
     with pytest.raises(ValueError, match="code"):
-        Board(code, 44.0)
+        Checkerboard(code, 44.0)
 
 
 def test_turning_the_board_by_180_degrees_swaps_the_colours():

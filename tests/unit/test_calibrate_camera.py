@@ -1,8 +1,6 @@
 """A lens from pictures: the published calibration of real photographs, drawn boards of a known lens, and bad input."""
 
-import os
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,16 +9,13 @@ import yaml
 from click.testing import CliRunner
 
 from drivers.camera.calibration.coverage import TILTS, coverage_of
-from drivers.camera.calibration.judge import Flaw, Judge
 from drivers.camera.calibration.pattern import pattern_of
+from drivers.camera.calibration.view_quality import Flaw, Judge
 from groundstation.cli.main import run
-from groundstation.geometry.calibration import intrinsics_from_mapping
+from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import rotation_from_euler
 
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).resolve().parents[2].parent / "shared" / "data"))
-FOLDER = DATA / "camera_calibration"
-photographs = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no photographs in {FOLDER}")
 LENS = CameraIntrinsics(480, 360, 400.0, 402.0, 243.0, 176.0, (-0.2, 0.05, 0.001, -0.001, 0.0))
 PATTERN = pattern_of("9x6", 25.0)
 POSES = [
@@ -82,10 +77,10 @@ def calibrated(tmp_path, capsys):
     return call
 
 
-@photographs
-def test_the_published_calibration_is_reproduced_with_its_recipe(calibrated):
-    code, _, file = calibrated(FOLDER, "--recipe", "opencv")
-    published = cv2.FileStorage(str(FOLDER / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
+def test_the_published_calibration_is_reproduced_with_its_recipe(calibrated, real_data):
+    folder = real_data("camera_calibration")
+    code, _, file = calibrated(folder, "--recipe", "opencv")
+    published = cv2.FileStorage(str(folder / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
     focal_px = published.getNode("camera_matrix").mat()[0, 0]
     rms_px = published.getNode("avg_reprojection_error").real()
     assert code == 0 and file["views"] == 13
@@ -94,10 +89,10 @@ def test_the_published_calibration_is_reproduced_with_its_recipe(calibrated):
     assert file["residual_px"] == pytest.approx(rms_px, abs=0.02)
 
 
-@photographs
-def test_our_own_recipe_fits_the_photographs_better_than_the_published_lens(calibrated):
+def test_our_own_recipe_fits_the_photographs_better_than_the_published_lens(calibrated, real_data):
     """The published figures hang on corners that slipped in a window of 23 px (1.2 px in left02)."""
-    code, _, file = calibrated(FOLDER)
+    folder = real_data("camera_calibration")
+    code, _, file = calibrated(folder)
     assert code == 0 and file["views"] == 13
     assert file["residual_px"] <= 0.2
     assert file["fx_px"] == pytest.approx(535.916, rel=0.007)
@@ -105,7 +100,7 @@ def test_our_own_recipe_fits_the_photographs_better_than_the_published_lens(cali
         640, 480, 535.91573, 535.91573, 342.28315, 235.57083, (-0.266373, -0.0385889, 0.00178319, -0.00028122, 0.238392)
     )
     errors = []
-    for path in sorted(FOLDER.glob("left*.jpg")):
+    for path in sorted(folder.glob("left*.jpg")):
         corners = PATTERN.corners(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
         assert corners is not None
         camera = (published.matrix, np.array(published.distortion))

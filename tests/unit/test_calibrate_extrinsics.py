@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.camera.calibration.marks import Steady
-from drivers.camera.calibration.placing import Mark, place_camera
+from drivers.camera.calibration.extrinsics import Mark, place_camera
+from drivers.camera.calibration.static_markers import Steady
 from groundstation.cli.main import run
 from groundstation.errors import DriverError
-from groundstation.geometry.board import Board, raster
+from groundstation.geometry.board import Checkerboard, raster
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
@@ -26,7 +26,7 @@ HEADINGS = {1: 0.3, 2: -1.2, 3: 2.0, 4: 0.0}
 
 def corners_of(code, camera=CEILING, lens=LENS, at=None):
     x, y, z = (*(at or PLACES[code]), 0.0)[:3]
-    points = Board(code, 44.0).corners() @ rotation_z(HEADINGS.get(code, 0.0)).T + (x, y, z)
+    points = Checkerboard(code, 44.0).corners() @ rotation_z(HEADINGS.get(code, 0.0)).T + (x, y, z)
     return lens.project(camera.inverse().apply(points))
 
 
@@ -85,11 +85,11 @@ def test_a_turned_ceiling_camera_is_placed_from_pictures(tmp_path, measured):
     assert np.allclose(lines["position_m"], CEILING.translation, atol=4 * std_m)
     assert np.allclose(lines["rotation_deg"], TURN_DEG, atol=4 * std_deg)
     # And these lines are what a field file takes.
-    from groundstation.settings.room import WorldCamera
+    from groundstation.settings.room import WorldCameraSettings
 
     lens = yaml.safe_load((tmp_path / "lens.yaml").read_text())
     entry = {"source": "/dev/video0", "calibration": lens | {"distortion": tuple(lens["distortion"])}, **lines}
-    WorldCamera.model_validate(entry, strict=False)
+    WorldCameraSettings.model_validate(entry, strict=False)
 
 
 def test_the_deviations_told_are_those_of_the_errors():

@@ -21,7 +21,7 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 
 SECTION = {
     "name": "drone_1_camera",
@@ -120,7 +120,7 @@ def jpeg():
     lens = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
     mount = Mount(Pose(base_from_tilted_optical(math.radians(45)), np.array([0.09, 0.0, 0.0])), "drone_1")
     boards = (BoardSpec("bot", 5, 44.0, (0, 0, 0.4), BodyShape.TURTLEBOT),)
-    spec = RenderSpec("c", mount, lens, boards, "t", ("drone_1", "bot"), "127.0.0.1", 0, CameraScenario(exposure_ms=0))
+    spec = RenderSpec("c", mount, lens, boards, "t", ("drone_1", "bot"), "127.0.0.1", 0, PictureQuality(exposure_ms=0))
     states = np.zeros((2, 13))
     states[0, 2], states[0, 6], states[1, 0], states[1, 8] = 1.8, 0.1, 1.4, 0.5
     return encoded(Renderer(spec).render(states))

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivers.camera.sources.container import device
-from drivers.camera.sources.drain import Drain
 from drivers.camera.sources.opening import open_source
+from drivers.camera.sources.reader_thread import Drain
 
 
 def wait_for(condition, seconds=10.0):

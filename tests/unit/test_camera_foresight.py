@@ -7,17 +7,17 @@ import pytest
 
 from drivers.camera import pose
 from drivers.camera.convert import stabilized_from_optical
-from drivers.camera.foresight import Foresight
 from drivers.camera.pipeline import Pipeline
+from drivers.camera.prediction import Foresight
 from drivers.camera.settings import DetectorSettings, MarkerKind, MarkerSettings, MountSettings
 from groundstation.bus.messages import EntityEstimate, Estimate, Header
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
 MOUNT = MountSettings(parent="drone_1", position_m=(0.09, 0.0, 0.0), tilt_down_deg=45.0)
@@ -26,7 +26,7 @@ MARKERS = (
     MarkerSettings(entity="bot", code=5, square_mm=44.0, position_m=(0.0, 0.0, 0.4), kind=MarkerKind.TARGET),
 )
 FRAME_NS = 66_666_667
-SCENARIO = CameraScenario(exposure_ms=0.0)
+SCENARIO = PictureQuality(exposure_ms=0.0)
 
 
 def renderer_of(codes=(2, 5), square_mm=44.0, scenario=SCENARIO):
@@ -74,7 +74,7 @@ def gravity_of(states):
 
 def true_corners(renderer, states, body):
     sight = next(s for s in compose_scene(renderer._spec, np.array(states)).sights if s.board.body == body)
-    return FRONT.project(sight.optical_from_marker.apply(Board(5, 44.0).corners()))
+    return FRONT.project(sight.optical_from_marker.apply(Checkerboard(5, 44.0).corners()))
 
 
 SCENE = [state(0.2, -0.1, 2.0, 0.5, 0.05, -0.08), state(1.6, 1.2, 0.5, 2.0), state(1.7, 0.5, 0.0, -1.0)]

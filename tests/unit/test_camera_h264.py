@@ -1,22 +1,19 @@
 """From access units to pictures: backlogs, gaps, damage, another size; and what a real drone recorded."""
 
-import os
 from collections import Counter
 from fractions import Fraction
-from pathlib import Path
 
 import av
 import numpy as np
 import pytest
 
-from drivers.ardrone.wire.pave import Frame, FrameReader, FrameType
+from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame
 from drivers.camera.sources.ardrone import Assembly
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
-from drivers.camera.sources.settled import SettledClock
+from drivers.camera.sources.jitter_filter import SettledClock
 from groundstation.errors import DriverError
 
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data")) / "ardrone"
 MS = 1_000_000
 
 
@@ -91,13 +88,10 @@ def test_another_picture_size_begins_with_its_key_picture(stream):
     assert found[1].jpeg().startswith(b"\xff\xd8")
 
 
-def test_pictures_of_a_real_drone():
-    path = DATA / "pave68-node-24971.bin"
-    if not path.exists():
-        pytest.skip(f"no capture at {path}; set GROUNDSTATION_DATA")
+def test_pictures_of_a_real_drone(real_data):
     assembly, decoder = Assembly(), H264Decoder(Counter())
     shapes, sharpness = [], []
-    for frame in FrameReader().feed(path.read_bytes()):
+    for frame in FrameReader().feed(real_data("ardrone/pave68-node-24971.bin").read_bytes()):
         found = decoder.newest(assembly.units([frame], frame.timestamp_ms * MS + 77))
         assert found is not None
         shapes.append(found[1].grey().shape)
@@ -107,7 +101,7 @@ def test_pictures_of_a_real_drone():
 
 
 def pave(number, payload=b"x", timestamp_ms=0, kind=FrameType.PREDICTED, codec=4, **more):
-    return Frame(codec, 640, 360, number, timestamp_ms, kind, payload, **more)
+    return PaveFrame(codec, 640, 360, number, timestamp_ms, kind, payload, **more)
 
 
 def test_gaps_and_new_sizes_are_seen_by_number_and_header():
@@ -117,7 +111,7 @@ def test_gaps_and_new_sizes_are_seen_by_number_and_header():
         pave(2),
         pave(4),
         pave(5),
-        Frame(4, 1280, 720, 6, 0, FrameType.PREDICTED, b"x"),
+        PaveFrame(4, 1280, 720, 6, 0, FrameType.PREDICTED, b"x"),
     ]
     got = [unit for frame in frames for unit in assembly.units([frame], 0)]
     assert [(unit.starts, unit.follows) for unit in got] == [

@@ -1,8 +1,5 @@
 """Corners in real photographs (OpenCV's calibration pictures): found, and refined to the print's own error."""
 
-import os
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -12,8 +9,6 @@ from drivers.camera.detect import spacing_px
 from drivers.camera.search import saddle_points, search
 from groundstation.geometry.lens import CameraIntrinsics
 
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).resolve().parents[2].parent / "shared" / "data"))
-FOLDER = DATA / "camera_calibration"
 LENS = CameraIntrinsics(
     640,
     480,
@@ -24,20 +19,19 @@ LENS = CameraIntrinsics(
     (-0.26637260909660682, -0.038588898922304653, 0.0017831947042852964, -0.00028122100441115472, 0.23839153080878486),
 )
 
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no photographs in {FOLDER}")
 
-
-def photographs():
-    return sorted(FOLDER.glob("*.jpg"))
+@pytest.fixture
+def photographs(real_data):
+    return sorted(real_data("camera_calibration").glob("*.jpg"))
 
 
 def found_corners(picture):
     return Pattern(9, 6, 25.0).corners(picture)
 
 
-def test_all_boards_are_found_and_refined_to_a_fifth_of_a_pixel():
+def test_all_boards_are_found_and_refined_to_a_fifth_of_a_pixel(photographs):
     """13 of 13; the residual is that of an own calibration with these corners, its lens model included."""
-    pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in photographs()]
+    pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in photographs]
     corners = [found_corners(picture) for picture in pictures]
     assert len(corners) == 13
     assert all(found is not None for found in corners)
@@ -55,9 +49,9 @@ def test_a_picture_without_a_board_has_no_corners():
 
 
 @pytest.mark.parametrize("name", ["left01.jpg", "left03.jpg", "left05.jpg", "left12.jpg"])
-def test_our_lens_explains_real_corners(name):
+def test_our_lens_explains_real_corners(name, real_data):
     """A flat board seen through the published calibration: a homography of undistorted corners leaves little over."""
-    corners = found_corners(cv2.imread(str(FOLDER / name), cv2.IMREAD_GRAYSCALE))
+    corners = found_corners(cv2.imread(str(real_data("camera_calibration") / name), cv2.IMREAD_GRAYSCALE))
     rays = LENS.normalised_from_pixels(corners)
     plane = np.array([[x, y] for y in range(6) for x in range(9)], dtype=np.float64)
     h, _ = cv2.findHomography(plane, rays)
@@ -66,9 +60,9 @@ def test_our_lens_explains_real_corners(name):
     assert np.sqrt((errors**2).sum(axis=1).mean()) < 0.35
 
 
-def test_nearly_all_real_corners_are_seeds_of_the_search():
+def test_nearly_all_real_corners_are_seeds_of_the_search(photographs):
     shares = []
-    for path in photographs():
+    for path in photographs:
         picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         seeds = saddle_points(picture).points
         corners = found_corners(picture)
@@ -78,7 +72,7 @@ def test_nearly_all_real_corners_are_seeds_of_the_search():
     assert np.mean(shares) > 0.95
 
 
-def test_a_larger_board_is_not_taken_for_a_marker():
-    for path in photographs():
+def test_a_larger_board_is_not_taken_for_a_marker(photographs):
+    for path in photographs:
         picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         assert [spacing_px(find.corners) for find in search(picture, [])] == []

@@ -12,18 +12,18 @@ from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import DetectorSettings, MarkerSettings, MountSettings
 from groundstation.geometry import board as marker
 from groundstation.geometry.angles import wrap
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
 CEILING = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, (-0.12, 0.05, 0.0, 0.0, 0.0))
-CLEAN = CameraScenario(corner_noise_px=0.0, pixel_noise=2.0, blur_px=0.7, exposure_ms=0.0)
-REAL = CameraScenario(exposure_ms=0.0)
+CLEAN = PictureQuality(corner_noise_px=0.0, pixel_noise=2.0, blur_px=0.7, exposure_ms=0.0)
+REAL = PictureQuality(exposure_ms=0.0)
 TILTED = MountSettings(parent="drone_1", position_m=(0.09, 0.0, 0.0), tilt_down_deg=45.0)
 DOWN = MountSettings(parent="world", position_m=(0.0, 0.0, 4.2), looking="down")
 CODES = {"drone_2": 2, "bot": 5}
@@ -118,7 +118,7 @@ class Trial:
             sight_line = truth.optical_from_marker.translation / range_m
             if -truth.optical_from_marker.rotation[:, 2] @ sight_line < 0.5:  # steeper than 60 deg
                 continue
-            card = FRONT.project(truth.optical_from_marker.apply(Board(5, 44.0).outline()))
+            card = FRONT.project(truth.optical_from_marker.apply(Checkerboard(5, 44.0).outline()))
             if not FRONT.contains(card, 8.0).all():
                 continue
             self.asked += 1
@@ -182,7 +182,7 @@ def test_identities_are_never_wrong():
         x = 0.09 + range_m / math.sqrt(2)
         states = np.array([state(0, 0, 0.4 + x - 0.09), state(x, random.uniform(-0.3, 0.3), 0, random.uniform(-3, 3))])
         truth = compose_scene(spec, states).sights[0].optical_from_marker
-        corners = FRONT.project(truth.apply(Board(code, 44.0).corners()))
+        corners = FRONT.project(truth.apply(Checkerboard(code, 44.0).corners()))
         picture, spacing = renderers[code].render(states), spacing_px(corners)
         find = find_board(picture, window_around(corners, 1.6 * spacing, picture.shape), spacing)
         reading = read_bar(picture, find, FRONT) if find else None

@@ -7,12 +7,12 @@ import pytest
 
 from drivers.camera import pose
 from groundstation.geometry.angles import wrap
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
-POINTS = Board(5, 44.0).corners()
+POINTS = Checkerboard(5, 44.0).corners()
 STABILIZED_FROM_OPTICAL = base_from_tilted_optical(math.radians(45))
 
 

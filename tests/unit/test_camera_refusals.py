@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from drivers.camera import jpeg
-from drivers.camera.settings import SourceAddress, SourceKind, parse_source, without_password
+from drivers.camera.settings import SourceAddress, SourceKind, parse_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
 
 
@@ -62,7 +62,8 @@ def test_any_bytes_have_a_size_or_none():
         ("http://10.0.0.5/a?b=1", SourceAddress(SourceKind.HTTP, "10.0.0.5", 80, "/a?b=1")),
         ("ardrone://192.168.1.1", SourceAddress(SourceKind.ARDRONE, "192.168.1.1", 5555, "/")),
         ("ardrone://192.168.1.1:5600", SourceAddress(SourceKind.ARDRONE, "192.168.1.1", 5600, "/")),
-        ("rtsp://me:pass@cam/live", SourceAddress(SourceKind.RTSP, "cam", 554, "/live")),
+        ("rtsp://me:pass@cam/live", SourceAddress(SourceKind.RTSP, "cam", 554, "/live", "me:pass")),
+        ("http://me:p%40ss%2F@cam/", SourceAddress(SourceKind.HTTP, "cam", 80, "/", "me:p@ss/")),
         ("/dev/video2", SourceAddress(SourceKind.DEVICE, path="/dev/video2")),
         ("file:///a b/c.mp4", SourceAddress(SourceKind.FILE, path="/a b/c.mp4")),
         ("/a/pictures", SourceAddress(SourceKind.FILE, path="/a/pictures")),
@@ -70,9 +71,3 @@ def test_any_bytes_have_a_size_or_none():
 )
 def test_sources_are_taken_apart(text, address):
     assert parse_source(text) == address
-
-
-def test_messages_name_a_source_without_its_password():
-    assert without_password("rtsp://me:pass@cam:554/live@2") == "rtsp://cam:554/live@2"
-    assert without_password("ardrone://192.168.1.1") == "ardrone://192.168.1.1"
-    assert without_password("/dev/video0") == "/dev/video0"

@@ -3,6 +3,7 @@
 import socket
 import threading
 import time
+from base64 import b64encode
 from contextlib import contextmanager
 
 import pytest
@@ -163,6 +164,20 @@ def test_strange_servers_are_named(answer, complaint):
     with reading(_serve_once(answer)) as source:
         wait_for(lambda: complaint in source.detail)
         assert not source.connected
+
+
+def test_the_reader_logs_in_with_the_address_s_user_and_password():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        source = open_source(f"http://me:p%40ss@127.0.0.1:{listener.getsockname()[1]}/video.mjpg")
+        try:
+            listener.settimeout(5.0)
+            connection, _ = listener.accept()
+            with connection:
+                request = read_until(connection, b"\r\n\r\n")
+        finally:
+            source.close()
+    assert request.startswith(b"GET /video.mjpg HTTP/1.0\r\n")
+    assert b"\r\nAuthorization: Basic " + b64encode(b"me:p@ss") + b"\r\n" in request
 
 
 def test_an_absent_camera_is_named():

@@ -14,15 +14,16 @@ from groundstation.geometry.angles import wrap
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 from groundstation.settings.sections import driver_sections
 from sim_bridge.cameras import render_specs
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 
@@ -40,9 +41,9 @@ def state(x, y, z, yaw=0.0):
     return [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0, 0.0]
 
 
-def renderer_of(family, number=7, scenario=CameraScenario(exposure_ms=0.0)):  # noqa: B008  frozen
+def renderer_of(family, number=7, scenario=PictureQuality(exposure_ms=0.0)):  # noqa: B008  frozen
     mount = Mount(Pose(base_from_tilted_optical(math.radians(45)), np.zeros(3)), "drone_1")
-    board = BoardSpec("bot", 0, 0.0, (0.0, 0.0, 0.4), BodyShape.TURTLEBOT, Tag(family, number, 168.0))
+    board = BoardSpec("bot", 0, 0.0, (0.0, 0.0, 0.4), BodyShape.TURTLEBOT, SquareTag(family, number, 168.0))
     return Renderer(RenderSpec("c", mount, FRONT, (board,), "t", ("drone_1", "bot"), "127.0.0.1", 0, scenario))
 
 
@@ -99,15 +100,14 @@ def test_the_field_file_chooses_the_kind_of_each_marker():
     field = load_field(find_field("lab"), TAGGED)
     ceiling = next(part for part in driver_sections(field) if part.name == "ceiling")
     assert '"tag":{"dictionary":"DICT_APRILTAG_36H11","id":7,"size_mm":168.0}' in ceiling.section
-    resolved = field.model_dump(mode="json")
-    specs = render_specs(parse_site(resolved), Scenario(), {"ceiling": ("127.0.0.1", 1)}, "t", 1)
+    specs = render_specs(parse_site(field.model_dump(mode="json")), Scenario(), {"ceiling": ("127.0.0.1", 1)}, "t", 1)
     assert {board.body: board.tag for board in specs[0].boards} == {
         "drone_1": None,
-        "drone_2": Tag("DICT_APRILTAG_36H11", 7, 168.0),
+        "drone_2": SquareTag("DICT_APRILTAG_36H11", 7, 168.0),
         "turtlebot": None,
     }
-    ordinary = sensors_from_field(load_field(find_field("lab")).model_dump(mode="json"))
-    reach = sensors_from_field(resolved).world["ceiling"].view.range_m
+    ordinary = sensors_from_field(resolved_field(load_field(find_field("lab"))))
+    reach = sensors_from_field(resolved_field(field)).world["ceiling"].view.range_m
     assert reach == pytest.approx(ordinary.world["ceiling"].view.range_m, rel=0.02)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.camera.calibration.stream import Stream
+from drivers.camera.calibration.stream import PictureServer
 from drivers.camera.multipart import MultipartParser
 from groundstation.cli.main import run
 from groundstation.geometry.board import EXTENT, raster
@@ -75,7 +75,7 @@ def test_bad_input_is_named(files, capsys):
 
 
 def test_a_stream_is_one_that_our_own_reader_understands():
-    stream = Stream(0)
+    stream = PictureServer(0)
     jpeg = cv2.imencode(".jpg", picture())[1].tobytes()
     halt = threading.Event()
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from groundstation.bench import estimator as estimator_bench
+from groundstation.bench import estimator_path, estimator_peers
+from groundstation.bench.estimator_team import frame_of, joined_state, minimal_parameters, team_of
 from groundstation.bus import codec, keys
 from groundstation.bus.messages import Verdict
 from groundstation.bus.topics import INNOVATION
 from groundstation.cli import bench_estimator
-from groundstation.experiments import estimator_bench, estimator_path, estimator_peers
-from groundstation.experiments.estimator_team import frame_of, joined_state, minimal_parameters, team_of
 
 
 def test_the_team_has_the_edges_that_are_asked_for():

@@ -126,7 +126,7 @@ def test_errors_are_told_without_a_traceback(
     def fail() -> None:
         raise error
 
-    monkeypatch.setitem(cli.VERBS, "broken", cli.Verb("Look", f"{__name__}:broken", "Fails."))
+    monkeypatch.setitem(cli.VERBS, "broken", cli.CommandRow("Look", f"{__name__}:broken", "Fails."))
     monkeypatch.setattr(cli.VerbGroup, "get_command", lambda *_: click.Command("broken", callback=fail))
     assert cli.run(["broken"]) == exit_code_of(error)
     assert capsys.readouterr().err == expected

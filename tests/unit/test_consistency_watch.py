@@ -1,9 +1,9 @@
 """Who contradicts the belief for seconds is named to the operator, with the remedy; a wild sighting is not."""
 
 from groundstation.bus.messages import Header, Odometry, Severity, Verdict
+from groundstation.bus.notice import Notice
 from groundstation.estimation.measurement import Correction
-from groundstation.runtime.consistency import ConsistencyWatch
-from groundstation.tracker import Notice
+from groundstation.runtime.consistency_watch import ConsistencyWatch
 
 NAMES = ("ceiling", "drone_1", "drone_2", "turtlebot")
 RIGHT, FAR = 1.0, 9.0

@@ -16,32 +16,31 @@ from groundstation.cli import deadman
 from groundstation.cli.deadman import Handle, watch
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError
-
-NS = 1_000_000_000
+from groundstation.time_units import NS_PER_S
 
 
 def test_it_does_nothing_before_it_is_held() -> None:
-    man = DeadMan(NS)
-    assert [man.step(k * NS) for k in range(100)] == [None] * 100
+    man = DeadMan(NS_PER_S)
+    assert [man.step(k * NS_PER_S) for k in range(100)] == [None] * 100
 
 
 def test_let_go_it_holds_and_then_lands_once() -> None:
-    man = DeadMan(NS)
-    man.press(10 * NS)
-    assert man.step(11 * NS) is None
-    assert man.step(11 * NS + 1) is Verb.HOLD
-    assert man.step(12 * NS) is None
-    assert man.step(17 * NS) is Verb.LAND
-    assert man.step(90 * NS) is None and man.grip is Grip.LANDED
+    man = DeadMan(NS_PER_S)
+    man.press(10 * NS_PER_S)
+    assert man.step(11 * NS_PER_S) is None
+    assert man.step(11 * NS_PER_S + 1) is Verb.HOLD
+    assert man.step(12 * NS_PER_S) is None
+    assert man.step(17 * NS_PER_S) is Verb.LAND
+    assert man.step(90 * NS_PER_S) is None and man.grip is Grip.LANDED
 
 
 def test_held_again_in_time_it_does_not_land() -> None:
-    man = DeadMan(NS)
+    man = DeadMan(NS_PER_S)
     man.press(0)
     assert man.release(1) is Verb.HOLD
     assert man.release(2) is None
-    man.press(3 * NS)
-    assert man.step(4 * NS) is None and man.grip is Grip.HELD
+    man.press(3 * NS_PER_S)
+    assert man.step(4 * NS_PER_S) is None and man.grip is Grip.HELD
 
 
 @pytest.fixture
@@ -67,7 +66,7 @@ def button(number: int, value: int, kind: int = 1) -> bytes:
     ],
 )
 def test_keys(pipe: tuple[int, int], data: bytes, grip: Grip, verb: Verb | None, leaves: bool) -> None:
-    man = DeadMan(NS)
+    man = DeadMan(NS_PER_S)
     os.write(pipe[1], data)
     assert Handle(pipe[0], gamepad=False).feel(man, 5) == (verb, leaves)
     assert man.grip is grip
@@ -94,7 +93,7 @@ def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None
     bus, drone = MemoryBus(exchange, "lab", "deadman_1"), MemoryBus(exchange, "lab", "drone_1")
     commands = drone.subscribe([t.COMMAND])
     os.write(pipe[1], b" q")
-    man = DeadMan(NS)
+    man = DeadMan(NS_PER_S)
     man.press(time.monotonic_ns())
     began = time.monotonic()
     watch(bus, ("drone_1",), Handle(pipe[0], gamepad=False), man, lambda: time.monotonic() - began < 0.8)

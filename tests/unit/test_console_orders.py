@@ -1,20 +1,35 @@
 """Orders of the page on the bus, who may give them, and how far they came."""
 
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from groundstation.bus import clock
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.console.board import Board
-from groundstation.console.helm import Helm
-from groundstation.console.orders import OrderDesk
-from groundstation.console.protocol import Drive, FollowPath, Hello, Order, Place, Release, Seen, TakeOver, Watch
+from groundstation.console.commands import OrderDesk
+from groundstation.console.operator_lock import Helm
+from groundstation.console.protocol import (
+    CommandRequest,
+    Drive,
+    FollowPath,
+    FramesHandled,
+    Hello,
+    Place,
+    Release,
+    TakeOver,
+    Watch,
+)
+from groundstation.console.section import run_id
 from groundstation.console.session import Sessions
-from groundstation.console.viewer import Viewer
+from groundstation.console.snapshot import Snapshot
+from groundstation.console.viewer import PageConnection
+from groundstation.time_units import NS_PER_S
 
 DRONES = ("drone_1", "drone_2")
-NS = 1_000_000_000
+RUN = "run-1"
 
 
 class Room:
@@ -25,12 +40,12 @@ class Room:
         self.heard = self.others.subscribe([t.COMMAND])
         self.steering = self.others.subscribe([t.SIM_COMMAND])
         self.desk = OrderDesk(self.bus, DRONES)
-        self.sessions = Sessions(self.bus, self.desk, "secret", targets)
+        self.sessions = Sessions(self.bus, self.desk, "secret", RUN, targets)
         self.now_ns = clock.now_ns()
 
     def lease(self) -> None:
         header = self.bus.header("team")
-        self.desk.hear_lease(m.Lease(header=header, holder="operator", expires_ns=header.stamp_ns + 60 * NS))
+        self.desk.hear_lease(m.Lease(header=header, holder="operator", expires_ns=header.stamp_ns + 60 * NS_PER_S))
 
     def commands(self) -> list[m.Command]:
         return [item.message for item in self.heard.drain() if isinstance(item.message, m.Command)]
@@ -40,26 +55,31 @@ class Room:
         ack = m.CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
         self.desk.hear(ack, self.now_ns)
 
-    def viewer(self, number: int, token: str = "secret") -> Viewer:
+    def viewer(self, number: int, token: str = "secret") -> PageConnection:
         async def nothing(_: object) -> None:
             return None
 
-        viewer = Viewer(number, Board(), nothing, nothing)
+        viewer = PageConnection(number, Snapshot(), nothing, nothing)
         self.sessions.add(viewer)
         self.sessions.handle(viewer, Hello(token=token, client=f"client-{number}"))
         return viewer
 
-    def says(self, viewer: Viewer) -> str:
+    def says(self, viewer: PageConnection) -> str:
         return " ".join(viewer._urgent)
 
     def give(self, verb: m.Verb, drones: tuple[str, ...] = (), late_ms: float = 0.0) -> str:
-        return self.desk.give(verb, drones, "viewer 1", self.now_ns / 1e6 - late_ms, "r", self.now_ns)
+        return self.desk.give(verb, drones, "viewer 1", late_ms, "r", self.now_ns)
+
+
+def order(verb: m.Verb, run: str = RUN, late_ms: float = 0.0, age_ms: float = 0.0, ref: str = "") -> CommandRequest:
+    """Return what a page sends; late_ms: how old it is by the server's clock, age_ms: by the page's own count."""
+    return CommandRequest(verb, (), run, clock.now_ns() / 1e6 - late_ms, age_ms, ref)
 
 
 @pytest.mark.parametrize("verb", [m.Verb.HOLD, m.Verb.LAND, m.Verb.CUT_MOTORS])
 def test_stops_go_to_the_drones_whatever_else(verb: m.Verb) -> None:
     room = Room()
-    assert room.give(verb, late_ms=1e9) == ""
+    assert room.give(verb, late_ms=4900) == ""
     (command,) = room.commands()
     assert (command.verb, command.scope, command.expires_ns, command.header.entity) == (verb, (), 0, "team")
 
@@ -69,12 +89,34 @@ def test_starts_go_to_the_lease_holder_fresh_or_not_at_all() -> None:
     assert "lease" in room.give(m.Verb.TAKEOFF)
     room.lease()
     assert "too late" in room.give(m.Verb.TAKEOFF, late_ms=2500)
-    assert "too late" in room.desk.give(m.Verb.TRACK, (), "v", float("nan"), "", room.now_ns)
     assert "no drone x" in room.give(m.Verb.TAKEOFF, ("x",))
     assert room.commands() == []
     assert room.give(m.Verb.TAKEOFF, ("drone_2",)) == ""
     (command,) = room.commands()
     assert command.scope == ("operator", "drone_2") and command.expires_ns > 0
+
+
+@pytest.mark.parametrize("verb", [m.Verb.HOLD, m.Verb.LAND, m.Verb.CUT_MOTORS])
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [({"run": "run-0"}, "another run"), ({"late_ms": 5100}, "too late"), ({"age_ms": 5100}, "too late")],
+)
+def test_a_stop_of_another_run_or_of_long_ago_stops_nobody(verb: m.Verb, bad: dict[str, Any], reason: str) -> None:
+    room = Room()
+    room.lease()
+    viewer = room.viewer(1)
+    room.sessions.handle(viewer, order(verb, ref="mine", **bad))
+    assert room.commands() == []
+    assert reason in room.says(viewer) and '"ref":"mine"' in room.says(viewer)
+    # A page that reckons the server's time as too late must not make its orders live longer.
+    room.sessions.handle(viewer, order(verb, late_ms=-60_000, age_ms=4900))
+    assert [command.verb for command in room.commands()] == [verb]
+
+
+def test_a_restarted_console_serves_the_same_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_id("runs/a") == run_id(str(tmp_path / "runs/a"))  # as the runtime file has it
+    assert run_id("runs/a") != run_id("runs/a-2")
 
 
 def test_an_order_is_followed_to_its_end() -> None:
@@ -87,20 +129,20 @@ def test_an_order_is_followed_to_its_end() -> None:
     room.ack(command, "drone_2", m.AckStage.RECEIVED)
     assert room.desk.summary()[0]["state"] == "heard"
     room.ack(command, "drone_2", m.AckStage.EFFECTIVE)
-    order = room.desk.summary()[0]
-    assert order["state"] == "confirmed" and order["ref"] == "r" and order["by"] == "viewer 1" and order["team"]
+    given = room.desk.summary()[0]
+    assert given["state"] == "confirmed" and given["ref"] == "r" and given["by"] == "viewer 1" and given["team"]
 
 
 def test_what_is_not_heard_is_repeated_and_in_the_end_not_confirmed() -> None:
     room = Room()
     room.give(m.Verb.LAND)
     (command,) = room.commands()
-    room.desk.step(room.now_ns + NS)
-    room.desk.step(room.now_ns + NS + 1)
+    room.desk.step(room.now_ns + NS_PER_S)
+    room.desk.step(room.now_ns + NS_PER_S + 1)
     assert [again.id for again in room.commands()] == [command.id]
-    room.desk.step(room.now_ns + 25 * NS)
+    room.desk.step(room.now_ns + 25 * NS_PER_S)
     assert room.desk.summary()[0]["state"] == "not_confirmed"
-    room.desk.step(room.now_ns + 26 * NS)
+    room.desk.step(room.now_ns + 26 * NS_PER_S)
     assert room.commands() == []
 
 
@@ -110,8 +152,8 @@ def test_a_refusal_is_shown_with_its_reason() -> None:
     (command,) = room.commands()
     room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
     room.ack(command, "drone_2", m.AckStage.REFUSED, "not flying")
-    order = room.desk.summary()[0]
-    assert order["state"] == "refused" and order["rows"][1]["reason"] == "not flying"
+    given = room.desk.summary()[0]
+    assert given["state"] == "refused" and given["rows"][1]["reason"] == "not flying"
 
 
 def test_everybody_s_orders_are_followed_even_if_answers_come_first() -> None:
@@ -121,9 +163,9 @@ def test_everybody_s_orders_are_followed_even_if_answers_come_first() -> None:
     room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
     room.desk.hear(command, room.now_ns)
     room.desk.hear(command, room.now_ns)
-    (order,) = room.desk.summary()
-    assert order["state"] == "confirmed" and order["by"] == "cli_1"
-    room.desk.step(room.now_ns + NS)
+    (given,) = room.desk.summary()
+    assert given["state"] == "confirmed" and given["by"] == "cli_1"
+    room.desk.step(room.now_ns + NS_PER_S)
     assert room.commands() == []  # others repeat their own
     for number in range(50):
         again = m.Command(header=header, id=f"{number}", verb=m.Verb.HOLD, scope=(), issuer="tracker")
@@ -139,7 +181,7 @@ def test_without_the_token_a_page_only_looks() -> None:
     room = Room()
     room.lease()
     stranger = room.viewer(1, token="guess")
-    for message in (Order(m.Verb.LAND, (), 0.0), TakeOver(), Place(0.0, 0.0)):
+    for message in (order(m.Verb.LAND), TakeOver(), Place(0.0, 0.0)):
         room.sessions.handle(stranger, message)
     assert room.commands() == [] and room.steering.drain() == []
     assert room.sessions.helm.client == ""
@@ -152,10 +194,9 @@ def test_one_operator_at_a_time_and_anybody_may_stop() -> None:
     room = Room()
     room.lease()
     first, second = room.viewer(1), room.viewer(2)
-    now_ms = room.now_ns / 1e6
-    room.sessions.handle(first, Order(m.Verb.TRACK, (), now_ms))
-    room.sessions.handle(second, Order(m.Verb.TRACK, (), now_ms, "mine"))
-    room.sessions.handle(second, Order(m.Verb.LAND, (), now_ms))
+    room.sessions.handle(first, order(m.Verb.TRACK))
+    room.sessions.handle(second, order(m.Verb.TRACK, ref="mine"))
+    room.sessions.handle(second, order(m.Verb.LAND))
     assert [command.verb for command in room.commands()] == [m.Verb.TRACK, m.Verb.LAND]
     assert "viewer 1 is the operator" in room.says(second) and '"ref":"mine"' in room.says(second)
     room.sessions.handle(second, TakeOver())
@@ -168,14 +209,14 @@ def test_one_operator_at_a_time_and_anybody_may_stop() -> None:
 def test_the_helm_waits_for_a_page_that_reconnects() -> None:
     helm = Helm()
     helm.take("a", "viewer 1")
-    helm.left("a", NS)
-    helm.step(10 * NS)
+    helm.left("a", NS_PER_S)
+    helm.step(10 * NS_PER_S)
     assert not helm.may_start("b")
     helm.arrived("a", "viewer 2")
-    helm.step(100 * NS)
+    helm.step(100 * NS_PER_S)
     assert helm.name == "viewer 2"
-    helm.left("a", 100 * NS)
-    helm.step(116 * NS)
+    helm.left("a", 100 * NS_PER_S)
+    helm.step(116 * NS_PER_S)
     assert helm.may_start("b")
 
 
@@ -199,7 +240,7 @@ def test_only_a_simulated_target_is_steered() -> None:
 def test_viewers_that_lag_are_spared(monkeypatch: pytest.MonkeyPatch) -> None:
     room = Room()
     viewer = room.viewer(1)
-    room.sessions.handle(viewer, Seen(10**9))  # nobody has seen what was not sent
+    room.sessions.handle(viewer, FramesHandled(10**9))  # nobody has seen what was not sent
     assert viewer._seen == 0
     for number in range(70):
         viewer.say(f"{number}")

@@ -3,7 +3,6 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -17,27 +16,28 @@ from groundstation.bus import topics as t
 from groundstation.bus.api import Received
 from groundstation.bus.jpeg import stated_size
 from groundstation.bus.topics import Topic
-from groundstation.console.board import Board
-from groundstation.console.health import Health, chi_square_bounds
 from groundstation.console.history import History
+from groundstation.console.innovation_statistics import InnovationStatistics, chi_square_bounds
 from groundstation.console.pictures import PictureDesk, frame_of
-from groundstation.console.scene import bare_scene, lenses_of, scene_from_field
-from groundstation.console.section import port_of
+from groundstation.console.room import bare_scene, lenses_of, scene_from_field
+from groundstation.console.snapshot import Snapshot
 from groundstation.console.state import ConsoleState
+from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.state import Cast
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+from groundstation.time_units import NS_PER_S
 
 LAB = Path(__file__).parents[2] / "config" / "lab.yaml"
-NS = 1_000_000_000
 JPEG = bytes(cv2.imencode(".jpg", np.zeros((360, 640, 3), np.uint8))[1])
 
 
 @pytest.fixture(scope="module")
-def field() -> dict[str, Any]:
-    return dict(load_field(LAB, []).model_dump(mode="json"))
+def field() -> ResolvedField:
+    return resolved_field(load_field(LAB, []))
 
 
-def header(entity: str, stamp_ns: int = NS) -> m.Header:
+def header(entity: str, stamp_ns: int = NS_PER_S) -> m.Header:
     return m.Header(stamp_ns, "c", entity, "s", 0)
 
 
@@ -46,7 +46,7 @@ def received(topic: Topic, message: m.Message) -> Received:
     return Received(key, message.header, message, b"")
 
 
-def estimate(stamp_ns: int = NS, age_s: float = 0.1) -> m.Estimate:
+def estimate(stamp_ns: int = NS_PER_S, age_s: float = 0.1) -> m.Estimate:
     robot = m.EntityEstimate(
         "drone_1", "robot", (1.0, 2.0, 1.5, 0.3), (0.04, 0.01, 0, 0, 0.01, 0.02) + (0.0,) * 10, (0, 0, 0), True, age_s
     )
@@ -55,7 +55,7 @@ def estimate(stamp_ns: int = NS, age_s: float = 0.1) -> m.Estimate:
 
 
 def test_a_board_tells_what_changed_since() -> None:
-    board = Board()
+    board = Snapshot()
     board.begin()
     board.put("a", 1)
     board.put("b", 2)
@@ -72,7 +72,7 @@ def test_a_board_tells_what_changed_since() -> None:
 
 
 def test_sections_say_what_came() -> None:
-    state, board = ConsoleState(Cast("lab", {"drone_1": 0.15}, ("turtlebot",)), NS), Board()
+    state, board = ConsoleState(Cast("lab", {"drone_1": 0.15}, ("turtlebot",)), NS_PER_S), Snapshot()
     setpoint = m.VelocitySetpoint(
         header=header("drone_1"), velocity_m_s=(0.1, 0, 0), yaw_rate_rad_s=0.2, lifetime_ms=300, epoch=3
     )
@@ -114,8 +114,8 @@ def test_sections_say_what_came() -> None:
     )
     for turn in range(10):
         board.begin()
-        state.note(NS + turn * 50_000_000)
-        state.put(board, NS + turn * 50_000_000)
+        state.note(NS_PER_S + turn * 50_000_000)
+        state.put(board, NS_PER_S + turn * 50_000_000)
     said = json.loads(board.since(-1))
     assert [entity["name"] for entity in said["estimate"]["entities"]] == ["drone_1", "turtlebot"]
     assert said["estimate"]["entities"][0]["cov"] == [0.04, 0.01, 0.02]
@@ -131,16 +131,19 @@ def test_sections_say_what_came() -> None:
 
 
 def test_what_was_never_seen_can_still_be_said() -> None:
-    state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Board()
+    state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Snapshot()
     state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])
     board.begin()
-    state.put(board, NS)
+    state.put(board, NS_PER_S)
     assert json.loads(board.since(-1))["estimate"]["entities"][0]["age_s"] == 1e6
 
 
 def test_history_keeps_trails_and_samples_within_bounds() -> None:
     history = History(("turtlebot",))
-    samples = [history.step(NS + k * 50_000_000, estimate(NS + k * 50_000_000), None, 1.0, {}) for k in range(20 * 200)]
+    samples = [
+        history.step(NS_PER_S + k * 50_000_000, estimate(NS_PER_S + k * 50_000_000), None, 1.0, {})
+        for k in range(20 * 200)
+    ]
     kept = history.as_json()
     assert len(kept["trails"]["drone_1"]) == 300 and kept["trails"]["drone_1"][-1] == (1.0, 2.0)
     assert len(kept["samples"]) == 240
@@ -158,7 +161,7 @@ def test_chi_square_bounds(degrees: int) -> None:
 
 
 def test_health_counts_what_entered_and_names_what_did_not() -> None:
-    health = Health()
+    health = InnovationStatistics()
     assert health.summary()["nis"] is None
     for k in range(40):
         late = k % 4 == 0
@@ -179,7 +182,7 @@ def test_health_counts_what_entered_and_names_what_did_not() -> None:
     assert said["edges"][0]["refused"] == "LATE by 0.7 s"
 
 
-def test_detections_belong_to_their_picture(field: dict[str, Any]) -> None:
+def test_detections_belong_to_their_picture(field: ResolvedField) -> None:
     desk = PictureDesk(lenses_of(field))
 
     def sight(stamp_ns: int) -> m.RelativeObservation:
@@ -194,12 +197,12 @@ def test_detections_belong_to_their_picture(field: dict[str, Any]) -> None:
         )
 
     desk.take_detection(sight(5))  # before its picture
-    assert desk.take_picture("drone_1_camera", header("drone_1_camera", 5), JPEG, NS)
+    assert desk.take_picture("drone_1_camera", header("drone_1_camera", 5), JPEG, NS_PER_S)
     desk.take_detection(sight(5))  # and after it
     desk.take_detection(sight(6))  # of another picture
     mark, later = desk.detections()["drone_1_camera"]["marks"]
     assert (mark["u"], mark["v"], mark["range_m"]) == (319.5, 179.5, 2.0) and later == mark
-    assert not desk.take_picture("drone_1_camera", header("drone_1_camera", 7), JPEG, NS + 50_000_000)
+    assert not desk.take_picture("drone_1_camera", header("drone_1_camera", 7), JPEG, NS_PER_S + 50_000_000)
     size = int.from_bytes(desk.frames["drone_1_camera"][:2], "big")
     assert json.loads(desk.frames["drone_1_camera"][2 : 2 + size])["camera"] == "drone_1_camera"
     assert frame_of("a", 0, b"xyz").endswith(b"xyz")
@@ -210,7 +213,7 @@ def test_pictures_come_at_five_a_second_on_the_average() -> None:
     # Five a second, seen in turns of 50 ms; then fifteen.
     for rate_hz, at_most in ((5, 101), (15, 102)):
         stamps = [
-            round(NS * (10 + k / rate_hz + jitter.uniform(0, 0.03))) // 50_000_000 * 50_000_000
+            round(NS_PER_S * (10 + k / rate_hz + jitter.uniform(0, 0.03))) // 50_000_000 * 50_000_000
             for k in range(20 * rate_hz)
         ]
         taken = sum(desk.take_picture(f"at_{rate_hz}", header("c", stamp), JPEG, stamp) for stamp in stamps)
@@ -240,9 +243,9 @@ def jpeg_of(width: int, height: int) -> bytes:
 )
 def test_absurd_pictures_are_refused_and_said_so(jpeg: bytes, words: str) -> None:
     desk = PictureDesk({})
-    assert not desk.take_picture("c", header("c"), jpeg, NS)
+    assert not desk.take_picture("c", header("c"), jpeg, NS_PER_S)
     assert words in desk.refused["c"] and "c" not in desk.frames
-    assert desk.take_picture("c", header("c"), JPEG, 2 * NS) and not desk.refused
+    assert desk.take_picture("c", header("c"), JPEG, 2 * NS_PER_S) and not desk.refused
 
 
 @settings(max_examples=200, deadline=None)
@@ -252,7 +255,7 @@ def test_the_size_of_any_bytes_can_be_asked_for(data: bytes) -> None:
     assert stated_size(JPEG) == (640, 360)
 
 
-def test_footprints_are_true_to_scale(field: dict[str, Any]) -> None:
+def test_footprints_are_true_to_scale(field: ResolvedField) -> None:
     scene = scene_from_field(field, truth=True)
     lens = lenses_of(field)["ceiling"]
     rays = np.array(scene["cameras"][0]["rays"])
@@ -268,8 +271,3 @@ def test_footprints_are_true_to_scale(field: dict[str, Any]) -> None:
 
 def test_a_scene_without_a_field() -> None:
     assert bare_scene("lab", ("a",), False)["drones"][0]["name"] == "a"
-
-
-def test_the_port_is_the_field_s(field: dict[str, Any]) -> None:
-    assert port_of(json.dumps(field).encode()) == 8765
-    assert port_of(b"{}") == 8765

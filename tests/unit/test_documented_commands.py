@@ -14,7 +14,12 @@ from groundstation.settings.files import SHIPPED
 from groundstation.settings.load import load_field
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "config" / "README.md"]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    ROOT / "config" / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 DOCUMENTS += sorted(path for name in ("groundstation", "drivers", "sim_bridge") for path in (ROOT / name).rglob("*.md"))
 DOCUMENTS = [path for path in DOCUMENTS if "shipped" not in path.parts]  # config/ once more
 
@@ -90,8 +95,8 @@ def test_help_shows_what_can_be_typed() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_the_readme_names_every_verb() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_page_of_commands_names_every_verb() -> None:
+    text = (ROOT / "docs" / "how-to" / "commands-by-task.md").read_text(encoding="utf-8")
     unnamed = [verb for verb in cli.VERBS if not re.search(rf"groundstation {verb}\b", text)]
     assert not unnamed, unnamed
 
@@ -99,5 +104,7 @@ def test_the_readme_names_every_verb() -> None:
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_of_a_document_lead_somewhere(path: Path) -> None:
     links = re.findall(r"\]\(([^)#\s]+)\)", path.read_text(encoding="utf-8"))
-    lost = [link for link in links if "://" not in link and not (path.parent / link).exists()]
+    # Generated pages exist once the site is built; the build resolves links to them.
+    kept = [link for link in links if "://" not in link and "/generated/" not in link]
+    lost = [link for link in kept if not (path.parent / link).exists()]
     assert not lost, lost

@@ -18,7 +18,7 @@ from groundstation.bus.messages import (
     Verdict,
 )
 from groundstation.estimation.fixed_lag import FixedLagFilter
-from groundstation.estimation.intake import REASONS, Intake
+from groundstation.estimation.ingest import REASONS, Intake
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.estimation import slots as s
-from groundstation.estimation.dispatch import call_locate
+from groundstation.arrays import Vector
+from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.gating import gate
-from groundstation.estimation.kernel import kernel
+from groundstation.estimation.model_kernels import call_locate
 from groundstation.estimation.models import (
     CommandedRobot,
     ConstantVelocityTarget,
@@ -24,9 +24,11 @@ from groundstation.estimation.models import (
 from groundstation.estimation.models.odometry_robot import SLOW_STATES
 from groundstation.estimation.motion import predict
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
+from groundstation.estimation.records import EntityMemory, EventRow, Innovation, SensorRow
 from groundstation.estimation.tables import empty_state, tables_from_parameters
 from groundstation.estimation.update import linearise
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
+from groundstation.kernel import Rows, kernel
 
 YAWS = (0.3, math.pi - 1e-9, -math.pi + 1e-9, 3.1, -2.0)
 ROBOT = OdometryRobot(marker_position_m=(0.05, -0.03, 0.08), slow_states=SLOW_STATES, velocity_bias_std_m_s=0.1)
@@ -54,11 +56,11 @@ TABLES = tables_from_parameters(EstimatorParameters(ENTITIES, SENSORS))
 NAMES = list(ENTITIES)
 
 
-def random_state(seed: int, yaw: float) -> tuple[np.ndarray, np.ndarray]:
+def random_state(seed: int, yaw: float) -> tuple[np.ndarray, Rows[EntityMemory]]:
     """A state with every heading at `yaw`, and inputs of all driven entities."""
     rng = np.random.default_rng(seed)
-    state = empty_state(TABLES, np.ones(len(NAMES)))
-    mean, aux = state.means[0], state.aux
+    state = empty_state(TABLES, [True] * len(NAMES))
+    mean, memory = state.means[0], state.memory
     mean[:] = rng.normal(0.0, 0.3, mean.size)
     for index, model in enumerate(ENTITIES.values()):
         part = TABLES.part(index)
@@ -68,10 +70,15 @@ def random_state(seed: int, yaw: float) -> tuple[np.ndarray, np.ndarray]:
             if label == "velocity_scale":
                 mean[part.start + offset] = 1.1
     mean[TABLES.part(NAMES.index("mount")).start + 2] = 4.0
-    aux[:, s.ACTIVE] = 1.0
-    aux[:, s.HELD_VX], aux[:, s.HELD_VY], aux[:, s.YAW_RATE] = 0.5, -0.2, 0.8
-    aux[:, s.SLOW_VX], aux[:, s.SLOW_VY] = 0.4, -0.1
-    return mean, aux
+    memory["active"] = 1
+    memory["held_vx"], memory["held_vy"], memory["yaw_rate"] = 0.5, -0.2, 0.8
+    memory["slow_vx"], memory["slow_vy"] = 0.4, -0.1
+    return mean, memory
+
+
+def belief_with(mean: np.ndarray, P: np.ndarray, memory: Rows[EntityMemory] | None = None) -> Belief:
+    memory = EntityMemory.rows(len(NAMES)) if memory is None else memory
+    return Belief(mean, P, TABLES.entities[0], memory)
 
 
 def headings() -> list[int]:
@@ -92,13 +99,12 @@ def difference(a: np.ndarray, b: np.ndarray, angles: list[int]) -> np.ndarray:
 @pytest.mark.parametrize("yaw", YAWS)
 @pytest.mark.parametrize("dt", [0.01, 0.2])
 def test_prediction_jacobian_is_that_of_the_mean(yaw: float, dt: float) -> None:
-    mean, aux = random_state(1, yaw)
+    mean, memory = random_state(1, yaw)
     n, step, rng = mean.size, 1e-6, np.random.default_rng(2)
-    entities, rows = TABLES.entities[0], TABLES.parameters[0]
 
     def moved(x):
         x = x.copy()
-        predict(x, np.zeros((n, n)), entities, rows, aux, dt)
+        predict(belief_with(x, np.zeros((n, n)), memory), dt)
         return x
 
     F = np.empty((n, n))
@@ -106,12 +112,12 @@ def test_prediction_jacobian_is_that_of_the_mean(yaw: float, dt: float) -> None:
         e = step * np.eye(n)[j]
         F[:, j] = difference(moved(mean + e), moved(mean - e), headings()) / (2 * step)
     Q = np.zeros((n, n))
-    predict(mean.copy(), Q, entities, rows, aux, dt)
+    predict(belief_with(mean.copy(), Q, memory), dt)
     assert np.linalg.eigvalsh(Q)[0] > -1e-15
     root = rng.normal(size=(n, n))
     P = root @ root.T
     predicted = P.copy()
-    predict(mean.copy(), predicted, entities, rows, aux, dt)
+    predict(belief_with(mean.copy(), predicted, memory), dt)
     np.testing.assert_allclose(predicted, F @ P @ F.T + Q, atol=2e-8 * np.abs(P).max())
     assert np.array_equal(predicted, predicted.T)
 
@@ -119,13 +125,12 @@ def test_prediction_jacobian_is_that_of_the_mean(yaw: float, dt: float) -> None:
 @pytest.mark.parametrize("rate", [0.0, 1e-9, 2e-4, -3e-3, 0.7])
 def test_turning_is_exact_at_any_rate(rate: float) -> None:
     """Against a thousand small steps, also where series replace quotients."""
-    entities, rows = TABLES.entities[0], TABLES.parameters[0]
     part = TABLES.part(NAMES.index("turning"))
-    mean, aux = random_state(3, 0.0)
-    aux[:, s.ACTIVE] = 0.0
-    aux[NAMES.index("turning"), s.ACTIVE] = 1.0
+    mean, memory = random_state(3, 0.0)
+    memory["active"] = 0
+    memory["active"][NAMES.index("turning")] = 1
     mean[part] = (0.0, 0.0, 0.3, 0.1, rate)
-    predict(mean, np.zeros((mean.size, mean.size)), entities, rows, aux, 0.5)
+    predict(belief_with(mean, np.zeros((mean.size, mean.size)), memory), 0.5)
     place, velocity = 0j, 0.3 + 0.1j
     for _ in range(1000):
         place += 0.0005 * velocity * np.exp(0.5j * rate * 0.0005)
@@ -136,21 +141,20 @@ def test_turning_is_exact_at_any_rate(rate: float) -> None:
 def observed(mean: np.ndarray, sensor: str, subject: str, rows: int, roll: float = 0.05, pitch: float = -0.08):
     """h(x) and its Jacobian by the whole state, through the filter's own linearisation."""
     number = list(SENSORS).index(sensor)
-    event = np.zeros(s.EVENT_COLUMNS)
     observer = NAMES.index(SENSORS[sensor].carrier)
-    event[[s.EVENT_OBSERVER, s.EVENT_SUBJECT, s.EVENT_SENSOR]] = observer, NAMES.index(subject), number
-    event[[s.EVENT_ROLL, s.EVENT_PITCH]] = roll, pitch
-    event[[s.EVENT_SUBJECT_ROLL, s.EVENT_SUBJECT_PITCH]] = 0.06, -0.11
-    work, W, y = np.zeros((4, 4, s.MAX_BLOCK)), np.zeros((4, mean.size)), np.zeros(4)
-    linearise(
-        mean, np.eye(mean.size), TABLES.entities[0], TABLES.parameters[0], TABLES.kernels[number],
-        TABLES.sensors[number], event, rows, np.zeros(4), np.eye(4), work, W, y,
+    event = EventRow.row(
+        observer=observer, subject=NAMES.index(subject), sensor=number, roll=roll, pitch=pitch, subject_roll=0.06,
+        subject_pitch=-0.11,
     )  # fmt: skip
+    innovation, HP, P = Innovation.rows(1), np.zeros((4, mean.size)), np.eye(mean.size)
+    innovation["R"] = np.eye(4)
+    linearise(belief_with(mean, P), TABLES.sensors[number], event, rows, np.zeros(4), innovation[0], HP)
     H = np.zeros((rows, mean.size))
-    for block, index in ((work[0], observer), (work[1], NAMES.index(subject))):
+    prediction = innovation["prediction"][0]
+    for block, index in ((prediction["H_observer"], observer), (prediction["H_subject"], NAMES.index(subject))):
         part = TABLES.part(index)
         H[:, part] += block[:rows, : part.stop - part.start]
-    return -y[:rows], H, event
+    return -innovation["y"][0, :rows], H, event
 
 
 PAIRS = [
@@ -215,14 +219,9 @@ def test_a_point_below_the_ceiling_camera_is_in_front_of_it() -> None:
     assert np.allclose(WORLD_FROM_DOWN.T @ (np.array([0.5, 0.3, 1.3]) - (0.0, 0.0, 4.2)), [0.5, -0.3, 2.9])
 
 
-LOCATE_LOOP = (
-    "int64(int64, float64[::1], int64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1])"
-)
-
-
-@kernel(LOCATE_LOOP)
-def locate(address, mean, entities, parameters, sensor, event, z, pose):
-    return call_locate(address, (mean, entities, parameters, sensor, event, z, pose))
+@kernel()
+def locate(address: int, belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
+    return call_locate(address, (belief, sensor, event, z, pose))
 
 
 @pytest.mark.parametrize("yaw", YAWS)
@@ -233,14 +232,12 @@ def test_an_observation_without_noise_gives_back_the_place(sensor: str, subject:
     z = np.zeros(4)
     z[:rows], _, event = observed(mean, sensor, subject, rows)
     number, pose = list(SENSORS).index(sensor), np.zeros(4)
-    placed = locate(
-        TABLES.kernels[number, s.SENSOR_LOCATE], mean, TABLES.entities[0], TABLES.parameters[0],
-        TABLES.sensors[number], event, z, pose,
-    )  # fmt: skip
+    row = TABLES.sensors[number]
+    placed = locate(int(row["locate"]), belief_with(mean, np.eye(mean.size)), row, event, z, pose)
     if sensor in ("range", "bearing", "heading"):
-        assert placed == 0
+        assert not placed
         return
-    assert placed == 1
+    assert placed
     if rows == 4:
         model = ENTITIES[subject]
         at = [model.labels.index(label) if label in model.labels else None for label in ("x", "y", "z", "yaw")]

@@ -6,21 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.arrays import Matrix, Vector
 from groundstation.estimation import correction
-from groundstation.estimation.correction import apply, bound_precision, project, project_columns, surprise
-from groundstation.estimation.kernel import kernel
+from groundstation.estimation.correction import Touched, apply, bound_precision, project, project_columns, surprise
 from groundstation.estimation.linear import cholesky
-from groundstation.estimation.models.height import correct_height
+from groundstation.estimation.models.height import HeightEntries, correct_height
+from groundstation.kernel import kernel
 
 
 def correct(P, R, H, y):
     """One dense correction through the compiled kernels: all states as block a."""
     rows, n = H.shape
     mean, W, HPH = np.zeros(n), np.zeros((4, n)), np.empty((rows, rows))
-    nothing, factor = np.zeros((rows, n)), np.zeros((rows, rows))
-    H = np.ascontiguousarray(H)
-    project(P, 0, n, H, 0, 0, nothing, rows, W)
-    project_columns(W[:rows], 0, n, H, 0, 0, nothing, rows, HPH)
+    everything, nothing = Touched(0, n, np.ascontiguousarray(H)), Touched(0, 0, np.zeros((rows, n)))
+    factor = np.zeros((rows, rows))
+    project(P, everything, nothing, rows, W)
+    project_columns(W[:rows], everything, nothing, rows, HPH)
     bound_precision(HPH, R, rows)
     nis = surprise(HPH, R, y, rows, factor)
     apply(mean, P, rows, W, factor, y)
@@ -62,23 +63,20 @@ def test_a_height_is_corrected_like_any_other_measurement() -> None:
     H = np.zeros((1, 6))
     H[0, [1, 4, 5]] = 1.0, 1.0, -1.0
     reference, _ = correct(expected, np.array([[0.3]]), H, np.array([0.7]))
-    correct_height(mean, other, 1, 4, 5, 0.7, 0.3, 1e9)
+    correct_height(mean, other, HeightEntries(1, 4, 5), 0.7, 0.3, 1e9)
     np.testing.assert_allclose(other, expected, atol=1e-9)
     np.testing.assert_allclose(mean, reference, atol=1e-9)
 
 
 def test_a_soft_gate_bounds_the_pull_of_an_outlier() -> None:
     P, mean = np.eye(2), np.zeros(2)
-    correct_height(mean, P, 0, 1, -1, 1000.0, 0.1, 9.0)
+    correct_height(mean, P, HeightEntries(0, 1, -1), 1000.0, 0.1, 9.0)
     assert 0.0 < mean.sum() < 1.0
     np.linalg.cholesky(P)
 
 
-FLIGHT = "int64(float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64, float64[::1])"
-
-
-@kernel(FLIGHT)
-def fly(mean, P, F, H, R, steps, worst):
+@kernel()
+def fly(mean: Vector, P: Matrix, F: Matrix, H: Matrix, R: Matrix, steps: int, worst: Vector) -> int:
     """Predict and correct a small state for many steps; returns the steps after which P was no covariance."""
     n, rows = P.shape[0], H.shape[0]
     W, S, factor, y, work = np.zeros((4, n)), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(4), np.zeros((n, n))

@@ -8,8 +8,8 @@ import pytest
 from groundstation.bus.messages import Header, Odometry, Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
-from groundstation.estimation.intake import Intake
-from groundstation.estimation.measurement import Measurement, Motion, Reading
+from groundstation.estimation.ingest import Intake
+from groundstation.estimation.measurement import Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models import (
     CommandedRobot,
     ConstantVelocityTarget,
@@ -49,7 +49,7 @@ class Room:
         for _ in range(round(seconds * 100)):
             self.now += 10 * MS
             for name in ("a", "b"):
-                self.filter.add_motion(name, Motion(self.now, (0.0, 0.0, 0.0), 0.0, height_m), self.now)
+                self.filter.add_motion(name, OdometrySample(self.now, (0.0, 0.0, 0.0), 0.0, height_m), self.now)
             self.filter.advance(self.now)
 
     def see(self, camera: str, subject: str, position: tuple[float, float, float], yaw: float | None = 0.0) -> Verdict:
@@ -241,8 +241,8 @@ def test_readings_that_repeat_their_error_share_one_readings_information() -> No
         joint = ground(repeats_s=repeats_s)
         for k in range(100):
             now = START + 10 * MS * k
-            joint.add_motion("rover", Motion(now, (0.0, 0.0, 0.0)), now)
-            joint.add_observation(Reading(now, "eye", "post", (2.0, 0.0), (0.01, 0.0, 0.0, 0.01)), str(k), now)
+            joint.add_motion("rover", OdometrySample(now, (0.0, 0.0, 0.0)), now)
+            joint.add_observation(SensorReading(now, "eye", "post", (2.0, 0.0), (0.01, 0.0, 0.0, 0.01)), str(k), now)
             joint.advance(now)
         spreads[repeats_s] = joint.belief().covariance_of("rover")[0, 0]
     first = 1.0 / (1.0 / 0.09 + 1.0 / 0.01)
@@ -252,14 +252,14 @@ def test_readings_that_repeat_their_error_share_one_readings_information() -> No
 
 def test_a_heading_is_a_measurement_of_the_carrier_itself() -> None:
     joint = ground()
-    assert joint.add_observation(Reading(START, "compass", "rover", (0.3,), (1e-4,)), "c", START) is None
+    assert joint.add_observation(SensorReading(START, "compass", "rover", (0.3,), (1e-4,)), "c", START) is None
     joint.advance(START)
     assert joint.belief().mean_of("rover")[3] == pytest.approx(0.3, abs=0.01)
-    assert joint.add_observation(Reading(START, "eye", "nobody", (2.0, 0.0), (1.0, 0, 0, 1.0)), "n", START) is (
+    assert joint.add_observation(SensorReading(START, "eye", "nobody", (2.0, 0.0), (1.0, 0, 0, 1.0)), "n", START) is (
         Verdict.UNKNOWN_ENTITY
     )
     with pytest.raises(ValueError, match="rows"):
-        joint.add_observation(Reading(START, "eye", "post", (2.0, 0.0), (1.0,)), "s", START)
+        joint.add_observation(SensorReading(START, "eye", "post", (2.0, 0.0), (1.0,)), "s", START)
 
 
 def test_a_vehicles_own_position_is_never_fused() -> None:

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
+from groundstation.bench.planner import exponents
+from groundstation.bench.planner_peer_process import PeerProcess
 from groundstation.cli.main import run
 from groundstation.experiments import runner
-from groundstation.experiments.peer_process import PeerProcess
-from groundstation.experiments.planner_bench import exponents
+from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.runner import SweepError, read_result, result_file, run_tasks, write_atomically
 from groundstation.experiments.tasks import Task
-from groundstation.planning.planar.parameters import PlanarParameters
 
 ROW_KEYS = {
     "robots", "layout", "method", "cpu_ms_median", "cpu_ms_min", "cpu_ms_max", "topologies", "survivors", "evaluations",

@@ -10,11 +10,11 @@ import pytest
 from groundstation.experiments.closed_loop import SimulationSettings, all_pairs, edges_of, forget_target, observe
 from groundstation.experiments.filter import correct, initial_belief, predict
 from groundstation.experiments.paths import figure_eight, receding
+from groundstation.experiments.planar.parameters import FIGURE_1
 from groundstation.experiments.sensors import SENSORS, compare, radial_compositions, reading_model
 from groundstation.experiments.strategies import STRATEGIES, Strategy
 from groundstation.experiments.summary import add_ratios, summarise
 from groundstation.experiments.tasks import SETUPS, Task, csv_text, execute, simulate
-from groundstation.planning.planar.parameters import FIGURE_1
 from groundstation.sensing.topology import LEAF, ROOT, Topology
 
 

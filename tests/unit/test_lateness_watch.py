@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.estimation.lateness import LatenessWatch
+from groundstation.estimation.camera_latency import LatenessWatch
 
 SECOND = 1_000_000_000
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.geometry.calibration import intrinsics_from_mapping
+from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
 from groundstation.geometry.lens import CameraIntrinsics
 
 PLAIN = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5)

@@ -15,7 +15,7 @@ from drivers.camera.markers import read_bar
 from groundstation.cli.markers import markers
 from groundstation.geometry.board import CODE_WORDS
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.geometry.tag import DICTIONARIES, Tag
+from groundstation.geometry.tag import DICTIONARIES, SquareTag
 
 MM = 72.0 / 25.4
 
@@ -119,7 +119,7 @@ def test_opencv_reads_the_printed_tag(tmp_path):
 
 
 def test_tags_have_their_border():
-    cells = np.array(black_cells(Tag("DICT_4X4_50", 0, 100.0)))
+    cells = np.array(black_cells(SquareTag("DICT_4X4_50", 0, 100.0)))
     assert cells.shape == (6, 6)
     assert cells[0].all()
     assert cells[:, 0].all()

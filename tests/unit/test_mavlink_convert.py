@@ -4,15 +4,15 @@ import math
 
 import pytest
 
-from drivers.limits import Limits
+from drivers.limits import VehicleLimits
 from drivers.mavlink import convert
-from drivers.mavlink.convert import Attitude, Pose
+from drivers.mavlink.convert import BaseAttitude, VisionPose
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
 
 H = math.sqrt(0.5)
-LEVEL = Attitude(0.0, 0.0, 0.0, (0.0, 0.0, 0.0))
+LEVEL = BaseAttitude(0.0, 0.0, 0.0, (0.0, 0.0, 0.0))
 
 
 def test_heading_east_is_a_right_turn():
@@ -31,7 +31,7 @@ def test_nose_up_is_negative_pitch_and_right_side_down_positive_roll():
 
 def test_velocity_is_turned_into_the_heading():
     # Nose to the east (world -y), flying north (world x): to its left.
-    east = Attitude(0.0, 0.0, -math.pi / 2, (0.0, 0.0, 0.0))
+    east = BaseAttitude(0.0, 0.0, -math.pi / 2, (0.0, 0.0, 0.0))
     velocity = convert.velocity_from_local(LocalPositionNed(0, 0, 0, 0, 1.0, 0.0, -0.5), east)
     assert velocity == pytest.approx((0.0, 1.0, 0.5))
     assert convert.position_from_local(LocalPositionNed(0, 1.0, 2.0, -3.0, 0, 0, 0)) == (1.0, -2.0, 3.0)
@@ -46,16 +46,16 @@ def test_imu_at_rest_feels_gravity_upwards():
 
 
 def test_setpoint_signs_mask_and_clamps():
-    s = convert.setpoint_from_velocity(11, 5_000_000, (0.3, 0.2, 0.1), 0.5, Limits())
+    s = convert.setpoint_from_velocity(11, 5_000_000, (0.3, 0.2, 0.1), 0.5, VehicleLimits())
     assert (s.vx, s.vy, s.vz, s.yaw_rate) == pytest.approx((0.3, -0.2, -0.1, -0.5))
     assert (s.coordinate_frame, s.type_mask, s.target_system) == (8, 0b010111000111, 11)
-    s = convert.setpoint_from_velocity(11, 0, (3.0, -4.0, -9.0), 9.0, Limits(max_speed_m_s=0.5))
+    s = convert.setpoint_from_velocity(11, 0, (3.0, -4.0, -9.0), 9.0, VehicleLimits(max_speed_m_s=0.5))
     assert (s.vx, s.vy, s.vz) == pytest.approx((0.3, 0.4, 0.4))
 
 
 def test_pose_becomes_ned():
-    pose = Pose(2_000_000, (1.0, 2.0, 3.0), 0.5, (0.1, 0.2, 0.3, 0.4), (1.0, 0.0, 0.25))
-    vision = convert.vision_from_pose(pose, Attitude(0.1, 0.2, 9.0, (0.0, 0.0, 0.0)), 257)
+    pose = VisionPose(2_000_000, (1.0, 2.0, 3.0), 0.5, (0.1, 0.2, 0.3, 0.4), (1.0, 0.0, 0.25))
+    vision = convert.vision_from_pose(pose, BaseAttitude(0.1, 0.2, 9.0, (0.0, 0.0, 0.0)), 257)
     assert (vision.usec, vision.x, vision.y, vision.z) == (2000, 1.0, -2.0, -3.0)
     assert (vision.roll, vision.pitch, vision.yaw) == (0.1, -0.2, -0.5)
     assert vision.reset_counter == 1

@@ -2,8 +2,8 @@
 
 from drivers.mavlink.parameters import needed
 from drivers.mavlink.requests import Requests
-from drivers.mavlink.session import Session
-from drivers.mavlink.settings import Origin
+from drivers.mavlink.session import MavlinkSession
+from drivers.mavlink.settings import GlobalOrigin
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import REAL32
 from drivers.mavlink.wire.service import ParamRequestRead, ParamValue
@@ -11,9 +11,9 @@ from drivers.mavlink.wire.service import ParamRequestRead, ParamValue
 MS = 1_000_000
 
 
-def read_all(strange: set[str], seconds: float) -> Session:
+def read_all(strange: set[str], seconds: float) -> MavlinkSession:
     """A vehicle that answers for every parameter but the strange ones."""
-    session, requests = Session(1, Flavour.ARDUPILOT, {}, 255, Origin()), Requests(1)
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
     values = {n.name: n.value for n in needed(Flavour.ARDUPILOT, 255)}
     for turn in range(round(seconds * 100)):
         for message in session.step(10_000 * MS + turn * 10 * MS, 0, requests):

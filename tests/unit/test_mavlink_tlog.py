@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from drivers.datagrams import DatagramLog
 from drivers.mavlink.wire import telemetry
-from drivers.mavlink.wire.frames import Encoder
+from drivers.mavlink.wire.frames import FrameEncoder
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.topics import RAW_RX, RAW_TX
@@ -23,27 +23,38 @@ S = 1_000_000_000
 OFFSET = 1_700_000_000 * S
 
 
-@pytest.fixture
-def run_dir(tmp_path):
-    exchange = MemoryExchange()
-    bus = MemoryBus(exchange, "lab", "mavlink")
+def record(folder, *speakers):
+    """Write a recording of what the speakers put into the logs of a bus."""
+    bus = MemoryBus(MemoryExchange(), "lab", "mavlink")
     queue = bus.subscribe([RAW_RX, RAW_TX])
-    log, encoder = DatagramLog(bus, "drone_2"), Encoder(11, 1)
-    for second in range(5):
-        log.received(second * S, encoder.encode(telemetry.ExtendedSysState(0, second)))
-        log.sent(second * S + S // 2, encoder.encode(telemetry.Heartbeat(6, 8, 0, 0, 4)))
-    log.flush()
-    other = DatagramLog(bus, "drone_1")
-    other.received(S, b"\x88\x77\x66\x55 an AR.Drone's")
-    other.flush()
+    for entity, speak in speakers:
+        log = DatagramLog(bus, entity)
+        speak(log)
+        log.flush()
     capture = Capture(Timeline(clock.clock_id(), OFFSET))
-    file = McapFile(tmp_path / "raw.mcap", Preamble({"run": {}}, {}, OFFSET))
+    file = McapFile(folder / "raw.mcap", Preamble({"run": {}}, {}, OFFSET))
     for sample in queue.drain_samples():
         entry = capture.entry(sample, S)
         assert entry is not None
         file.write(entry)
     file.close()
-    return tmp_path
+    return folder
+
+
+def copter(log):
+    encoder = FrameEncoder(11, 1)
+    for second in range(5):
+        log.received(second * S, encoder.encode(telemetry.ExtendedSysState(0, second)))
+        log.sent(second * S + S // 2, encoder.encode(telemetry.Heartbeat(6, 8, 0, 0, 4)))
+
+
+def ardrone(log):
+    log.received(S, b"\x88\x77\x66\x55 an AR.Drone's")
+
+
+@pytest.fixture
+def run_dir(tmp_path):
+    return record(tmp_path, ("drone_2", copter), ("drone_1", ardrone))
 
 
 def test_tlog_is_read_by_pymavlink(run_dir):
@@ -51,7 +62,7 @@ def test_tlog_is_read_by_pymavlink(run_dir):
     from pymavlink import mavutil
 
     written = write_tlogs(open_run(run_dir), run_dir)
-    assert {path.name: count for path, count in written.items()} == {"drone_2.tlog": 10}
+    assert {path.name: (len(log.frames), log.refused) for path, log in written.items()} == {"drone_2.tlog": (10, {})}
     log = mavutil.mavlink_connection(str(run_dir / "drone_2.tlog"))
     found = []
     while (message := log.recv_match()) is not None:
@@ -69,4 +80,22 @@ def test_a_run_without_mavlink_and_a_log_that_exists_are_errors(run_dir, tmp_pat
     empty.mkdir()
     McapFile(empty / "raw.mcap", Preamble({"run": {}}, {}, OFFSET)).close()
     result = CliRunner().invoke(export, ["--tlog", str(empty)], standalone_mode=False)
-    assert "no MAVLink datagrams" in str(result.exception)
+    assert "no MAVLink frames" in str(result.exception)
+
+
+def test_noise_that_an_older_version_recorded_is_left_out_and_counted(tmp_path):
+    good = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
+    noise = bytes((0xFD, 1, 0, 0, 9, 11, 1, 0xFF, 0xFF, 0)) + b"abc"
+
+    def noisy(log):
+        for datagram in (noise, good + noise + good, good[:-1] + bytes([good[-1] ^ 1]), b"rubbish", good[:9]):
+            log.received(S, datagram)
+
+    record(tmp_path, ("drone_2", noisy), ("drone_3", lambda log: log.received(S, noise)))
+    result = CliRunner().invoke(export, ["--tlog", str(tmp_path)], standalone_mode=False)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "drone_2.tlog").read_bytes()[8:] == good + (tmp_path / "drone_2.tlog").read_bytes()[:8] + good
+    assert not (tmp_path / "drone_3.tlog").exists()
+    for line in ("drone_2.tlog: 2 frames", "drone_2: left out: 2 x unknown kind", "drone_2: left out: 1 x checksum",
+                 "drone_2: left out: 1 x no frame", "drone_3: left out: 1 x unknown kind"):  # fmt: skip
+        assert line in result.output

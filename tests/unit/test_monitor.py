@@ -8,6 +8,8 @@ from rich.console import Console
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.cli.show import show
+from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.screen import DRAW_PERIOD_NS, Screen, line
 from groundstation.monitor.state import Cast, MonitorState, cast_from_field
@@ -70,6 +72,21 @@ class World:
         return console.export_text()
 
 
+def sighting(world: World, observer: str) -> m.RelativeObservation:
+    return m.RelativeObservation(
+        header=world.header(observer, 0.1), observer=observer, subject="turtlebot", camera="drone_1_camera",
+        position_m=(0.0, 0.0, 1.0), yaw_rad=None, covariance=(0.0,) * 9,
+    )  # fmt: skip
+
+
+def plan(world: World) -> m.Plan:
+    return m.Plan(
+        header=world.header("team"), topology="drone_1/drone_2", cost=0.0123, controls=(), edges=(),
+        alternatives=(m.Alternative("drone_1,drone_2", 0.0150), m.Alternative("drone_1/drone_2", 0.0123)),
+        solver=m.SolverReport("converged", 40, 0.012, 2, 1), mode="certified",
+    )  # fmt: skip
+
+
 @pytest.fixture
 def world() -> World:
     return World()
@@ -83,13 +100,7 @@ def test_an_empty_state_is_drawn(world: World) -> None:
 def test_the_table_shows_mode_battery_link_position_and_ellipse(world: World) -> None:
     world.vehicle("drone_1")
     world.estimate()
-    world.say(
-        t.OBSERVATION,
-        m.RelativeObservation(
-            header=world.header("drone_1", 0.1), observer="drone_1", subject="turtlebot", camera="drone_1_camera",
-            position_m=(0.0, 0.0, 1.0), yaw_rad=None, covariance=(0.0,) * 9,
-        ),
-    )  # fmt: skip
+    world.say(t.OBSERVATION, sighting(world, "drone_1"))
     text = world.text()
     (row,) = (line for line in text.splitlines() if line.startswith("drone_1 "))
     for part in ("TRACK", "80%", "200 Hz", "0.2 s", "1.25  -0.50   1.30", "0.24 x 0.24", "nobody"):
@@ -99,13 +110,36 @@ def test_the_table_shows_mode_battery_link_position_and_ellipse(world: World) ->
         assert part in row
 
 
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 140])
+def test_names_are_whole_in_any_terminal(world: World, width: int) -> None:
+    world.vehicle("drone_1", mode="TAKING_OFF")
+    world.vehicle("drone_2")
+    world.estimate()
+    for observer in ("ceiling", "drone_1", "drone_2"):
+        world.say(t.OBSERVATION, sighting(world, observer))
+    world.text()
+    console = Console(record=True, width=width, file=io.StringIO())
+    console.print(render(world.state, NOW))
+    rows = console.export_text().splitlines()
+    assert all(any(row.startswith(name) for row in rows) for name in ("drone_1", "drone_2", "turtlebot"))
+    assert not any("…" in row for row in rows)
+    assert any("mode" in row and "position [m]" in row for row in rows) == (width >= 60)  # where there is room
+
+
+def test_a_pipe_gets_everything(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+    world.vehicle("drone_1")
+    world.estimate()
+    world.say(t.PLAN, plan(world))
+    world.text()
+    show(render(world.state, NOW))
+    printed = capsys.readouterr().out
+    assert "vehicle" in printed and "seen by" in printed and "…" not in printed
+    (row,) = (row for row in printed.splitlines() if row.startswith("topology"))
+    assert row.endswith("instead of drone_1,drone_2 150 cm2")
+
+
 def test_the_plan_is_shown_beside_its_alternatives(world: World) -> None:
-    plan = m.Plan(
-        header=world.header("team"), topology="drone_1/drone_2", cost=0.0123, controls=(), edges=(),
-        alternatives=(m.Alternative("drone_1,drone_2", 0.0150), m.Alternative("drone_1/drone_2", 0.0123)),
-        solver=m.SolverReport("converged", 40, 0.012, 2, 1), mode="certified",
-    )  # fmt: skip
-    world.say(t.PLAN, plan)
+    world.say(t.PLAN, plan(world))
     text = world.text()
     assert "drone_1 / drone_2" in text and "123 cm2" in text and "12 ms" in text
     assert "instead of drone_1,drone_2 150 cm2" in text
@@ -201,6 +235,5 @@ def test_the_line_names_modes_and_alarms(world: World) -> None:
     assert line(world.state, NOW) == "  100 s  drone_1 HOLD; ! drone_1: battery 10% (lands at 15%)"
 
 
-def test_the_cast_comes_from_the_resolved_field() -> None:
-    field = b'{"site":"lab","drones":{"d":{"limits":{"battery_min":0.2}}},"cameras":{"c":{}},"target":{"name":"t"}}'
-    assert cast_from_field(field) == Cast("lab", {"d": 0.2}, ("t",), ("c",))
+def test_the_cast_comes_from_the_resolved_field(lab_field: ResolvedField) -> None:
+    assert cast_from_field(lab_field) == Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",))

@@ -11,26 +11,41 @@ from groundstation.bus.messages import (
     CommandAck,
     FlightState,
     Lease,
+    Odometry,
     RelativeObservation,
     VehicleStatus,
     Verb,
 )
-from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, OBSERVATION, VEHICLE_STATUS
-from groundstation.runtime.acknowledgements import AckBook
-from groundstation.runtime.operator import Operator, Phase
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, OBSERVATION, ODOMETRY, VEHICLE_STATUS
+from groundstation.runtime.marker_height import FixedCamera
+from groundstation.runtime.operator import Operator, TeamPhase
 from groundstation.runtime.take_off import TakeOffLimits
 
 MS = 1_000_000
 LIMITS = TakeOffLimits(connect_s=5, lift_off_s=15, unseen_s=10)
+CEILING_M, MARKER_M, FLIGHT_M = 4.2, 0.1, 0.8
+CAMERAS = {"ceiling": FixedCamera(CEILING_M, (0.0, 0.0, -1.0))}
 
 
 class Drone:
-    """A driver with its drone: takes off in half a second, answers every order."""
+    """A driver with its drone: takes off in half a second, answers every order.
 
-    def __init__(self, exchange: MemoryExchange, name: str, seen: bool = True, refusal: str = "") -> None:
+    marker: whose marker the drone carries; reports: whether it measures its height.
+    """
+
+    def __init__(
+        self,
+        exchange: MemoryExchange,
+        name: str,
+        seen: bool = True,
+        refusal: str = "",
+        marker: str = "",
+        reports: bool = True,
+    ) -> None:
         self.bus = MemoryBus(exchange, "lab", name)
         self.camera = MemoryBus(exchange, "lab", "ceiling")
         self.name, self.seen, self.refusal = name, seen, refusal
+        self.marker, self.reports = marker or name, reports
         self.state = FlightState.LANDED
         self.commands = self.bus.subscribe([COMMAND])
         self.heard: list[Verb] = []
@@ -50,8 +65,10 @@ class Drone:
             self.change = None
         header = self.bus.header(self.name)
         self.bus.publish(VEHICLE_STATUS, VehicleStatus(header=header, flight_state=self.state, mode="HOVER"))
+        height_m = 0.0 if self.state is FlightState.LANDED else FLIGHT_M
+        self.measure(height_m if self.reports and height_m else None)
         if self.seen:
-            self.observe()
+            self.observe(height_m)
 
     def obey(self, command: Command, now_ns: int) -> None:
         if command.id in self.last:
@@ -75,13 +92,25 @@ class Drone:
         ack = CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
         self.bus.publish(COMMAND_ACK, ack)
 
-    def observe(self) -> None:
+    def measure(self, height_m: float | None) -> None:
+        odometry = Odometry(
+            header=self.bus.header(self.name),
+            velocity_m_s=(0.0, 0.0, 0.0),
+            velocity_covariance=(1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0),
+            yaw_rad=0.0,
+            roll_rad=0.0,
+            pitch_rad=0.0,
+            height_m=height_m,
+        )
+        self.bus.publish(ODOMETRY, odometry)
+
+    def observe(self, height_m: float) -> None:
         observation = RelativeObservation(
             header=self.camera.header("ceiling"),
             observer="ceiling",
-            subject=self.name,
+            subject=self.marker,
             camera="ceiling",
-            position_m=(0.0, 0.0, 2.0),
+            position_m=(0.0, 0.0, CEILING_M - MARKER_M - height_m),
             yaw_rad=None,
             covariance=(1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0),
         )
@@ -93,7 +122,7 @@ class Scene:
         self.exchange = MemoryExchange()
         self.said: list[str] = []
         self.bus = MemoryBus(self.exchange, "lab", "supervisor")
-        self.operator = Operator(self.bus, ("drone_1", "drone_2"), LIMITS, self.said.append)
+        self.operator = Operator(self.bus, ("drone_1", "drone_2"), CAMERAS, LIMITS, self.said.append)
         self.drones: dict[str, Drone] = {}
         self.now_ns = 10**12
 
@@ -135,8 +164,41 @@ def test_one_by_one_then_track(scene: Scene) -> None:
         if Verb.TAKEOFF in two.heard:
             assert one.state is FlightState.HOVERING
     assert one.heard == two.heard == [Verb.TAKEOFF, Verb.TRACK]
-    assert scene.operator.phase is Phase.TRACKING and scene.operator.tracking_since_ns
+    assert scene.operator.phase is TeamPhase.TRACKING and scene.operator.tracking_since_ns
+    assert scene.operator.mistake is None
     assert "drone_1: TAKEOFF sent / received / accepted / effective" in scene.said
+
+
+@pytest.mark.parametrize("reports", [True, False])
+def test_exchanged_drones_stop_the_take_off_and_the_one_that_flies_lands(scene: Scene, reports: bool) -> None:
+    one = scene.add("drone_1", marker="drone_2", reports=reports)
+    two = scene.add("drone_2", marker="drone_1", reports=reports)
+    scene.pass_(0.5)
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(10.0)
+    assert (one.heard, two.heard) == ([Verb.TAKEOFF, Verb.LAND], [])
+    assert one.state is FlightState.LANDED and scene.operator.phase is TeamPhase.GROUND
+    says = "drone_1 reports 0.8 m" if reports else "drone_1 says that it flies"
+    mistake = (
+        f"{says} but its marker is on the floor and drone_2's marker rose: the addresses or markers of the two are "
+        "probably exchanged; check address, system id and marker code of drone_1 and drone_2 in the field file "
+    )
+    assert sum(line.startswith(f"TAKE-OFF STOPPED: {mistake}") for line in scene.said) == 1
+    assert str(scene.operator.mistake).startswith(mistake)
+    assert "drone_2: left out, the take-off was stopped" in scene.said
+    assert not any("seen by a camera" in line for line in scene.said)
+
+
+def test_a_mix_up_among_the_others_lets_who_was_seen_hover_without_tracking(scene: Scene) -> None:
+    one = scene.add("drone_1")
+    two = scene.add("drone_2", marker="stranger")
+    scene.add("its_marker_on_the_floor", marker="drone_2")
+    scene.pass_(0.5)
+    scene.operator.take_off(scene.now_ns)
+    scene.pass_(12.0)
+    assert (one.heard, two.heard) == ([Verb.TAKEOFF], [Verb.TAKEOFF, Verb.LAND])
+    assert scene.operator.phase is TeamPhase.UP
+    assert any("drone_2 reports 0.8 m but its marker is on the floor and no other rose" in s for s in scene.said)
 
 
 def test_missing_drone_is_named_and_the_rest_flies_on(scene: Scene) -> None:
@@ -229,13 +291,13 @@ def test_another_shell_may_ask_for_take_off(scene: Scene) -> None:
     scene.pass_(5.0)
     stages = [r.message.stage for r in acks.drain() if isinstance(r.message, CommandAck)]
     assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]
-    assert scene.operator.phase is Phase.UP
+    assert scene.operator.phase is TeamPhase.UP
     other.publish(COMMAND, Command(header=other.header("operator"), id="r2", verb=Verb.TRACK, scope=("operator",),
                                    issuer="cli_1", expires_ns=1))  # fmt: skip
     scene.pass_(2.0)
     stages = [r.message.stage for r in acks.drain() if isinstance(r.message, CommandAck)]
     assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]
-    assert scene.operator.phase is Phase.TRACKING
+    assert scene.operator.phase is TeamPhase.TRACKING
 
 
 def test_landed_means_all_say_so(scene: Scene) -> None:
@@ -250,20 +312,3 @@ def test_landed_means_all_say_so(scene: Scene) -> None:
     two.state = FlightState.LOST
     scene.pass_(0.2)
     assert not scene.operator.landed(scene.now_ns), "a lost drone is not known to stand"
-
-
-def test_ack_book_takes_only_news_from_who_was_asked() -> None:
-    bus = MemoryBus(MemoryExchange(), "lab", "x")
-    command = Command(header=bus.header("team"), id="1", verb=Verb.LAND, scope=(), issuer="x")
-    book = AckBook(command, ("drone_1",))
-
-    def ack(entity: str, stage: AckStage, command_id: str = "1") -> CommandAck:
-        return CommandAck(header=bus.header(entity), command_id=command_id, verb=Verb.LAND, stage=stage)
-
-    assert not book.note(ack("stranger", AckStage.RECEIVED))
-    assert not book.note(ack("drone_1", AckStage.RECEIVED, "2"))
-    assert book.note(ack("drone_1", AckStage.ACCEPTED))
-    assert not book.note(ack("drone_1", AckStage.RECEIVED)), "out of order"
-    assert book.progress["drone_1"].text(final=True) == "sent / received / accepted / NOT CONFIRMED"
-    assert book.note(ack("drone_1", AckStage.EFFECTIVE)) and book.confirmed and book.settled
-    assert not book.note(ack("drone_1", AckStage.REFUSED)), "nothing after the end"

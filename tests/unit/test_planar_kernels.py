@@ -1,28 +1,26 @@
 """The compiled kernels of the planar planner against numpy, complex steps and the reference vectors."""
 
 import json
-import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from groundstation.planning.peers import naive, numpy_adjoint
-from groundstation.planning.planar.dense import (
+from groundstation.bench.planner_peers import naive, numpy_adjoint
+from groundstation.experiments.planar.dense import (
     cholesky_upper,
     negative_inverse,
     padded,
     subtract_products,
 )
-from groundstation.planning.planar.edges import exponentials
-from groundstation.planning.planar.objective import cost_and_gradient
-from groundstation.planning.planar.parameters import FIGURE_1, PlanarParameters
-from groundstation.planning.planar.planner import PlanarPlanner, SearchOptions
-from groundstation.planning.planar.problem import load_topology, make_problem, make_workspace
-from groundstation.planning.planar.scenarios import bench_belief
-
-DATA = Path(os.environ.get("GROUNDSTATION_DATA", Path(__file__).parents[3] / "shared" / "data"))
+from groundstation.experiments.planar.edges import exponentials
+from groundstation.experiments.planar.objective import cost_and_gradient
+from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParameters
+from groundstation.experiments.planar.planner import PlanarPlanner, SearchOptions
+from groundstation.experiments.planar.problem import load_topology, make_problem, make_workspace
+from groundstation.experiments.planar.scenarios import bench_belief
 
 
 def evaluate(
@@ -81,11 +79,8 @@ def test_exponentials() -> None:
     assert np.abs(out / np.exp(x) - 1.0).max() <= 2 * 2.3e-16
 
 
-def test_reference_vectors() -> None:
-    file = DATA / "planner_vectors.json"
-    if not file.is_file():
-        pytest.skip(f"{file} is not there (set GROUNDSTATION_DATA)")
-    for v in json.loads(file.read_text()):
+def test_reference_vectors(real_data: Callable[[str], Path]) -> None:
+    for v in json.loads(real_data("planner_vectors.json").read_text()):
         p = v["params"]
         names = ("sigma", "r", "s", "eps", "qr", "qt", "dt", "h", "gamma", "umax")
         parameters = PlanarParameters(*(p[name] for name in names), tuple(p["vt"]))

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from groundstation.planning.peers import naive, numpy_adjoint
-from groundstation.planning.planar.parameters import FIGURE_1, PlanarParameters
-from groundstation.planning.planar.planner import Fate, Mode, PlanarPlan, PlanarPlanner, SearchOptions
-from groundstation.planning.planar.scenarios import bench_belief
+from groundstation.bench.planner_peers import naive, numpy_adjoint
+from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParameters
+from groundstation.experiments.planar.planner import Fate, PlanarPlan, PlanarPlanner, SearchMode, SearchOptions
+from groundstation.experiments.planar.scenarios import bench_belief
 
 P = PlanarParameters()
 
@@ -21,7 +21,7 @@ def plan_of(robots: int, layout: str = "two-level", seed: int = 3, **options: An
 
 
 def test_paper_mode_solves_current_and_neighbours_and_takes_the_cheapest() -> None:
-    plan = plan_of(5, mode=Mode.PAPER, hysteresis=0.5)
+    plan = plan_of(5, mode=SearchMode.PAPER, hysteresis=0.5)
     assert all(candidate.fate is Fate.SOLVED for candidate in plan.certificate)
     assert plan.cost == min(candidate.cost for candidate in plan.certificate if candidate.cost is not None)
     assert len(plan.certificate) == 11
@@ -29,7 +29,7 @@ def test_paper_mode_solves_current_and_neighbours_and_takes_the_cheapest() -> No
 
 def test_peers_agree() -> None:
     mean, covariance, level = bench_belief(4, "two-level", 3, P)
-    plan = PlanarPlanner(4, P, SearchOptions(mode=Mode.PAPER)).plan(mean, covariance, level)
+    plan = PlanarPlanner(4, P, SearchOptions(mode=SearchMode.PAPER)).plan(mean, covariance, level)
     for peer in (numpy_adjoint, naive):
         step = peer.solve(mean, covariance, tuple(int(k) for k in level), P)
         assert step.level == tuple(plan.level)
@@ -57,15 +57,15 @@ def test_certified_mode_dissolves_a_string_at_once() -> None:
 
 def test_global_mode_is_never_worse() -> None:
     for robots in (3, 4, 5):
-        everything = plan_of(robots, "random", mode=Mode.GLOBAL)
+        everything = plan_of(robots, "random", mode=SearchMode.GLOBAL)
         assert everything.cost <= plan_of(robots, "random").cost * (1.0 + 1e-12)
         assert len(everything.certificate) == {3: 13, 4: 75, 5: 541}[robots]
     with pytest.raises(ValueError, match="at most 6 robots"):
-        plan_of(7, mode=Mode.GLOBAL)
+        plan_of(7, mode=SearchMode.GLOBAL)
 
 
 def test_fixed_mode_keeps_the_topology() -> None:
-    plan = plan_of(6, mode=Mode.FIXED)
+    plan = plan_of(6, mode=SearchMode.FIXED)
     assert not plan.switched and len(plan.certificate) == 1
 
 
@@ -123,12 +123,12 @@ def test_another_thread_can_stop_it() -> None:
 
 def test_segments_and_starts_only_help() -> None:
     mean, covariance, level = bench_belief(6, "two-level", 5, P)
-    one = PlanarPlanner(6, P, SearchOptions(mode=Mode.FIXED, tolerance=1e-6)).plan(mean, covariance, level)
-    pieces = PlanarPlanner(6, P, SearchOptions(mode=Mode.FIXED, segments=5, tolerance=1e-6))
+    one = PlanarPlanner(6, P, SearchOptions(mode=SearchMode.FIXED, tolerance=1e-6)).plan(mean, covariance, level)
+    pieces = PlanarPlanner(6, P, SearchOptions(mode=SearchMode.FIXED, segments=5, tolerance=1e-6))
     plan = pieces.plan(mean, covariance, level)
     assert plan.velocity_m_s.shape == (5, 6, 2)
     assert plan.cost <= one.cost * (1.0 + 1e-6)
-    options = SearchOptions(mode=Mode.FIXED, tolerance=1e-6, starts=4)
+    options = SearchOptions(mode=SearchMode.FIXED, tolerance=1e-6, starts=4)
     again = [PlanarPlanner(6, P, options).plan(mean, covariance, level) for _ in range(2)]
     assert again[0].cost == again[1].cost <= one.cost
     assert again[0].evaluations > one.evaluations
@@ -136,7 +136,7 @@ def test_segments_and_starts_only_help() -> None:
 
 def test_warm_start_saves_evaluations() -> None:
     mean, covariance, level = bench_belief(10, "two-level", 3, P)
-    planner = PlanarPlanner(10, P, SearchOptions(mode=Mode.FIXED))
+    planner = PlanarPlanner(10, P, SearchOptions(mode=SearchMode.FIXED))
     assert planner.plan(mean, covariance, level).evaluations > planner.plan(mean, covariance, level).evaluations
 
 
@@ -173,7 +173,7 @@ def test_odd_but_legal_input(robots: int, kind: str) -> None:
             mean = mean + 50.0
         case "far apart":
             mean = mean * 1e6
-    for mode in (Mode.PAPER, Mode.CERTIFIED):
+    for mode in (SearchMode.PAPER, SearchMode.CERTIFIED):
         plan = PlanarPlanner(robots, P, SearchOptions(mode=mode)).plan(mean, covariance, level)
         assert np.isfinite(plan.cost) and plan.cost > 0.0
         assert np.isfinite(plan.velocity_m_s).all() and np.abs(plan.velocity_m_s).max() <= P.max_speed_m_s

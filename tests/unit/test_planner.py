@@ -1,6 +1,5 @@
 """One planning step: what it chooses, why, and what it does when time or belief run out."""
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,16 +9,16 @@ import pytest
 
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, Layout
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import PlannerParameters, parameters_from_field
-from groundstation.planning.plan import Planner, PlanResult
-from groundstation.planning.selection import choose
+from groundstation.planning.plan import Planner, PlanResult, choose
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 
-LAB = json.loads(load_field(Path(__file__).parents[2] / "config/lab.yaml").model_dump_json())
+LAB = resolved_field(load_field(Path(__file__).parents[2] / "config/lab.yaml"))
 SENSORS = sensors_from_field(LAB)
 PARAMETERS = parameters_from_field(LAB)
 FLAT, STRING = Topology.parse("drone_1,drone_2"), Topology.parse("drone_1/drone_2")
@@ -32,7 +31,7 @@ def belief(
     target_std: float = 0.05,
     extra: tuple[str, ...] = (),
 ) -> JointBelief:
-    layout, mean, variances = Layout(), [], []
+    layout, mean, variances = StateLayout(), [], []
     for name, pose in robots.items():
         layout = layout.with_entity(name, EntityKind.ROBOT, (*ROBOT_CORE, *extra))
         mean += [*pose, *(0.0 for _ in extra)]

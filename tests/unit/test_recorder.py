@@ -11,12 +11,14 @@ import pytest
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Event, Severity
 from groundstation.bus.topics import EVENT, IMAGE
-from groundstation.recording import series as series_module
-from groundstation.recording import space
+from groundstation.recording import disk_space
+from groundstation.recording import rotating_file as series_module
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.reader import open_recording, parts
 from groundstation.runtime import recorder as recorder_module
 from groundstation.runtime.recorder import Recorder, RecorderSection
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
 
 
 class FakeChild:
@@ -53,8 +55,9 @@ def now(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def _recorder(child: Any, folder: Path, **recording: bool) -> Recorder:
-    field = {"site": "lab", "recording": recording}
-    return Recorder(child, RecorderSection(msgspec.Raw(json.dumps(field).encode()), str(folder), 1))
+    options = [f"recording.{key}={json.dumps(value)}" for key, value in recording.items()]
+    field = load_field(find_field("lab"), options).model_dump_json().encode()
+    return Recorder(child, RecorderSection(msgspec.Raw(field), str(folder), 1))
 
 
 def _say(bus: MemoryBus, text: str) -> None:
@@ -109,7 +112,7 @@ def test_low_disk_warns_then_drops_pictures_only(
         recorder.turn()
     recorder.close()
     assert [severity for severity, _ in child.events] == ["WARNING", "WARNING"]
-    assert recorder._space is space.Space.NO_IMAGES
+    assert recorder._space is disk_space.Space.NO_IMAGES
     assert len(list(open_recording(tmp_path / "raw.mcap").raw_records())) == 2
     assert len(list(open_recording(tmp_path / "state.mcap").raw_records())) == 3
 

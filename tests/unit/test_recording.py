@@ -13,11 +13,11 @@ from groundstation.bus.api import Sample
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.topics import IMAGE, ODOMETRY, RAW_RX, TRUTH, VIDEO
 from groundstation.recording.capture import Capture, Entry
+from groundstation.recording.disk_space import Space, assess
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import Preamble
 from groundstation.recording.reader import RecordingError, open_recording, parts, payload
-from groundstation.recording.series import RETRY_PERIOD_NS, FileSeries
-from groundstation.recording.space import Space, assess
+from groundstation.recording.rotating_file import RETRY_PERIOD_NS, FileSeries
 from groundstation.recording.timeline import Timeline
 
 S = 1_000_000_000

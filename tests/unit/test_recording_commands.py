@@ -17,7 +17,7 @@ from mcap.writer import Writer
 from groundstation.bus.topics import ESTIMATE
 from groundstation.cli.exits import ExitCode, exit_code_of
 from groundstation.cli.main import VERBS, groundstation
-from groundstation.recording import origin
+from groundstation.recording import compatibility
 from groundstation.recording.capture import Entry
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import Preamble
@@ -202,7 +202,7 @@ def test_info_names_messages_that_were_others_when_they_were_recorded(tmp_path: 
 
 
 def test_messages_of_another_version_are_refused_with_the_remedy(tmp_path: Path) -> None:
-    metadata = {"run": {origin.VERSION_FIELD: "9"}, "versions": {"skein-groundstation": "4.2.0"}}
+    metadata = {"run": {compatibility.VERSION_FIELD: "9"}, "versions": {"skein-groundstation": "4.2.0"}}
     McapFile(tmp_path / "state.mcap", Preamble(metadata, {}, 0)).close()
     code, text = _refusal("info", tmp_path)
     assert code is ExitCode.SETTINGS
@@ -212,7 +212,7 @@ def test_messages_of_another_version_are_refused_with_the_remedy(tmp_path: Path)
 def test_output_that_exists_is_never_touched(whole: Path, tmp_path: Path) -> None:
     taken = tmp_path / "taken"
     taken.write_text("mine")
-    for command in (("cut",), ("export", "--csv"), ("export", "--rrd"), ("export", "--foxglove-scene")):
+    for command in (("cut",), ("export", "--csv")):
         code, text = _refusal(*command, whole, "--output", taken)
         assert code is ExitCode.SETTINGS and "exists already" in text
     assert taken.read_text() == "mine"

@@ -5,6 +5,7 @@ import math
 import struct
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -12,6 +13,7 @@ from mcap.reader import make_reader
 
 from groundstation.bus import messages as m
 from groundstation.cli.bench import bench
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.recording.capture import Entry
 from groundstation.recording.derived import ViewerChannels, camera_frames
@@ -96,8 +98,8 @@ def test_a_message_that_is_malformed_inside_costs_the_viewers_line_only(topic: s
     assert ViewerChannels().derived(entry) is None
 
 
-def test_a_field_without_cameras_has_no_camera_frames() -> None:
-    assert camera_frames({"site": "lab"}) == ()
+def test_a_field_without_cameras_has_no_camera_frames(lab_field: ResolvedField) -> None:
+    assert camera_frames(msgspec.structs.replace(lab_field, cameras={}, drones={})) == ()
 
 
 def test_severities_have_levels() -> None:

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.bus.clock import NS_PER_S
 from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, IMU, PLAN
+from groundstation.recording.cut import cut_run
+from groundstation.recording.file_topics import LATCHED_TOPICS
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.reader import RecordingError, open_recording, parts
+from groundstation.recording.rotating_file import Rotation
 from groundstation.recording.run import open_run
-from groundstation.recording.selection import LATCHED_TOPICS
-from groundstation.recording.series import Rotation
-from groundstation.recording.stretch import cut_run
 from groundstation.recording.synthetic import SyntheticRun, write_run
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
+from groundstation.time_units import NS_PER_S
 
 DURATION_S = 5.0
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from drivers.camera.detect import refined
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
-from sim_bridge.render.process import Link, active_outage
+from sim_bridge.render.process import FrameDelay, active_outage
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, Mount, Outage, OutageKind, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, Outage, OutageKind, PictureQuality, RenderSpec
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
 CEILING = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, (-0.12, 0.05, 0.0, 0.0, 0.0))
@@ -22,7 +22,7 @@ MOUNTS = {
     "drone_1": Mount(Pose(base_from_tilted_optical(math.radians(45)), np.array([0.09, 0.0, 0.0])), "drone_1"),
     "ceiling": Mount(Pose(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 4.2]))),
 }
-CLEAN = CameraScenario(corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.5, exposure_ms=0.0)
+CLEAN = PictureQuality(corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.5, exposure_ms=0.0)
 
 
 def make_spec(camera="drone_1", scenario=CLEAN, seed=1):
@@ -37,7 +37,7 @@ def state(x, y, z, yaw=0.0, roll=0.0, pitch=0.0, velocity=(0.0, 0.0, 0.0)):
 
 def bot_corners(spec, states):
     sight = next(s for s in compose_scene(spec, states).sights if s.board.body == "bot")
-    return spec.intrinsics.project(sight.optical_from_marker.apply(Board(5, 44.0).corners()))
+    return spec.intrinsics.project(sight.optical_from_marker.apply(Checkerboard(5, 44.0).corners()))
 
 
 def corner_errors(camera, scenario, poses, seed=0):
@@ -65,13 +65,13 @@ def test_corners_are_where_projection_says(camera):
 
 @pytest.mark.parametrize("camera", ["drone_1", "ceiling"])
 def test_corners_scatter_by_the_scenarios_figure(camera):
-    errors = corner_errors(camera, CameraScenario(exposure_ms=0.0), 40)
+    errors = corner_errors(camera, PictureQuality(exposure_ms=0.0), 40)
     assert np.sqrt((errors**2).mean()) == pytest.approx(0.2, abs=0.045)
     assert np.abs(errors.mean(axis=(0, 1))).max() <= 0.05
 
 
 def test_a_smear_does_not_move_the_corners():
-    spec = make_spec("ceiling", CameraScenario(corner_noise_px=0, pixel_noise=0, exposure_ms=8.0))
+    spec = make_spec("ceiling", PictureQuality(corner_noise_px=0, pixel_noise=0, exposure_ms=8.0))
     renderer = Renderer(spec)
     states = np.array([state(0, 0, 9), state(0.4, 0.3, 0.5, 0.4, velocity=(0.6, 0.3, 0.0))])
     truth = bot_corners(spec, states)
@@ -85,7 +85,7 @@ def test_a_smear_does_not_move_the_corners():
 
 def test_same_seed_same_picture():
     states = np.array([state(0, 0, 2), state(1.6, 0, 0)])
-    scenario = CameraScenario()
+    scenario = PictureQuality()
     first, second = (Renderer(make_spec(scenario=scenario, seed=3)).render(states) for _ in range(2))
     other = Renderer(make_spec(scenario=scenario, seed=4)).render(states)
     assert (first == second).all()
@@ -104,7 +104,7 @@ def test_a_camera_does_not_see_its_own_carrier():
 
 
 def test_boards_seen_from_below_and_beyond_the_border_are_harmless():
-    renderer = Renderer(make_spec(scenario=CameraScenario()))
+    renderer = Renderer(make_spec(scenario=PictureQuality()))
     random = np.random.default_rng(5)
     for _ in range(40):
         states = np.array(
@@ -125,7 +125,7 @@ def test_ceiling_picture_axes():
 
 
 def test_link_keeps_order_loses_its_share_and_is_late_by_the_delay():
-    link = Link(make_spec(scenario=CameraScenario(frame_loss=0.05)))
+    link = FrameDelay(make_spec(scenario=PictureQuality(frame_loss=0.05)))
     exposures = [k * 66_000_000 for k in range(3000)]
     pairs = [(e, link.release_ns(e)) for e in exposures]
     delays = np.array([r - e for e, r in pairs if r is not None]) / 1e6

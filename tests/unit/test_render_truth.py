@@ -8,18 +8,18 @@ import pytest
 
 from drivers.camera.detect import find_board, refined, spacing_px, window_around
 from groundstation.geometry import board as marker
-from groundstation.geometry.board import Board
+from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
-from groundstation.geometry.tag import Tag
+from groundstation.geometry.tag import SquareTag
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.render.spec import BoardSpec, BodyShape, CameraScenario, FloorKind, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, BodyShape, FloorKind, Mount, PictureQuality, RenderSpec
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
 MOUNT = Mount(Pose(base_from_tilted_optical(math.radians(45)), np.zeros(3)), "drone_1")
-IDEAL = CameraScenario(corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.0, exposure_ms=0.0)
+IDEAL = PictureQuality(corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.0, exposure_ms=0.0)
 BOT = BoardSpec("bot", 5, 44.0, (0.0, 0.0, 0.4), BodyShape.TURTLEBOT)
 RAYS = 8
 
@@ -61,7 +61,9 @@ def test_corners_agree_with_rays_to_hundredths_of_a_pixel():
     while len(errors) < 25:
         states = [state(0, 0, 2.2), state(*random.uniform([1.2, -0.6], [2.6, 0.6]), 0.0, random.uniform(-3, 3))]
         pose = sight_of(renderer, states).optical_from_marker
-        corners, card = (FRONT.project(pose.apply(p)) for p in (Board(5, 44.0).corners(), Board(5, 44.0).outline()))
+        corners, card = (
+            FRONT.project(pose.apply(p)) for p in (Checkerboard(5, 44.0).corners(), Checkerboard(5, 44.0).outline())
+        )
         if not FRONT.contains(card, 8.0).all():
             continue
         window = window_around(card, 3.0, (360, 640))
@@ -78,19 +80,19 @@ def test_corners_agree_with_rays_to_hundredths_of_a_pixel():
 
 
 def test_a_rolling_shutter_shears_what_moves_and_nothing_else():
-    rolling = CameraScenario(
+    rolling = PictureQuality(
         corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.5, exposure_ms=0.0, rolling_shutter_ms=30.0
     )
     renderer, still = make(rolling), [state(0, 0, 2.0), state(1.6, 0.0, 0.0, 0.4)]
-    ordinary = make(CameraScenario(corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.5, exposure_ms=0.0))
+    ordinary = make(PictureQuality(corner_noise_px=0.0, pixel_noise=0.0, blur_px=0.5, exposure_ms=0.0))
     assert np.abs(renderer.render(np.array(still)).astype(int) - ordinary.render(np.array(still))).max() <= 1
     moving = [still[0], state(1.6, 0.0, 0.0, 0.4, velocity=(0.0, -1.0, 0.0))]
     pose = sight_of(renderer, moving).optical_from_marker
-    truth = FRONT.project(pose.apply(Board(5, 44.0).corners()))
+    truth = FRONT.project(pose.apply(Checkerboard(5, 44.0).corners()))
     find = refined(renderer.render(np.array(moving)), truth)
     shift = find - truth
     # By hand: 1 m/s to the right at f / z, times each row's time from the middle one.
-    z = pose.apply(Board(5, 44.0).corners())[:, 2]
+    z = pose.apply(Checkerboard(5, 44.0).corners())[:, 2]
     expected = 460.0 / z * 0.030 * (truth[:, 1] / 359.0 - 0.5)
     assert shift[:, 0] == pytest.approx(expected, abs=0.25)
     assert np.abs(shift[:, 1]).max() < 0.25
@@ -99,11 +101,11 @@ def test_a_rolling_shutter_shears_what_moves_and_nothing_else():
 def test_little_light_darkens_and_photon_noise_grows_with_the_light():
     states = np.array([state(0, 0, 2.0), state(1.6, 0.0, 0.0)])
     clean = make(IDEAL).render(states).astype(float)
-    dark = make(CameraScenario(0, light=0.25, corner_noise_px=0, pixel_noise=0, blur_px=0, exposure_ms=0)).render(
+    dark = make(PictureQuality(0, light=0.25, corner_noise_px=0, pixel_noise=0, blur_px=0, exposure_ms=0)).render(
         states
     )
     assert dark == pytest.approx(0.25 * clean, abs=1.01)
-    noisy = make(CameraScenario(0, shot_noise=8.0, corner_noise_px=0, pixel_noise=0, blur_px=0, exposure_ms=0))
+    noisy = make(PictureQuality(0, shot_noise=8.0, corner_noise_px=0, pixel_noise=0, blur_px=0, exposure_ms=0))
     noise = noisy.render(states).astype(float) - clean
     bright, black = noise[clean > 200], noise[clean < 45]
     assert bright.std() == pytest.approx(8.0 * math.sqrt(230 / 255), rel=0.15)
@@ -113,13 +115,13 @@ def test_little_light_darkens_and_photon_noise_grows_with_the_light():
 
 def test_a_turning_camera_smears_the_floor():
     turning = np.array([state(0, 0, 2.0, rates=(0.0, 0.0, 2.0)), state(9, 9, 9)])
-    sharp, smeared = (make(CameraScenario(0, exposure_ms=ms, pixel_noise=0)).render(turning) for ms in (0.0, 15.0))
+    sharp, smeared = (make(PictureQuality(0, exposure_ms=ms, pixel_noise=0)).render(turning) for ms in (0.0, 15.0))
     assert cv2.Laplacian(smeared, cv2.CV_64F).var() < 0.6 * cv2.Laplacian(sharp, cv2.CV_64F).var()
 
 
 def test_floors_differ():
     nothing = np.array([state(0, 0, 2.0), state(9, 9, 9)])
-    pictures = [make(CameraScenario(0, floor=kind, pixel_noise=0)).render(nothing).astype(int) for kind in FloorKind]
+    pictures = [make(PictureQuality(0, floor=kind, pixel_noise=0)).render(nothing).astype(int) for kind in FloorKind]
     for first in range(4):
         for second in range(first):
             assert np.abs(pictures[first] - pictures[second]).mean() > 4.0
@@ -128,10 +130,10 @@ def test_floors_differ():
 def test_a_drone_hides_the_board_behind_it():
     """The camera looks down at a TurtleBot; a drone hovers on the line of sight, half a metre before the camera."""
     boards = (BoardSpec("drone_2", 2, 44.0, (0.0, 0.0, 0.08)), BOT)
-    renderer, target = make(CameraScenario(0, corner_noise_px=0), boards), state(1.6, 0.0, 0.0)
+    renderer, target = make(PictureQuality(0, corner_noise_px=0), boards), state(1.6, 0.0, 0.0)
     away, between = state(9, 9, 1), state(1.0, 0.0, 0.92)
     corners = FRONT.project(
-        sight_of(renderer, [state(0, 0, 2.0), away, target]).optical_from_marker.apply(Board(5, 44.0).corners())
+        sight_of(renderer, [state(0, 0, 2.0), away, target]).optical_from_marker.apply(Checkerboard(5, 44.0).corners())
     )
     spacing = spacing_px(corners)
     window = window_around(corners, 1.6 * spacing + 6.0, (360, 640))
@@ -144,9 +146,9 @@ def test_a_drone_hides_the_board_behind_it():
 
 @pytest.mark.parametrize("dictionary", ["DICT_4X4_50", "DICT_APRILTAG_36H11"])
 def test_a_tag_is_drawn_where_projection_says(dictionary):
-    tag = Tag(dictionary, 7, 168.0)
+    tag = SquareTag(dictionary, 7, 168.0)
     board = BoardSpec("bot", 0, 0.0, (0.0, 0.0, 0.4), BodyShape.TURTLEBOT, tag)
-    renderer = make(CameraScenario(0, corner_noise_px=0, exposure_ms=0), (board,))
+    renderer = make(PictureQuality(0, corner_noise_px=0, exposure_ms=0), (board,))
     states = [state(0, 0, 1.6), state(1.2, 0.1, 0.0, 0.5)]
     truth = FRONT.project(sight_of(renderer, states).optical_from_marker.apply(tag.corners()))
     finder = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)))

@@ -25,24 +25,12 @@ from groundstation.report.gather import gather
 from groundstation.report.judge import judge
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.summary import summary
+from groundstation.settings.load import load_field
 
 S = 1_000_000_000
 UNIX = 1_700_000_000 * S
 FLAT, STRING = "drone_1,drone_2", "drone_1/drone_2"
-FIELD = {
-    "site": "lab",
-    "room": {"size_m": [8.0, 6.0, 4.5], "fence": {"x_m": [-3.7, 3.7], "y_m": [-2.7, 2.7], "z_m": [0.0, 2.8]}},
-    "cameras": {
-        "ceiling": {
-            "position_m": [0.0, 0.0, 4.2],
-            "calibration": {"width_px": 1280, "height_px": 720, "fx_px": 763.0, "fy_px": 763.0},
-        }
-    },
-    "drones": {"drone_1": {}, "drone_2": {}},
-    "target": {"name": "turtlebot"},
-    "planner": {"level_heights_m": [[1.3], [2.2, 1.3]]},
-    "safety": {"min_separation_m": 0.6},
-}
+FIELD = load_field(Path(__file__).parents[1] / "fixtures/field/lab.yaml").model_dump_json().encode()
 
 
 @dataclass
@@ -82,7 +70,7 @@ class Tape:
     """Writes messages with chosen stamps into a recording."""
 
     def __init__(self, folder: Path) -> None:
-        attachments = {"field.json": ("application/json", json.dumps(FIELD).encode())}
+        attachments = {"field.json": ("application/json", FIELD)}
         self._file = McapFile(folder / "state.mcap", Preamble({}, attachments, UNIX))
         self._capture = Capture(Timeline("here", UNIX))
         self._seq = 0

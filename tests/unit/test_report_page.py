@@ -11,7 +11,6 @@ from click.testing import CliRunner
 
 from groundstation.bus import messages as m
 from groundstation.cli.report import report as report_command
-from groundstation.report.arena import Arena
 from groundstation.report.consistency import bounds, edges, nees_per_dof, windowed_nis
 from groundstation.report.decisions import interventions, switches
 from groundstation.report.findings import findings_of
@@ -21,12 +20,12 @@ from groundstation.report.page.chart import held, thin
 from groundstation.report.page.comparison import write_comparison
 from groundstation.report.page.document import write_page
 from groundstation.report.run_facts import RunFacts
-from groundstation.report.tracks import EstimateTrack, RunData, Timed, TruthTrack
+from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, RunData, TimedMessage, TruthTrack
 
 HEADER = m.Header(0, "here", "drone_1", "test", 0)
 
 
-def innovation(time_s: float, nis: float, verdict: m.Verdict = m.Verdict.ACCEPTED) -> Timed[m.Innovation]:
+def innovation(time_s: float, nis: float, verdict: m.Verdict = m.Verdict.ACCEPTED) -> TimedMessage[m.Innovation]:
     message = m.Innovation(
         header=HEADER,
         observer="ceiling",
@@ -36,19 +35,21 @@ def innovation(time_s: float, nis: float, verdict: m.Verdict = m.Verdict.ACCEPTE
         nis=nis,
         latency_ms=120.0,
     )
-    return Timed(time_s, message)
+    return TimedMessage(time_s, message)
 
 
-def plan(time_s: float, topology: str, cost: float, others: dict[str, float], **control: object) -> Timed[m.Plan]:
+def plan(
+    time_s: float, topology: str, cost: float, others: dict[str, float], **control: object
+) -> TimedMessage[m.Plan]:
     alternatives = tuple(m.Alternative(name, value) for name, value in others.items())
     controls = (m.Control("drone_1", (0.1, 0.0, 0.0), 0.0, **control),) if control else ()
     solver = m.SolverReport("ok", 1, 0.001, 1, 1)
-    return Timed(time_s, m.Plan(header=HEADER, topology=topology, cost=cost, controls=controls, edges=(),
+    return TimedMessage(time_s, m.Plan(header=HEADER, topology=topology, cost=cost, controls=controls, edges=(),
                                 alternatives=alternatives, solver=solver, mode="x"))  # fmt: skip
 
 
 def run_with(**series: object) -> RunData:
-    data = RunData(Arena(), RunFacts(), end_s=10.0)
+    data = RunData(UNKNOWN_FIELD, RunFacts(), end_s=10.0)
     for name, value in series.items():
         setattr(data, name, value)
     return data
@@ -107,8 +108,8 @@ def test_interventions_are_counted_in_episodes() -> None:
 
 def test_links_name_the_longest_silence_and_the_worst_quality() -> None:
     statuses = [
-        Timed(time_s, m.VehicleStatus(header=HEADER, flight_state=m.FlightState.FLYING, mode="TRACK", battery=level,
-                                      link_quality=quality, rate_hz=rate, rejected={"checksum": count}))
+        TimedMessage(time_s, m.VehicleStatus(header=HEADER, flight_state=m.FlightState.FLYING, mode="TRACK",
+                                      battery=level, link_quality=quality, rate_hz=rate, rejected={"checksum": count}))
         for time_s, level, quality, rate, count in (
             (0.0, 0.9, 1.0, 200.0, 0), (0.2, 0.9, 0.4, 150.0, 3), (2.2, 0.8, 0.9, 200.0, 1),
         )
@@ -128,7 +129,7 @@ def sample_run(tmp_path: Path, name: str) -> tuple[RunData, Path]:
     folder = tmp_path / name
     folder.mkdir()
     events = [
-        Timed(
+        TimedMessage(
             2.0,
             m.Event(header=HEADER, severity=m.Severity.WARNING, text="<script>alert(1)</script>", remedy="</script>"),
         )

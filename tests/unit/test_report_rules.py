@@ -5,39 +5,58 @@ import numpy as np
 import pytest
 
 from groundstation.bus import messages as m
+from groundstation.field.drones import FieldDrone, OnboardCamera
+from groundstation.field.room import Fence, LensCalibration
+from groundstation.field.targets import DroneMarker
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
-from groundstation.report.arena import Arena
 from groundstation.report.criteria import criteria_of
 from groundstation.report.interval import tracking_interval
 from groundstation.report.metrics import figures_of
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.safety import all_airborne_s, fence_violation_m
-from groundstation.report.tracks import EstimateTrack, ProcessTrack, RunData, Timed, TruthTrack
+from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
 
+LENS = LensCalibration(
+    model="plumb_bob",
+    width_px=640,
+    height_px=360,
+    fx_px=560.0,
+    fy_px=560.0,
+    cx_px=320.0,
+    cy_px=180.0,
+    distortion=(0.0, 0.0, 0.0, 0.0, 0.0),
+)
+DRONE = FieldDrone(
+    kind="ardrone",
+    address="192.168.1.11",
+    marker=DroneMarker(code=1),
+    camera=OnboardCamera(source="/dev/video0", calibration=LENS),
+    pad_m=(0.0, 0.0),
+)
 HEADER = m.Header(0, "here", "team", "tester", 0)
 
 
 def _data(**content: object) -> RunData:
-    arena = Arena(drones={"a": b"{}", "b": b"{}"})  # type: ignore[dict-item]
-    return RunData(arena, RunFacts(), end_s=100.0, **content)  # type: ignore[arg-type]
+    resolved = msgspec.structs.replace(UNKNOWN_FIELD, drones={"a": DRONE, "b": DRONE})
+    return RunData(resolved, RunFacts(), end_s=100.0, **content)  # type: ignore[arg-type]
 
 
-def _ack(time_s: float, verb: m.Verb, stage: m.AckStage) -> Timed[m.CommandAck]:
-    return Timed(time_s, m.CommandAck(header=HEADER, command_id="x", verb=verb, stage=stage))
+def _ack(time_s: float, verb: m.Verb, stage: m.AckStage) -> TimedMessage[m.CommandAck]:
+    return TimedMessage(time_s, m.CommandAck(header=HEADER, command_id="x", verb=verb, stage=stage))
 
 
-def _command(time_s: float, verb: m.Verb, *scope: str) -> Timed[m.Command]:
-    return Timed(time_s, m.Command(header=HEADER, id="x", verb=verb, scope=scope, issuer="me"))
+def _command(time_s: float, verb: m.Verb, *scope: str) -> TimedMessage[m.Command]:
+    return TimedMessage(time_s, m.Command(header=HEADER, id="x", verb=verb, scope=scope, issuer="me"))
 
 
-def _plan(time_s: float, text: str) -> Timed[m.Plan]:
+def _plan(time_s: float, text: str) -> TimedMessage[m.Plan]:
     solver = m.SolverReport("ok", 1, 0.01, 1, 1)
     plan = m.Plan(
         header=HEADER, topology=text, cost=1.0, controls=(), edges=(), alternatives=(), solver=solver, mode="certified"
     )
-    return Timed(time_s, plan)
+    return TimedMessage(time_s, plan)
 
 
 def _truth(ground: list[bool], z: float = 1.0) -> TruthTrack:
@@ -59,7 +78,9 @@ def test_both_topologies_must_occur_in_the_demo_alone(mode: str, failed: set[str
     data = _data(plans=[_plan(0.0, "a,b"), _plan(10.0, "a,b")])
     seconds = topology_use.topology_seconds(data, 0.0, 20.0)
     figures = msgspec.structs.replace(figures_of(data), topology_seconds=seconds, sim_overrun_percent=0.0)
-    judged = {c.name: c for c in criteria_of(figures, data.arena, RunFacts(mode=mode)) if c.name.startswith("topology")}
+    judged = {
+        c.name: c for c in criteria_of(figures, data.resolved, RunFacts(mode=mode)) if c.name.startswith("topology")
+    }
     assert {name for name, criterion in judged.items() if not criterion.ok} == failed
     assert bool(judged) == (mode == "demo")
 
@@ -106,9 +127,7 @@ def test_cpu_is_averaged_over_the_whole_run() -> None:
 
 
 def test_the_fence_binds_flying_drones_only() -> None:
-    from groundstation.report.arena import Fence
-
-    fence = Fence((-1.0, 1.0), (-1.0, 1.0), (0.0, 0.7))
+    fence = Fence(x_m=(-1.0, 1.0), y_m=(-1.0, 1.0), z_m=(0.0, 0.7))
     assert fence_violation_m(_truth([True, True]), fence) == 0.0
     assert fence_violation_m(_truth([True, False]), fence) == pytest.approx(0.3)
     assert fence_violation_m(_truth([False], z=-0.0005), fence) == 0.0

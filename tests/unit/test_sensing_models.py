@@ -7,21 +7,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.sensing.models import Frustum, Noise, OnboardCamera, Rectangle, SensorSuite, Softness, WorldCamera
-from groundstation.sensing.visibility import observe, row_of_onboard_camera, row_of_world_camera
+from groundstation.sensing.models import (
+    Frustum,
+    Noise,
+    OnboardCameraModel,
+    Rectangle,
+    SensorSuite,
+    Softness,
+    WorldCameraModel,
+)
+from groundstation.sensing.visibility import camera_rows, observe
 
-CEILING = WorldCamera((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0, border_m=0.0))
-ONBOARD = OnboardCamera((0.09, 0.0, 0.0), Frustum.of_picture(640, 360, 460, 460, 1.9, border_m=0.0))
+CEILING = WorldCameraModel((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0, border_m=0.0))
+ONBOARD = OnboardCameraModel((0.09, 0.0, 0.0), Frustum.of_picture(640, 360, 460, 460, 1.9, border_m=0.0))
 SUITE = SensorSuite({"ceiling": CEILING}, {"a": ONBOARD}, {"a": 0.08, "target": 0.4})
 POINT = st.tuples(*[st.floats(-3, 3)] * 3)
 
 
-def informations(camera: WorldCamera | OnboardCamera, point: tuple[float, float, float]) -> np.ndarray:
-    soft = SUITE.softness
-    row = row_of_world_camera(camera, soft) if isinstance(camera, WorldCamera) else row_of_onboard_camera(camera, soft)
-    out = np.empty(8)
-    observe(row, *point, out)
-    return out
+def informations(camera: WorldCameraModel | OnboardCameraModel, point: tuple[float, float, float]) -> np.ndarray:
+    return np.array(observe(camera_rows([camera], SUITE.softness)[0], *point))
 
 
 def test_the_ceiling_footprint_shrinks_with_height() -> None:
@@ -53,7 +57,7 @@ def test_the_border_keeps_a_whole_board_in_the_picture() -> None:
 @given(POINT, st.sampled_from([CEILING, ONBOARD]))
 @settings(max_examples=60, deadline=None)
 def test_derivatives_agree_with_central_differences(
-    point: tuple[float, float, float], camera: WorldCamera | OnboardCamera
+    point: tuple[float, float, float], camera: WorldCameraModel | OnboardCameraModel
 ) -> None:
     out = informations(camera, point)
     for axis in range(3):
@@ -69,7 +73,7 @@ def test_derivatives_agree_with_central_differences(
 @given(POINT, st.sampled_from([CEILING, ONBOARD]))
 @settings(max_examples=60, deadline=None)
 def test_soft_availability_follows_the_hard_one_and_never_vanishes(
-    point: tuple[float, float, float], camera: WorldCamera | OnboardCamera
+    point: tuple[float, float, float], camera: WorldCameraModel | OnboardCameraModel
 ) -> None:
     margin = camera.view.margin(np.array(point))
     availability = informations(camera, point)[0] * camera.noise.position_std_m(float(np.linalg.norm(point))) ** 2

@@ -1,6 +1,5 @@
 """Setpoints from plans: slots, columns, the search, the way back, and the flight-mode table."""
 
-import json
 import math
 from itertools import product
 from pathlib import Path
@@ -9,17 +8,18 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import SolverReport
-from groundstation.control.modes import Phase, Situation, phase_of
+from groundstation.control.flight_mode import FlightMode, Situation, phase_of
 from groundstation.control.parameters import control_from_field
 from groundstation.control.setpoints import Setpoint, setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, Layout
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.planning.plan import PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 
-LAB = json.loads(load_field(Path(__file__).parents[2] / "config/lab.yaml").model_dump_json())
+LAB = resolved_field(load_field(Path(__file__).parents[2] / "config/lab.yaml"))
 SENSORS, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
 NAMES = ("drone_1", "drone_2")
 
@@ -32,7 +32,7 @@ def belief(
     target_std: float = 0.05,
     stamp_s: float = 0.0,
 ) -> JointBelief:
-    layout = Layout()
+    layout = StateLayout()
     for name in NAMES:
         layout = layout.with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
     mean, variances = [*first, *second], [robot_std**2] * 8
@@ -68,7 +68,7 @@ def test_a_plan_is_flown_as_it_is_and_heights_are_held() -> None:
     assert out["drone_1"].velocity_m_s[:2] == pytest.approx((0.2, -0.1))
     assert out["drone_1"].yaw_rate_rad_s == pytest.approx(0.3)
     assert out["drone_1"].velocity_m_s[2] > 0 > out["drone_2"].velocity_m_s[2]
-    assert {s.phase for s in out.values()} == {Phase.TRACK}
+    assert {s.phase for s in out.values()} == {FlightMode.TRACK}
 
 
 def test_climbing_is_bounded_by_the_limit() -> None:
@@ -97,69 +97,99 @@ def test_small_corrections_of_height_go_on_within_a_column() -> None:
 def test_without_a_fresh_target_they_search_and_look_different_ways(age: float | None) -> None:
     target = None if age is None else (0.5, 0.0, 0.0, 0.0)
     at = [np.array([-0.5, 0.5, 1.3, 0.0]), np.array([-0.5, -0.5, 1.3, 0.0])]
-    headings, nearest = [], math.inf
+    headings, gaps = [], []
     for tick in range(1500):
         now = belief(tuple(at[0]), tuple(at[1]), target, target_std=9.0, stamp_s=0.05 * tick)
         out = setpoints(now, plan((1.5, 1.5)), age)
         for pose, name in zip(at, NAMES, strict=True):
-            assert out[name].phase is Phase.SEARCH
+            assert out[name].phase is FlightMode.SEARCH
             vx, vy, vz = out[name].velocity_m_s
             c, s = math.cos(pose[3]), math.sin(pose[3])
             pose += 0.05 * np.array([c * vx - s * vy, s * vx + c * vy, vz, out[name].yaw_rate_rad_s])
         headings.append([at[0][3], at[1][3]])
-        nearest = min(nearest, float(np.hypot(*(at[0][:2] - at[1][:2]))))
+        gaps.append(math.dist(at[0][:2], at[1][:2]))
         if tick > 200:
             assert all(SENSORS.world_in_view("ceiling", np.add(pose[:3], (0, 0, 0.08))) for pose in at)
     late = np.array(headings[600:])
     apart = np.abs(np.mod(late[:, 0] - late[:, 1] + math.pi, math.tau) - math.pi)
     assert apart.mean() > 2.5
     assert np.ptp(late[:, 0]) > math.tau  # a full turn
-    assert nearest > 0.8
+    assert min(gaps) > 0.8
+    assert min(gaps[200:]) > CONTROL.column_m
     assert at[0][2] == pytest.approx(CONTROL.search_height_m, abs=0.05)
 
 
 def test_a_fair_prediction_of_the_target_is_searched_around() -> None:
     at = belief((-1.0, 0.4, 1.5, 0.0), (-1.0, -0.4, 1.5, 0.0), (2.5, 0.0, 0.0, 0.0), target_std=0.5)
     out = setpoints(at, plan((1.5, 1.5)), age=4.0)
-    assert all(one.phase is Phase.SEARCH and one.velocity_m_s[0] > 0.1 for one in out.values())
+    assert all(one.phase is FlightMode.SEARCH and one.velocity_m_s[0] > 0.1 for one in out.values())
+
+
+@pytest.mark.parametrize("hint", [(3.5, 2.4), (3.5, 0.0), (0.0, 2.6), (-3.0, -2.5)])
+def test_two_that_search_for_a_target_far_outside_of_the_view_stay_in_it(hint: tuple[float, float]) -> None:
+    """The view's corner is nearest to both: with one stand for two they pushed each other out of the view."""
+    at = [np.array([0.2, 0.5, 1.6, 0.0]), np.array([0.2, -0.5, 1.6, 0.0])]
+    for tick in range(1000):
+        now = belief(tuple(at[0]), tuple(at[1]), (*hint, 0.0, 0.0), target_std=0.5, stamp_s=0.05 * tick)
+        out = setpoints(now, None, 5.0)
+        for pose, name in zip(at, NAMES, strict=True):
+            vx, vy, vz = out[name].velocity_m_s
+            c, s = math.cos(pose[3]), math.sin(pose[3])
+            pose += 0.05 * np.array([c * vx - s * vy, s * vx + c * vy, vz, out[name].yaw_rate_rad_s])
+        assert all(SENSORS.world_in_view("ceiling", np.add(pose[:3], (0, 0, 0.08))) for pose in at)
+        if tick > 300:
+            assert math.dist(at[0][:2], at[1][:2]) > CONTROL.column_m - 0.05
+
+
+def test_two_that_fly_back_are_given_a_stand_each() -> None:
+    at = belief((2.5, 0.3, 1.6, 0.0), (2.5, -0.9, 1.6, 0.0), robot_std=0.4)
+    places = [np.array([2.5, 0.3, 1.6, 0.0]), np.array([2.5, -0.9, 1.6, 0.0])]
+    for _ in range(800):
+        at = belief(tuple(places[0]), tuple(places[1]), robot_std=0.4)
+        out = setpoints_from_plan(None, at, NAMES, 5.0, CONTROL, SENSORS, unseen_s=dict.fromkeys(NAMES, 8.0))
+        assert {one.phase for one in out.values()} == {FlightMode.RETURN}
+        for pose, name in zip(places, NAMES, strict=True):
+            pose[:3] += 0.05 * np.array(out[name].velocity_m_s)
+    assert all(SENSORS.world_in_view("ceiling", np.add(pose[:3], (0, 0, 0.08))) for pose in places)
+    assert math.dist(places[0][:2], places[1][:2]) > CONTROL.column_m - 0.05
 
 
 def test_a_lost_robot_flies_back_towards_the_middle_of_the_view() -> None:
     out = setpoints(belief((3.0, 1.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0), robot_std=0.4), plan((1.5, 1.5)))
-    assert out["drone_1"].phase is Phase.RETURN
+    assert out["drone_1"].phase is FlightMode.RETURN
     assert out["drone_1"].velocity_m_s[0] < 0 and out["drone_1"].velocity_m_s[1] < 0
-    assert out["drone_2"].phase is Phase.TRACK  # as uncertain, but in view: the camera will see it
+    assert out["drone_2"].phase is FlightMode.TRACK  # as uncertain, but in view: the camera will see it
 
 
 def test_an_airborne_drone_that_was_never_seen_hovers_and_a_grounded_one_gets_nothing() -> None:
     out = setpoints(belief((0, 1, 1.5, 0), (0, -1, 1.5, 0)), plan((1.5, 1.5)), airborne=("drone_1", "drone_9"))
     assert set(out) == {"drone_1", "drone_9"}
-    assert out["drone_9"] == Setpoint((0.0, 0.0, 0.0), 0.0, Phase.UNKNOWN)
+    assert out["drone_9"] == Setpoint((0.0, 0.0, 0.0), 0.0, FlightMode.UNKNOWN)
 
 
 def test_without_a_plan_they_search() -> None:
     out = setpoints(belief((0, 1, 1.5, 0), (0, -1, 1.5, 0)), None)
-    assert {one.phase for one in out.values()} == {Phase.SEARCH}
+    assert {one.phase for one in out.values()} == {FlightMode.SEARCH}
 
 
 def test_the_flight_mode_table() -> None:
     table = {
-        (False, False): Phase.GROUNDED,
-        (False, True): Phase.GROUNDED,
-        (True, False): Phase.UNKNOWN,
+        (False, False): FlightMode.GROUNDED,
+        (False, True): FlightMode.GROUNDED,
+        (True, False): FlightMode.UNKNOWN,
     }
     for airborne, known, lost, fresh, planned in product((False, True), repeat=5):
         expected = table.get((airborne, known))
         if expected is None:
-            expected = Phase.RETURN if lost else Phase.TRACK if fresh and planned else Phase.SEARCH
+            expected = FlightMode.RETURN if lost else FlightMode.TRACK if fresh and planned else FlightMode.SEARCH
         assert phase_of(Situation(airborne, known, lost, fresh, planned)) is expected
 
 
 def test_while_one_target_is_tracked_the_robot_farthest_from_it_searches_for_a_missing_one() -> None:
     at = belief((-0.5, 0.5, 1.3, 0.0), (-1.5, -0.5, 1.3, 0.0))
     common = (plan((1.3, 1.3), "drone_1,drone_2"), at, NAMES, 0.1, CONTROL, SENSORS)
-    assert {s.phase for s in setpoints_from_plan(*common).values()} == {Phase.TRACK}
+    assert {s.phase for s in setpoints_from_plan(*common).values()} == {FlightMode.TRACK}
     out = setpoints_from_plan(*common, missing=("other",))
-    assert (out["drone_1"].phase, out["drone_2"].phase) == (Phase.TRACK, Phase.SEARCH)
+    assert (out["drone_1"].phase, out["drone_2"].phase) == (FlightMode.TRACK, FlightMode.SEARCH)
     alone = setpoints_from_plan(common[0], at, ("drone_1",), 0.1, CONTROL, SENSORS, missing=("other",))
-    assert alone["drone_1"].phase is Phase.TRACK
+    assert alone["drone_1"].phase is FlightMode.TRACK

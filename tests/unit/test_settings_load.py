@@ -9,7 +9,7 @@ import pytest
 
 from groundstation.errors import SettingsError
 from groundstation.geometry.board import VALID_CODES
-from groundstation.settings.document import Origin, dotted, parse
+from groundstation.settings.document import SourceLine, dotted, parse
 from groundstation.settings.drawing import footprint, marker_height, paths_of, slots
 from groundstation.settings.files import SHIPPED, find_field, find_scenario
 from groundstation.settings.json_schema import field_file_schema
@@ -127,7 +127,7 @@ def test_lines_survive_merging() -> None:
     assert both.plain() == {"limits": {"a": 1, "b": 3}}
     assert str(both.origin_of(("limits", "a"))) == "low:2"
     assert str(both.origin_of(("limits", "b"))) == "up:2"
-    assert both.origin_of(("limits", "c")) == Origin("up", 2, ("limits", "c"))
+    assert both.origin_of(("limits", "c")) == SourceLine("up", 2, ("limits", "c"))
     assert dotted(("drones", "drone_1", "pad_m", 0)) == "drones.drone_1.pad_m[0]"
 
 
@@ -142,10 +142,10 @@ def test_the_json_schema_knows_every_key_of_the_file() -> None:
     definitions = schema["$defs"]
     assert "required" not in definitions["Level"]
     assert set(definitions["Drone"]["properties"]) - set(definitions["Level"]["properties"]) == {"type"}
-    limits = definitions["Limits"]["properties"]["max_speed_m_s"]
+    limits = definitions["LimitSettings"]["properties"]["max_speed_m_s"]
     assert (limits["maximum"], limits["exclusiveMinimum"]) == (3, 0)
-    assert definitions["OnboardCamera"]["properties"]["calibration"]["anyOf"][0] == {"type": "string"}
-    assert "required" in definitions["Calibration"]
+    assert definitions["OnboardCameraSettings"]["properties"]["calibration"]["anyOf"][0] == {"type": "string"}
+    assert "required" in definitions["CalibrationSettings"]
 
 
 def test_the_summary_names_who_wins(field: Field) -> None:

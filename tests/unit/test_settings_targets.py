@@ -9,14 +9,16 @@ import pytest
 
 from groundstation.errors import SettingsError
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, Layout
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.estimation.models import ConstantVelocityTarget, CoordinatedTurnTarget, ManoeuvringTarget
 from groundstation.estimation.parameters import parameters_from_field
+from groundstation.field.resolved import ResolvedField
 from groundstation.planning import parameters as planning
 from groundstation.planning.plan import Planner
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, driver_sections
 
@@ -24,8 +26,8 @@ CONFIG = Path(__file__).parents[2] / "config"
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml"
 
 
-def resolved(*options: str) -> dict[str, Any]:
-    return load_field(FIXTURE, options).model_dump(mode="json")
+def resolved(*options: str) -> ResolvedField:
+    return resolved_field(load_field(FIXTURE, options))
 
 
 @pytest.mark.parametrize(
@@ -72,7 +74,7 @@ def problems_of(tmp_path: Path, old: str, new: str) -> list[str]:
 def test_several_targets_reach_estimator_planner_and_every_camera() -> None:
     field = two_targets("targets.turtlebot_2.weight=4", "targets.turtlebot_2.model=coordinated_turn")
     assert Field.model_validate_json(field.model_dump_json()) == field
-    plain = field.model_dump(mode="json")
+    plain = resolved_field(field)
     entities = parameters_from_field(plain).entities
     assert isinstance(entities["turtlebot_1"], ConstantVelocityTarget)
     assert isinstance(entities["turtlebot_2"], CoordinatedTurnTarget)
@@ -110,8 +112,8 @@ def test_an_option_invents_no_target() -> None:
 
 @pytest.mark.parametrize(("heavy", "side"), [("turtlebot_1", 1.0), ("turtlebot_2", -1.0)])
 def test_a_lone_drone_turns_to_the_target_that_weighs_more(heavy: str, side: float) -> None:
-    plain = two_targets(f"targets.{heavy}.weight=50").model_dump(mode="json")
-    layout = Layout().with_entity("drone_1", EntityKind.ROBOT, ROBOT_CORE)
+    plain = resolved_field(two_targets(f"targets.{heavy}.weight=50"))
+    layout = StateLayout().with_entity("drone_1", EntityKind.ROBOT, ROBOT_CORE)
     for name in ("turtlebot_1", "turtlebot_2"):
         layout = layout.with_entity(name, EntityKind.TARGET, TARGET_CORE)
     mean = np.array([0.0, 0.0, 1.6, 0.0, 0.7, 1.0, 0.0, 0.0, 0.7, -1.0, 0.0, 0.0])

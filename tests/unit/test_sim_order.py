@@ -9,12 +9,12 @@ import pytest
 
 from groundstation.errors import GroundStationError, SettingsError
 from sim_bridge.cameras import render_specs
-from sim_bridge.clockwork import LATE_NS, Clockwork
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.faults import FaultSchedule
-from sim_bridge.order import read_order
+from sim_bridge.launch_spec import read_order
 from sim_bridge.render.spec import BodyShape, OutageKind
 from sim_bridge.scenario import Fault, FaultKind, Scenario
+from sim_bridge.tick_schedule import LATE_NS, Clockwork
 from sim_bridge.world.world import TICK_NS, World
 
 LENS = {
@@ -133,6 +133,20 @@ def test_render_specs_follow_field_and_scenario(tmp_path: Path) -> None:
     assert [(board.body, board.code) for board in onboard.boards] == [("drone_1", 1), ("drone_2", 2), ("turtlebot", 5)]
     assert onboard.boards[2].shape is BodyShape.TURTLEBOT
     assert onboard.boards[2].position_m == (0.0, 0.0, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("firmware", "header_bytes"), [("ar2-2.2", 64), ("ar2-2.3", 68), ("ar2-2.3.3", 68), ("ar2-2.4.8", 68), (None, 68)]
+)
+def test_the_header_of_a_drone_s_video_is_that_of_its_firmware(
+    tmp_path: Path, firmware: str | None, header_bytes: int
+) -> None:
+    content = order()
+    if firmware is not None:
+        content["scenario"] = {"drones": {"firmware_by_drone": {"drone_1": firmware}}}
+    read = read_order(write(tmp_path, content))
+    _, onboard = render_specs(read.site, read.scenario, read.streams, "board", read.seed)
+    assert onboard.video_header_bytes == header_bytes
 
 
 def test_a_stream_of_no_camera_is_named(tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from groundstation.errors import SettingsError
-from sim_bridge.scenario import Scenario, parse_scenario, weaker_than_reality
+from sim_bridge.realism import weaker_than_reality
+from sim_bridge.scenario import Scenario, parse_scenario
 
 SCENARIOS = Path(__file__).parents[2] / "config" / "scenarios"
 

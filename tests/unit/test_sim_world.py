@@ -1,4 +1,4 @@
-"""The simulated bodies move as real ones were measured to move (protocol sheet 7, reliability sheet 5)."""
+"""The simulated bodies move as real ones do (docs/reference/ardrone.md 7)."""
 
 import math
 
@@ -7,10 +7,10 @@ import pytest
 
 from sim_bridge.scenario import DroneScenario, Scenario, TargetScenario
 from sim_bridge.site import Site
-from sim_bridge.world.airframe import STANDING_HEIGHT_M
-from sim_bridge.world.autopilot import FlightLimits, Motion, Phase
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
+from sim_bridge.world.ardrone_autopilot import FlightLimits, MotionReferences, Phase
 from sim_bridge.world.noise import generator_of
-from sim_bridge.world.quadrotor import Quadrotor
 from sim_bridge.world.world import TICK_S, World
 
 STILL = (0.0, 0.0, 0.0)
@@ -49,7 +49,7 @@ def hovering(scenario: DroneScenario = CALM, yaw_rad: float = 0.0) -> Quadrotor:
 def pulse(seconds: float, tilt_deg: float = 12.0) -> tuple[np.ndarray, np.ndarray]:
     """Return pitch [deg] and forward speed [m/s] from the command on, which ends after `seconds`."""
     body = hovering()
-    body.autopilot.move(Motion(0.0, math.radians(tilt_deg), 0.0, 0.0))
+    body.autopilot.move(MotionReferences(0.0, math.radians(tilt_deg), 0.0, 0.0))
     rows = []
     for tick in range(600):
         if tick == round(seconds / TICK_S):
@@ -122,7 +122,10 @@ def test_signs_of_motion(yaw_deg: float) -> None:
     """Pitch down goes forward, roll right goes right, climb goes up, a positive turn is counter-clockwise."""
     yaw = math.radians(yaw_deg)
     forward, left = np.array([math.cos(yaw), math.sin(yaw)]), np.array([-math.sin(yaw), math.cos(yaw)])
-    for motion, axis, sign in ((Motion(0, 0.1, 0, 0), forward, 1), (Motion(0.1, 0, 0, 0), left, -1)):
+    for motion, axis, sign in (
+        (MotionReferences(0, 0.1, 0, 0), forward, 1),
+        (MotionReferences(0.1, 0, 0, 0), left, -1),
+    ):
         body = hovering(yaw_rad=yaw)
         body.autopilot.move(motion)
         fly(body, 1.0)
@@ -131,7 +134,7 @@ def test_signs_of_motion(yaw_deg: float) -> None:
         assert abs(velocity @ (forward + left - axis)) < 0.1
     body = hovering(yaw_rad=yaw)
     height = body.airframe.z
-    body.autopilot.move(Motion(0, 0, 0.4, 0.5))
+    body.autopilot.move(MotionReferences(0, 0, 0.4, 0.5))
     fly(body, 1.0)
     assert body.airframe.z > height + 0.1
     assert 0.3 < math.remainder(body.airframe.yaw - yaw, math.tau) < 0.5
@@ -139,7 +142,7 @@ def test_signs_of_motion(yaw_deg: float) -> None:
 
 def test_climb_and_turn_are_first_order() -> None:
     body = hovering()
-    body.autopilot.move(Motion(0, 0, 0.5, 1.0))
+    body.autopilot.move(MotionReferences(0, 0, 0.5, 1.0))
     fly(body, 0.05 + 0.1)
     assert body.airframe.yaw_rate == pytest.approx(1 - math.exp(-1), abs=0.05)
     fly(body, 1 / 1.4 - 0.1)
@@ -149,7 +152,7 @@ def test_climb_and_turn_are_first_order() -> None:
 def test_limits_hold() -> None:
     body = hovering()
     body.autopilot.limits = FlightLimits(tilt_rad=0.1, climb_m_s=0.5, yaw_rate_rad_s=1.0, height_m=1.5)
-    body.autopilot.move(Motion(0, 1.0, 3.0, 9.0))
+    body.autopilot.move(MotionReferences(0, 1.0, 3.0, 9.0))
     top_rate = 0.0
     for _ in range(1600):
         body.step(STILL)
@@ -161,7 +164,7 @@ def test_limits_hold() -> None:
 
 def test_hover_brakes_then_drifts_slowly() -> None:
     body = hovering(DroneScenario())
-    body.autopilot.move(Motion(0, 0.2, 0, 0))
+    body.autopilot.move(MotionReferences(0, 0.2, 0, 0))
     fly(body, 0.7)
     assert body.airframe.vx > 0.8
     body.autopilot.hover()
@@ -225,7 +228,7 @@ def test_walls_hold() -> None:
     body.autopilot.take_off()
     for tick in range(2000):
         if tick == 1000:
-            body.autopilot.move(Motion(0, 0.2, 0.5, 0))
+            body.autopilot.move(MotionReferences(0, 0.2, 0.5, 0))
         world.step()
     assert body.airframe.x <= 4.0
     assert body.airframe.z <= 3.02

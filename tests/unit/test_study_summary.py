@@ -2,12 +2,19 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
+from groundstation.field.resolved import ResolvedField
 from sim_bridge.study.summary import anees, interval, nis, summary
 
-FIELD = {"drones": {"a": {}, "b": {}}, "target": {"name": "t"}, "cameras": {"sky": {}}}
+
+def field_of(lab: ResolvedField) -> ResolvedField:
+    drone, camera = lab.drones["drone_1"], lab.cameras["ceiling"]
+    assert lab.target is not None
+    target = msgspec.structs.replace(lab.target, name="t")
+    return msgspec.structs.replace(lab, drones={"a": drone, "b": drone}, cameras={"sky": camera}, target=target)
 
 
 def report(a: float, t: float | None) -> dict:
@@ -30,11 +37,11 @@ def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
     assert math.isnan(interval([0.5]).half)
 
 
-def test_a_flight_is_one_sample_whatever_it_saw() -> None:
+def test_a_flight_is_one_sample_whatever_it_saw(lab_field: ResolvedField) -> None:
     assert anees(report(1.0, None), ("a", "b")) == pytest.approx(1.5)
     assert math.isnan(anees(report(1.0, None), ("t",)))
     assert nis(report(1.0, 1.0), ("sky",)) == pytest.approx(1.0)
-    found = summary([report(1.0, 0.9), report(1.2, None), report(0.8, 1.1)], FIELD)
+    found = summary([report(1.0, 0.9), report(1.2, None), report(0.8, 1.1)], field_of(lab_field))
     assert found["anees robots"].mean == pytest.approx(1.5)
     assert (found["anees target"].mean, found["anees target"].flights) == (pytest.approx(1.0), 2)
     assert found["nis onboard cameras"].mean == pytest.approx(2.0)

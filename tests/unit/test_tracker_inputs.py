@@ -19,12 +19,12 @@ from groundstation.bus.messages import (
     VehicleStatus,
     Verdict,
 )
-from groundstation.control.setpoints import Phase
+from groundstation.control.flight_mode import FlightMode
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z
 from groundstation.tracker import Tracker, tracker_from_field
 
-MS = 1_000_000
-START = 7_000_000_000_000
+MS, START = 1_000_000, 7_000_000_000_000
 COVARIANCE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
 TILTED = base_from_tilted_optical(math.radians(45))
 PLACES = {"drone_1": np.array([-0.9, 0.5, 1.3]), "drone_2": np.array([-0.9, -0.7, 1.3])}
@@ -34,7 +34,7 @@ TARGET = np.array([0.2, 0.3, 0.4])
 class Flight:
     """Two drones that hover, a target that stands still, and cameras without noise."""
 
-    def __init__(self, field: dict[str, Any]) -> None:
+    def __init__(self, field: ResolvedField) -> None:
         self.tracker: Tracker = tracker_from_field(field, "here", 3)
         self.now = START
         self.seq = 0
@@ -92,7 +92,7 @@ class Flight:
 
 
 @pytest.fixture
-def flight(lab_field: dict[str, Any]) -> Flight:
+def flight(lab_field: ResolvedField) -> Flight:
     return Flight(lab_field)
 
 
@@ -299,7 +299,7 @@ def test_plan_and_setpoints_follow_from_the_belief(tracking: Flight) -> None:
     assert plan is not None
     assert plan.topology.robots == {"drone_1", "drone_2"}
     limited = tracking.tracker.setpoints(tracking.now)
-    assert {entry.setpoint.phase for entry in limited.values()} == {Phase.TRACK}
+    assert {entry.setpoint.phase for entry in limited.values()} == {FlightMode.TRACK}
     for entry in limited.values():
         assert math.hypot(*entry.setpoint.velocity_m_s[:2]) <= 0.6 + 1e-9
 

@@ -4,6 +4,7 @@ import math
 import time
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -38,10 +39,11 @@ from groundstation.bus.topics import (
     VEHICLE_STATUS,
     Topic,
 )
+from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.replay.difference import first_difference
 from groundstation.replay.rerun import Rerun
-from groundstation.replay.ticks import Tick
+from groundstation.replay.tick_log import Tick
 from groundstation.runtime.health import Deadlines, UnseenWatch
 from groundstation.runtime.tracking import TrackerSection, Tracking
 from groundstation.runtime.warm_up import warm_up
@@ -55,7 +57,7 @@ TARGET = np.array([0.2, 0.3, 0.4])
 class Lab:
     """Drivers and cameras on a memory bus, and the tracker's loop under test."""
 
-    def __init__(self, field: dict[str, Any]) -> None:
+    def __init__(self, field: ResolvedField) -> None:
         exchange = MemoryExchange()
         self.buses = {name: MemoryBus(exchange, "lab", name) for name in (*PLACES, "ceiling")}
         self.listener = MemoryBus(exchange, "lab", "listener")
@@ -115,7 +117,7 @@ def _sight(header: Header, subject: str, position: tuple[float, float, float]) -
 
 
 @pytest.fixture
-def lab(lab_field: dict[str, Any]):
+def lab(lab_field: ResolvedField):
     lab = Lab(lab_field)
     yield lab
     lab.tracking.close()
@@ -151,7 +153,7 @@ def test_drones_hover_once_the_planner_is_silent(lab: Lab) -> None:
     assert [n.text for n in lab.tracking.notices if "plan" in n.text] == ["no new plan for 1 s: drones hover"]
 
 
-def test_a_replayed_journal_says_the_same_to_the_bit(lab: Lab, lab_field: dict[str, Any]) -> None:
+def test_a_replayed_journal_says_the_same_to_the_bit(lab: Lab, lab_field: ResolvedField) -> None:
     lab.run(80, pause_s=0.002)
     heard = lab.messages()
     journal: list[JournalEntry] = heard.pop("journal")
@@ -181,9 +183,14 @@ def test_garbage_is_counted_by_reason_and_reported_once(lab: Lab) -> None:
     assert texts.count("messages are refused: malformed") == 1
 
 
-def test_a_drone_that_nobody_sees_is_ordered_to_land(lab_field: dict[str, Any]) -> None:
+def hurried(field: ResolvedField) -> ResolvedField:
+    safety = msgspec.structs.replace(field.safety, unseen_land_after_s=2.0)
+    return msgspec.structs.replace(field, safety=safety)
+
+
+def test_a_drone_that_nobody_sees_is_ordered_to_land(lab_field: ResolvedField) -> None:
     """However good its position still is by its odometry."""
-    lab = Lab({**lab_field, "safety": {**lab_field["safety"], "unseen_land_after_s": 2.0}})
+    lab = Lab(hurried(lab_field))
     lab.run(25)
     lab.run(round(1.6 * 50), look=False)
     assert "command" not in lab.messages()
@@ -196,8 +203,8 @@ def test_a_drone_that_nobody_sees_is_ordered_to_land(lab_field: dict[str, Any]) 
     assert len({order.id for order in orders}) == len(orders)
 
 
-def test_a_drone_that_was_never_seen_is_ordered_to_land(lab_field: dict[str, Any]) -> None:
-    lab = Lab({**lab_field, "safety": {**lab_field["safety"], "unseen_land_after_s": 2.0}})
+def test_a_drone_that_was_never_seen_is_ordered_to_land(lab_field: ResolvedField) -> None:
+    lab = Lab(hurried(lab_field))
     lab.run(95, look=False)
     assert "command" not in lab.messages()
     lab.run(10, look=False)
@@ -227,7 +234,7 @@ def test_late_ticks_are_counted_and_not_made_up_for() -> None:
     assert deadlines.overruns == 7
 
 
-def test_nothing_compiles_after_the_warm_up(lab: Lab, lab_field: dict[str, Any]) -> None:
+def test_nothing_compiles_after_the_warm_up(lab: Lab, lab_field: ResolvedField) -> None:
     from numba.core import event
 
     warm_up(lab_field)

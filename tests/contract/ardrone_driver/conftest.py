@@ -10,8 +10,8 @@ import pytest
 
 from drivers.ardrone.driver import ArDrone
 from drivers.ardrone.settings import ArDroneDriverSettings
-from drivers.authority import AuthorityLimits
 from drivers.host import VehicleHost
+from drivers.watchdog_types import AuthorityLimits
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Lease, Severity, VelocitySetpoint, Verb
 from groundstation.bus.topics import (

@@ -5,9 +5,9 @@ import time
 
 import pytest
 
+from drivers.ardrone.desired_config import ids_of
 from drivers.ardrone.link import ArDroneLink
 from drivers.ardrone.settings import ArDroneDriverSettings, Video
-from drivers.ardrone.wishes import ids_of
 from drivers.datagrams import DatagramLog
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.bus.topics import COMMAND_ACK

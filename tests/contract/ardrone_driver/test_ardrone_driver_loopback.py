@@ -8,8 +8,8 @@ import pytest
 
 from drivers import datagrams
 from drivers.ardrone.driver import ArDrone, run
-from drivers.authority import AuthorityLimits
 from drivers.host import VehicleHost, run_hosts
+from drivers.watchdog_types import AuthorityLimits
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Severity, Verb
 from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, RAW_RX, RAW_TX, VEHICLE_STATUS

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from drivers.host import VehicleHost
-from drivers.mavlink.link import Heard
+from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
-from drivers.mavlink.wire.frames import Decoder, Encoder, split
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.names import Flavour
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -36,7 +36,7 @@ from groundstation.bus.topics import (
 from sim_bridge.devices import mavlink
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.scenario import CopterScenario
-from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter
+from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_NS, TICK_S
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # what lies there and is no test belongs to these tests
@@ -70,7 +70,7 @@ class DirectLink:
 
         self.rejected = Counter()
         self.emulator = emulator
-        self.encoder, self.decoder = Encoder(system, 190), Decoder()
+        self.encoder, self.decoder = FrameEncoder(system, 190), FrameDecoder()
         self.sent = []
         self.cut = False
 
@@ -102,7 +102,7 @@ class Rig:
         response = PX4_RESPONSE if flavour == "px4" else ARDUPILOT_RESPONSE
         self.rng = np.random.default_rng(seed)
         scenario = scenario or CopterScenario()
-        self.copter = Copter((0.5, -0.3), 0.4, scenario, response, TICK_S, self.rng)
+        self.copter = MavlinkCopter((0.5, -0.3), 0.4, scenario, response, TICK_S, self.rng)
         self.emulator = MavlinkEmulator("v", GROUND, self.flavour, 11, self.copter, configured=configured)
         self.link = DirectLink(self.emulator)
         exchange = MemoryExchange()

@@ -1,4 +1,4 @@
-"""The emulated autopilots against the figures measured on real ones (mavlink.md 1, 2, 4, 5), without the driver."""
+"""The emulated autopilots, without the driver, against figures of real ones (docs/reference/mavlink.md 1, 2, 4, 5)."""
 
 import struct
 
@@ -8,11 +8,11 @@ import pytest
 from drivers.mavlink.wire import flight as f
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
-from drivers.mavlink.wire.frames import Decoder, Encoder, split
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.names import Flavour
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.scenario import CopterScenario
-from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter, Steering
+from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter, Steering
 from sim_bridge.world.world import TICK_S
 
 GROUND = ("127.0.0.1", 14999)
@@ -26,11 +26,11 @@ class Bench:
     def __init__(self, flavour, configured=True, scenario=CALM):
         px4 = flavour == "px4"
         response = PX4_RESPONSE if px4 else ARDUPILOT_RESPONSE
-        self.copter = Copter((0.0, 0.0), 0.0, scenario, response, TICK_S, np.random.default_rng(3))
+        self.copter = MavlinkCopter((0.0, 0.0), 0.0, scenario, response, TICK_S, np.random.default_rng(3))
         kind = Flavour.PX4 if px4 else Flavour.ARDUPILOT
         self.emulator = MavlinkEmulator("v", GROUND, kind, 5, self.copter, configured=configured)
         self.firmware = self.emulator.firmware
-        self.encoder, self.decoder = Encoder(255, 190), Decoder()
+        self.encoder, self.decoder = FrameEncoder(255, 190), FrameDecoder()
         self.heard = []
         self.seen = self.beating = True
         self.setpoint = None
@@ -42,7 +42,7 @@ class Bench:
 
     def command(self, number, *params):
         self.say(f.CommandLong(5, 1, number, 0, *params))
-        return [m.result for m in self.heard if isinstance(m, f.CommandAck) and m.command == number][-1]
+        return [m.result for m in self.heard if isinstance(m, f.CommandAckMessage) and m.command == number][-1]
 
     def collect(self):
         came = []
@@ -270,7 +270,9 @@ def test_frames_of_odometry_that_are_taken(bench_of, flavour):
     def feed(frame, child):
         before = bench.copter.estimate.poses
         bench.say(
-            f.Odometry(1, frame, child, 0, 0, 0, (1.0, 0, 0, 0), 0, 0, 0, 0, 0, 0, (0.1,) * 21, (0.1,) * 21, 0, 2, 0)
+            f.OdometryMessage(
+                1, frame, child, 0, 0, 0, (1.0, 0, 0, 0), 0, 0, 0, 0, 0, 0, (0.1,) * 21, (0.1,) * 21, 0, 2, 0
+            )
         )
         return bench.copter.estimate.poses > before
 

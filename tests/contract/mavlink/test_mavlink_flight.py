@@ -7,7 +7,7 @@ import pytest
 
 from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.vehicle import MavlinkVehicle
-from drivers.mavlink.wire.flight import CommandLong, Odometry, SetPositionTargetLocalNed
+from drivers.mavlink.wire.flight import CommandLong, OdometryMessage, SetPositionTargetLocalNed
 from drivers.mavlink.wire.service import SetGpsGlobalOrigin, Timesync
 from drivers.mavlink.wire.telemetry import Attitude, GpsGlobalOrigin, LocalPositionNed
 from groundstation.bus.messages import Verb
@@ -103,7 +103,7 @@ def test_a_setpoint_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
 
 def test_px4_is_asked_to_stop_the_streams_that_nobody_uses(rig_of):
     rig = rig_of("px4").connect().run(0.5)
-    assert not {Attitude, Odometry} & rig.emulator.services.intervals.keys()
+    assert not {Attitude, OdometryMessage} & rig.emulator.services.intervals.keys()
     assert rig.emulator.services.intervals[LocalPositionNed] == 4
 
 

@@ -12,7 +12,7 @@ import pytest
 from drivers.mavlink.wire.names import Flavour
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.scenario import CopterScenario
-from sim_bridge.world.copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Copter
+from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_S
 
 _numbers = itertools.count(1)
@@ -46,7 +46,7 @@ class Hangar:
     def add(self, flavour, system, address=None, aided=False, **options):
         flavour = Flavour.PX4 if flavour == "px4" else Flavour.ARDUPILOT
         response = PX4_RESPONSE if flavour is Flavour.PX4 else ARDUPILOT_RESPONSE
-        copter = Copter((0.0, 0.0), 0.0, CopterScenario(), response, TICK_S, np.random.default_rng(system))
+        copter = MavlinkCopter((0.0, 0.0), 0.0, CopterScenario(), response, TICK_S, np.random.default_rng(system))
         address = address or (free_address(), 14550)
         emulator = MavlinkEmulator(f"v{system}", address, flavour, system, copter, **options)
         with self.lock:

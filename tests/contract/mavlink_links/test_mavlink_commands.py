@@ -11,10 +11,12 @@ from click.testing import CliRunner
 from pymavlink import mavutil
 
 from drivers.camera.sources.opening import open_source
-from drivers.mavlink.link import UdpLink, open_link, signing_of
+from drivers.mavlink.links.opening import open_link, signing_of
+from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire import telemetry
-from drivers.mavlink.wire.frames import Encoder, Signing
+from drivers.mavlink.wire.frames import FrameEncoder
+from drivers.mavlink.wire.verification import Signing
 from groundstation.cli.mavlink import mavlink
 from groundstation.errors import DriverError
 from sim_bridge.devices.camera_stream import PATH, CameraStream
@@ -136,7 +138,7 @@ def test_a_bad_key_is_named_but_not_shown(tmp_path, content):
 
 def test_duplicates_strangers_and_rubbish_are_refused_by_name():
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"))
-    beat = Encoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
+    beat = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
     now = time.monotonic_ns()
     assert len(link._judge(now, beat, ("127.0.0.2", 1))) == 1
     assert link._judge(now + 1, beat, ("127.0.0.3", 1)) == []
@@ -144,7 +146,7 @@ def test_duplicates_strangers_and_rubbish_are_refused_by_name():
     assert len(link._judge(now + 4_000_000_000, beat, ("127.0.0.3", 1))) == 1
     assert link._judge(now, b"rubbish", ("127.0.0.3", 1)) == []
     assert len(link._judge(now, beat + beat[:-3], ("127.0.0.3", 1))) == 1
-    own = Encoder(255, 190).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
+    own = FrameEncoder(255, 190).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
     assert link._judge(now, own, ("127.0.0.9", 1)) == []
     assert link.rejected == {"duplicate_system": 1, "no_frame": 1, "truncated": 1}
     link.close()
@@ -159,9 +161,11 @@ def test_a_signed_link_refuses_what_is_unsigned_forged_or_played_again(tmp_path)
     ours = signing_of(LinkSettings(target="udpin:127.0.0.1:0", key_file=str(key)))
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"), ours)
     beat, place, now = telemetry.Heartbeat(2, 3, 1, 4, 3), ("127.0.0.2", 1), time.monotonic_ns()
-    good, stale = (Encoder(11, n, Signing(ours.key, at)).encode(beat) for n, at in ((1, ours.timestamp), (2, 10**9)))
-    assert link._judge(now, Encoder(11, 1).encode(beat), place) == []
-    assert link._judge(now, Encoder(11, 1, Signing(bytes(32), ours.timestamp)).encode(beat), place) == []
+    good, stale = (
+        FrameEncoder(11, n, Signing(ours.key, at)).encode(beat) for n, at in ((1, ours.timestamp), (2, 10**9))
+    )
+    assert link._judge(now, FrameEncoder(11, 1).encode(beat), place) == []
+    assert link._judge(now, FrameEncoder(11, 1, Signing(bytes(32), ours.timestamp)).encode(beat), place) == []
     assert [heard.frame.system for heard, _ in link._judge(now, good, place)] == [11]
     assert link._judge(now, good, place) == []
     assert link._judge(now, stale, place) == []  # recorded years ago

@@ -6,11 +6,12 @@ import time
 
 import pytest
 
-from drivers.mavlink.link import ignore_bytes, open_link
+from drivers.mavlink.links.opening import open_link
+from drivers.mavlink.links.seam import ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire import flight, service, telemetry
-from drivers.mavlink.wire.frames import Decoder, Encoder
-from drivers.mavlink.wire.names import Command
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder
+from drivers.mavlink.wire.names import MavCmd
 from groundstation.errors import DriverError
 
 
@@ -73,13 +74,13 @@ def test_commands_are_acknowledged_and_rates_are_granted(hangar, opened):
     link = opened(f"udpout:{address}:{port}")
     each = heartbeat(link, 9)
     collect(link, lambda h: of(h, telemetry.Heartbeat, 9), 3.0, each)
-    link.send(9, flight.CommandLong(9, 1, Command.SET_MESSAGE_INTERVAL, 0, 32.0, 20_000.0))
-    collect(link, lambda h: (511, 0) in [ack[:2] for ack in of(h, flight.CommandAck)])
+    link.send(9, flight.CommandLong(9, 1, MavCmd.SET_MESSAGE_INTERVAL, 0, 32.0, 20_000.0))
+    collect(link, lambda h: (511, 0) in [ack[:2] for ack in of(h, flight.CommandAckMessage)])
     heard = collect(link, lambda h: len(of(h, telemetry.LocalPositionNed)) > 20)
     stamps = [m.time_boot_ms for m in of(heard, telemetry.LocalPositionNed)]
     assert all(b - a == 20 for a, b in itertools.pairwise(stamps))
     link.send(9, flight.CommandLong(9, 1, 9999, 0))
-    collect(link, lambda h: (9999, 3) in [ack[:2] for ack in of(h, flight.CommandAck)])
+    collect(link, lambda h: (9999, 3) in [ack[:2] for ack in of(h, flight.CommandAckMessage)])
 
 
 def test_values_arrive_to_the_bit(hangar, opened):
@@ -91,7 +92,7 @@ def test_values_arrive_to_the_bit(hangar, opened):
         (lambda frame, now: [*(seen.append(frame), original(frame, now))[1]]),
         (emulator.services.take),
     )
-    sent = flight.Odometry(
+    sent = flight.OdometryMessage(
         2**53 + 12345, 1, 12, 1.5, -2.25, -0.125, (0.5, 0.5, -0.5, 0.5), 0.25, 0.0, -0.75, 0.0, 0.0, 0.5,
         tuple(i / 8 for i in range(21)), tuple(-i / 4 for i in range(21)), 3, 2, 100,
     )  # fmt: skip
@@ -169,7 +170,7 @@ def test_what_goes_over_the_port_is_told_to_the_byte(hangar, opened):
     link.send(7, setpoint)
     link.send(7, service.ParamRequestRead(7, 1, "COM_OF_LOSS_T", -1))
     heard = collect(link, lambda h: of(h, service.ParamValue))
-    decoder = Decoder()
+    decoder = FrameDecoder()
     frames = {
         way: [decoder.decode(data) for system, data, r in told if r is way and system == 7] for way in (True, False)
     }
@@ -199,7 +200,7 @@ def test_a_vehicle_that_goes_and_comes_again_and_again_is_spoken_to_again(hangar
 
 def test_strangers_duplicates_and_broken_frames_are_refused_by_name(opened, port):
     link = opened(f"udpin:127.0.0.1:{port}")
-    beat = Encoder(21, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
+    beat = FrameEncoder(21, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other,

@@ -1,6 +1,7 @@
 """A console's server on a real socket, with one drone that hears its commands."""
 
 import asyncio
+import json
 import warnings
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -9,13 +10,21 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from groundstation.bus import clock
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.console.scene import bare_scene
+from groundstation.console.room import bare_scene
 from groundstation.console.server import ConsoleServer, claim_port
 from groundstation.monitor.state import Cast
 
+RUN = "run-1"
 Test = Callable[["Site"], Awaitable[None]]
+
+
+def land(**other: Any) -> str:
+    """Return the message of a page that orders everybody down now."""
+    order = {"type": "order", "verb": "LAND", "drones": [], "run": RUN, "at_ms": clock.now_ns() / 1e6, "age_ms": 0}
+    return json.dumps(order | other)
 
 
 class Site:
@@ -25,7 +34,8 @@ class Site:
         self.drone = MemoryBus(exchange, "lab", "drone_1")
         self.commands = self.drone.subscribe([t.COMMAND])
         cast = Cast("lab", {"drone_1": 0.15}, ("turtlebot",))
-        self.server = ConsoleServer(self.bus, cast, bare_scene("lab", ("drone_1",), True), {}, claim_port(38765))
+        scene = bare_scene("lab", ("drone_1",), True)
+        self.server = ConsoleServer(self.bus, cast, scene, None, claim_port(38765), RUN)
         self.port = int(self.server.url.rsplit(":", 1)[1].strip("/"))
         self.over = False
 

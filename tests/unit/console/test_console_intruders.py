@@ -5,7 +5,7 @@ import contextlib
 import json
 
 import pytest
-from console_site import Site, run, until
+from console_site import Site, land, run, until
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
@@ -25,7 +25,8 @@ from groundstation.errors import MessageError
         ('{"type":"hello","token":"a","client":"abcd","more":1}', "malformed"),
         ('{"type":"place","x_m":1e9,"y_m":0}', "malformed"),
         ('{"type":"drive","speed_m_s":NaN,"turn_rad_s":0}', "malformed"),
-        ('{"type":"order","verb":"EXPLODE","drones":[],"at_ms":0}', "malformed"),
+        (land().replace("LAND", "EXPLODE"), "malformed"),
+        (land(age_ms=-1), "malformed"),
         ("[" * 4000, "malformed"),
         (" " * (MAX_BYTES + 1), "too_long"),
         (b"\x00\x01", "binary"),
@@ -100,7 +101,7 @@ def test_a_hundred_connections_leave_the_operator_his_page() -> None:
             silent = [await site.connect() for _ in range(app.MAX_VIEWERS - 1)]
             async with site.connect() as one_more:
                 assert (await site.closed(one_more))[0] == 1013
-            await page.send(json.dumps({"type": "order", "verb": "LAND", "drones": [], "at_ms": 0}))
+            await page.send(land())
             (received,) = await until(site.commands.drain)
             assert received.message.verb is m.Verb.LAND
             for other in silent:

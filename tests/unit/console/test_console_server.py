@@ -5,22 +5,22 @@ import json
 import socket
 
 import pytest
-from console_site import Site, run, until
-from websockets.exceptions import InvalidStatus
+from console_site import RUN, Site, land, run, until
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
-from groundstation.console.board import Board
-from groundstation.console.gate import refusal
+from groundstation.console.access import refusal
 from groundstation.console.pages import load_pages
 from groundstation.console.server import claim_port
-from groundstation.console.viewer import WINDOW, Viewer
+from groundstation.console.snapshot import Snapshot
+from groundstation.console.viewer import WINDOW, PageConnection
 
 
 def test_pages_and_their_headers() -> None:
     async def test(site: Site) -> None:
         status, head, body = await site.request("/")
-        assert status == 200 and b"@@TOKEN@@" not in body and (await site.token()).encode() in body
+        assert status == 200 and b"@@" not in body and (await site.token()).encode() in body and RUN.encode() in body
         for name in ("content-security-policy: default-src 'none'", "x-frame-options: deny", "cache-control: no-store"):
             assert name in head
         assert "unsafe" not in head
@@ -95,17 +95,33 @@ def test_a_viewer_gets_a_seed_and_then_what_changes() -> None:
     run(test)
 
 
+def test_viewers_hear_how_the_run_ended_before_they_are_cut_off() -> None:
+    async def test(site: Site) -> None:
+        async with site.connect() as page:
+            await page.recv()
+            end = m.Event(header=site.drone.header(m.RUN), severity=m.Severity.INFO, text="run ended: all is well")
+            site.drone.publish(t.EVENT, end)
+            site.over = True  # in the same moment: the event is still on its way
+            heard = []
+            with pytest.raises(ConnectionClosed):
+                async with asyncio.timeout(5):
+                    while True:
+                        heard.append(json.loads(await page.recv()))
+            assert heard[-1]["s"]["ended"] == {"text": "run ended: all is well", "severity": "INFO"}
+
+    run(test)
+
+
 def test_an_order_reaches_the_bus_with_the_token_only() -> None:
     async def test(site: Site) -> None:
         token = await site.token()
-        order = {"type": "order", "verb": "LAND", "drones": [], "at_ms": 0}
         async with site.connect() as page:
             await page.send(json.dumps({"type": "hello", "token": "guess", "client": "abcd"}))
-            await page.send(json.dumps(order))
+            await page.send(land())
             await until(lambda: site.server.sessions.refused["untrusted"])
             assert site.commands.drain() == []
             await page.send(json.dumps({"type": "hello", "token": token, "client": "abcd"}))
-            await page.send(json.dumps(order))
+            await page.send(land())
             (received,) = await until(site.commands.drain)
             assert received.message.verb is m.Verb.LAND
 
@@ -114,13 +130,13 @@ def test_an_order_reaches_the_bus_with_the_token_only() -> None:
 
 def test_a_viewer_that_does_not_answer_gets_a_window_full_and_then_the_newest() -> None:
     async def test() -> None:
-        board, sent = Board(), []
+        board, sent = Snapshot(), []
 
         async def keep(frame: str | bytes) -> None:
             sent.append(frame)
 
         board.begin()
-        viewer = Viewer(1, board, keep, keep)
+        viewer = PageConnection(1, board, keep, keep)
         viewer.watched = frozenset({"ceiling"})
         task = asyncio.create_task(viewer.run(lambda seq: json.dumps({"seq": seq})))
         for value in range(40):
@@ -160,7 +176,7 @@ def test_a_port_in_use_is_no_obstacle() -> None:
 
 def test_nothing_is_loaded_from_elsewhere() -> None:
     """The page works without any network but loopback: no address of anything else is in its files."""
-    for path, file in load_pages("x").items():
+    for path, file in load_pages("x", "y").items():
         text = file.content.decode()
         if path.startswith("/vendor/"):
             assert "http" not in text.split("*/", 1)[-1] or path.endswith(".txt"), path

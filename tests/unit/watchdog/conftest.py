@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from drivers.authority import Action, AuthorityLimits, Upstream, VehicleView
 from drivers.watchdog import Watchdog
+from drivers.watchdog_types import Action, AuthorityLimits, Upstream, VehicleView
 from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
 MS = 1_000_000
@@ -41,9 +41,16 @@ class Bench:
             self.watchdog.accept_lease(self.now, Lease(header=self.header(), holder="op", expires_ns=self.now + 2 * S))
         if self.tracker_speaks:
             self.setpoint()
-        view = VehicleView(self.state, self.fresh, self.battery, self.not_ready)
-        self.decision = self.watchdog.step(self.now, view, self.upstream)
+        self.decision = self.watchdog.step(self.now, self.view, self.upstream)
         return self.decision
+
+    @property
+    def view(self):
+        return VehicleView(self.state, self.fresh, self.battery, self.not_ready)
+
+    def see(self):
+        """Let the watchdog know what the vehicle says, as its host does before it hands over orders."""
+        self.watchdog.see(self.view, self.upstream)
 
     def run(self, seconds):
         decisions = [self.step() for _ in range(round(seconds * S / STEP))]

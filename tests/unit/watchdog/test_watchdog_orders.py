@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.authority import Action, Mode, Upstream
+from drivers.watchdog_types import Action, DriverMode, Upstream
 from groundstation.bus.messages import AckStage, FlightState, Lease, Verb
 
 MS = 1_000_000
@@ -18,7 +18,7 @@ def test_take_off_track_and_land(new_bench):
     assert bench.step().acks == ()
     bench.state = FlightState.HOVERING
     decision = bench.step()
-    assert (decision.mode, decision.action) == (Mode.HOVER, Action.HOVER)
+    assert (decision.mode, decision.action) == (DriverMode.HOVER, Action.HOVER)
     assert [(ack.command_id, ack.stage) for ack in decision.acks] == [("up", AckStage.EFFECTIVE)]
     bench.tracker_speaks = True
     assert bench.step().action is Action.HOVER, "setpoints move nothing before TRACK"
@@ -30,7 +30,7 @@ def test_take_off_track_and_land(new_bench):
     assert bench.step().action is Action.LAND
     bench.state = FlightState.LANDED
     decision = bench.step()
-    assert (decision.mode, decision.action, decision.acks[0].command_id) == (Mode.LANDED, Action.IDLE, "down")
+    assert (decision.mode, decision.action, decision.acks[0].command_id) == (DriverMode.LANDED, Action.IDLE, "down")
     assert set(bench.run(5)) == {Action.IDLE}, "setpoints go on and move nothing"
 
 
@@ -135,12 +135,43 @@ def test_hold_waits_for_resume(new_bench):
     assert bench.step().action is Action.FLY
 
 
-def test_hold_cancels_a_take_off_that_has_not_begun(new_bench):
-    bench = new_bench()
+@pytest.mark.parametrize("state", [FlightState.LANDED, FlightState.EMERGENCY])
+def test_hold_cancels_a_take_off_that_has_not_begun(new_bench, state):
+    bench = new_bench(state=state)
     bench.order(Verb.TAKEOFF)
     bench.step()
     bench.order(Verb.HOLD)
     assert bench.step().action is Action.IDLE
+    bench.state = FlightState.LANDED
+    assert bench.step().action is Action.IDLE, "a drone whose emergency has just been cleared stays down"
+
+
+@pytest.mark.parametrize("state", [FlightState.TAKING_OFF, FlightState.UNKNOWN, FlightState.FLYING])
+def test_hold_in_the_climb_holds_for_as_long_as_a_take_off_lets_it_hover_unseen(new_bench, state):
+    bench = new_bench()
+    bench.order(Verb.TAKEOFF)
+    bench.step()
+    bench.state = state
+    bench.see()
+    assert bench.order(Verb.HOLD).stage is AckStage.ACCEPTED
+    decision = bench.step()
+    assert (decision.mode, decision.action, decision.reason) == (DriverMode.HOLD, Action.HOVER, "held by op")
+    bench.state = FlightState.HOVERING
+    assert set(bench.run(9.8)) == {Action.HOVER}, "the tracker was not heard yet"
+    assert bench.run(0.3)[-1] is Action.LAND
+
+
+@pytest.mark.parametrize("verb", [Verb.HOLD, Verb.LAND])
+def test_a_drone_that_starts_after_its_take_off_was_cancelled_is_landed_for_that_reason(new_bench, verb):
+    bench = new_bench()
+    bench.order(Verb.TAKEOFF)
+    bench.step()
+    bench.order(verb, issuer="anyone")
+    bench.step()
+    bench.state = FlightState.TAKING_OFF  # the order to start was on its way
+    decision = bench.step()
+    assert decision.action is Action.LAND
+    assert "without a standing take-off order" in decision.reason and "anyone" in decision.reason
 
 
 def test_take_off_that_takes_too_long_is_given_up(new_bench):
@@ -187,7 +218,7 @@ def test_an_emergency_that_does_not_clear_ends_the_take_off(new_bench):
 def test_an_emergency_in_flight_is_no_landing(new_bench):
     bench = new_bench().fly()
     bench.state = FlightState.EMERGENCY
-    assert bench.step().mode is Mode.CUT
+    assert bench.step().mode is DriverMode.CUT
 
 
 def test_a_vehicle_that_lands_by_itself_is_not_taken_up_again(new_bench):
@@ -196,6 +227,16 @@ def test_a_vehicle_that_lands_by_itself_is_not_taken_up_again(new_bench):
     assert bench.step().action is Action.LAND
     bench.state = FlightState.HOVERING
     assert bench.step().action is Action.LAND
+
+
+@pytest.mark.parametrize("state", [FlightState.LANDED, FlightState.LANDING, FlightState.EMERGENCY])
+@pytest.mark.parametrize("verb", [Verb.TRACK, Verb.RESUME])
+def test_a_vehicle_that_has_just_ended_its_flight_is_not_tracked_with(new_bench, verb, state):
+    bench = new_bench().fly()
+    bench.state = state
+    bench.see()
+    ack = bench.order(verb)
+    assert (ack.stage, ack.reason) == (AckStage.REFUSED, f"the vehicle says {state}")
 
 
 def test_a_vehicle_that_flies_without_order_is_landed(new_bench):

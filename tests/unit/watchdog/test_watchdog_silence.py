@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.authority import Action, Upstream
+from drivers.watchdog_types import Action, Upstream
 from groundstation.bus.messages import AckStage, FlightState, Header, VelocitySetpoint, Verb
 
 MS = 1_000_000
@@ -65,10 +65,12 @@ def test_a_silent_bus_lands_what_hovers_too(new_bench, verb):
     assert bench.run(0.2)[-1] is Action.LAND
 
 
-def test_an_order_to_track_gives_a_silent_tracker_time_to_speak(new_bench):
+@pytest.mark.parametrize("silent_s", [0.4, 1.0])
+def test_an_order_to_track_gives_a_silent_tracker_time_to_speak(new_bench, silent_s):
+    # 0.4 s: still in TRACK; 1.0 s: suspended.
     bench = new_bench().fly()
     bench.tracker_speaks = False
-    bench.run(1.0)
+    bench.run(silent_s)
     assert bench.order(Verb.TRACK).stage is AckStage.ACCEPTED
     assert set(bench.run(0.3)) == {Action.HOVER}
     bench.tracker_speaks = True

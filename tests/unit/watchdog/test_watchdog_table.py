@@ -5,8 +5,8 @@ import random
 
 import pytest
 
-from drivers.authority import AIRBORNE, FREE, Action, AuthorityLimits, Mode, Upstream, VehicleView
 from drivers.watchdog import Watchdog
+from drivers.watchdog_types import AIRBORNE, FREE, Action, AuthorityLimits, DriverMode, Upstream, VehicleView
 from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
 S = 1_000_000_000
@@ -43,7 +43,7 @@ def watchdog_in(mode, setpoints="live", lease=True, aged_s=0.1):
     """Return a watchdog in a mode, entered `aged_s` ago, with everything else as its arguments say."""
     dog = Watchdog(AuthorityLimits(), "clock")
     dog.mode, dog.reason = mode, "test"
-    dog._mode_since_ns = dog._airborne_since_ns = NOW - int(aged_s * S)
+    dog._entered_ns = dog._take_off_ended_ns = NOW - int(aged_s * S)
     dog._last_step_ns = NOW - S // 30
     dog._brake_until_ns = 0
     past = NOW - int(aged_s * S)
@@ -99,7 +99,7 @@ CUT         CUT        CUT        CUT        CUT        CUT        CUT        CU
 def test_mode_and_action_by_what_the_vehicle_says():
     """Everybody is heard, a setpoint is live: rows are modes, columns the vehicle's state."""
     lines = [" " * 12 + " ".join(f"{state:<10}" for state in STATES)]
-    for mode in Mode:
+    for mode in DriverMode:
         decisions = [step(watchdog_in(mode), view(state)) for state in STATES]
         lines.append(f"{mode:<12}" + " ".join(f"{decision.mode:<10}" for decision in decisions))
         lines.append(" " * 12 + " ".join(f"{SHORT[decision.action]:<10}" for decision in decisions))
@@ -121,9 +121,13 @@ CUT         TAKING_OFF refused    refused    refused    refused    CUT
 
 def test_mode_by_command():
     """With a live lease; the vehicle says what fits the mode."""
-    says = {Mode.LANDED: FlightState.LANDED, Mode.CUT: FlightState.EMERGENCY, Mode.CONNECTING: FlightState.UNKNOWN}
+    says = {
+        DriverMode.LANDED: FlightState.LANDED,
+        DriverMode.CUT: FlightState.EMERGENCY,
+        DriverMode.CONNECTING: FlightState.UNKNOWN,
+    }
     lines = [" " * 12 + " ".join(f"{verb:<10}" for verb in Verb)]
-    for mode in Mode:
+    for mode in DriverMode:
         cells = []
         for verb in Verb:
             dog = watchdog_in(mode)
@@ -152,7 +156,7 @@ def test_action_in_track_by_how_long_something_is_missing():
     for what in ("telemetry", *list(UPSTREAMS)[1:], "battery", "expired", "foreign"):
         cells = []
         for age in OLD_S:
-            dog = watchdog_in(Mode.TRACK, what if what in SETPOINTS else "live", aged_s=age)
+            dog = watchdog_in(DriverMode.TRACK, what if what in SETPOINTS else "live", aged_s=age)
             if what in SETPOINTS:
                 dog.gate.last_heard_ns = NOW - int(age * S)
             vehicle = view(FlightState.FLYING, fresh=what != "telemetry", battery=0.1 if what == "battery" else 0.9)
@@ -166,7 +170,7 @@ CASES = tuple(
 )
 
 
-@pytest.mark.parametrize("mode", Mode)
+@pytest.mark.parametrize("mode", DriverMode)
 def test_invariants_over_every_mode_and_input(mode):
     """Each mode x setpoint x lease x age x vehicle state x freshness x battery x upstream x command, one step each."""
     for setpoints, lease, age, state, fresh, battery, up in CASES:
@@ -181,23 +185,25 @@ def test_invariants_over_every_mode_and_input(mode):
             if decision.action is Action.FLY:
                 assert setpoints == "live" or (setpoints == "foreign" and verb is Verb.RESUME), case
                 assert healthy and state not in (FlightState.LANDED, FlightState.LANDING, FlightState.EMERGENCY), case
-                assert mode is Mode.TRACK or (mode in FREE and accepted and verb in (Verb.TRACK, Verb.RESUME)), case
-            if decision.action is Action.TAKE_OFF and mode is not Mode.TAKING_OFF:
+                assert mode is DriverMode.TRACK or (mode in FREE and accepted and verb in (Verb.TRACK, Verb.RESUME)), (
+                    case
+                )
+            if decision.action is Action.TAKE_OFF and mode is not DriverMode.TAKING_OFF:
                 assert accepted and verb is Verb.TAKEOFF and lease and healthy, case
                 assert battery == 0.9 and state in (FlightState.LANDED, FlightState.EMERGENCY), case
             if verb in (Verb.TAKEOFF, Verb.TRACK, Verb.RESUME) and not lease:
                 assert not accepted, case
             if verb is Verb.CUT_MOTORS:
                 assert accepted and decision.action is Action.CUT, case
-            if mode is Mode.CUT and not (accepted and verb is Verb.TAKEOFF):
+            if mode is DriverMode.CUT and not (accepted and verb is Verb.TAKEOFF):
                 assert decision.action is Action.CUT, case
             if decision.action is Action.CUT:
-                assert verb is Verb.CUT_MOTORS or mode is Mode.CUT or state is FlightState.EMERGENCY, case
-            if mode is Mode.LANDING and decision.action is not Action.CUT:
+                assert verb is Verb.CUT_MOTORS or mode is DriverMode.CUT or state is FlightState.EMERGENCY, case
+            if mode is DriverMode.LANDING and decision.action is not Action.CUT:
                 assert decision.action in (Action.LAND, Action.IDLE), case
             if decision.action is Action.IDLE:
                 assert not (fresh and state in AIRBORNE), case
-            if up == "stop" and mode in (*FREE, Mode.TAKING_OFF):
+            if up == "stop" and mode in (*FREE, DriverMode.TAKING_OFF):
                 assert decision.action in (Action.LAND, Action.IDLE, Action.CUT), case
 
 

@@ -1,4 +1,4 @@
-"""Runtime file, network, terminal, interrupts, last words: each alone."""
+"""Runtime file, terminal, interrupts, last words: each alone."""
 
 import os
 import signal
@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import GroundStationError
-from groundstation.supervisor import network, runtime_file
+from groundstation.supervisor import runtime_file
+from groundstation.supervisor.failsafe import LastWordsSender
 from groundstation.supervisor.interrupts import Interrupts
-from groundstation.supervisor.last_words import LastWordsSender
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 from groundstation.supervisor.table import LastWords
 from groundstation.supervisor.terminal import Terminal
@@ -76,31 +76,6 @@ def test_folder_of_someone_else_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_
     (tmp_path / "skein").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(GroundStationError, match="not a folder of yours"):
         runtime_file.folder()
-
-
-def test_networks_never_meet_and_the_lock_follows_a_child(tmp_path: Path) -> None:
-    first = network.claim(tmp_path)
-    second = network.claim(tmp_path)
-    assert first.prefix != second.prefix
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(first.lock,)) as child:
-        first.release()
-        third = network.claim(tmp_path)
-        assert third.prefix != first.prefix, "an emulator that still lands keeps its addresses"
-        child.communicate(b"\n")
-    again = network.claim(tmp_path)
-    assert again.prefix == first.prefix
-    for held in (second, third, again):
-        held.release()
-
-
-def test_port_in_use_is_a_clear_error() -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(GroundStationError, match=f"port {port} on 127.0.0.1 is in use"):
-            network.require_free(f"tcp/127.0.0.1:{port}")
-    network.require_free(f"tcp/127.0.0.1:{port}")
 
 
 def test_closed_terminal_is_survived() -> None:

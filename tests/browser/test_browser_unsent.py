@@ -1,0 +1,86 @@
+"""What becomes of a stop that was given while there was no connection: it belongs to one run, and lives for 5 s."""
+
+from typing import Any
+
+import pytest
+from seen_page import Seen, eventually
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+
+def cut_off(stage: Any, run: str) -> Seen:
+    """Return a page without a connection; a console of the run named waits for it at the same port."""
+    page: Seen = stage.open()
+    stage.console.kill()
+    stage.console.wait(5)
+    page.there("banner-link").wait_for(timeout=20_000)
+    page.page.context.set_offline(True)
+    stage.start_console(run=run)
+    eventually(stage.answers, what="the next console answers")
+    return page
+
+
+def hold_cut_motors(page: Seen) -> None:
+    box = page.there("cut-motors").bounding_box()
+    page.page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.page.mouse.down()
+    page.page.wait_for_timeout(1300)
+    page.page.mouse.up()
+
+
+def reconnect(page: Seen) -> dict[str, Any]:
+    """Return the state of the page once it has had the time to say everything that it means to."""
+    page.page.context.set_offline(False)
+    page.wait(lambda s: s["connected"] and s["seeds"] == 2 and s["trusted"])
+    page.page.wait_for_timeout(1500)
+    return page.state()
+
+
+def test_a_stop_goes_out_to_a_restarted_console_of_the_same_run(stage: Any) -> None:
+    page = cut_off(stage, run="run-1")
+    page.there("land-all").click()
+    assert "NOT SENT" in page.there("orders").inner_text()
+    page.page.context.set_offline(False)
+    page.wait(lambda s: any(order["state"] == "confirmed" for order in s["orders"]))
+    assert [command.verb for command in stage.flight.commands] == ["LAND"]
+
+
+def test_a_stop_never_goes_to_the_next_run(stage: Any) -> None:
+    page = cut_off(stage, run="run-2")
+    hold_cut_motors(page)
+    page.there("land-all").click()
+    assert "NOT SENT" in page.there("orders").inner_text()
+    state = reconnect(page)
+    assert stage.flight.commands == [] and state["orders"] == []
+    assert page.there("orders").inner_text().count("for another run") == 2
+    page.shot("stop_of_another_run")
+    page.there("land-all").click()  # what is given from now on is for the run that the page shows
+    page.wait(lambda s: [command.verb for command in stage.flight.commands] == ["LAND"])
+
+
+def test_cut_motors_held_while_the_next_run_appears_does_not_cut_it(stage: Any) -> None:
+    page = cut_off(stage, run="run-2")
+    # The next press of the button lasts for longer than the page needs to connect.
+    longer = "(f, ms, ...r) => later(f, ms === 1000 ? 6000 : ms, ...r)"
+    page.page.evaluate(f"() => {{ const later = setTimeout; window.setTimeout = {longer}; }}")
+    box = page.there("cut-motors").bounding_box()
+    page.page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.page.mouse.down()
+    reconnect(page)
+    page.page.wait_for_timeout(6000)
+    page.page.mouse.up()
+    assert stage.flight.commands == []
+    assert "for another run" in page.there("orders").inner_text()
+
+
+@pytest.mark.parametrize("asleep", [False, True], ids=["awake", "asleep"])
+def test_a_stop_lives_for_five_seconds(stage: Any, asleep: bool) -> None:
+    page = cut_off(stage, run="run-1")
+    page.there("land-all").click()
+    if asleep:  # performance.now() stands still, and nothing runs
+        page.page.evaluate("() => { const wall = Date.now; Date.now = () => wall() + 6000; }")
+    else:
+        page.page.wait_for_timeout(5500)
+    state = reconnect(page)
+    assert stage.flight.commands == [] and state["orders"] == []
+    assert "no connection for 5 s" in page.there("orders").inner_text()

@@ -1,0 +1,140 @@
+"""A real run with cameras that want a password, on loopback, without a take-off: nothing that it leaves holds it."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from base64 import b64encode
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from groundstation.recording.reader import attached_field, open_recording, parts
+from groundstation.supervisor import runtime_file
+
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
+
+COMMAND = [sys.executable, "-m", "groundstation.cli.main"]
+SECRET = "s3cr3t-w0rd"
+
+
+class LockedCamera:
+    """Answers 401 whatever it is told, and keeps it."""
+
+    def __init__(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        self.requests = b""
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        with suppress(OSError):
+            while True:
+                connection, _ = self._listener.accept()
+                with connection:
+                    self._talk(connection)
+
+    def _talk(self, connection: socket.socket) -> None:
+        with suppress(OSError):
+            while data := connection.recv(4096):
+                self.requests += data
+                if data.startswith(b"GET"):
+                    connection.sendall(b"HTTP/1.0 401 Unauthorized\r\n\r\n")
+                    return
+                head = b"RTSP/1.0 401 Unauthorized\r\nCSeq: %d\r\n" % (2 if b"CSeq: 2" in data else 1)
+                connection.sendall(head + b'WWW-Authenticate: Basic realm="x"\r\n\r\n')
+
+    def close(self) -> None:
+        self._listener.close()
+
+
+@pytest.fixture
+def cameras() -> Iterator[list[LockedCamera]]:
+    made = [LockedCamera(), LockedCamera()]
+    yield made
+    for camera in made:
+        camera.close()
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return int(probe.getsockname()[1])
+
+
+def all_bytes(run_dir: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield every file as it is, and what recordings hold, unpacked."""
+    for path in sorted(run_dir.rglob("*")):
+        if path.is_file():
+            yield str(path), path.read_bytes()
+    for kind in ("state", "raw"):
+        for part in parts(run_dir, kind):
+            recording = open_recording(part)
+            for name, content in recording.attachments.items():
+                yield f"{part}/{name}", content
+            for raw in recording.raw_records():
+                yield f"{part}/{raw.key}", raw.data
+
+
+def arguments(pid: int) -> bytes:
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    return b""
+
+
+def test_a_run_leaves_no_password_behind(
+    tmp_path: Path, cameras: list[LockedCamera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    login = f"operator:{SECRET}"
+    field = (Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml").read_text()
+    for old, new in (
+        ("http://192.168.1.50:8080/", f"http://{login}@127.0.0.1:{cameras[0].port}/"),
+        ("http://192.168.1.51:8080/", f"rtsp://{login}@127.0.0.1:{cameras[1].port}/"),
+        ("http://192.168.1.52:8080/", f"http://127.0.0.1:{free_port()}/"),
+        ("address: 192.168.1.", "address: 127.99.77."),
+        ("port: 8765", f"port: {free_port()}\nbus:\n  port: {free_port()}"),
+    ):
+        assert old in field
+        field = field.replace(old, new)
+    (tmp_path / "lab.yaml").write_text(field)
+    (tmp_path / "cameras").symlink_to(Path(__file__).parents[1] / "fixtures" / "field" / "cameras")
+    output = tmp_path / "output.txt"
+    command = [*COMMAND, "fly", "lab.yaml", "--headless"]
+    with output.open("wb") as sink:
+        run = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sink, stderr=sink, cwd=tmp_path)
+    told = b""
+    try:
+        deadline = time.monotonic() + 240
+        while b"groundstation takeoff" not in output.read_bytes():
+            assert time.monotonic() < deadline and run.poll() is None, output.read_text()
+            time.sleep(0.2)
+        (record,) = runtime_file.live_records()
+        told = b"".join(arguments(process.pid) for process in (record.supervisor, *record.processes))
+        runtime = b"".join(path.read_bytes() for path in runtime_file.folder().glob("*.json"))
+        run.send_signal(signal.SIGINT)
+        run.wait(60)
+    finally:
+        if run.poll() is None:
+            os.kill(run.pid, signal.SIGTERM)
+            run.wait(60)
+    (run_dir,) = (tmp_path / "runs").iterdir()
+    basic = b64encode(login.encode())
+    assert all(b"Basic " + basic in camera.requests for camera in cameras), "the drivers got it"
+    assert b"groundstation.process.entry" in told
+    evidence = [("arguments", told), ("runtime file", runtime), ("output", output.read_bytes()), *all_bytes(run_dir)]
+    assert {f"127.0.0.1:{camera.port}" for camera in cameras} <= set(attached_sources(run_dir))
+    assert [name for name, content in evidence if SECRET.encode() in content or basic in content] == []
+    for verb in (["report", str(run_dir)], ["replay", str(run_dir), "--rerun", "tracker"]):
+        again = subprocess.run([*COMMAND, *verb], capture_output=True, text=True, timeout=120, check=False)
+        assert "Traceback" not in again.stderr and SECRET not in again.stdout + again.stderr
+        assert again.returncode == 0 or verb[0] == "report", again.stdout + again.stderr
+
+
+def attached_sources(run_dir: Path) -> list[str]:
+    return attached_field(run_dir).decode().replace("/", '"').split('"')

@@ -1,0 +1,53 @@
+"""A supervisor of real children that leaves none behind."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from groundstation.supervisor.supervisor import Run, Supervisor
+from groundstation.supervisor.table import ProcessSpec, StopOrder
+from groundstation.supervisor.terminal import Terminal
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+
+from dummy_table import free_port  # noqa: E402
+
+
+@pytest.fixture
+def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Supervisor]]:
+    runtime = tmp_path / "runtime"
+    runtime.mkdir()
+    monkeypatch.setenv("PYTHONPATH", str(HERE))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    made: list[Supervisor] = []
+    sink = os.open(tmp_path / "terminal", os.O_WRONLY | os.O_CREAT)
+
+    def build(*specs: ProcessSpec) -> Supervisor:
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        router = ProcessSpec(
+            "router",
+            "router",
+            entry="groundstation.runtime.router:run",
+            section=json.dumps({"endpoint": endpoint}),
+            stop_order=StopOrder.CONNECTS,
+            on_bus=False,
+        )
+        run = Run("lab", "lab", endpoint, tmp_path / "run", ("drone_1",))
+        made.append(Supervisor(run, (router, *specs), Terminal(sink)))
+        return made[-1]
+
+    yield build
+    for supervisor in made:
+        supervisor.interrupts.hurry = True
+        supervisor.close()
+        assert all(not process.running for process in supervisor.processes)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    os.close(sink)

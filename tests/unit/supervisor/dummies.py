@@ -1,0 +1,50 @@
+"""Children that behave as their names say."""
+
+import json
+import os
+import signal
+import time
+
+
+def turn(child):
+    child.beat()
+    child.tick_status()
+    child.sleep_until(time.monotonic_ns() + 20_000_000)
+
+
+def obedient(child):
+    settings = json.loads(child.section)
+    time.sleep(settings.get("slow_s", 0))
+    if settings.get("hoarse_s"):
+        child.degrade("no picture")
+        time.sleep(settings["hoarse_s"])
+    print("epoch", settings.get("epoch"), flush=True)
+    child.ready("fine")
+    while not child.stop_requested and child.supervisor_alive:
+        turn(child)
+    if not child.supervisor_alive:
+        print("orphan leaves", flush=True)
+    return 0
+
+
+def deaf(child):
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    child.ready()
+    while True:
+        turn(child)
+
+
+def crashing(child):
+    raise RuntimeError("no luck")
+
+
+def never_ready(child):
+    child.starting("waiting for a drone")
+    while not child.stop_requested and child.supervisor_alive:
+        turn(child)
+    return 0
+
+
+def killed_when_ready(child):
+    child.ready()
+    os.kill(os.getpid(), signal.SIGKILL)

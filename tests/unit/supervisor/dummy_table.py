@@ -1,0 +1,30 @@
+"""Rows of a process table whose children are dummies, and how to wait for what they do."""
+
+import socket
+import time
+from collections.abc import Callable
+
+from groundstation.supervisor.start import Start
+from groundstation.supervisor.supervisor import Supervisor
+from groundstation.supervisor.table import ProcessSpec
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def spec(name: str, entry: str, **options: object) -> ProcessSpec:
+    return ProcessSpec(name, "driver", entry=f"dummies:{entry}", **options)  # type: ignore[arg-type]
+
+
+def start(supervisor: Supervisor) -> None:
+    Start(supervisor).run()
+
+
+def until(supervisor: Supervisor, condition: Callable[[], bool], limit_s: float = 15.0) -> None:
+    deadline = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < deadline, "never happened"
+        supervisor.step()

@@ -1,0 +1,167 @@
+"""The supervisor against real children: crash, hang, deaf to SIGTERM; and its own death."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dummy_table import free_port, spec, start, until
+
+from groundstation.supervisor import runtime_file
+from groundstation.supervisor.supervisor import Supervisor
+from groundstation.supervisor.table import LastWords, Restart
+
+
+def test_children_ignore_the_terminals_interrupt(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("drone_1", "obedient"))
+    start(supervisor)
+    pid = supervisor.processes[1].pid
+    assert os.getsid(pid) == pid
+    os.kill(pid, signal.SIGINT)
+    for _ in range(10):
+        supervisor.step()
+    assert supervisor.processes[1].is_up and supervisor.processes[1].pid == pid
+
+
+def test_restarts_a_killed_process_with_a_new_epoch(make: Callable[..., Supervisor], tmp_path: Path) -> None:
+    supervisor = make(spec("tracker", "obedient", section='{"epoch": 7}', numbered=True))
+    start(supervisor)
+    tracker = supervisor.processes[1]
+    pid = tracker.pid
+    os.kill(pid, signal.SIGKILL)
+    until(supervisor, lambda: tracker.is_up and tracker.pid != pid)
+    log = (tmp_path / "run/log/tracker.log").read_text()
+    assert "epoch 7\n" in log and "epoch 8\n" in log
+
+
+def test_even_a_first_restart_waits_where_the_table_says_so(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("relay", "obedient", restart_delay_s=0.5))
+    start(supervisor)
+    relay = supervisor.processes[1]
+    pid, killed_ns = relay.pid, time.monotonic_ns()
+    os.kill(pid, signal.SIGKILL)
+    until(supervisor, lambda: relay.is_up and relay.pid != pid)
+    assert relay.started_ns - killed_ns >= 500_000_000
+
+
+def test_frozen_process_gets_last_words_then_is_replaced(make: Callable[..., Supervisor]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+        drone.bind(("127.0.0.1", 0))
+        drone.setblocking(False)
+        words = LastWords("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=0.0)
+        supervisor = make(
+            spec("drone_1", "obedient", last_words=words, silence_limit_s=0.4, hang_limit_s=1.5),
+            spec("drone_2", "obedient"),
+        )
+        start(supervisor)
+        driver, other = supervisor.processes[1:]
+        pids = driver.pid, other.pid
+        os.kill(driver.pid, signal.SIGSTOP)
+        until(supervisor, lambda: driver.pid != pids[0] and driver.is_up)
+        for _ in range(3):
+            supervisor.step()
+        assert other.pid == pids[1], "only the silent one is replaced"
+        heard = []
+        with pytest.raises(BlockingIOError):
+            while True:
+                heard.append(drone.recv(100))
+        assert heard and set(heard) <= {b"hover", b"land"} and b"land" in heard
+        for _ in range(6):
+            supervisor.step()
+        with pytest.raises(BlockingIOError):
+            drone.recv(100)
+
+
+def test_a_freeze_of_the_supervisor_itself_is_nobodys_fault(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("drone_1", "obedient", silence_limit_s=0.4, hang_limit_s=0.8))
+    start(supervisor)
+    driver = supervisor.processes[1]
+    pid = driver.pid
+    os.kill(pid, signal.SIGSTOP)  # both stand still, as when the whole host is suspended
+    time.sleep(1.2)
+    os.kill(pid, signal.SIGCONT)
+    for _ in range(5):
+        supervisor.step()
+    assert driver.pid == pid and driver.is_up
+
+
+def test_deaf_process_is_killed_after_its_deadline(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("drone_1", "deaf", stop_limit_s=0.3))
+    start(supervisor)
+    supervisor.stop()
+    assert not any(process.running for process in supervisor.processes)
+
+
+def test_end_of_what_the_run_stands_on_ends_the_run(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("sim_bridge", "obedient", restart=Restart.ENDS_RUN))
+    start(supervisor)
+    os.kill(supervisor.processes[1].pid, signal.SIGKILL)
+    until(supervisor, lambda: bool(supervisor.failure))
+    assert "sim_bridge killed by SIGKILL" in supervisor.failure
+
+
+def test_router_comes_back_on_the_same_port(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("drone_1", "obedient"))
+    start(supervisor)
+    router = supervisor.processes[0]
+    pid = router.pid
+    os.kill(pid, signal.SIGKILL)
+    until(supervisor, lambda: router.is_up and router.pid != pid)
+    assert supervisor.processes[1].is_up
+
+
+def test_runtime_file_lives_as_long_as_the_run(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("drone_1", "obedient"))
+    start(supervisor)
+    (record,) = runtime_file.live_records()
+    assert record.endpoint == supervisor.run.endpoint
+    assert {process.name for process in record.processes} == {"router", "drone_1"}
+    supervisor.close()
+    assert runtime_file.live_records() == []
+
+
+def test_killed_supervisor_leaves_no_orphan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    script = f"""
+        import json
+        from pathlib import Path
+        from groundstation.supervisor.start import Start
+        from groundstation.supervisor.supervisor import Run, Supervisor
+        from groundstation.supervisor.table import *
+        from groundstation.supervisor.terminal import Terminal
+        endpoint = "tcp/127.0.0.1:{free_port()}"
+        table = (
+            ProcessSpec("router", "router", entry="groundstation.runtime.router:run", on_bus=False,
+                        section=json.dumps(dict(endpoint=endpoint)), stop_order=StopOrder.CONNECTS),
+            ProcessSpec("drone_1", "driver", entry="dummies:obedient"),
+        )
+        terminal = Terminal()
+        supervisor = Supervisor(Run("lab", "lab", endpoint, Path("{tmp_path}/run"), ()), table, terminal)
+        Start(supervisor).run()
+        terminal.say("up")
+        while True:
+            supervisor.step()
+    """
+    command = [sys.executable, "-c", textwrap.dedent(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            assert b"up\n" in process.stdout
+            (record,) = runtime_file.live_records()
+        finally:
+            process.kill()
+    deadline = time.monotonic() + 10
+    while record.alive:
+        assert time.monotonic() < deadline, "orphans remain"
+        time.sleep(0.02)
+    assert "orphan leaves" in (tmp_path / "run/log/drone_1.log").read_text()
+    assert Path(record.heartbeat).exists()
+    assert runtime_file.live_records() == []
+    assert not Path(record.heartbeat).exists()

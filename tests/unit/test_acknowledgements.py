@@ -1,0 +1,22 @@
+"""The answers to one command, of the drones that were asked."""
+
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import AckStage, Command, CommandAck, Verb
+from groundstation.runtime.acknowledgements import AckBook
+
+
+def test_ack_book_takes_only_news_from_who_was_asked() -> None:
+    bus = MemoryBus(MemoryExchange(), "lab", "x")
+    command = Command(header=bus.header("team"), id="1", verb=Verb.LAND, scope=(), issuer="x")
+    book = AckBook(command, ("drone_1",))
+
+    def ack(entity: str, stage: AckStage, command_id: str = "1") -> CommandAck:
+        return CommandAck(header=bus.header(entity), command_id=command_id, verb=Verb.LAND, stage=stage)
+
+    assert not book.note(ack("stranger", AckStage.RECEIVED))
+    assert not book.note(ack("drone_1", AckStage.RECEIVED, "2"))
+    assert book.note(ack("drone_1", AckStage.ACCEPTED))
+    assert not book.note(ack("drone_1", AckStage.RECEIVED)), "out of order"
+    assert book.progress["drone_1"].text(final=True) == "sent / received / accepted / NOT CONFIRMED"
+    assert book.note(ack("drone_1", AckStage.EFFECTIVE)) and book.confirmed and book.settled
+    assert not book.note(ack("drone_1", AckStage.REFUSED)), "nothing after the end"

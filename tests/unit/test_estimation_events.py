@@ -1,0 +1,32 @@
+"""What one observation does to the belief, by the compiled kernels alone."""
+
+import numpy as np
+
+from groundstation.estimation.event_log import observation_values, write_event
+from groundstation.estimation.events import observe
+from groundstation.estimation.measurement import Measurement
+from groundstation.estimation.models import FixedMount, ManoeuvringTarget, MountedCamera
+from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
+from groundstation.estimation.records import ACCEPTED, EventRow, OutcomeRow
+from groundstation.estimation.tables import empty_state, tables_from_parameters
+
+
+def test_a_mode_whose_innovation_has_no_covariance_is_not_corrected_and_loses_its_probability() -> None:
+    entities = {"ceiling": FixedMount((0.0, 0.0, 4.0), 0.004, 0.02), "rover": ManoeuvringTarget()}
+    tables = tables_from_parameters(EstimatorParameters(entities, {"eye": MountedCamera("ceiling", WORLD_FROM_DOWN)}))
+    state = empty_state(tables, [True, True])
+    state.memory["active"][1] = 1
+    rover = tables.part(1)
+    for covariance in state.covariances:
+        covariance[rover, rover] = np.eye(rover.stop - rover.start)
+    state.covariances[1, rover, rover] *= -1.0
+    means, covariances = state.means.copy(), state.covariances.copy()
+    sight = Measurement(0, "eye", "rover", (0.3, 0.0, 3.6), None, tuple(np.diag([1e-4] * 3).ravel().tolist()))
+    events, outcomes = EventRow.rows(1), OutcomeRow.rows(1)
+    write_event(events.view(np.uint8).data, 0, observation_values(sight, 0.0, 0, observer=0, subject=1, sensor=0))
+    observe(state, tables, events[0], outcomes[0])
+    assert outcomes["verdict"][0] == ACCEPTED
+    assert abs(state.means[0, rover.start] - 0.3) < 0.01
+    np.testing.assert_array_equal(state.means[1], means[1])
+    np.testing.assert_array_equal(state.covariances[1], covariances[1])
+    assert state.weights.tolist() == [1.0, 0.0]

@@ -1,0 +1,50 @@
+"""The library examples of the documentation run as they stand."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.estimation import models
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+PAGE, SENSOR_PAGE = HOW_TO / "use-the-estimator-as-a-library.md", HOW_TO / "add-a-sensor-model.md"
+
+
+def examples_of(page: Path) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.S)
+
+
+def run_example(number: int) -> dict[str, Any]:
+    names: dict[str, Any] = {}
+    exec(compile(examples_of(PAGE)[number], str(PAGE), "exec"), names)
+    return names
+
+
+def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    belief = run_example(0)["belief"]
+    rover, drone = belief.mean_of("rover"), belief.mean_of("drone")
+    # The camera looks 45 degrees down and has the rover 0.898 m ahead of it.
+    np.testing.assert_allclose(drone[:2], (0.52, 0.0), atol=0.05)
+    np.testing.assert_allclose(rover[:2], (drone[0] + 0.09 + 0.898, 0.0), atol=0.05)
+    assert "ACCEPTED" in capsys.readouterr().out
+
+
+def test_the_example_on_real_data_runs(monkeypatch: pytest.MonkeyPatch, real_data: Callable[[str], Path]) -> None:
+    monkeypatch.setenv("GROUNDSTATION_DATA", str(real_data("mrclam7").parent))
+    assert max(run_example(1)["errors_m"]) < 0.3
+
+
+def test_the_sensor_model_of_the_how_to_passes_its_own_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page's files, saved beside the models as it says."""
+    model, test = examples_of(SENSOR_PAGE)
+    (tmp_path / "uwb_range.py").write_text(model)
+    monkeypatch.setattr(models, "__path__", [*models.__path__, str(tmp_path)])
+    names: dict[str, Any] = {}
+    exec(compile(test, str(SENSOR_PAGE), "exec"), names)
+    names["test_the_derivatives_are_exact"]()
+    names["test_four_anchors_find_the_robot"]()
+    assert len(model[model.index("\nclass") :].strip().splitlines()) <= 40

@@ -1,0 +1,74 @@
+"""A run says on the bus that it ends, and how, before its processes are stopped."""
+
+import time
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.errors import GroundStationError
+from groundstation.flight.loop import Flight
+from groundstation.flight.plan import FlightPlan
+from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.supervisor.start import Interrupted, Start
+from groundstation.supervisor.supervisor import Supervisor
+from groundstation.supervisor.terminal import Terminal
+
+
+class Stage:
+    """What a flight needs of a supervisor: one drone that says where it is, and whatever stops the run."""
+
+    def __init__(self, state: m.FlightState, failure: str = "", start: Exception | None = None) -> None:
+        exchange = MemoryExchange()
+        self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
+        self.heard = self._drone.subscribe([t.EVENT])
+        self.run = SimpleNamespace(drones=("drone_1",))
+        self.interrupts = SimpleNamespace(stop_requested=not failure, hurry=False)
+        self.failure, self.unwell, self._state, self._start = failure, [], state, start
+        self.ends: list[m.Event] = []
+
+    def start(self) -> None:
+        if self._start is not None:
+            raise self._start
+
+    def step(self) -> None:
+        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=self._state, mode="HOVER")
+        self._drone.publish(t.VEHICLE_STATUS, status)
+        time.sleep(0.01)
+
+    def close(self) -> None:
+        self.ends = [r.message for r in self.heard.drain() if isinstance(r.message, m.Event)]
+
+    def fly(self) -> m.Event:
+        terminal = cast(Terminal, SimpleNamespace(say=lambda _: None, unmute=lambda: None))
+        plan = FlightPlan(None, asks=False, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
+        try:
+            flight = Flight(cast(Supervisor, self), plan, terminal)
+            flight._start = cast(Start, SimpleNamespace(run=self.start, show_screen=lambda: None))
+            flight.run()
+        except GroundStationError:
+            assert self._start is not None
+        (end,) = [event for event in self.ends if event.header.entity == m.RUN]
+        return end
+
+
+LANDED, FLYING = m.FlightState.LANDED, m.FlightState.FLYING
+
+
+@pytest.mark.parametrize(
+    ("stage", "severity", "words"),
+    [
+        ({"state": LANDED}, "INFO", "stopped by the operator; all drones are on the ground"),
+        ({"state": FLYING}, "WARNING", "stopped by the operator; not every drone reported a landing"),
+        ({"state": LANDED, "failure": "it died\nlog"}, "ERROR", "it died; all drones are on the ground"),
+        ({"state": LANDED, "start": Interrupted("no")}, "INFO", "stopped by the operator; all drones are on the"),
+        ({"state": LANDED, "start": GroundStationError("no tracker\nlog")}, "ERROR", "its start failed: no tracker"),
+    ],
+)
+def test_a_run_says_how_it_ended(stage: dict[str, Any], severity: str, words: str) -> None:
+    end = Stage(**stage).fly()
+    assert end.severity == severity
+    assert end.text.startswith(f"run ended: {words}") and "\n" not in end.text

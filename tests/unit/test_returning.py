@@ -1,0 +1,88 @@
+"""The way back into a world-fixed view starts in time for it."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.control.flight_mode import FlightMode
+from groundstation.control.parameters import ControlParameters, control_from_field
+from groundstation.control.returning import is_lost, return_after_s, way_back_m
+from groundstation.control.setpoints import setpoints_from_plan
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.models import Rectangle
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+
+LAB = resolved_field(load_field(Path(__file__).parents[2] / "config/lab.yaml"))
+SENSORS, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
+VIEW = Rectangle((-1.0, 1.0), (-0.5, 0.5))
+TICK_S = 0.02
+LAG_S = 0.5
+
+
+def belief(pose: np.ndarray, std_m: float = 0.1) -> JointBelief:
+    layout = StateLayout().with_entity("drone_1", EntityKind.ROBOT, ROBOT_CORE)
+    layout = layout.with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+    return JointBelief(np.array([*pose, 0.0, 0.0, 0.0, 0.0]), std_m**2 * np.eye(8), layout, 0)
+
+
+@pytest.mark.parametrize(
+    ("place", "way"),
+    [
+        ((0.0, 0.0), 0.0),
+        ((1.0, 0.5), 0.0),
+        ((3.0, 0.0), 2.0),
+        ((0.0, -2.5), 2.0),
+        ((2.0, 1.0), math.hypot(1.0, 0.5)),
+        ((-2.0, 2.0), math.hypot(2.0, 2.0) * 0.75),
+    ],
+)
+def test_the_way_back_ends_where_it_enters_the_view(place: tuple[float, float], way: float) -> None:
+    assert way_back_m(*place, VIEW) == pytest.approx(way)
+
+
+def test_the_way_back_into_a_view_without_width_is_that_to_its_middle() -> None:
+    assert way_back_m(3.0, 4.0, Rectangle((0.0, 0.0), (0.0, 0.0))) == pytest.approx(5.0, abs=1e-5)
+
+
+def test_the_farther_the_way_back_the_earlier_it_starts() -> None:
+    p = ControlParameters(1.6)
+    starts = [return_after_s(0.25 * k, p) for k in range(30)]
+    assert starts[0] == p.return_unseen_s
+    assert starts == sorted(starts, reverse=True)
+    assert starts[-1] == p.return_soonest_s
+    for k, start_s in enumerate(starts):
+        if start_s > p.return_soonest_s:
+            assert start_s + 0.25 * k / p.return_speed_m_s + p.return_margin_s <= p.unseen_land_after_s + 1e-9
+
+
+def test_a_well_localised_drone_far_out_flies_back_before_it_is_too_late() -> None:
+    far, near = np.array([3.4, 0.0, 1.6, 0.0]), np.array([0.0, 0.0, 1.6, 0.0])
+    assert is_lost("drone_1", belief(far), CONTROL, SENSORS, unseen_s=4.0)
+    assert not is_lost("drone_1", belief(far), CONTROL, SENSORS, unseen_s=1.0)
+    assert not is_lost("drone_1", belief(near), CONTROL, SENSORS, unseen_s=4.0)
+
+
+@pytest.mark.parametrize("start", [(1.2, 0.0), (0.9, 0.9), (1.5, -1.0), (-1.8, 0.6), (0.0, 2.0)])
+def test_a_drone_that_flies_outwards_unseen_is_back_in_view_before_it_would_land(start: tuple[float, float]) -> None:
+    """It flies away at 0.5 m/s until RETURN, and follows velocities with a lag."""
+    pose, velocity = np.array([*start, 1.6, 0.0]), np.zeros(3)
+    away = 0.5 * np.array([*start, 0.0]) / math.hypot(*start)
+    velocity[:] = away
+    unseen_s, seen = 0.0, False
+    while not seen and unseen_s < 12.0:
+        unseen_s += TICK_S
+        out = setpoints_from_plan(
+            None, belief(pose), ("drone_1",), None, CONTROL, SENSORS, unseen_s={"drone_1": unseen_s}
+        )["drone_1"]
+        wanted = np.array(out.velocity_m_s) if out.phase is FlightMode.RETURN else away
+        velocity += TICK_S / LAG_S * (wanted - velocity)
+        pose[:3] += TICK_S * velocity
+        marker = SENSORS.marker("drone_1", pose, is_robot=True)
+        seen = out.phase is FlightMode.RETURN and SENSORS.world_in_view("ceiling", marker)
+    assert seen
+    assert unseen_s < CONTROL.unseen_land_after_s - 0.5

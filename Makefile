@@ -1,34 +1,39 @@
-# make demo, make test: each creates .venv if needed, installs everything, and runs. make alone only installs.
+# make demo, make test: each creates .venv if needed, installs what it uses (an extra of pyproject.toml), and runs.
+# make alone only installs the product.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
 DEMO_ARGS ?=
 
 INTEROP := .interop
 
-.PHONY: install demo test test-slow check format interop clean
+.PHONY: install demo test test-slow check format docs interop clean
 
 install: $(STAMP)
 
 demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
-test: $(STAMP)
+test: $(STAMP)-test
 	$(BIN)/python -m pytest -m "not slow" tests
 
-test-slow: $(STAMP)
+test-slow: $(STAMP)-test-slow
 	$(BIN)/python -m pytest -m slow --timeout 900 tests
 
-check: $(STAMP)
+check: $(STAMP)-check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: $(STAMP)
+format: $(STAMP)-check
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(STAMP)-docs
+	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
 # Clients of others for the interoperability tests, each in an environment of its own.
 interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed
@@ -49,10 +54,14 @@ $(INTEROP)/%/.installed: tests/interop/%.txt
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "Skein needs Python 3.11 or newer; this is %d.%d. Use: make PYTHON=python3.11 $(MAKECMDGOALS)" % v[:2])'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	$(INSTALL) .
 	@echo "compiling the kernels, once: half a minute"
-	@$(BIN)/python -m groundstation.runtime.kernels
+	@$(BIN)/python -m groundstation.runtime.compile_kernels
+	@touch $@
+
+$(STAMP)-%: $(STAMP)
+	$(INSTALL) '.[$*]'
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(INTEROP) .mypy_cache .ruff_cache .pytest_cache .numba_cache
+	rm -rf $(VENV) $(INTEROP) docs/_build .mypy_cache .ruff_cache .pytest_cache .numba_cache

@@ -25,7 +25,7 @@ def test_one_place_looks_for_real_data() -> None:
     allowed = {
         Path("tests/conftest.py"),
         Path(__file__).relative_to(ROOT),
-        Path("tests/unit/test_estimation_examples.py"),
+        Path("tests/unit/estimation/test_estimation_examples.py"),
     }
     found = {
         path.relative_to(ROOT)

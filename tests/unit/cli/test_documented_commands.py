@@ -13,7 +13,7 @@ from groundstation.cli import main as cli
 from groundstation.settings.files import SHIPPED
 from groundstation.settings.load import load_field
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 DOCUMENTS = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",

@@ -11,7 +11,7 @@ from groundstation.settings.load import load_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, core_section, driver_sections, rerouted
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml"
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
 
 
 @pytest.fixture(scope="module")

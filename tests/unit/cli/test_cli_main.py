@@ -13,7 +13,7 @@ from groundstation.cli import main as cli
 from groundstation.cli.exits import ExitCode, UnreachableError, exit_code_of
 from groundstation.errors import DriverError, GroundStationError, SettingsError
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "field"
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "field"
 
 
 @pytest.fixture

@@ -22,8 +22,8 @@ from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, driver_sections
 
-CONFIG = Path(__file__).parents[2] / "config"
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml"
+CONFIG = Path(__file__).parents[3] / "config"
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
 
 
 def resolved(*options: str) -> ResolvedField:

@@ -9,7 +9,7 @@ import pytest
 from groundstation.errors import SettingsError
 from groundstation.settings.load import load_field
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "field"
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "field"
 OTHER_VERSION = "lab.yaml:1: schema_version: must be 1, the version that this program reads"
 GOOD = (FIXTURE / "lab.yaml").read_text(encoding="utf-8")
 
@@ -43,7 +43,7 @@ def broken(old: str, new: str, at: str = "") -> list[str]:
 
 
 def catalogue() -> list[tuple[str, ...]]:
-    text = (Path(__file__).parents[1] / "fixtures" / "broken_fields.txt").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "fixtures" / "broken_fields.txt").read_text(encoding="utf-8")
     entries = [block.splitlines() for block in text.split("\n\n") if not block.startswith("#")]
     assert all([line[:2] for line in entry] == ["- ", "+ ", "= "] for entry in entries)
     return [tuple(line[2:].replace("\\n", "\n") for line in entry) for entry in entries]

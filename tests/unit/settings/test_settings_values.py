@@ -15,7 +15,7 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def facts(kind: Any, path: str = "field") -> Iterator[str]:

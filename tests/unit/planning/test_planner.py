@@ -18,7 +18,7 @@ from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
-LAB = resolved_field(load_field(Path(__file__).parents[2] / "config/lab.yaml"))
+LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
 SENSORS = sensors_from_field(LAB)
 PARAMETERS = parameters_from_field(LAB)
 FLAT, STRING = Topology.parse("drone_1,drone_2"), Topology.parse("drone_1/drone_2")

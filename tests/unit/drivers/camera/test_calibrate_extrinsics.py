@@ -16,7 +16,7 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
 
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[4] / "config"
 LENS = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, residual_px=0.1)
 TURN_DEG = (1.2, -0.8, 15.0)
 CEILING = Pose(world_from_downward_optical(TURN_DEG), np.array([0.2, -0.1, 3.2]))

@@ -11,7 +11,7 @@ from groundstation.errors import SettingsError
 from sim_bridge.realism import weaker_than_reality
 from sim_bridge.scenario import Scenario, parse_scenario
 
-SCENARIOS = Path(__file__).parents[2] / "config" / "scenarios"
+SCENARIOS = Path(__file__).parents[3] / "config" / "scenarios"
 
 
 def read(name: str) -> dict[str, Any]:

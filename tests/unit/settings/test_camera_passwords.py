@@ -20,7 +20,7 @@ from groundstation.settings.recorded import recorded_field
 from groundstation.settings.resolved import summary_of, yaml_of
 from groundstation.settings.schema import Field
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml"
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
 SECRET = "s3cr3t-w0rd"
 SOURCES = {
     "cameras.ceiling.source": f"http://operator:{SECRET}@192.168.1.50:8080/video.mjpg",

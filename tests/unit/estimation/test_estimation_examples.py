@@ -10,7 +10,7 @@ import pytest
 
 from groundstation.estimation import models
 
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+HOW_TO = Path(__file__).parents[3] / "docs" / "how-to"
 PAGE, SENSOR_PAGE = HOW_TO / "use-the-estimator-as-a-library.md", HOW_TO / "add-a-sensor-model.md"
 
 

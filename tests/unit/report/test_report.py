@@ -30,7 +30,7 @@ from groundstation.settings.load import load_field
 S = 1_000_000_000
 UNIX = 1_700_000_000 * S
 FLAT, STRING = "drone_1,drone_2", "drone_1/drone_2"
-FIELD = load_field(Path(__file__).parents[1] / "fixtures/field/lab.yaml").model_dump_json().encode()
+FIELD = load_field(Path(__file__).parents[2] / "fixtures/field/lab.yaml").model_dump_json().encode()
 
 
 @dataclass

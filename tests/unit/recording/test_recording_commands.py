@@ -29,7 +29,7 @@ from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 
 DURATION_S = 3.0
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.time_units import NS_PER_S
 
-LAB = Path(__file__).parents[2] / "config" / "lab.yaml"
+LAB = Path(__file__).parents[3] / "config" / "lab.yaml"
 JPEG = bytes(cv2.imencode(".jpg", np.zeros((360, 640, 3), np.uint8))[1])
 
 

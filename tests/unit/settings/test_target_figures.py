@@ -17,7 +17,7 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
 START, MS = 10_000_000_000_000, 1_000_000
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[3] / "config"
 HEIGHT_M, MARKER_M, SEEN_STD_M = 4.2, 0.4, 0.02
 FIELDS = ("lab.yaml", "mixed-team.yaml", "two-targets.yaml")
 

@@ -19,7 +19,7 @@ from groundstation.settings.resolved import summary_of, yaml_of
 from groundstation.settings.scenario import load_scenario
 from groundstation.settings.schema import Field
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FIXTURE = ROOT / "tests" / "fixtures" / "field" / "lab.yaml"
 
 

@@ -14,7 +14,7 @@ from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, driver_sections, rerouted
 from groundstation.supervisor.table import LastWords
 
-CONFIG = Path(__file__).parents[2] / "config"
+CONFIG = Path(__file__).parents[3] / "config"
 REFUSED = r"kind: tello is not known; known: ardrone, mavlink"
 
 

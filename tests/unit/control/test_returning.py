@@ -17,7 +17,7 @@ from groundstation.sensing.models import Rectangle
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
-LAB = resolved_field(load_field(Path(__file__).parents[2] / "config/lab.yaml"))
+LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
 SENSORS, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
 VIEW = Rectangle((-1.0, 1.0), (-0.5, 0.5))
 TICK_S = 0.02

@@ -20,7 +20,7 @@ class EstimatorSettings(SettingsSection):
     """Age [s] up to which a late measurement is still fused in its place; an older one is refused as LATE."""
     gate_probability: Annotated[float, Field(ge=0.5, lt=1)] = 0.997
     """Share of good measurements that the chi-square gate lets pass (0.997: 3 sigma of one axis). Larger accepts
-    more outliers; smaller discards more good measurements."""
+    more outliers; smaller gives more good measurements less weight."""
     lost_after_s: Annotated[float, Field(gt=0, le=60)] = 3.0
     """Time [s] without an observation of a target after which the team searches for it."""
 
@@ -53,8 +53,8 @@ class PlannerSettings(SettingsSection):
     rate_hz: Annotated[int, Field(ge=1, le=50)] = 10
     """Plans per second; at most the estimator's rate."""
     mode: Literal["certified", "paper"] = "certified"
-    """certified: several starting points per topology, a proof for each topology that is dropped, hysteresis and a
-    minimum stay. paper: as in the method's paper, each topology solved once, from rest, and the cheapest wins."""
+    """certified: several starting points per topology, hysteresis and a minimum stay. paper: as in the method's paper,
+    each topology solved once, from rest, and the cheapest wins."""
     horizon_steps: Annotated[int, Field(ge=1, le=50)] = 10
     """Number of steps that a plan looks ahead. A change of topology must pay within horizon_steps x step_s."""
     step_s: Annotated[float, Field(gt=0, le=2)] = 0.2

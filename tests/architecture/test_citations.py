@@ -21,6 +21,7 @@ CITATION = re.compile(rf"(docs/[\w./-]+\.md)(#[\w-]+|{GAP}{NUMBER}(?:(?:,{GAP}|{
 HEADING = re.compile(r"^#+ (.+)$", flags=re.MULTILINE)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 REPOSITORY_PATH = re.compile(r"`((?:groundstation|drivers|sim_bridge|tests|config)/[\w./-]*)`")
+FILE_NAME = re.compile(r"`((?:[\w-]+/)*[\w-]+\.(?:py|js|css|yaml))`")
 OLD_SHEETS = re.compile(r"\b(?:AR\.Drone|protocol|reliability) sheet\b|\bshared/(?:reference|design)\b")
 OLD_PAGES = re.compile(
     r"(?<![\w/-])(?:ardrone-protocol|mavlink|zenoh|vision|estimation|planning|method|reliability|lab-interop"
@@ -154,6 +155,19 @@ def test_documentation_names_files_that_exist() -> None:
         if page.is_relative_to(ROOT / "docs")
         for name in REPOSITORY_PATH.findall(page.read_text(encoding="utf-8"))
         if not (ROOT / name).exists()
+    ]
+    assert not lost, "\n".join(lost)
+
+
+def test_files_are_named_as_they_are_called() -> None:
+    """A file in a table of a package, or in a page, that was renamed or has gone; files of the reader's own aside."""
+    there = {path.name for path in files({".py", ".js", ".css", ".yaml"})}
+    readers_own = {"uwb_range.py", "test_uwb_range.py", "resolved.yaml", "lab.yaml"}
+    lost = [
+        f"{page.relative_to(ROOT)}: {name}"
+        for page in pages()
+        for name in FILE_NAME.findall(FENCE.sub("", page.read_text(encoding="utf-8")))
+        if Path(name).name not in there | readers_own
     ]
     assert not lost, "\n".join(lost)
 

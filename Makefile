@@ -6,10 +6,14 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
 DEMO_ARGS ?=
+# REPEAT=--last-failed repeats only what failed, in each of the test targets.
+REPEAT ?=
+PYTEST = $(BIN)/python -m pytest $(REPEAT)
 
 INTEROP := .interop
+STUDIES := .pytest_cache/studies
 
-.PHONY: install demo test test-slow check format docs interop clean
+.PHONY: install demo test test-slow slow-flights slow-studies check format docs interop clean
 
 install: $(STAMP)
 
@@ -17,10 +21,19 @@ demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
 test: $(STAMP)-test
-	$(BIN)/python -m pytest -m "not slow" tests
+	$(PYTEST) -m "not slow" tests
 
+# Flights are judged by the clock; what only computes runs beside them, where they leave time, and is printed at the end.
 test-slow: $(STAMP)-test-slow
-	$(BIN)/python -m pytest -m slow --timeout 900 tests
+	$(MAKE) --jobs 2 --keep-going --output-sync=none slow-flights slow-studies
+
+slow-flights: $(STAMP)-test-slow
+	$(PYTEST) -m "slow and not study" --timeout 900 tests
+
+slow-studies: $(STAMP)-test-slow
+	@mkdir -p $(STUDIES) && code=0; \
+	nice -n 15 $(PYTEST) -m study --timeout 1800 -o cache_dir=$(STUDIES) tests >$(STUDIES)/log 2>&1 || code=$$?; \
+	cat $(STUDIES)/log; exit $$code
 
 check: $(STAMP)-check
 	$(BIN)/ruff check .

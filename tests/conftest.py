@@ -14,6 +14,21 @@ numba_cache.activate(numba_cache.EVERYTHING)
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config"
+STUDIES = {"property", "replay", "statistics"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the slow tests of folders that only compute."""
+    for item in items:
+        if item.get_closest_marker("slow") and STUDIES & set(item.path.relative_to(ROOT).parts):
+            item.add_marker("study")
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Let a repetition pass in which there is nothing to repeat."""
+    nothing_to_repeat = session.config.getoption("last_failed_no_failures") == "none"
+    if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and nothing_to_repeat:
+        session.exitstatus = pytest.ExitCode.OK
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from groundstation.recording.viewers import Transform, viewer_descriptor
 pytest.importorskip("foxglove", reason="the extra [foxglove] is not installed")
 from foxglove import messages as fm
 
-pytestmark = pytest.mark.slow  # the library is large: make test does without it
+pytestmark = [pytest.mark.slow, pytest.mark.study]  # the library is large: make test does without it
 
 TIME_NS = 1_700_000_001_250_000_000
 STAMP = fm.Timestamp(1_700_000_001, 250_000_000)

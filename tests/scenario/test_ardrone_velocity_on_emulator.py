@@ -153,6 +153,7 @@ def test_the_bar_holds_with_noise_and_wind():
 
 
 @pytest.mark.slow
+@pytest.mark.study
 def test_all_of_sixty_noisy_steps_hold_the_bar(capsys):
     """The default scenario: 90 % of 0.5 m/s within 1.2 s, at most 15 % over, on both axes of 30 seeds."""
     steps = [(seed, axis, *step_response(Flight(seed).take_off(), axis, 2.6)) for seed in range(30) for axis in (0, 1)]

@@ -14,6 +14,7 @@ TASKS = [Task("teams", 4, "certified", seed, steps=30) for seed in range(1, 25)]
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore")
 def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
     import distributed
@@ -37,6 +38,7 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore")
 def test_sweep_command_on_a_local_cluster(tmp_path: Path) -> None:
     arguments = ["experiment", "sweep", "--robots", "2,3", "--strategies", "certified", "--starts", "string"]
@@ -49,6 +51,7 @@ def test_sweep_command_on_a_local_cluster(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore")
 def test_a_scheduler_that_is_not_there_is_named() -> None:
     with pytest.raises(SweepError, match="no dask scheduler answers"):

@@ -125,14 +125,15 @@ def test_restarted_tracker_moves_nothing(sitl: Start) -> None:
 
 @FAULTS
 def test_two_runs_at_once(sitl: Start) -> None:
-    first = sitl("--duration", "3")
-    second = sitl("--duration", "3")
+    first, second = sitl(), sitl()
     assert first.record.endpoint != second.record.endpoint
     first.until_tracking(120)
     second.until_tracking(120)
     assert "several ground stations" in cli("land").stderr
-    first.wait(120)
-    second.wait(120)
+    for run in (first, second):
+        assert cli("land", "--run", run.record.name).returncode == 0
+        run.until_landed(10)
+        assert run.wait(60) == 0
 
 
 @FAULTS

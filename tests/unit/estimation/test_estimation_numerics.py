@@ -133,6 +133,7 @@ def test_a_million_steps_leave_a_covariance(prior: float, noise: float) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.timeout(300)
 def test_ten_million_steps_leave_a_covariance() -> None:
     assert long_flight(1e6, 1e-6, 10_000_000) == (0, 0.0)

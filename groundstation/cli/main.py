@@ -111,6 +111,10 @@ class VerbGroup(click.Group):
         assert isinstance(command, click.Command)
         return command
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the arguments; `help VERB` asks for what `VERB --help` prints."""
+        return super().parse_args(ctx, [*args[1:], "--help"] if args[:1] == ["help"] else args)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -143,6 +147,7 @@ _EXAMPLES = (
 
 
 @click.command(cls=VerbGroup, name="groundstation", context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="skein-groundstation", message="%(package)s %(version)s")
 def groundstation() -> None:
     """Ground station for small teams of drones that track a moving target together."""
 

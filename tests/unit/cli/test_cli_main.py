@@ -161,6 +161,17 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["location"] == str(Path(cli.__file__).parents[2])
     assert cli.run(["version"]) == 0
     assert "eclipse-zenoh" in capsys.readouterr().out
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out == "skein-groundstation 0.1.0\n"
+
+
+@pytest.mark.parametrize("words", [[], ["land"], ["config", "check"]])
+def test_help_is_a_word_too(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert cli.run(["help", *words]) == 0
+    asked = capsys.readouterr().out
+    assert cli.run([*words, "--help"]) == 0
+    assert asked == capsys.readouterr().out
+    assert "Usage: groundstation" in asked
 
 
 @pytest.mark.usefixtures("lab")

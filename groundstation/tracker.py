@@ -23,7 +23,7 @@ from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning import parameters as planning
-from groundstation.planning.plan import Planner, PlanResult
+from groundstation.planning.planner import Planner, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology

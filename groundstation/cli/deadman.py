@@ -20,7 +20,7 @@ from groundstation.bus.topics import COMMAND_ACK
 from groundstation.bus.zenoh_bus import open_bus
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.stop import choose_run
-from groundstation.console.commands import OrderDesk
+from groundstation.console.commands import CommandDesk
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.time_units import NS_PER_MS
@@ -101,7 +101,7 @@ def deadman(name: str | None, gamepad: str | None) -> int:
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
     """Obey the handle until the user leaves and what he asked for last is settled, or until `go_on` says no."""
-    desk, answers = OrderDesk(bus, drones), bus.subscribe([COMMAND_ACK])
+    desk, answers = CommandDesk(bus, drones), bus.subscribe([COMMAND_ACK])
     shown, left_ns = "", 0
     while go_on():
         now_ns = time.monotonic_ns()
@@ -126,11 +126,11 @@ def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_
     click.echo("")
 
 
-def _settled(desk: OrderDesk) -> bool:
+def _settled(desk: CommandDesk) -> bool:
     return all(order["state"] not in ("sent", "heard") for order in desk.summary() if order["by"] == _ME)
 
 
-def _line(desk: OrderDesk, man: DeadMan) -> str:
+def _line(desk: CommandDesk, man: DeadMan) -> str:
     words = {"sent": "NOT CONFIRMED", "heard": "acknowledged", "not_confirmed": "NOT CONFIRMED"}
     orders = [f"{o['verb']} {words.get(o['state'], o['state'])}" for o in desk.summary() if o["by"] == _ME]
     grip = {Grip.DISARMED: "not armed: hold it", Grip.HELD: "held", Grip.LOOSE: "LET GO", Grip.LANDED: "landing"}

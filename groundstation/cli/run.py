@@ -71,7 +71,7 @@ def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
     Ctrl-C lands; a second one stops at once.
     """
     from groundstation.flight.composition import fly_endpoint
-    from groundstation.flight.plan import plan_of
+    from groundstation.flight.flight_plan import plan_of
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.supervisor.network import require_free
@@ -96,7 +96,7 @@ def run_simulated(
 ) -> int:
     """Fly a field in the simulator, judge the run, and return the exit code."""
     from groundstation.flight.composition import Simulation, simulated
-    from groundstation.flight.plan import plan_of
+    from groundstation.flight.flight_plan import plan_of
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field

@@ -34,7 +34,7 @@ class Followed:
     closed: bool = False
 
 
-class OrderDesk:
+class CommandDesk:
     """Gives commands and follows these and everybody else's.
 
     Stops go to the drones at once. Starts go to the run's operator, who holds the lease and takes off one by one.

@@ -7,7 +7,7 @@ _GRACE_NS = 15_000_000_000
 
 
 @dataclass(slots=True)
-class Helm:
+class OperatorLock:
     """Who of the viewers is the operator: `client` survives a reconnection, `name` is what the others see."""
 
     client: str = ""
@@ -25,7 +25,7 @@ class Helm:
         return replaced
 
     def release(self, client: str) -> None:
-        """Give the helm back, if it is that viewer's."""
+        """Give the lock back, if it is that viewer's."""
         if client == self.client:
             self.client = self.name = ""
 
@@ -40,6 +40,6 @@ class Helm:
             self._left_ns = now_ns
 
     def step(self, now_ns: int) -> None:
-        """Free the helm when its viewer stays away."""
+        """Free the lock when its viewer stays away."""
         if self.client and self._left_ns and now_ns - self._left_ns > _GRACE_NS:
             self.client = self.name = ""

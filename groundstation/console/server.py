@@ -31,7 +31,7 @@ from groundstation.bus.topics import (
     VEHICLE_STATUS,
 )
 from groundstation.console.app import ConsoleApp
-from groundstation.console.commands import OrderDesk
+from groundstation.console.commands import CommandDesk
 from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
 from groundstation.console.player import Player
@@ -100,7 +100,7 @@ class ConsoleServer:
         self._pictures = PictureDesk(self._lenses)
         token = secrets.token_urlsafe(24)
         steered = cast.targets if scene["truth"] and player is None else ()
-        desk = OrderDesk(bus, tuple(cast.drones))
+        desk = CommandDesk(bus, tuple(cast.drones))
         self.sessions = Sessions(bus, desk, token, run, steered, lambda: self._pictures.frames, player)
         self.app = ConsoleApp(load_pages(token, run), token, self.board, self.sessions, self._seed, self._now_ns)
         self._run = run
@@ -184,7 +184,7 @@ class ConsoleServer:
             self.ingest(self._less_often.drain(), now_ns)
         self.ingest(self._each.drain(), now_ns)
         self.sessions.desk.step(now_ns)
-        self.sessions.helm.step(now_ns)
+        self.sessions.operator_lock.step(now_ns)
         self._take_pictures(now_ns)
         self.state.note(now_ns)
 
@@ -201,7 +201,7 @@ class ConsoleServer:
             subscription.drain_samples()
         self.state = ConsoleState(self._cast, self._now_ns())
         self._pictures = PictureDesk(self._lenses)
-        self.sessions.desk = OrderDesk(self._bus, tuple(self._cast.drones))
+        self.sessions.desk = CommandDesk(self._bus, tuple(self._cast.drones))
 
     def show_anew(self, now_ns: int) -> None:
         """Tell all viewers everything, as to one that has just come."""

@@ -11,8 +11,8 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import SimCommand
 from groundstation.bus.topics import SIM_COMMAND
-from groundstation.console.commands import STOPS, OrderDesk
-from groundstation.console.operator_lock import Helm
+from groundstation.console.commands import STOPS, CommandDesk
+from groundstation.console.operator_lock import OperatorLock
 from groundstation.console.player import Player
 from groundstation.console.protocol import (
     CommandRequest,
@@ -55,7 +55,7 @@ class Sessions:
     def __init__(
         self,
         bus: Bus,
-        desk: OrderDesk,
+        desk: CommandDesk,
         token: str,
         run: str,
         simulated_targets: tuple[str, ...],
@@ -69,7 +69,7 @@ class Sessions:
         self._targets = simulated_targets
         self._newest_pictures = pictures
         self._player = player
-        self.helm = Helm()
+        self.operator_lock = OperatorLock()
         self.viewers: dict[int, PageConnection] = {}
         self.refused: Counter[str] = Counter()
 
@@ -81,17 +81,17 @@ class Sessions:
         """A viewer went."""
         self.viewers.pop(viewer.number, None)
         if viewer.client and not any(other.client == viewer.client for other in self.viewers.values()):
-            self.helm.left(viewer.client, clock.now_ns())
+            self.operator_lock.left(viewer.client, clock.now_ns())
 
     def is_operators(self, hello: Hello) -> bool:
         """Whether this is said by a page of the operator."""
-        return self.helm.client == hello.client and self._has_token(hello)
+        return self.operator_lock.client == hello.client and self._has_token(hello)
 
     def summary(self, now_ns: int) -> dict[str, Any]:
         """Return who is here and who is in command."""
         return {
-            "operator": self.helm.client,
-            "operator_name": self.helm.name,
+            "operator": self.operator_lock.client,
+            "operator_name": self.operator_lock.name,
             "viewers": len(self.viewers),
             "lease": self.desk.lease_holder(now_ns),
         }
@@ -116,7 +116,7 @@ class Sessions:
             case TakeOver():
                 self._take_over(viewer)
             case Release():
-                self.helm.release(viewer.client)
+                self.operator_lock.release(viewer.client)
             case _:
                 self._steer(viewer, message)
 
@@ -144,7 +144,7 @@ class Sessions:
         viewer.client = hello.client
         viewer.trusted = self._has_token(hello)
         if viewer.trusted:
-            self.helm.arrived(viewer.client, viewer.name)
+            self.operator_lock.arrived(viewer.client, viewer.name)
         else:
             self.refused["token"] += 1
         viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, trusted=viewer.trusted))
@@ -157,10 +157,12 @@ class Sessions:
             self._refuse(viewer, "other_run", f"{order.verb} was given for another run and was dropped", order.ref)
             return
         if order.verb not in STOPS:
-            if not self.helm.may_start(viewer.client):
-                self._refuse(viewer, "not_operator", f"{self.helm.name} is the operator: take over first", order.ref)
+            if not self.operator_lock.may_start(viewer.client):
+                self._refuse(
+                    viewer, "not_operator", f"{self.operator_lock.name} is the operator: take over first", order.ref
+                )
                 return
-            self.helm.take(viewer.client, viewer.name)
+            self.operator_lock.take(viewer.client, viewer.name)
         now_ns = clock.now_ns()
         # A page that slept may reckon the server's time wrongly, and cannot know how long an order waited here.
         age_ms = max(order.age_ms, now_ns / NS_PER_MS - order.at_ms)
@@ -169,7 +171,7 @@ class Sessions:
             self._refuse(viewer, "order", problem, order.ref)
 
     def _take_over(self, viewer: PageConnection) -> None:
-        replaced = self.helm.take(viewer.client, viewer.name)
+        replaced = self.operator_lock.take(viewer.client, viewer.name)
         for other in self.viewers.values():
             if replaced and other is not viewer:
                 other.say(encoded("notice", text=f"{viewer.name} has taken over from {replaced}", grave=True, ref=""))

@@ -25,7 +25,7 @@ class Situation:
     planned: bool = False
 
 
-def phase_of(situation: Situation) -> FlightMode:
+def flight_mode_of(situation: Situation) -> FlightMode:
     """Return the phase; the first row that fits, from the most careful to the boldest."""
     if not situation.airborne:
         return FlightMode.GROUNDED

@@ -47,7 +47,7 @@ def search_stands(
 
     While the prediction of one of them is any good they fan out around it and sweep over it; later they go slowly
     round an ellipse, spread evenly, and turn; where they would come within a column of each other, they only swing to
-    and fro about its long axis. In a corner of the view stands may coincide: spacing.py moves them apart.
+    and fro about its long axis. In a corner of the view stands may coincide: search_spacing.py moves them apart.
     """
     hint = _hint(belief, parameters, targets)
     seconds = belief.stamp_ns * 1e-9

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.bus.messages import Vector3
-from groundstation.control.flight_mode import FlightMode, Situation, phase_of
+from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.search import Stand, search_stands, view_of
-from groundstation.control.spacing import apart
+from groundstation.control.search_spacing import apart
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
-from groundstation.planning.plan import PlanResult
+from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
 
@@ -53,7 +53,7 @@ def setpoints_from_plan(
     fresh = target_age_s is not None and target_age_s <= parameters.lost_after_s and bool(belief.layout.targets)
     robots = [name for name in belief.layout.robots if name in airborne]
     phases = {
-        name: phase_of(
+        name: flight_mode_of(
             Situation(
                 airborne=True,
                 in_belief=name in robots,

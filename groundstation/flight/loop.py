@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from groundstation.bus.messages import RUN, Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
-from groundstation.flight.plan import FlightPlan
+from groundstation.flight.flight_plan import FlightPlan
 from groundstation.runtime.operator import Operator, TeamPhase
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor

@@ -9,9 +9,9 @@ from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.kernel import Rows
 from groundstation.planning.gradient import evaluate
+from groundstation.planning.lbfgs import solve
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
-from groundstation.planning.search import solve
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import LEAF, ROOT, Topology
 from groundstation.sensing.visibility import camera_rows

@@ -9,7 +9,7 @@ from groundstation.bus.sender import Sender
 from groundstation.bus.topics import Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.plan import Planner
+from groundstation.planning.planner import Planner
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
 from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking

@@ -20,7 +20,7 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import BELIEF, COMMAND, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT
 from groundstation.control.output_limiter import Limited
 from groundstation.estimation.measurement import Correction
-from groundstation.planning.plan import PlanResult
+from groundstation.planning.planner import PlanResult
 from groundstation.tracker import Tracker
 
 TEAM = "team"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Header, JournalEntry, Message
-from groundstation.planning.plan import PlanResult
+from groundstation.planning.planner import PlanResult
 
 FAULT = "fault"
 STOPPED = "stopped"

@@ -9,7 +9,7 @@ from dataclasses import replace
 import msgspec
 
 from groundstation.errors import EstimatorFault
-from groundstation.planning.plan import Planner
+from groundstation.planning.planner import Planner
 from groundstation.process.priority import Rank, go_first
 from groundstation.runtime.journal import Adoption
 from groundstation.tracker import PlanRequest

@@ -12,7 +12,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Message, Severity
 from groundstation.bus.notice import Notice
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.plan import Planner
+from groundstation.planning.planner import Planner
 from groundstation.runtime.announcer import TEAM, Announcer
 from groundstation.runtime.consistency_watch import ConsistencyWatch
 from groundstation.runtime.health import UnseenWatch

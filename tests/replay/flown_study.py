@@ -11,7 +11,7 @@ from groundstation.bus import topics as t
 from groundstation.bus.api import Sample
 from groundstation.bus.topics import Topic
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.plan import Planner
+from groundstation.planning.planner import Planner
 from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import Preamble, preamble_of_run

@@ -18,7 +18,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import wrap
 from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning.parameters import parameters_from_field
-from groundstation.planning.plan import Planner, PlanResult
+from groundstation.planning.planner import Planner, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field

@@ -75,7 +75,7 @@ def test_there_is_room_for_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
         hello = {"type": "hello", "token": await site.token(), "client": "abcd"}
         await pages[0].send(json.dumps(hello))
         await pages[0].send(json.dumps({"type": "takeover"}))
-        await until(lambda: site.server.sessions.helm.client == "abcd")
+        await until(lambda: site.server.sessions.operator_lock.client == "abcd")
         for claim in (hello | {"client": "efgh"}, hello | {"token": "guess"}, {"type": "takeover"}):
             async with site.connect() as pretender:
                 await pretender.send(json.dumps(claim))

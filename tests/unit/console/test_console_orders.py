@@ -9,8 +9,8 @@ from groundstation.bus import clock
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.console.commands import OrderDesk
-from groundstation.console.operator_lock import Helm
+from groundstation.console.commands import CommandDesk
+from groundstation.console.operator_lock import OperatorLock
 from groundstation.console.protocol import (
     CommandRequest,
     Drive,
@@ -39,7 +39,7 @@ class Room:
         self.others = MemoryBus(exchange, "lab", "drone_1")
         self.heard = self.others.subscribe([t.COMMAND])
         self.steering = self.others.subscribe([t.SIM_COMMAND])
-        self.desk = OrderDesk(self.bus, DRONES)
+        self.desk = CommandDesk(self.bus, DRONES)
         self.sessions = Sessions(self.bus, self.desk, "secret", RUN, targets)
         self.now_ns = clock.now_ns()
 
@@ -184,7 +184,7 @@ def test_without_the_token_a_page_only_looks() -> None:
     for message in (order(m.Verb.LAND), TakeOver(), Place(0.0, 0.0)):
         room.sessions.handle(stranger, message)
     assert room.commands() == [] and room.steering.drain() == []
-    assert room.sessions.helm.client == ""
+    assert room.sessions.operator_lock.client == ""
     assert room.sessions.refused == {"token": 1, "untrusted": 3}
     room.sessions.handle(stranger, Watch(("ceiling",)))
     assert stranger.watched == {"ceiling"}
@@ -206,18 +206,18 @@ def test_one_operator_at_a_time_and_anybody_may_stop() -> None:
     assert room.sessions.summary(room.now_ns)["operator"] == ""
 
 
-def test_the_helm_waits_for_a_page_that_reconnects() -> None:
-    helm = Helm()
-    helm.take("a", "viewer 1")
-    helm.left("a", NS_PER_S)
-    helm.step(10 * NS_PER_S)
-    assert not helm.may_start("b")
-    helm.arrived("a", "viewer 2")
-    helm.step(100 * NS_PER_S)
-    assert helm.name == "viewer 2"
-    helm.left("a", 100 * NS_PER_S)
-    helm.step(116 * NS_PER_S)
-    assert helm.may_start("b")
+def test_the_lock_waits_for_a_page_that_reconnects() -> None:
+    lock = OperatorLock()
+    lock.take("a", "viewer 1")
+    lock.left("a", NS_PER_S)
+    lock.step(10 * NS_PER_S)
+    assert not lock.may_start("b")
+    lock.arrived("a", "viewer 2")
+    lock.step(100 * NS_PER_S)
+    assert lock.name == "viewer 2"
+    lock.left("a", 100 * NS_PER_S)
+    lock.step(116 * NS_PER_S)
+    assert lock.may_start("b")
 
 
 def test_only_a_simulated_target_is_steered() -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import SolverReport
-from groundstation.control.flight_mode import FlightMode, Situation, phase_of
+from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import control_from_field
 from groundstation.control.setpoints import Setpoint, setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
-from groundstation.planning.plan import PlanResult
+from groundstation.planning.planner import PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
@@ -182,7 +182,7 @@ def test_the_flight_mode_table() -> None:
         expected = table.get((airborne, known))
         if expected is None:
             expected = FlightMode.RETURN if lost else FlightMode.TRACK if fresh and planned else FlightMode.SEARCH
-        assert phase_of(Situation(airborne, known, lost, fresh, planned)) is expected
+        assert flight_mode_of(Situation(airborne, known, lost, fresh, planned)) is expected
 
 
 def test_while_one_target_is_tracked_the_robot_farthest_from_it_searches_for_a_missing_one() -> None:

@@ -10,8 +10,8 @@ from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.errors import GroundStationError
+from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
-from groundstation.flight.plan import FlightPlan
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor

@@ -11,7 +11,7 @@ from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import PlannerParameters, parameters_from_field
-from groundstation.planning.plan import Planner, PlanResult, choose
+from groundstation.planning.planner import Planner, PlanResult, choose
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology

@@ -9,8 +9,8 @@ from scipy.optimize import minimize
 
 from groundstation.arrays import Array
 from groundstation.planning.gradient import evaluate
+from groundstation.planning.lbfgs import solve
 from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
-from groundstation.planning.search import solve
 from groundstation.sensing.models import Frustum, OnboardCameraModel, Softness, WorldCameraModel
 from groundstation.sensing.visibility import camera_rows, observe
 

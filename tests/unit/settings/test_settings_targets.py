@@ -14,7 +14,7 @@ from groundstation.estimation.models import ConstantVelocityTarget, CoordinatedT
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning import parameters as planning
-from groundstation.planning.plan import Planner
+from groundstation.planning.planner import Planner
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field

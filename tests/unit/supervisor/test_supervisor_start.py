@@ -10,8 +10,8 @@ import pytest
 from dummy_table import spec, start, until
 
 from groundstation.errors import GroundStationError
+from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
-from groundstation.flight.plan import FlightPlan
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.start import Interrupted

@@ -41,19 +41,7 @@ def test_short_flight_lands_and_leaves_nothing(sitl: Start) -> None:
 
 
 @FAULTS
-def test_land_from_another_shell(sitl: Start) -> None:
-    run = sitl()
-    run.until_tracking()
-    result = cli("land", "--run", run.record.name, "--json")
-    assert result.returncode == 0, result.stdout + result.stderr
-    answers = json.loads(result.stdout)
-    assert answers["confirmed"] and set(answers["drones"]) == set(run.record.drones)
-    run.until_landed(5)
-    assert run.wait(30) == 0
-
-
-@FAULTS
-def test_other_shells_find_a_run_that_had_to_take_other_ports(sitl: Start) -> None:
+def test_other_shells_hold_and_land_a_run_that_had_to_take_other_ports(sitl: Start) -> None:
     with ExitStack() as others:
         router = others.enter_context(
             socket.create_server(("::", 0), family=socket.AF_INET6, dualstack_ipv6=True)
@@ -67,8 +55,10 @@ def test_other_shells_find_a_run_that_had_to_take_other_ports(sitl: Start) -> No
         state = cli("monitor", "--run", name, "--json")
         assert set(json.loads(state.stdout)["vehicles"]) == set(run.record.drones), state.stderr
         for verb in ("hold", "land"):
-            answer = cli(verb, "--run", name)
-            assert answer.returncode == 0, answer.stdout + answer.stderr
+            result = cli(verb, "--run", name, "--json")
+            assert result.returncode == 0, result.stdout + result.stderr
+            answers = json.loads(result.stdout)
+            assert answers["confirmed"] and set(answers["drones"]) == set(run.record.drones)
         run.until_landed(5)
         assert run.wait(30) == 0
 

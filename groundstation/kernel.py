@@ -183,12 +183,15 @@ def signature_of(function: Callable[..., Any]) -> Any:
     return compiled_type(hints["return"])(*arguments)
 
 
-def kernel(*, inlined: bool = False, contract: bool = False) -> Callable[[Function], Function]:
+def kernel(
+    *, inlined: bool = False, contract: bool = False, reassociate: bool = False
+) -> Callable[[Function], Function]:
     """Compile a function for the signature of its annotations, with IEEE arithmetic, so that replays agree to the bit.
 
     inlined: into every kernel that calls it, for what is short or called from one place. To hand over a dozen arrays
     takes as long as a small kernel's work; but what is copied often makes compiling slow.
     contract: multiply and add in one rounding, where that is worth more than agreeing with numpy.
+    reassociate: sum in another order, so that sums are vectorised.
 
     Cached only in a directory that the process has chosen by the state of all sources (process/numba_cache.py): beside
     the source, numba would not notice an edited callee or constant of another module.
@@ -198,7 +201,7 @@ def kernel(*, inlined: bool = False, contract: bool = False) -> Callable[[Functi
         cached = bool(getattr(numba.config, "CACHE_DIR", ""))
         compiled = numba.njit(
             signature_of(function), cache=cached, nogil=True, error_model="numpy", forceinline=inlined,
-            fastmath={"contract"} if contract else False,
+            fastmath={name for name, wanted in (("contract", contract), ("reassoc", reassociate)) if wanted} or False,
         )  # fmt: skip
         return cast(Function, compiled(function))
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from groundstation.bench.planner_peers.step import edges_of, neighbours_of
 from groundstation.experiments.planar.candidates import all_topologies, candidate_list, merges, neighbours, radial_cuts
 from groundstation.experiments.planar.edges import sort_team
+from groundstation.experiments.planar.records import Observers
 from groundstation.sensing.topology import LEAF, ROOT, Topology
 
 NAMES = "abcdefghijkl"
@@ -25,15 +26,15 @@ def compiled_neighbours(level: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 def compiled_edges(level: tuple[int, ...]) -> set[tuple[str, str]]:
     n = len(level)
-    order, rows = np.empty(n + 1, dtype=np.int64), np.zeros((n + 2, 3), dtype=np.uint64)
-    count = sort_team(np.array(level, dtype=np.int64), order, rows)
+    order, seen = np.empty(n + 1, dtype=np.int64), Observers(*np.zeros((3, n + 2), dtype=np.uint64))
+    sort_team(np.array(level, dtype=np.int64), order, seen)
     names = [*(NAMES[a] for a in order[:-1]), LEAF]
     edges = {
         (ROOT if row == 0 else names[row - 1], names[b])
         for row in range(n + 1)
-        for b in range(int(rows[row, 0]), int(rows[row, 1]))
+        for b in range(int(seen.first[row]), int(seen.end[row]))
     }
-    assert len(edges) == count
+    assert len(edges) == seen.edge[n + 1]
     return edges
 
 

@@ -1,17 +1,16 @@
 """Candidate topologies as level vectors (0 is seen by the global sensor): neighbours, radial cuts, merges, all."""
 
 import numpy as np
-from numba import njit, types
 
-from groundstation.arrays import IntArray
+from groundstation.arrays import IntArray, IntMatrix, IntVector, Matrix
+from groundstation.experiments.planar.records import X, Y
+from groundstation.kernel import kernel
 
 MOST_CUTS = 6
 
-_i1, _i2, _i8, _f2 = types.int64[::1], types.int64[:, ::1], types.int64, types.float64[:, ::1]
 
-
-@njit(types.void(_i1, _i8, _i8, types.boolean, _i1), cache=True, nogil=True)
-def _move(level, robot, to, alone, out):  # type: ignore[no-untyped-def]
+@kernel()
+def _move(level: IntVector, robot: int, to: int, alone: bool, out: IntVector) -> None:
     """Write the level vector with one robot moved to a level (-1 and L open new ones), without empty levels."""
     own = level[robot]
     for a in range(level.shape[0]):
@@ -22,8 +21,8 @@ def _move(level, robot, to, alone, out):  # type: ignore[no-untyped-def]
             out[a] += 1
 
 
-@njit(_i8(_i1, _i2), cache=True, nogil=True)
-def neighbours(level, out):  # type: ignore[no-untyped-def]
+@kernel()
+def neighbours(level: IntVector, out: IntMatrix) -> int:
     """Write all topologies one robot-move away, each once, into out (2n, n); return how many.
 
     Only two moves can give the same topology twice: merging two single-robot levels, and splitting a pair
@@ -34,11 +33,11 @@ def neighbours(level, out):  # type: ignore[no-untyped-def]
     last = 0
     for a in range(n):
         sizes[level[a]] += 1
-        last = max(last, level[a])
+        last = max(last, int(level[a]))
     count = 0
     for robot in range(n):
-        own = level[robot]
-        alone = sizes[own] == 1
+        own = int(level[robot])
+        alone = bool(sizes[own] == 1)
         for to in (own - 1, own + 1):
             if to < 0 and alone:
                 continue
@@ -51,35 +50,35 @@ def neighbours(level, out):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(_i8(_f2, _i8, _i2), cache=True, nogil=True)
-def radial_cuts(mean, most, out):  # type: ignore[no-untyped-def]
+@kernel()
+def radial_cuts(mean: Matrix, most: int, out: IntMatrix) -> int:
     """Write the team sorted by distance to the global sensor and cut into 1..most equal groups; return how many.
 
     mean (n + 1, 2), target last; out (most, n).
     """
     robots = mean.shape[0] - 1
-    order = np.argsort(np.hypot(mean[:robots, 0], mean[:robots, 1]), kind="mergesort")
-    count = min(most, robots)
+    order = np.argsort(np.hypot(mean[:robots, X], mean[:robots, Y]), kind="mergesort")
+    count: int = min(most, robots)
     for k in range(count):
         for place in range(robots):
             out[k, order[place]] = place * (k + 1) // robots
     return count
 
 
-@njit(_i8(_i1, _i2), cache=True, nogil=True)
-def merges(level, out):  # type: ignore[no-untyped-def]
+@kernel()
+def merges(level: IntVector, out: IntMatrix) -> int:
     """Write the topologies in which two adjacent levels have become one, into out (n - 1, n); return how many."""
     last = 0
     for own in level:
-        last = max(last, own)
+        last = max(last, int(own))
     for k in range(last):
         for a in range(level.shape[0]):
             out[k, a] = level[a] - (1 if level[a] > k else 0)
     return last
 
 
-@njit(_i8(_i2, _i8), cache=True, nogil=True)
-def _without_repeats(rows, count):  # type: ignore[no-untyped-def]
+@kernel()
+def _without_repeats(rows: IntMatrix, count: int) -> int:
     """Keep the first of equal rows, in order; return how many are left."""
     kept = 0
     for candidate in range(count):
@@ -100,8 +99,8 @@ def _without_repeats(rows, count):  # type: ignore[no-untyped-def]
     return kept
 
 
-@njit(_i8(_i1, _f2, types.boolean, _i2), cache=True, nogil=True)
-def candidate_list(level, mean, wide, out):  # type: ignore[no-untyped-def]
+@kernel()
+def candidate_list(level: IntVector, mean: Matrix, wide: bool, out: IntMatrix) -> int:
     """Write the current topology, its neighbours and, if `wide`, radial cuts and merges, each once; return how many.
 
     out (3n + MOST_CUTS + 1, n).

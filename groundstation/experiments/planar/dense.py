@@ -5,12 +5,16 @@ what stands below the diagonal is neither used nor cleared. An inverse of 31 x 3
 """
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from groundstation.arrays import Matrix
+from groundstation.kernel import kernel
 
 LANES = 8
 _PIVOTS = 4
@@ -54,15 +58,17 @@ def _rank4_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-def _typed_rank4(typingctx, target, panel, stride, factors, factor_stride, row_stride, blocks):  # type: ignore[no-untyped-def]
+def _typed_rank4(
+    _typing: Any, target: Any, panel: Any, stride: Any, factors: Any, factor_stride: Any, row_stride: Any, blocks: Any
+) -> Any:
     return types.void(*[types.intp] * 7), _rank4_code
 
 
-_rank4: Any = intrinsic(_typed_rank4)
+_rank4 = cast(Callable[[int, int, int, int, int, int, int], None], intrinsic(_typed_rank4))
 
 
-@njit("void(f8[:, ::1], i8, i8, i8)", cache=True, nogil=True)
-def _eliminate(matrix, panel, factors, first):  # type: ignore[no-untyped-def]
+@kernel()
+def _eliminate(matrix: Matrix, panel: int, factors: int, first: int) -> None:
     """Subtract sum_p factors[p] panel[p] (addresses of 4 rows each) from the upper triangle below row `first`."""
     m = matrix.shape[0]
     stride, base = m * 8, matrix.ctypes.data
@@ -72,8 +78,8 @@ def _eliminate(matrix, panel, factors, first):  # type: ignore[no-untyped-def]
         _rank4(base + i * stride + column * 8, panel + column * 8, stride, factors + i * 8, stride, 8, blocks)
 
 
-@njit("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], i8)", cache=True, nogil=True)
-def subtract_products(target, matrix, columns, count):  # type: ignore[no-untyped-def]
+@kernel()
+def subtract_products(target: Matrix, matrix: Matrix, columns: Matrix, count: int) -> None:
     """Subtract matrix @ column from target for the first `count` rows of columns; matrix (m, m) symmetric and full.
 
     target and columns (>= count, m) hold one column per row, with 3 rows to spare: rows come in fours.
@@ -86,8 +92,8 @@ def subtract_products(target, matrix, columns, count):  # type: ignore[no-untype
             _rank4(target.ctypes.data + c * stride, matrix.ctypes.data + a * stride, stride, factors, 8, stride, m >> 3)
 
 
-@njit("b1(f8[:, ::1])", cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def cholesky_upper(matrix):  # type: ignore[no-untyped-def]
+@kernel(contract=True)
+def cholesky_upper(matrix: Matrix) -> bool:
     """Factor A = U^T U in place; False when a pivot is not positive (or not a number)."""
     m = matrix.shape[0]
     for k in range(0, m, 4):
@@ -114,8 +120,8 @@ def cholesky_upper(matrix):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit("b1(f8[:, ::1], f8[:, ::1])", cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def negative_inverse(matrix, panel):  # type: ignore[no-untyped-def]
+@kernel(contract=True)
+def negative_inverse(matrix: Matrix, panel: Matrix) -> bool:
     """Replace A by -A^-1 (symmetric sweeps, four pivots at a time); False when a pivot is not positive.
 
     panel (8, m) is scratch: the pivot block's inverse times the four pivot rows, then these rows themselves.

@@ -1,20 +1,19 @@
 """Projected L-BFGS in the box [-1, 1]^m, compiled around the planning cost."""
 
 import numpy as np
-from numba import njit, types
 
+from groundstation.arrays import Matrix, Vector
 from groundstation.experiments.planar.objective import cost_and_gradient
-from groundstation.experiments.planar.problem import PROBLEM, WORKSPACE
+from groundstation.experiments.planar.records import Limits, PlanarProblem, Workspace
+from groundstation.kernel import kernel
 
 MEMORY = 8
 ARMIJO = 1e-4
 CONVERGED, OUT_OF_BUDGET, NO_PROGRESS, FAILED = 0, 1, 2, 3
 
-_f1, _f2, _f8, _i8 = types.float64[::1], types.float64[:, ::1], types.float64, types.int64
 
-
-@njit(_f8(_f1, _f1), cache=True, nogil=True)
-def projected_gradient_norm(x, gradient):  # type: ignore[no-untyped-def]
+@kernel()
+def projected_gradient_norm(x: Vector, gradient: Vector) -> float:
     """Return max |clip(x - g) - x|, zero at a constrained stationary point."""
     largest = 0.0
     for k in range(x.shape[0]):
@@ -22,8 +21,8 @@ def projected_gradient_norm(x, gradient):  # type: ignore[no-untyped-def]
     return largest
 
 
-@njit(types.void(_f1, _f1, _f2, _f2, _i8, _f1), cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _direction(x, gradient, steps, changes, used, direction):  # type: ignore[no-untyped-def]
+@kernel(contract=True, reassociate=True)
+def _direction(x: Vector, gradient: Vector, steps: Matrix, changes: Matrix, used: int, direction: Vector) -> None:
     """Write the quasi-Newton descent direction in the subspace of variables that are free to move.
 
     Two-loop recursion in which steps and changes are projected onto the free subspace; a pair whose curvature
@@ -68,8 +67,10 @@ def _direction(x, gradient, steps, changes, used, direction):  # type: ignore[no
             direction[k] = -free[k] * gradient[k]
 
 
-@njit(_i8(_f1, _f1, _f1, _f1, _f2, _f2, _i8), cache=True, nogil=True)
-def _remember(x, trial, gradient, trial_gradient, steps, changes, used):  # type: ignore[no-untyped-def]
+@kernel()
+def _remember(
+    x: Vector, trial: Vector, gradient: Vector, trial_gradient: Vector, steps: Matrix, changes: Matrix, used: int
+) -> int:
     """Append a step and its gradient change if their curvature is positive; return how many are kept."""
     curvature, size = 0.0, 0.0
     for k in range(x.shape[0]):
@@ -87,16 +88,13 @@ def _remember(x, trial, gradient, trial_gradient, steps, changes, used):  # type
     return used + 1
 
 
-@njit(
-    types.Tuple((_f8, _i8, _i8))(_f1, PROBLEM, WORKSPACE, _f8, _f8, _i8, types.int64[::1]),
-    cache=True,
-    nogil=True,
-)
-def minimise(x, problem, work, scale, tolerance, budget, stop):  # type: ignore[no-untyped-def]
+@kernel()
+def minimise(
+    x: Vector, problem: PlanarProblem, work: Workspace, scale: float, limits: Limits
+) -> tuple[float, int, int]:
     """Minimise cost / scale of the workspace's topology from x, in place; scale 0 stands for the cost at x.
 
-    Returns (cost [m^2], evaluations, status); stops when max |clip(x - g) - x| <= tolerance, and out of budget when
-    stop[0] != 0.
+    Returns (cost [m^2], evaluations, status); converged when max |clip(x - g) - x| <= tolerance.
     """
     m = x.shape[0]
     gradient, trial, trial_gradient, direction = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
@@ -107,12 +105,12 @@ def minimise(x, problem, work, scale, tolerance, budget, stop):  # type: ignore[
     scale = value if scale == 0.0 else scale
     gradient /= scale
     evaluations, used = 1, 0
-    while projected_gradient_norm(x, gradient) > tolerance:
+    while projected_gradient_norm(x, gradient) > limits.tolerance:
         _direction(x, gradient, steps, changes, used, direction)
         length = 1.0 if used > 0 else 0.5 / np.max(np.abs(direction))
         accepted = False
         for _ in range(20):
-            if evaluations >= budget or stop[0] != 0:
+            if evaluations >= limits.budget or limits.stop[0] != 0:
                 return value, evaluations, OUT_OF_BUDGET
             slope = 0.0
             for k in range(m):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.experiments.planar.records import PlanarConstants
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +48,13 @@ class PlanarParameters:
         if self.steps < 1:
             raise ValueError(f"steps must be at least 1 (got {self.steps})")
 
-    def packed(self) -> Array:
-        """Return the constants in the order the kernels read them."""
+    def constants(self) -> PlanarConstants:
+        """Return what the kernels read."""
         vx, vy = self.target_velocity_m_s
-        return np.array(
-            [
-                self.sigma_m,
-                self.range_m,
-                self.softness_m,
-                self.epsilon_m,
-                self.step_s,
-                self.discount,
-                self.max_speed_m_s,
-                vx,
-                vy,
-                self.tail,
-            ]
-        )
+        return PlanarConstants(
+            float(self.sigma_m), float(self.range_m), float(self.softness_m), float(self.epsilon_m), float(self.step_s),
+            float(self.discount), float(self.max_speed_m_s), float(vx), float(vy), float(self.tail),
+        )  # fmt: skip
 
     def process_variance(self, robots: int) -> Array:
         """Return the per-step process variance of each entity, target last (robots + 1) [m^2]."""

@@ -11,7 +11,8 @@ from groundstation.arrays import Array, IntArray
 from groundstation.experiments.planar.candidates import MOST_CUTS, all_topologies, candidate_list
 from groundstation.experiments.planar.lbfgs import FAILED
 from groundstation.experiments.planar.parameters import PlanarParameters
-from groundstation.experiments.planar.problem import PlanarProblem, Workspace, make_problem, make_workspace
+from groundstation.experiments.planar.problem import make_problem, make_workspace
+from groundstation.experiments.planar.records import Candidates, Limits, PlanarProblem
 from groundstation.experiments.planar.search import (
     DROPPED_BY_REACH,
     DROPPED_BY_TANGENT,
@@ -147,7 +148,7 @@ class PlanarPlanner:
         self.parameters = parameters
         self.options = options or SearchOptions()
         self._generator = generator or np.random.default_rng(0)
-        self._work: Workspace = make_workspace(robots, parameters.steps)
+        self._work = make_workspace(robots, parameters.steps)
         self._all = all_topologies(robots) if self.options.mode is SearchMode.GLOBAL else None
         rows = len(self._all) if self._all is not None else 3 * robots + MOST_CUTS + 1
         self._rows = np.empty((rows, robots), dtype=np.int64)
@@ -173,32 +174,25 @@ class PlanarPlanner:
         if len(problem.mean) != len(level) + 1:
             raise ValueError(f"the planner was made for {len(level)} robots (got {len(problem.mean) - 1})")
         if target_velocity_m_s is not None:
-            problem.constants[7:9] = target_velocity_m_s
+            vx, vy = map(float, target_velocity_m_s)
+            constants = problem.constants._replace(target_velocity_x=vx, target_velocity_y=vy)
+            problem = problem._replace(constants=constants)
         options, total = self.options, self._candidates(problem.mean, level)
-        bounds, costs, fates = np.empty(total), np.empty(total), np.empty(total, dtype=np.int64)
         paper = options.mode is SearchMode.PAPER
-        best, evaluations = certified_search(
-            self._rows,
-            total,
-            self._warm,
-            problem,
-            self._work,
-            options.tolerance,
-            options.budget,
-            0.0 if paper else options.hysteresis,
-            self.stop,
-            options.prune and not paper,
-            bounds,
-            costs,
-            fates,
-            self._controls,
+        candidates = Candidates(
+            self._rows[:total], np.empty(total), np.empty(total), np.empty(total, np.int64), self._controls[:total]
         )
+        limits = Limits(options.tolerance, options.budget, self.stop)
+        hysteresis, prune = 0.0 if paper else float(options.hysteresis), options.prune and not paper
+        best, evaluations = certified_search(candidates, self._warm, problem, self._work, limits, hysteresis, prune)
         if best < 0:
             raise ValueError("the predicted covariance is not positive definite")
         self._warm = self._controls[best].copy()
-        cost, more = self._restart(problem, self._rows[best], float(costs[best]), options.budget - evaluations)
+        cost, more = self._restart(
+            problem, self._rows[best], float(candidates.costs[best]), options.budget - evaluations
+        )
         velocity = self._warm.reshape(options.segments, len(level), 2) * self.parameters.max_speed_m_s
-        certificate = Certificate(self._rows[:total].copy(), costs, bounds, fates)
+        certificate = Certificate(self._rows[:total].copy(), candidates.costs, candidates.bounds, candidates.fates)
         return PlanarPlan(self._rows[best].copy(), velocity, cost, best != 0, int(evaluations) + more, certificate)
 
     def _candidates(self, mean: Array, level: IntArray) -> int:
@@ -220,9 +214,8 @@ class PlanarPlanner:
             if self.stop[0] or spent >= budget:
                 break
             start, found = self._generator.uniform(-1.0, 1.0, len(self._warm)), np.empty(len(self._warm))
-            value, used, status = solve_topology(
-                level, start, problem, self._work, cost, self.options.tolerance, budget - spent, self.stop, found
-            )
+            limits = Limits(self.options.tolerance, budget - spent, self.stop)
+            value, used, status = solve_topology(level, start, problem, self._work, cost, limits, found)
             spent += used
             if status != FAILED and value < cost:
                 cost, self._warm = float(value), found

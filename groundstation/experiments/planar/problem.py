@@ -1,66 +1,17 @@
-"""What the compiled kernels pass around: one control step's problem and its scratch memory."""
-
-from typing import NamedTuple
+"""Arrays for the kernels: one control step's problem and its scratch memory."""
 
 import numpy as np
-from numba import njit, types
-from numpy.typing import NDArray
 
-from groundstation.arrays import Array
+from groundstation.arrays import Array, IntVector, Matrix
 from groundstation.experiments.planar.dense import cholesky_upper, padded
 from groundstation.experiments.planar.edges import sort_team
 from groundstation.experiments.planar.parameters import PlanarParameters
+from groundstation.experiments.planar.records import Observers, PlanarProblem, Workspace, X, Y
 from groundstation.experiments.planar.rollout import predicted_information
+from groundstation.kernel import kernel
 
 # The information-form predict loses eps * max(D P) relative accuracy: beyond this the covariance form is used.
 STABLE_ABOVE = 1e6
-
-
-class PlanarProblem(NamedTuple):
-    """Belief and constants of one control step.
-
-    mean (n + 1, 2) [m; target last]; information (m, m): (P + Q)^-1 per axis, shared by all topologies;
-    variance (n + 1): Q; constants: see PlanarParameters.packed; segments: controls held over the horizon;
-    stable: predict through the covariance.
-    """
-
-    mean: Array
-    information: Array
-    variance: Array
-    constants: Array
-    steps: int
-    segments: int
-    stable: bool
-
-
-class Workspace(NamedTuple):
-    """Scratch arrays of the kernels for n robots and h steps, and the topology at hand, its team sorted by level.
-
-    order (n + 1): which entity stands at each sorted place; rows (n + 2, 3): see `sort_team`; mean (2, m) and
-    variance (n + 1) in sorted order; all others are filled by the rollout. m: n + 1 padded to the vector width.
-    """
-
-    order: NDArray[np.int64]
-    rows: NDArray[np.uint64]
-    mean: Array
-    variance: Array
-    prior: Array
-    factor: Array
-    square: Array
-    panel: Array
-    columns: Array
-    distance: Array
-    weights: Array
-    scratch: Array
-    position: Array
-    gradient: Array
-
-
-_f1, _f2, _f3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
-_i1, _i8 = types.int64[::1], types.int64
-PROBLEM = types.NamedTuple([_f2, _f2, _f1, _f1, _i8, _i8, types.boolean], PlanarProblem)
-_u2 = types.uint64[:, ::1]
-WORKSPACE = types.NamedTuple([_i1, _u2, _f2, _f1, _f3, _f3, _f2, _f2, _f3, _f2, _f2, _f1, _f3, _f3], Workspace)
 
 
 def make_workspace(robots: int, steps: int) -> Workspace:
@@ -69,7 +20,7 @@ def make_workspace(robots: int, steps: int) -> Workspace:
     m, edges = padded(size), robots * robots // 4 + robots + 2
     return Workspace(
         order=np.arange(size),
-        rows=np.zeros((robots + 2, 3), dtype=np.uint64),
+        observers=Observers(*np.zeros((3, robots + 2), dtype=np.uint64)),
         mean=np.zeros((2, m)),
         variance=np.ones(size),
         prior=np.tile(np.eye(m), (steps, 1, 1)),
@@ -85,29 +36,29 @@ def make_workspace(robots: int, steps: int) -> Workspace:
     )
 
 
-@njit(_i8(_i1, PROBLEM, WORKSPACE), cache=True, nogil=True)
-def load_topology(level, problem, work):  # type: ignore[no-untyped-def]
-    """Sort the problem's team by the levels of a topology; return the number of its edges."""
-    count = sort_team(level, work.order, work.rows)
-    for a in range(work.order.shape[0]):
-        own = work.order[a]
-        work.mean[0, a], work.mean[1, a] = problem.mean[own, 0], problem.mean[own, 1]
-        work.variance[a] = problem.variance[own]
-        for b in range(work.order.shape[0]):
-            work.prior[0, a, b] = problem.information[own, work.order[b]]
-    return count
+@kernel()
+def load_topology(level: IntVector, problem: PlanarProblem, work: Workspace) -> None:
+    """Sort the problem's team by the levels of a topology."""
+    order, mean, variance, prior = work.order, work.mean, work.variance, work.prior
+    sort_team(level, order, work.observers)
+    for a in range(order.shape[0]):
+        own = order[a]
+        mean[X, a], mean[Y, a] = problem.mean[own, X], problem.mean[own, Y]
+        variance[a] = problem.variance[own]
+        for b in range(order.shape[0]):
+            prior[0, a, b] = problem.information[own, order[b]]
 
 
 FINE, NOT_FINITE, NOT_SYMMETRIC, NOT_PSD = 0, 1, 2, 3
 
 
-@njit(_i8(_f2, _f2, _f2), cache=True, nogil=True)
-def _judge(mean, covariance, scratch):  # type: ignore[no-untyped-def]
+@kernel()
+def _judge(mean: Matrix, covariance: Matrix, scratch: Matrix) -> int:
     """Return what is wrong with a belief; positive semidefinite means to 1e-9 of the trace."""
     size, trace, largest = mean.shape[0], 0.0, 0.0
     for a in range(size):
         trace += covariance[a, a]
-        if not (np.isfinite(mean[a, 0]) and np.isfinite(mean[a, 1])):
+        if not (np.isfinite(mean[a, X]) and np.isfinite(mean[a, Y])):
             return NOT_FINITE
         for b in range(size):
             if not np.isfinite(covariance[a, b]):
@@ -155,4 +106,4 @@ def make_problem(mean: Array, covariance: Array, parameters: PlanarParameters, s
     if not predicted_information(covariance, variance, information, np.zeros((8, m))):
         raise ValueError("covariance plus process noise is not positive definite")
     stable = bool((covariance.diagonal() / variance).max() > STABLE_ABOVE)
-    return PlanarProblem(mean, information, variance, parameters.packed(), parameters.steps, segments, stable)
+    return PlanarProblem(mean, information, variance, parameters.constants(), parameters.steps, segments, stable)

@@ -5,21 +5,23 @@ D = Q^-1: L_i = Lm_i + Laplacian(w_i), Lm_{i+1} = D - D (L_i + D)^-1 D, cost = s
 """
 
 import numpy as np
-from numba import njit
 
+from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.experiments.planar.dense import cholesky_upper, negative_inverse, subtract_products
 from groundstation.experiments.planar.edges import add_laplacian
+from groundstation.experiments.planar.records import PlanarProblem, Workspace
+from groundstation.kernel import kernel
 
 
-@njit("void(f8[:, ::1], i8)", cache=True, nogil=True)
-def _mirror(matrix, size):  # type: ignore[no-untyped-def]
+@kernel()
+def _mirror(matrix: Matrix, size: int) -> None:
     for a in range(size):
         for b in range(a):
             matrix[a, b] = matrix[b, a]
 
 
-@njit("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])", cache=True, nogil=True)
-def predicted_information(covariance, variance, out, panel):  # type: ignore[no-untyped-def]
+@kernel()
+def predicted_information(covariance: Matrix, variance: Vector, out: Matrix, panel: Matrix) -> bool:
     """Write (P + Q)^-1 into `out` (m, m), identity in the padding; False when P + Q is not positive definite."""
     size = covariance.shape[0]
     out[:, :] = 0.0
@@ -40,47 +42,49 @@ def predicted_information(covariance, variance, out, panel):  # type: ignore[no-
     return True
 
 
-@njit("b1(f8[:, :, ::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1])", cache=True, nogil=True, fastmath={"contract"})
-def _predict(prior, i, variance, size, work, panel):  # type: ignore[no-untyped-def]
-    """Write Lm_{i+1} from L_i, which stands in `work`."""
+@kernel(contract=True)
+def _predict(prior: MatrixStack, i: int, variance: Vector, size: int, square: Matrix, panel: Matrix) -> bool:
+    """Write Lm_{i+1} from L_i, which stands in `square`."""
     for a in range(size):
-        work[a, a] += 1.0 / variance[a]
-    if not negative_inverse(work, panel):
+        square[a, a] += 1.0 / variance[a]
+    if not negative_inverse(square, panel):
         return False
     for b in range(size):
         panel[0, b] = 1.0 / variance[b]
     for a in range(size):
         da = panel[0, a]
         for b in range(np.uint64(a & ~7), np.uint64(size)):
-            prior[i + 1, a, b] = da * work[a, b] * panel[0, b]
+            prior[i + 1, a, b] = da * square[a, b] * panel[0, b]
         prior[i + 1, a, a] += da
     return True
 
 
-@njit("b1(f8[:, :, ::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1])", cache=True, nogil=True)
-def _predict_through_covariance(prior, i, variance, size, work, panel):  # type: ignore[no-untyped-def]
+@kernel()
+def _predict_through_covariance(
+    prior: MatrixStack, i: int, variance: Vector, size: int, square: Matrix, panel: Matrix
+) -> bool:
     """Do the same as (L_i^-1 + Q)^-1.
 
     The short form loses digits when the process noise is tiny against P: eps * max(D P).
     """
-    if not negative_inverse(work, panel):
+    if not negative_inverse(square, panel):
         return False
     for a in range(size):
         for b in range(a, size):
-            work[a, b] = -work[a, b]
-        work[a, a] += variance[a]
-    for a in range(size, work.shape[0]):
-        work[a, a] = 1.0
-    if not negative_inverse(work, panel):
+            square[a, b] = -square[a, b]
+        square[a, a] += variance[a]
+    for a in range(size, square.shape[0]):
+        square[a, a] = 1.0
+    if not negative_inverse(square, panel):
         return False
     for a in range(size):
         for b in range(a, size):
-            prior[i + 1, a, b] = -work[a, b]
+            prior[i + 1, a, b] = -square[a, b]
     return True
 
 
-@njit("void(f8[:, :, ::1], i8, f8[:, :, ::1])", cache=True, nogil=True)
-def _copy(source, i, target):  # type: ignore[no-untyped-def]
+@kernel()
+def _copy(source: MatrixStack, i: int, target: MatrixStack) -> None:
     """Copy the upper triangle of one matrix of a stack."""
     m = np.uint64(source.shape[1])
     for a in range(source.shape[1]):
@@ -88,59 +92,52 @@ def _copy(source, i, target):  # type: ignore[no-untyped-def]
             target[i, a, b] = source[i, a, b]
 
 
-@njit("void(f8[:, :, ::1], i8, f8[:, ::1])", cache=True, nogil=True)
-def _copy_one(source, i, target):  # type: ignore[no-untyped-def]
+@kernel()
+def _copy_one(source: MatrixStack, i: int, target: Matrix) -> None:
     m = np.uint64(source.shape[1])
     for a in range(source.shape[1]):
         for b in range(np.uint64(a & ~7), m):
             target[a, b] = source[i, a, b]
 
 
-@njit(
-    "f8(f8[:, :, ::1], f8[:, :, ::1], u8[:, ::1], f8[:, ::1], f8[::1], f8, b1, f8[:, ::1], f8[:, ::1])",
-    cache=True,
-    nogil=True,
-)
-def rollout_cost(prior, factor, rows, information, variance, discount, stable, work, panel):  # type: ignore[no-untyped-def]
-    """Return the discounted trace of the target's covariance [m^2], or -1 when a matrix is not positive definite.
+@kernel()
+def rollout_cost(problem: PlanarProblem, work: Workspace) -> float:
+    """Return the discounted trace of the target's covariance [m^2] for the edge informations in the workspace.
 
-    prior[0] holds Lm_1; prior and factor (h, m, m) are filled for the adjoint (upper triangles);
-    information (h, edges).
+    -1 when a matrix is not positive definite. prior[0] holds Lm_1; prior and factor are filled for the adjoint (upper
+    triangles).
     """
+    prior, factor, variance, square, panel = work.prior, work.factor, work.variance, work.square, work.panel
+    observers, information, discount = work.observers, work.weights, problem.constants.discount
     steps, size = prior.shape[0], variance.shape[0]
     target = size - 1
     cost, weight = 0.0, 1.0
     for i in range(steps):
         _copy(prior, i, factor)
-        add_laplacian(factor[i], rows, information, i)
+        add_laplacian(factor[i], observers, information, i)
         if i + 1 < steps:
-            _copy_one(factor, i, work)
+            _copy_one(factor, i, square)
         if not cholesky_upper(factor[i]):
             return -1.0
         weight *= discount
         cost += 2.0 * weight / (factor[i, target, target] * factor[i, target, target])
         if i + 1 < steps:
-            if stable:
-                if not _predict_through_covariance(prior, i, variance, size, work, panel):
+            if problem.stable:
+                if not _predict_through_covariance(prior, i, variance, size, square, panel):
                     return -1.0
-            elif not _predict(prior, i, variance, size, work, panel):
+            elif not _predict(prior, i, variance, size, square, panel):
                 return -1.0
     return cost
 
 
-@njit(
-    "void(f8[:, :, ::1], f8[:, :, ::1], f8[::1], f8, f8[:, :, ::1])",
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    fastmath={"contract", "reassoc"},
-)
-def adjoint_columns(prior, factor, variance, discount, columns):  # type: ignore[no-untyped-def]
+@kernel(contract=True, reassociate=True)
+def adjoint_columns(discount: float, work: Workspace) -> None:
     """Write the rank-one adjoints: columns[i, 0..h-1-i] = Y_i, so that dc/dw_ab,i = -sum_c (Y[c, b] - Y[c, a])^2.
 
     Each step adds L_i^-1 e_t; older columns go from step i to i - 1 by L_{i-1}^-1 Lm_i = 1 - Q Lm_i, which is cheaper
     than a solve and needs nothing but Lm_i.
     """
+    prior, factor, variance, columns = work.prior, work.factor, work.variance, work.columns
     steps, m, target = prior.shape[0], prior.shape[1], variance.shape[0] - 1
     for i in range(steps - 1, -1, -1):
         own = steps - 1 - i

@@ -40,16 +40,15 @@ class MavlinkEmulator:
     """
 
     def __init__(
-        self, name: str, address: Address, flavour: Flavour, system: int, copter: MavlinkCopter, *,
-        configured: bool = True, calls: Address | None = None, video: t.VideoStreamInformation | None = None,
-        signing: Signing | None = None,
+        self, name: str, address: Address, parameters: Parameters, copter: MavlinkCopter, *,
+        calls: Address | None = None, video: t.VideoStreamInformation | None = None, signing: Signing | None = None,
     ) -> None:  # fmt: skip
         self.name = name
         self.silent = False
         self.deaf = False
         self.rejected: Counter[str] = Counter()
-        parameters = Parameters(flavour, system, configured)
-        self.firmware: AutopilotFirmware = (Px4 if flavour is Flavour.PX4 else ArduCopter)(copter, parameters)
+        system, px4 = parameters.system, parameters.flavour is Flavour.PX4
+        self.firmware: AutopilotFirmware = (Px4 if px4 else ArduCopter)(copter, parameters)
         self.speaker = Speaker(self.firmware)
         self.services = Services(system, self.firmware, self.speaker, video)
         self._encoder, self._decoder = FrameEncoder(system, 1, signing), FrameDecoder(signing)

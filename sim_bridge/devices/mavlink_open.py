@@ -6,6 +6,7 @@ from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import VideoStreamInformation
 from sim_bridge.devices.camera_stream import PATH
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.site import Lens, SiteDrone
 from sim_bridge.world.mavlink_copter import MavlinkCopter
@@ -37,10 +38,8 @@ def open_vehicle(name: str, drone: SiteDrone, copter: MavlinkCopter, order: Laun
     return MavlinkEmulator(
         name,
         (order.addresses[name], identity.port),
-        flavour,
-        identity.system_id,
+        Parameters(flavour, identity.system_id, order.scenario.mavlink.configured),
         copter,
-        configured=order.scenario.mavlink.configured,
         calls=(identity.local_address, identity.port) if identity.listen else None,
         video=video,
     )

@@ -87,9 +87,10 @@ _COPTER_INDOOR: dict[str, float] = {
 
 
 class Parameters:
-    """Values and kinds of one vehicle, in the order of its list."""
+    """Values and kinds of one vehicle, in the order of its list; configured: for flight indoors."""
 
     def __init__(self, flavour: Flavour, system: int, configured: bool) -> None:
+        self.flavour, self.system = flavour, system
         px4 = flavour is Flavour.PX4
         whole, real = (_PX4_FACTORY, _PX4_REALS) if px4 else (_COPTER_FACTORY, _COPTER_REALS)
         self.values = dict(sorted((whole | real).items()))

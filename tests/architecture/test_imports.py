@@ -124,6 +124,22 @@ def test_nothing_is_forked() -> None:
     assert not found, found
 
 
+def test_kernels_have_one_kind() -> None:
+    """Only groundstation.kernel compiles, so that every kernel has annotations, and the same arithmetic and cache."""
+    compiling = {"njit", "jit", "vectorize", "guvectorize", "cfunc"}
+    found = []
+    for path in sources():
+        if path == ROOT / "groundstation/kernel.py":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+            imported = isinstance(node, ast.ImportFrom) and node.module == "numba"
+            names = {alias.name for alias in node.names} if imported else set()
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "numba":
+                names = {node.attr}
+            found += [f"{path.relative_to(ROOT)}:{node.lineno}: {name}" for name in sorted(names & compiling)]
+    assert not found, "\n".join(found)
+
+
 def test_import_contracts_hold() -> None:
     linter = Path(sys.executable).with_name("lint-imports")
     result = subprocess.run(

@@ -8,6 +8,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("groundstation", "drivers", "sim_bridge")
 MODULE_LINES = 320
 FUNCTION_LINES = 60
+PARAMETERS = 8
 DRAWERS = {"utils", "util", "helpers", "helper", "common", "misc"}
 
 
@@ -31,6 +32,20 @@ def test_no_function_is_too_long() -> None:
                 if length > FUNCTION_LINES:
                     long.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.name}: {length} lines")
     assert not long, "\n".join(long)
+
+
+def test_no_function_has_too_many_parameters() -> None:
+    """What belongs together is handed over together; `self` and `cls` are handed over by nobody."""
+    many = []
+    for path in sources(*PACKAGES):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                given = node.args
+                names = [one.arg for one in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+                count = len([name for name in names if name not in ("self", "cls")])
+                if count > PARAMETERS:
+                    many.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.name}: {count} parameters")
+    assert not many, "\n".join(many)
 
 
 def test_no_module_is_a_drawer() -> None:

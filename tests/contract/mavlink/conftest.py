@@ -35,6 +35,7 @@ from groundstation.bus.topics import (
 )
 from sim_bridge.devices import mavlink
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.scenario import CopterScenario
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_NS, TICK_S
@@ -103,7 +104,7 @@ class Rig:
         self.rng = np.random.default_rng(seed)
         scenario = scenario or CopterScenario()
         self.copter = MavlinkCopter((0.5, -0.3), 0.4, scenario, response, TICK_S, self.rng)
-        self.emulator = MavlinkEmulator("v", GROUND, self.flavour, 11, self.copter, configured=configured)
+        self.emulator = MavlinkEmulator("v", GROUND, Parameters(self.flavour, 11, configured), self.copter)
         self.link = DirectLink(self.emulator)
         exchange = MemoryExchange()
         self.other = MemoryBus(exchange, "lab", "tracker")

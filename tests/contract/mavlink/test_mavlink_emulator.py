@@ -11,6 +11,7 @@ from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.names import Flavour
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.scenario import CopterScenario
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter, Steering
 from sim_bridge.world.world import TICK_S
@@ -28,7 +29,7 @@ class Bench:
         response = PX4_RESPONSE if px4 else ARDUPILOT_RESPONSE
         self.copter = MavlinkCopter((0.0, 0.0), 0.0, scenario, response, TICK_S, np.random.default_rng(3))
         kind = Flavour.PX4 if px4 else Flavour.ARDUPILOT
-        self.emulator = MavlinkEmulator("v", GROUND, kind, 5, self.copter, configured=configured)
+        self.emulator = MavlinkEmulator("v", GROUND, Parameters(kind, 5, configured), self.copter)
         self.firmware = self.emulator.firmware
         self.encoder, self.decoder = FrameEncoder(255, 190), FrameDecoder()
         self.heard = []

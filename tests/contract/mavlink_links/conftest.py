@@ -11,6 +11,7 @@ import pytest
 
 from drivers.mavlink.wire.names import Flavour
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.scenario import CopterScenario
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_S
@@ -43,12 +44,12 @@ class Hangar:
         self.lock = threading.Lock()
         self.aided = set()
 
-    def add(self, flavour, system, address=None, aided=False, **options):
+    def add(self, flavour, system, address=None, aided=False, configured=True, **options):
         flavour = Flavour.PX4 if flavour == "px4" else Flavour.ARDUPILOT
         response = PX4_RESPONSE if flavour is Flavour.PX4 else ARDUPILOT_RESPONSE
         copter = MavlinkCopter((0.0, 0.0), 0.0, CopterScenario(), response, TICK_S, np.random.default_rng(system))
         address = address or (free_address(), 14550)
-        emulator = MavlinkEmulator(f"v{system}", address, flavour, system, copter, **options)
+        emulator = MavlinkEmulator(f"v{system}", address, Parameters(flavour, system, configured), copter, **options)
         with self.lock:
             self.emulators[address, system], self.copters[address, system] = emulator, copter
             if aided:

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.field.drones import FieldDrone
+from groundstation.field.drones import FieldDrone, camera_name
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import LensCalibration, WorldCamera
 from groundstation.geometry.lens import CameraIntrinsics
@@ -52,9 +52,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
 
 def lenses_of(field: ResolvedField) -> dict[str, CameraIntrinsics]:
     """Return the lens of each camera by its name on the bus."""
-    fixed = {name: camera.calibration for name, camera in field.cameras.items()}
-    carried = {f"{name}_camera": drone.camera.calibration for name, drone in field.drones.items()}
-    return {name: _lens(calibration) for name, calibration in (fixed | carried).items()}
+    return {name: _lens(calibration) for name, calibration in field.calibrations.items()}
 
 
 def _lens(own: LensCalibration) -> CameraIntrinsics:
@@ -73,7 +71,7 @@ def _drone(name: str, drone: FieldDrone) -> Json:
         "pad_m": drone.pad_m,
         "pad_yaw_rad": float(np.radians(drone.pad_yaw_deg)),
         "camera": {
-            "name": f"{name}_camera",
+            "name": camera_name(name),
             "position_m": camera.position_m,
             "rays": _rays(_lens(camera.calibration), base_from_tilted_optical(float(tilt), float(pan))),
         },

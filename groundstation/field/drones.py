@@ -8,6 +8,11 @@ from groundstation.field.room import LensCalibration, Vector2, Vector3
 from groundstation.field.targets import DroneMarker
 
 
+def camera_name(drone: str) -> str:
+    """Return the name on the bus of the camera that a drone carries."""
+    return f"{drone}_camera"
+
+
 class DroneLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What a drone is never commanded to exceed, and when its battery makes it land."""
 

@@ -13,8 +13,8 @@ from groundstation.field.behaviour import (
     RecordingValues,
     SafetyValues,
 )
-from groundstation.field.drones import FieldDrone
-from groundstation.field.room import Room, WorldCamera
+from groundstation.field.drones import FieldDrone, camera_name
+from groundstation.field.room import LensCalibration, Room, WorldCamera
 from groundstation.field.targets import SingleTarget, Target, WeightedTarget
 
 
@@ -39,6 +39,12 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     def tracked(self) -> Mapping[str, Target]:
         """Return the targets by name, in the file's order."""
         return self.targets if self.target is None else {self.target.name: self.target}
+
+    @property
+    def calibrations(self) -> dict[str, LensCalibration]:
+        """Return the lens of each camera by its name on the bus."""
+        fixed = {name: camera.calibration for name, camera in self.cameras.items()}
+        return fixed | {camera_name(name): drone.camera.calibration for name, drone in self.drones.items()}
 
 
 def field_from_json(content: bytes) -> ResolvedField:

@@ -7,6 +7,7 @@ import msgspec
 
 from groundstation.bus.messages import Severity
 from groundstation.bus.topics import ESTIMATE, EVENT
+from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import (
@@ -55,7 +56,7 @@ def camera_frames(field: ResolvedField) -> tuple[Transform, ...]:
         own = drone.camera
         tilt, pan = math.radians(own.tilt_down_deg), math.radians(own.pan_left_deg)
         turn = quaternion_from_euler(*euler_from_rotation(base_from_tilted_optical(tilt, pan)))
-        carried.append(Transform(name, f"{name}_camera", own.position_m, turn))
+        carried.append(Transform(name, camera_name(name), own.position_m, turn))
     return (*fixed, *carried)
 
 

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from groundstation.bus import clock
+from groundstation.field.resolved import field_from_json
 from groundstation.process.numba_cache import sources_hash
 from groundstation.recording.compatibility import MESSAGE_VERSION, VERSION_FIELD
 from groundstation.recording.timeline import Timeline
@@ -38,9 +40,9 @@ class Preamble:
 def preamble_of_run(field: bytes, epoch: int, timeline: Timeline, folder: Path) -> Preamble:
     """Return the preamble for a resolved field (JSON) and what lies in the run folder."""
     created = clock.now_ns() + timeline.unix_offset_ns
-    resolved = json.loads(field)
+    resolved = field_from_json(field)
     run = {
-        "site": str(resolved.get("site", "")),
+        "site": resolved.site,
         "epoch": str(epoch),
         "clock": timeline.clock,
         "unix_offset_ns": str(timeline.unix_offset_ns),
@@ -51,7 +53,7 @@ def preamble_of_run(field: bytes, epoch: int, timeline: Timeline, folder: Path) 
     # A re-run repeats every bit only with the same compiled kernels on the same kind of processor.
     versions |= {"kernels": sources_hash(), "processor": processor()}
     attachments = {FIELD_NAME: ("application/json", field)}
-    attachments[CALIBRATIONS_NAME] = ("application/json", json.dumps(_calibrations(resolved)).encode())
+    attachments[CALIBRATIONS_NAME] = ("application/json", msgspec.json.encode(resolved.calibrations))
     for name, media_type in _FILES.items():
         if (folder / name).is_file():
             attachments[name] = (media_type, (folder / name).read_bytes())
@@ -67,13 +69,6 @@ def processor() -> str:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
-
-
-def _calibrations(field: dict[str, Any]) -> dict[str, Any]:
-    """Return the calibration of each camera by its name on the bus."""
-    fixed = {name: camera["calibration"] for name, camera in field.get("cameras", {}).items()}
-    carried = {f"{name}_camera": drone["camera"]["calibration"] for name, drone in field.get("drones", {}).items()}
-    return fixed | carried
 
 
 def _seeds(attachments: Mapping[str, tuple[str, bytes]]) -> dict[str, str]:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -75,7 +74,7 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
         raise RecordingError(f"{', '.join(map(str, state))}: these are not parts of one recording")
     run = first.metadata["run"]
     try:
-        msgspec.json.decode(first.attachments[FIELD_NAME], type=dict[str, Any])
+        msgspec.json.decode(first.attachments[FIELD_NAME], type=dict[str, msgspec.Raw])
         offset_ns = int(run.get("unix_offset_ns", "0"))
     except (msgspec.DecodeError, ValueError) as error:
         raise RecordingError(f"{first.path}: its field or run cannot be read ({error})") from error

@@ -31,12 +31,12 @@ def main() -> int:
 
 
 def _serve(spec: Path) -> int:
-    from groundstation.process.child import Child, ChildSpec
+    from groundstation.process.child import Child
     from sim_bridge.harness import Harness
     from sim_bridge.launch_spec import read_order
 
     order = read_order(spec)
-    with Child(ChildSpec(**order.child)) as child:
+    with Child(order.child) as child:
         harness = Harness(child, order)
         try:
             harness.open()

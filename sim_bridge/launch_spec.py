@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import SettingsError
+from groundstation.process.child import ChildSpec
 from sim_bridge.scenario import CAMERA_FAULTS, Fault, FaultKind, Scenario, describe_problems, parse_scenario
 from sim_bridge.site import Site, SiteDrone, parse_site
 
@@ -16,9 +17,11 @@ _ARDRONE_FAULTS = frozenset({FaultKind.PROPELLER_BLOCKED})
 
 
 class _Envelope(BaseModel):
+    """The parts of an order; the field's and the scenario's own models judge what is in theirs."""
+
     model_config = ConfigDict(frozen=True, extra="ignore")
 
-    child: dict[str, Any]
+    child: ChildSpec
     field: dict[str, Any]
     scenario: dict[str, Any] = {}
     addresses: dict[str, str]
@@ -30,11 +33,11 @@ class _Envelope(BaseModel):
 class LaunchSpec:
     """A checked start order.
 
-    child: fields of the ChildSpec; addresses: loopback address of each drone; streams: address and port of each
+    addresses: loopback address of each drone; streams: address and port of each
     camera, by the name of the world-fixed camera or of the drone that carries it.
     """
 
-    child: dict[str, Any]
+    child: ChildSpec
     site: Site
     scenario: Scenario
     addresses: dict[str, str]

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from groundstation.geometry.tag import DICTIONARIES, tag_fault
+from groundstation.geometry.board import Checkerboard
+from groundstation.geometry.tag import DICTIONARIES, SquareTag, tag_fault
 from groundstation.settings.values import MarkerCode, SettingsSection, SquareSize
 
 TagId = Annotated[int, Field(ge=0)]
@@ -58,11 +59,11 @@ class MarkerSettings(SettingsSection):
         return str(self.code) if self.kind == "checkerboard" else f"{self.dictionary} {self.id}"
 
     @property
-    def printed(self) -> dict[str, Any]:
-        """Return what the camera drivers are told of the print: a code with its square size, or a tag."""
-        if self.kind == "checkerboard":
-            return {"code": self.code, "square_mm": self.square_mm}
-        return {"tag": {"dictionary": self.dictionary, "id": self.id, "size_mm": self.size_mm}}
+    def printed(self) -> Checkerboard | SquareTag:
+        """Return the marker's layout."""
+        if self.dictionary is not None and self.id is not None and self.size_mm is not None:
+            return SquareTag(self.dictionary, self.id, self.size_mm)
+        return Checkerboard(-1 if self.code is None else self.code, self.square_mm)
 
 
 def _fault(text: str) -> PydanticCustomError:

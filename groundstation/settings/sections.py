@@ -4,16 +4,22 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
-from drivers.ardrone.settings import ArDroneDriverSettings
-from drivers.camera.settings import CameraDriverSettings, SourceKind, parse_source
-from drivers.mavlink.settings import MavlinkDriverSettings
+from drivers.ardrone.settings import (
+    ArDroneDriverSettings,
+    ArDroneLimits,
+    FlightConfiguration,
+    VelocityScale,
+    Video,
+)
+from drivers.camera.settings import SourceKind, parse_source
+from drivers.limits import SilenceLimits, VehicleLimits
+from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
+from groundstation.field.drones import camera_name
+from groundstation.settings.behaviour import SafetySettings
+from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
 from groundstation.settings.drones import Drone, Mavlink, unknown_kind
-from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
-
-_SEARCH_RATE_HZ = 2.0
 
 
 class DriverKind(StrEnum):
@@ -34,11 +40,6 @@ class DriverSection:
     section: str
 
 
-def camera_name(drone: str) -> str:
-    """Return the name on the bus of the camera that a drone carries."""
-    return f"{drone}_camera"
-
-
 def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, tuple[str, int]]) -> Field:
     """Return the same field with other addresses of drones and other sources of cameras, by name.
 
@@ -49,37 +50,43 @@ def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, t
     for name in (*addresses, *streams):
         if name not in field.drones and name not in field.cameras:
             raise KeyError(name)
-    drones = {}
-    for name, drone in field.drones.items():
-        camera = drone.camera.model_copy(update=_source(drone.camera.source, streams.get(name)))
-        drones[name] = drone.model_copy(update={"camera": camera, **_place(drone, addresses.get(name))})
+    drones = {
+        name: _moved(_with_source(drone, streams.get(name)), addresses.get(name))
+        for name, drone in field.drones.items()
+    }
     cameras = {
-        name: camera.model_copy(update=_source(camera.source, streams.get(name)))
+        name: camera.model_copy(update={"source": _source(camera.source, streams.get(name))})
         for name, camera in field.cameras.items()
     }
     return field.model_copy(update={"drones": drones, "cameras": cameras})
 
 
-def _place(drone: Drone, address: str | None) -> dict[str, Any]:
+def _with_source(drone: Drone, stream: tuple[str, int] | None) -> Drone:
+    camera = drone.camera.model_copy(update={"source": _source(drone.camera.source, stream)})
+    return drone.model_copy(update={"camera": camera})
+
+
+def _moved(drone: Drone, address: str | None) -> Drone:
     if address is None:
-        return {}
+        return drone
+    moved = drone.model_copy(update={"address": address})
     match drone.kind:
         case "ardrone":
-            return {"address": address}
+            return moved
         case "mavlink":
             # Vehicles that call us do so within the simulated network; there are no serial lines in it.
             way = {"local_address": address.rpartition(".")[0] + ".1", "serial": ""}
-            return {"address": address, "mavlink": drone.require_mavlink().model_copy(update=way)}
+            return moved.model_copy(update={"mavlink": drone.require_mavlink().model_copy(update=way)})
         case other:
             raise unknown_kind(other)
 
 
-def _source(source: str, stream: tuple[str, int] | None) -> dict[str, str]:
+def _source(source: str, stream: tuple[str, int] | None) -> str:
     if stream is None:
-        return {}
+        return source
     if parse_source(source).kind is SourceKind.ARDRONE:
-        return {"source": f"ardrone://{stream[0]}:{stream[1]}"}
-    return {"source": f"http://{stream[0]}:{stream[1]}/video.mjpg"}
+        return f"ardrone://{stream[0]}:{stream[1]}"
+    return f"http://{stream[0]}:{stream[1]}/video.mjpg"
 
 
 def core_section(field: Field, run_dir: str, epoch: int) -> str:
@@ -93,14 +100,14 @@ def driver_sections(field: Field) -> list[DriverSection]:
     Raises SettingsError for a kind of vehicle that is not known.
     """
     count = len(field.cameras) + len(field.drones)
-    phases = [index / (count * _SEARCH_RATE_HZ) for index in range(count)]
+    phases = [index / (count * SEARCH_RATE_HZ) for index in range(count)]
     fixed = [
-        DriverSection(name, DriverKind.CAMERA, name, _world_camera(field, name, camera, phase).model_dump_json())
+        DriverSection(name, DriverKind.CAMERA, name, world_camera(field, name, camera, phase).model_dump_json())
         for (name, camera), phase in zip(field.cameras.items(), phases, strict=False)
     ]
     carried = [
         DriverSection(
-            camera_name(name), DriverKind.CAMERA, name, _onboard_camera(field, name, drone, phase).model_dump_json()
+            camera_name(name), DriverKind.CAMERA, name, onboard_camera(field, name, drone, phase).model_dump_json()
         )
         for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
     ]
@@ -128,18 +135,36 @@ def _vehicles(field: Field) -> list[DriverSection]:
 
 def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
     drone = field.drones[name]
-    return ArDroneDriverSettings.model_validate(
-        {
-            "name": name,
-            "address": drone.address,
-            "limits": drone.limits.model_dump(),
-            "odometry": drone.odometry.model_dump(include={"velocity_scale", "velocity_std_m_s"}),
-            "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
-            # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
-            "flight": {"altitude_max_m": max(0.5, field.room.fence.z_m[1]), "ultrasound_freq": 7 + index % 2},
-            "video": None if drone.video is None else drone.video.model_dump(),
-            "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
-        }
+    limits, video = drone.limits, drone.video
+    return ArDroneDriverSettings(
+        name=name,
+        address=drone.address,
+        limits=ArDroneLimits(
+            max_speed_m_s=limits.max_speed_m_s,
+            max_climb_m_s=limits.max_climb_m_s,
+            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
+            max_tilt_deg=limits.max_tilt_deg,
+            battery_min=limits.battery_min,
+            battery_hold_s=limits.battery_hold_s,
+        ),
+        odometry=VelocityScale(
+            velocity_scale=drone.odometry.velocity_scale, velocity_std_m_s=drone.odometry.velocity_std_m_s
+        ),
+        safety=_silence(field.safety),
+        # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
+        flight=FlightConfiguration(
+            altitude_max_m=max(0.5, field.room.fence.z_m[1]), ultrasound_freq=8 if index % 2 else 7
+        ),
+        video=None if video is None else Video(codec=video.codec, channel=video.channel, bitrate=video.bitrate),
+        raw_datagrams=field.recording.enabled and field.recording.raw_datagrams,
+    )
+
+
+def _silence(safety: SafetySettings) -> SilenceLimits:
+    return SilenceLimits(
+        setpoint_lifetime_ms=safety.setpoint_lifetime_ms,
+        land_after_s=safety.land_after_s,
+        unseen_land_after_s=safety.unseen_land_after_s,
     )
 
 
@@ -154,80 +179,30 @@ def _target(drone: Drone, mavlink: Mavlink) -> str:
 def _mavlink(field: Field, names: list[str]) -> MavlinkDriverSettings:
     first = field.drones[names[0]]
     mavlink = first.require_mavlink()
-    return MavlinkDriverSettings.model_validate(
-        {
-            "link": {
-                "kind": mavlink.link,
-                "target": _target(first, mavlink),
-                "key_file": mavlink.key_file,
-            },
-            "vehicles": [_mavlink_vehicle(name, field.drones[name]) for name in names],
-            "safety": field.safety.model_dump(include={"setpoint_lifetime_ms", "land_after_s", "unseen_land_after_s"}),
-            "vision": {"rate_hz": mavlink.vision_hz},
-            "raw_datagrams": field.recording.enabled and field.recording.raw_datagrams,
-        }
+    return MavlinkDriverSettings(
+        link=LinkSettings(kind=mavlink.link, target=_target(first, mavlink), key_file=mavlink.key_file),
+        vehicles=tuple(_mavlink_vehicle(name, field.drones[name]) for name in names),
+        safety=_silence(field.safety),
+        vision=VisionFeedback(rate_hz=mavlink.vision_hz),
+        raw_datagrams=field.recording.enabled and field.recording.raw_datagrams,
     )
 
 
-def _mavlink_vehicle(name: str, drone: Drone) -> dict[str, Any]:
-    mavlink = drone.require_mavlink()
-    return {
-        "name": name,
-        "system_id": mavlink.system_id,
-        "flavour": mavlink.flavour,
-        "pad_m": drone.pad_m,
-        "pad_yaw_rad": drone.pad_yaw_rad,
-        "limits": drone.limits.model_dump(exclude={"max_tilt_deg"}),
-        "take_off_m": mavlink.take_off_m,
-        "velocity_std_m_s": drone.odometry.velocity_std_m_s,
-    }
-
-
-def _world_camera(field: Field, name: str, camera: WorldCameraSettings, phase_s: float) -> CameraDriverSettings:
-    mount = {
-        "parent": "world",
-        "position_m": camera.position_m,
-        "looking": camera.looking,
-        "rotation_deg": camera.rotation_deg,
-    }
-    robots = list(field.drones) if "robots" in camera.observes else []
-    targets = list(field.tracked) if "targets" in camera.observes else []
-    common = _camera(field, camera.source, camera.calibration, camera.video_delay_ms, phase_s)
-    return CameraDriverSettings.model_validate({"name": name, "mount": mount, "observes": robots + targets, **common})
-
-
-def _onboard_camera(field: Field, name: str, drone: Drone, phase_s: float) -> CameraDriverSettings:
-    camera = drone.camera
-    mount = {
-        "parent": name,
-        "position_m": camera.position_m,
-        "tilt_down_deg": camera.tilt_down_deg,
-        "pan_deg": camera.pan_left_deg,
-    }
-    common = _camera(field, camera.source, camera.calibration, camera.video_delay_ms, phase_s)
-    return CameraDriverSettings.model_validate({"name": camera_name(name), "mount": mount, **common})
-
-
-def _camera(field: Field, source: str, lens: CalibrationSettings, delay_ms: float, phase_s: float) -> dict[str, Any]:
-    calibration = lens.model_dump(mode="json", exclude_none=True, exclude={"views", "std"})
-    return {
-        "source": source,
-        "calibration": calibration,
-        "video_delay_ms": delay_ms,
-        "markers": _markers(field),
-        "image_fps": field.recording.image_fps,
-        "search_rate_hz": _SEARCH_RATE_HZ,
-        "search_phase_s": phase_s,
-    }
-
-
-def _markers(field: Field) -> list[dict[str, Any]]:
-    robots = [
-        {"entity": name, "kind": "robot", "position_m": drone.marker.position_m, **drone.marker.printed}
-        for name, drone in field.drones.items()
-    ]
-    targets = [
-        {"entity": name, "kind": "target", "position_m": target.marker.position_m, **target.marker.printed}
-        for name, target in field.tracked.items()
-    ]
-    return robots + targets
+def _mavlink_vehicle(name: str, drone: Drone) -> VehicleSettings:
+    mavlink, limits = drone.require_mavlink(), drone.limits
+    return VehicleSettings(
+        name=name,
+        system_id=mavlink.system_id,
+        flavour=mavlink.flavour,
+        pad_m=drone.pad_m,
+        pad_yaw_rad=drone.pad_yaw_rad,
+        limits=VehicleLimits(
+            max_speed_m_s=limits.max_speed_m_s,
+            max_climb_m_s=limits.max_climb_m_s,
+            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
+            battery_min=limits.battery_min,
+            battery_hold_s=limits.battery_hold_s,
+        ),
+        take_off_m=mavlink.take_off_m,
+        velocity_std_m_s=drone.odometry.velocity_std_m_s,
+    )

@@ -7,11 +7,14 @@ import pytest
 
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.camera.settings import CameraDriverSettings
+from groundstation.settings.behaviour import SafetySettings
+from groundstation.settings.drones import LimitSettings
 from groundstation.settings.load import load_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, core_section, driver_sections, rerouted
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
+CONFIG = Path(__file__).parents[3] / "config"
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +58,31 @@ def test_a_drone_s_driver_gets_its_limits_and_times(field: Field) -> None:
     assert settings.odometry.velocity_std_m_s == odometry.velocity_std_m_s
     assert settings.safety.land_after_s == field.safety.land_after_s
     assert settings.flight.altitude_max_m == field.room.fence.z_m[1]
+
+
+LIMITS = LimitSettings(
+    max_speed_m_s=0.5, max_climb_m_s=0.3, max_yaw_rate_deg_s=50.0, max_tilt_deg=11.0, battery_min=0.2,
+    battery_hold_s=4.0,
+)  # fmt: skip
+SILENCE = SafetySettings(setpoint_lifetime_ms=250, land_after_s=4.0, unseen_land_after_s=9.0)
+
+
+def test_every_limit_reaches_every_driver() -> None:
+    """One that a driver's section left out would be flown with the driver's default."""
+    field = load_field(CONFIG / "mixed-team.yaml")
+    assert not LIMITS.model_dump().items() & LimitSettings().model_dump().items()
+    team = {name: drone.model_copy(update={"limits": LIMITS}) for name, drone in field.drones.items()}
+    sections = driver_sections(field.model_copy(update={"drones": team, "safety": SILENCE}))
+    for section in sections:
+        if section.kind is DriverKind.CAMERA:
+            continue
+        settings = json.loads(section.section)
+        assert settings["safety"].items() <= SILENCE.model_dump().items()
+        if section.kind is DriverKind.ARDRONE:
+            assert settings["limits"] == LIMITS.model_dump()
+        else:
+            assert [one["limits"] for one in settings["vehicles"]] == [LIMITS.model_dump(exclude={"max_tilt_deg"})]
+    assert {section.kind for section in sections} == set(DriverKind)
 
 
 def test_neighbours_do_not_hear_each_other_s_ultrasound(field: Field) -> None:

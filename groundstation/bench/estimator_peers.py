@@ -5,7 +5,7 @@ All are given the same h, H, F and Q: what differs is the filter around them.
 
 import math
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -179,14 +179,14 @@ class Filterpy:
     def __init__(self, team: BenchTeam, state: State) -> None:
         from filterpy.kalman import ExtendedKalmanFilter
 
-        class Moved(ExtendedKalmanFilter):  # type: ignore[misc]
-            def predict_x(self, u: Any = 0) -> None:
-                self.x = u
-
         self.model = TeamModel(team)
         n = self.model.dim
-        self.filter = Moved(n, 4)
+        self.filter = ExtendedKalmanFilter(n, 4)
+        self.filter.predict_x = self._move_to
         self.filter.x, self.filter.P = state.means[0, :n].copy(), state.covariances[0, :n, :n].copy()
+
+    def _move_to(self, mean: Array) -> None:
+        self.filter.x = mean
 
     @property
     def mean(self) -> Array:

@@ -107,7 +107,7 @@ class _PeerWriter:
 
     def close(self) -> float:
         begin = time.process_time()
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         return time.process_time() - begin
 
 

@@ -91,4 +91,5 @@ def _rays(lens: CameraIntrinsics, rotation: Array) -> list[list[float]]:
     flat = lens.normalised_from_pixels(np.concatenate(edges))
     flat = flat[np.isfinite(flat).all(axis=1)]
     directions = np.column_stack((flat, np.ones(len(flat)))) @ rotation.T
-    return np.round(directions, 5).tolist()  # type: ignore[no-any-return]
+    rounded: list[list[float]] = np.round(directions, 5).tolist()
+    return rounded

@@ -82,7 +82,7 @@ class CopyWriter:
 
     def finish(self) -> None:
         """Write the indexes."""
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
 
 
 @contextmanager

@@ -68,7 +68,7 @@ class McapFile:
 
         A file that somebody has removed is an error: the kernel would take everything, and nothing would be left.
         """
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._writer.flush()
         self._sound_bytes = self._stream.tell()
         if os.fstat(self._stream.fileno()).st_nlink == 0:
             raise OSError(errno.ENOENT, "the file was removed")
@@ -76,7 +76,7 @@ class McapFile:
     def close(self) -> None:
         """Write indexes and footer and close; idempotent."""
         if not self._stream.closed:
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._writer.finish()
             self._stream.close()
 
     def abandon(self) -> None:

@@ -1,6 +1,6 @@
 """The report as it is printed at the end of a run."""
 
-from rich.console import Group, RenderableType
+from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -60,8 +60,9 @@ def _verdict(report: RunReport) -> Text:
 
 def _criteria(criteria: tuple[Criterion, ...]) -> Table:
     table = Table(box=None, pad_edge=True, header_style="dim")
-    for title, justify in (("", "left"), ("criterion", "left"), ("value", "right"), ("limit", "left")):
-        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    columns: dict[str, JustifyMethod] = {"": "left", "criterion": "left", "value": "right", "limit": "left"}
+    for title, justify in columns.items():
+        table.add_column(title, justify=justify)
     for criterion in criteria:
         mark = Text("ok", style="green") if criterion.ok else Text("NO", style="bold red")
         limit = f"{criterion.relation} {_text(criterion.limit)}"

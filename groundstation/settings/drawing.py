@@ -140,7 +140,16 @@ def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
     axes.plot(0.0, board_m, color=_TARGET_COLOUR, marker="s")
 
 
-def _box(axes: "Axes", x: tuple[float, float], y: tuple[float, float], label: str | None = None, **style: str) -> None:
+def _box(
+    axes: "Axes",
+    x: tuple[float, float],
+    y: tuple[float, float],
+    edgecolor: str,
+    linestyle: str = "-",
+    label: str | None = None,
+) -> None:
     from matplotlib.patches import Rectangle
 
-    axes.add_patch(Rectangle((x[0], y[0]), x[1] - x[0], y[1] - y[0], fill=False, label=label, **style))  # type: ignore[arg-type]
+    size = x[1] - x[0], y[1] - y[0]
+    box = Rectangle((x[0], y[0]), *size, fill=False, label=label, edgecolor=edgecolor, linestyle=linestyle)
+    axes.add_patch(box)

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -118,7 +118,7 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
         return _valid(model, value)
 
     def named(section: str) -> dict[str, Any]:
-        model = Field.model_fields[section].annotation.__args__[1]  # type: ignore[union-attr]
+        model = get_args(Field.model_fields[section].annotation)[1]
         entries = plain.get(section)
         if not isinstance(entries, dict):
             return {}

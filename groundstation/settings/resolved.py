@@ -25,7 +25,7 @@ def yaml_of(field: Field) -> str:
 
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.representer.sort_base_mapping_type_on_output = False
     yaml.width = 120
     stream = io.StringIO()
     yaml.dump(field.model_dump(mode="json"), stream)

@@ -27,7 +27,7 @@ from mavsdk.plugins.mavlink_direct.mavlink_direct import MavlinkMessage
 from drivers.mavlink.links.seam import Heard, Transport
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, name_of
+from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, fields_of, name_of
 from drivers.mavlink.wire.telemetry import Heartbeat
 from groundstation.errors import DriverError
 
@@ -45,7 +45,7 @@ def message_from_json(name: str, text: str) -> Message | None:
         return None
     try:
         fields = json.loads(text)
-        values = {key: _value(fields[key]) for key in cls._fields if key in fields}  # type: ignore[attr-defined]
+        values = {key: _value(fields[key]) for key in fields_of(cls) if key in fields}
         return cls(**values)
     except (ValueError, TypeError, KeyError) as error:
         raise WireError("malformed", f"{name}: {error}") from error
@@ -60,7 +60,7 @@ def _value(value: Any) -> Any:
 def json_from_message(message: Message) -> str:
     """Return all fields of a message as JSON; raises WireError for what MAVSDK refuses (not finite)."""
     try:
-        return json.dumps(dict(zip(message._fields, message, strict=True)), allow_nan=False)  # type: ignore[attr-defined]
+        return json.dumps(dict(zip(fields_of(type(message)), message, strict=True)), allow_nan=False)
     except ValueError as error:
         raise WireError("unencodable", f"{name_of(message)}: {error}") from error
 

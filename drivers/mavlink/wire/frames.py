@@ -5,7 +5,7 @@ pymavlink's dialect knows layout and order, and signs; `verification.py` decides
 
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -58,12 +58,18 @@ def id_of(kind: type[Message]) -> int:
     return IDS[_NAMES[kind]]
 
 
+def fields_of(kind: type[Message]) -> tuple[str, ...]:
+    """Return the names of a message's fields, in their order."""
+    names: tuple[str, ...] = getattr(kind, "_fields", ())
+    return names
+
+
 def dialect_faults() -> list[str]:
     """Return where our messages differ from pymavlink's dialect; a missing field would be sent as 0."""
     faults = []
     for name, cls in CLASSES.items():
         known = dialect.mavlink_map[IDS[name]].fieldnames if name in IDS else []
-        ours: Sequence[str] = getattr(cls, "_fields", ())
+        ours = fields_of(cls)
         if list(ours) != list(known):
             faults.append(f"{name}: has {', '.join(known)}, not {', '.join(ours)}")
     return faults

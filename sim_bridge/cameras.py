@@ -14,7 +14,6 @@ import numpy as np
 
 from groundstation.errors import GroundStationError
 from groundstation.geometry.board import Checkerboard
-from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
@@ -53,7 +52,7 @@ def render_specs(
         RenderSpec(
             camera=name,
             mount=_mount(site, name),
-            intrinsics=_intrinsics(_lens(site, name)),
+            intrinsics=_lens(site, name).intrinsics,
             boards=_boards(site),
             truth_name=truth_name,
             bodies=site.bodies,
@@ -95,12 +94,6 @@ def _mount(site: Site, name: str) -> Mount:
     eye = drone.camera
     rotation = base_from_tilted_optical(math.radians(eye.tilt_down_deg), math.radians(eye.pan_left_deg))
     return Mount(Pose(rotation, np.array(eye.position_m)), name)
-
-
-def _intrinsics(lens: Lens) -> CameraIntrinsics:
-    return CameraIntrinsics(
-        lens.width_px, lens.height_px, lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, lens.distortion
-    )
 
 
 def _boards(site: Site) -> tuple[BoardSpec, ...]:

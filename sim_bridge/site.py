@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from groundstation.errors import SettingsError
 from groundstation.geometry.board import Checkerboard
+from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.scenario import describe_problems
 
@@ -35,6 +36,13 @@ class Lens(_Part):
     cx_px: float
     cy_px: float
     distortion: tuple[float, float, float, float, float]
+
+    @property
+    def intrinsics(self) -> CameraIntrinsics:
+        """Return the lens model."""
+        return CameraIntrinsics(
+            self.width_px, self.height_px, self.fx_px, self.fy_px, self.cx_px, self.cy_px, self.distortion
+        )
 
 
 class MarkerPrint(_Part):

@@ -8,7 +8,6 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.bus.messages import Header, RelativeObservation
 from groundstation.geometry.board import Checkerboard
-from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
     rotation_from_euler,
@@ -72,7 +71,7 @@ class Eye:
     ) -> None:  # fmt: skip
         self.name = name
         self.period_s = 1.0 / cameras.fps
-        self._lens = CameraIntrinsics(**lens.model_dump())
+        self._lens = lens.intrinsics
         self._carrier = name if isinstance(mount, SiteDrone) else None
         if isinstance(mount, SiteDrone):
             assert mount.camera is not None

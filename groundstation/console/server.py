@@ -53,7 +53,9 @@ _NEWEST = (ESTIMATE,)
 # Looked at in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of what this process does.
 _LESS_OFTEN = (PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS)
 _EACH = (EVENT, COMMAND, COMMAND_ACK, LEASE, OBSERVATION, INNOVATION)
-TOPICS = (*_NEWEST, *_LESS_OFTEN, *_EACH, TRUTH, IMAGE)
+# Of these only the newest message counts.
+STATES = (*_NEWEST, *_LESS_OFTEN, TRUTH)
+TOPICS = (*STATES, *_EACH, IMAGE)
 
 
 def claim_port(port: int) -> socket.socket:

@@ -9,23 +9,9 @@ from groundstation.bus import codec
 from groundstation.bus.api import Received, Sample
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Event, Severity
-from groundstation.bus.topics import (
-    CAMERA_STATUS,
-    ESTIMATE,
-    IMAGE,
-    INNOVATION,
-    LEASE,
-    OBSERVATION,
-    PLAN,
-    PROCESS_STATUS,
-    SETPOINT,
-    SIM_STATUS,
-    TRUTH,
-    VEHICLE_STATUS,
-    Topic,
-)
+from groundstation.bus.topics import ESTIMATE, IMAGE, INNOVATION, LEASE, OBSERVATION, PLAN, TRUTH, Topic
 from groundstation.console.room import scene_from_field
-from groundstation.console.server import ConsoleServer, claim_port
+from groundstation.console.server import STATES, ConsoleServer, claim_port
 from groundstation.errors import MessageError
 from groundstation.monitor.state import cast_from_field
 from groundstation.recording.chunks import RawRecord
@@ -33,7 +19,7 @@ from groundstation.recording.reader import RecordingError, payload
 from groundstation.replay.arrival_order import among
 from groundstation.replay.playback import Playback
 
-_LATCHED = (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS, TRUTH, LEASE)
+_LATCHED = (*STATES, LEASE)
 _TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
 # What the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
 _LOOK_BACK_NS, _SEEN_NS = 122_000_000_000, 5_000_000_000

@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from groundstation.geometry.board import VALID_CODES, Checkerboard
-from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
-from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.tag import SquareTag
 
 _Positive = Annotated[float, Field(gt=0)]
@@ -96,7 +95,7 @@ class CalibrationSettings(_Section):
 
     def intrinsics(self) -> CameraIntrinsics:
         """Return the lens model."""
-        return intrinsics_from_mapping(self.model_dump())
+        return intrinsics_of(self)
 
 
 class MarkerKind(StrEnum):

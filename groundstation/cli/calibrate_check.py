@@ -115,11 +115,11 @@ def _lens_findings(
 
 
 def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, frames: int) -> Iterator[CheckFinding]:
-    from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
+    from groundstation.geometry.lens import intrinsics_of
 
     places: dict[int, dict[str, tuple[Any, float]]] = {}
     for name, camera in field.cameras.items():
-        lens = intrinsics_from_mapping(camera.calibration.model_dump())
+        lens = intrinsics_of(camera.calibration)
         try:
             _, seen = _seen(camera.source, lens, f"of {name}", frames)
         except OperatorMistake as error:

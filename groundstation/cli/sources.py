@@ -35,10 +35,10 @@ def source_of(_context: click.Context, _parameter: click.Parameter, value: str) 
 
 def lens_of(path: Path) -> "CameraIntrinsics":
     """Return the lens of a calibration file; raises SettingsError with what is wrong in it."""
-    from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
+    from groundstation.geometry.lens import intrinsics_of
     from groundstation.settings.calibration_file import load_calibration
 
-    return intrinsics_from_mapping(load_calibration(path).model_dump())
+    return intrinsics_of(load_calibration(path))
 
 
 def require_size(shot: "SourcePicture", lens: "CameraIntrinsics", calibration: str) -> None:

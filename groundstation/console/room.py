@@ -8,8 +8,8 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone, camera_name
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import LensCalibration, WorldCamera
-from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.field.room import WorldCamera
+from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
 
 Json = dict[str, Any]
@@ -52,13 +52,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
 
 def lenses_of(field: ResolvedField) -> dict[str, CameraIntrinsics]:
     """Return the lens of each camera by its name on the bus."""
-    return {name: _lens(calibration) for name, calibration in field.calibrations.items()}
-
-
-def _lens(own: LensCalibration) -> CameraIntrinsics:
-    return CameraIntrinsics(
-        own.width_px, own.height_px, own.fx_px, own.fy_px, own.cx_px, own.cy_px, own.distortion, own.residual_px
-    )
+    return {name: intrinsics_of(calibration) for name, calibration in field.calibrations.items()}
 
 
 def _drone(name: str, drone: FieldDrone) -> Json:
@@ -73,13 +67,13 @@ def _drone(name: str, drone: FieldDrone) -> Json:
         "camera": {
             "name": camera_name(name),
             "position_m": camera.position_m,
-            "rays": _rays(_lens(camera.calibration), base_from_tilted_optical(float(tilt), float(pan))),
+            "rays": _rays(intrinsics_of(camera.calibration), base_from_tilted_optical(float(tilt), float(pan))),
         },
     }
 
 
 def _world_camera(name: str, camera: WorldCamera) -> Json:
-    rays = _rays(_lens(camera.calibration), world_from_downward_optical(camera.rotation_deg))
+    rays = _rays(intrinsics_of(camera.calibration), world_from_downward_optical(camera.rotation_deg))
     return {"name": name, "position_m": camera.position_m, "rays": rays, "observes": camera.observes}
 
 

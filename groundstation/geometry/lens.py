@@ -6,6 +6,7 @@ Pixel (0, 0) is the centre of the top left pixel, as in OpenCV. Normalised coord
 import math
 from dataclasses import dataclass
 from functools import cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,3 +162,47 @@ def _undistort(x_d: Array, y_d: Array, distortion: tuple[float, ...]) -> tuple[A
     x_now, y_now = _distort(x, y, distortion)
     bad = np.hypot(x_now - x_d, y_now - y_d) > 1e-9
     return np.where(bad, np.nan, x), np.where(bad, np.nan, y)
+
+
+class LensFigures(Protocol):
+    """A lens calibration as the settings, the resolved field and a camera driver's section hold it."""
+
+    @property
+    def width_px(self) -> int:
+        """Width of the picture."""
+
+    @property
+    def height_px(self) -> int:
+        """Height of the picture."""
+
+    @property
+    def fx_px(self) -> float:
+        """Focal length along the picture's x axis."""
+
+    @property
+    def fy_px(self) -> float:
+        """Focal length along its y axis."""
+
+    @property
+    def cx_px(self) -> float:
+        """Principal point, x."""
+
+    @property
+    def cy_px(self) -> float:
+        """Principal point, y."""
+
+    @property
+    def distortion(self) -> tuple[float, float, float, float, float]:
+        """k1, k2, p1, p2, k3."""
+
+    @property
+    def residual_px(self) -> float:
+        """RMS residual of the calibration."""
+
+
+def intrinsics_of(lens: LensFigures) -> CameraIntrinsics:
+    """Return the lens model of a calibration; raises ValueError for figures no camera has."""
+    return CameraIntrinsics(
+        lens.width_px, lens.height_px, lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, lens.distortion,
+        lens.residual_px,
+    )  # fmt: skip

@@ -1,12 +1,15 @@
 """The lens model: known figures, inversion everywhere in the picture, derivatives, refusal of nonsense."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
-from groundstation.geometry.lens import CameraIntrinsics
+from drivers.camera import settings as section
+from groundstation.field.room import LensCalibration
+from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
+from groundstation.settings import room
 
 PLAIN = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5)
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
@@ -78,20 +81,8 @@ def test_impossible_calibrations_are_refused(wrong):
         CameraIntrinsics(**{**good, **wrong})
 
 
-def test_calibration_files_are_read_by_name():
-    document = {
-        "schema_version": 1,
-        "model": "plumb_bob",
-        "width_px": 640,
-        "height_px": 360,
-        "fx_px": 460,
-        "fy_px": 460,
-        "cx_px": 319.5,
-        "cy_px": 179.5,
-        "distortion": [-0.30, 0.08, 0, 0, 0],
-    }
-    assert intrinsics_from_mapping(document) == FRONT
-    with pytest.raises(ValueError, match="fx_px"):
-        intrinsics_from_mapping({k: v for k, v in document.items() if k != "fx_px"})
-    with pytest.raises(ValueError, match="model"):
-        intrinsics_from_mapping({**document, "model": "fisheye"})
+@pytest.mark.parametrize("kind", [room.CalibrationSettings, section.CalibrationSettings, LensCalibration])
+def test_every_form_of_a_calibration_is_the_same_lens(kind):
+    figures = {name: getattr(MIXED, name) for name in ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px")}
+    calibration = kind(model="plumb_bob", distortion=MIXED.distortion, residual_px=0.3, **figures)
+    assert intrinsics_of(calibration) == replace(MIXED, residual_px=0.3)

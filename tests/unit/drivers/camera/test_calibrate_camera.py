@@ -12,9 +12,9 @@ from drivers.camera.calibration.coverage import TILTS, coverage_of
 from drivers.camera.calibration.pattern import pattern_of
 from drivers.camera.calibration.view_quality import Flaw, Judge
 from groundstation.cli.main import run
-from groundstation.geometry.intrinsics_file import intrinsics_from_mapping
-from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.rotations import rotation_from_euler
+from groundstation.settings.calibration_file import load_calibration
 
 LENS = CameraIntrinsics(480, 360, 400.0, 402.0, 243.0, 176.0, (-0.2, 0.05, 0.001, -0.001, 0.0))
 PATTERN = pattern_of("9x6", 25.0)
@@ -117,7 +117,7 @@ def test_a_known_lens_is_found_again_within_its_own_deviation(tmp_path, calibrat
     for name in ("fx_px", "fy_px", "cx_px", "cy_px"):
         assert abs(file[name] - getattr(LENS, name)) < 0.5 + 4.0 * file["std"][name], name
     assert file["residual_px"] < 0.2 and file["views"] == len(POSES)
-    assert intrinsics_from_mapping(file).width_px == 480
+    assert intrinsics_of(load_calibration(tmp_path / "out" / "lens.yaml")).width_px == 480
     assert len(list((tmp_path / "seen").iterdir())) == len(POSES)
 
 

@@ -6,12 +6,19 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.numbers import FiniteRange
+
+if TYPE_CHECKING:
+    from groundstation.flight.composition import Simulation
+    from groundstation.flight.flight_plan import FlightPlan
+    from groundstation.report.judge import RunReport
+    from groundstation.report.run_facts import RunFacts
+    from groundstation.settings.schema import Field
 
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -72,6 +79,7 @@ def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
     """
     from groundstation.flight.composition import fly_endpoint
     from groundstation.flight.flight_plan import plan_of
+    from groundstation.report.run_facts import RunFacts
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.supervisor.network import require_free
@@ -80,7 +88,7 @@ def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
     loaded = load_field(path, options)
     plan = plan_of(loaded, None, asks=True)
     require_free(fly_endpoint(loaded))
-    return _run("fly", path, loaded, plan, headless=headless)
+    return _run(path, loaded, plan, RunFacts(mode="fly", field=str(path)), headless=headless)
 
 
 def run_simulated(
@@ -97,6 +105,7 @@ def run_simulated(
     """Fly a field in the simulator, judge the run, and return the exit code."""
     from groundstation.flight.composition import Simulation, simulated
     from groundstation.flight.flight_plan import plan_of
+    from groundstation.report.run_facts import RunFacts
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
@@ -114,23 +123,22 @@ def run_simulated(
     net = network.claim(runtime_file.folder(), loaded.bus.port)
     try:
         simulation = Simulation(net, chosen, seed)
-        facts = {"scenario": scenario, "seed": seed, "tracking_s": duration}
+        facts = RunFacts(mode=mode, field=str(path), scenario=scenario, seed=seed, tracking_s=duration)
         field_there = simulated(loaded, net)
-        return _run(mode, path, field_there, plan, headless=headless, simulation=simulation, report=report, facts=facts)
+        return _run(path, field_there, plan, facts, headless=headless, simulation=simulation, report=report)
     finally:
         net.release()
 
 
 def _run(
-    mode: str,
     path: Path,
-    field: Any,
-    plan: Any,
+    field: "Field",
+    plan: "FlightPlan",
+    facts: "RunFacts",
     *,
     headless: bool,
-    simulation: Any = None,
+    simulation: "Simulation | None" = None,
     report: Path | None = None,
-    facts: dict[str, Any] | None = None,
 ) -> int:
     from groundstation.flight.composition import fly_endpoint, process_table
     from groundstation.flight.loop import Flight, require_outcome
@@ -141,13 +149,13 @@ def _run(
 
     run_dir = make_run_dir(report or Path(field.recording.directory), path.stem)
     (run_dir / "resolved.yaml").write_text(yaml_of(field))
-    write_facts(run_dir, mode, path, facts or {})
+    write_facts(run_dir, facts)
     log_to(run_dir)
     endpoint = simulation.network.endpoint if simulation else fly_endpoint(field)
     monitor = not headless and sys.stdout.isatty()
     table = process_table(field, endpoint, run_dir, simulation=simulation, monitor=monitor)
     terminal = Terminal()
-    terminal.say(f"{mode} {path}: {len(table)} processes, run folder {run_dir}")
+    terminal.say(f"{facts.mode} {path}: {len(table)} processes, run folder {run_dir}")
     run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones))
     outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()
     terminal.flush()
@@ -157,12 +165,12 @@ def _run(
         return ExitCode.OK if outcome.landed else ExitCode.FAILED
     if outcome.interrupted and plan.duration_s is not None:
         return ExitCode.INTERRUPTED
-    if mode == "fly" or plan.duration_s is None:
+    if facts.mode == "fly" or plan.duration_s is None:
         return ExitCode.OK if outcome.landed else ExitCode.FAILED
     return ExitCode.OK if passed else ExitCode.FAILED
 
 
-def _build(run_dir: Path) -> Any:
+def _build(run_dir: Path) -> "RunReport":
     from groundstation.report.build import build_report
     from groundstation.report.gather import gather
     from groundstation.report.judge import judge

@@ -18,7 +18,10 @@ from groundstation.supervisor.table import ProcessSpec
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """What makes a run a simulated one: its network, scenario and seed."""
+    """What makes a run a simulated one: its network, scenario and seed.
+
+    The scenario is as its file has it: only the simulator, which judges it, knows its keys.
+    """
 
     network: Network
     scenario: dict[str, Any]

@@ -5,7 +5,8 @@ import os
 import time
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.process.log import DiscreetFormatter
@@ -43,10 +44,10 @@ def _free_bytes(path: Path) -> int:
     return status.f_bavail * status.f_frsize
 
 
-def write_facts(run_dir: Path, mode: str, path: Path, facts: dict[str, Any]) -> None:
+def write_facts(run_dir: Path, facts: run_facts.RunFacts) -> None:
     """Write how the run was asked for, and when this process was started: the operator waits from then on."""
     command_ns = time.time_ns() - _age_ns()
-    run_facts.write(run_dir, run_facts.RunFacts(mode=mode, field=str(path), command_unix_ns=command_ns, **facts))
+    run_facts.write(run_dir, msgspec.structs.replace(facts, command_unix_ns=command_ns))
 
 
 def _age_ns() -> int:

@@ -1,8 +1,9 @@
 """The router process: it listens and forwards, and does nothing else, so that no stall here can stall the team."""
 
-import json
 import time
 from typing import Any
+
+import msgspec
 
 from groundstation.bus.zenoh_bus import open_router
 from groundstation.process.child import Child
@@ -12,9 +13,15 @@ _TURN_NS = 50_000_000
 _LINGER_NS = 25_000_000_000
 
 
+class RouterSection(msgspec.Struct, frozen=True):
+    """What the supervisor hands to the router: where to listen."""
+
+    endpoint: str
+
+
 def run(child: Child) -> int:
     """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
-    session = open_router(json.loads(child.section)["endpoint"])
+    session = open_router(msgspec.json.decode(child.section, type=RouterSection).endpoint)
     child.ready()
     orphaned_ns = 0
     while not child.stop_requested:

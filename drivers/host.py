@@ -62,7 +62,7 @@ class VehicleHost:
         for received in self._leases.drain():
             if isinstance(received.message, Lease):
                 self._count("lease", self.watchdog.accept_lease(now_ns, received.message))
-        view = self.vehicle.view(now_ns)
+        view = self.vehicle.view(now_ns).believed
         self.watchdog.see(view, self._upstream())
         for received in self._commands.drain():
             if isinstance(received.message, Command):
@@ -164,6 +164,8 @@ class VehicleHost:
         limit_ns = _UNANSWERED_NS if decision.mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
         if not self._silent and now_ns - self._heard_ns >= limit_ns:
             self._silent = True
+            if view.unsound:  # it does answer, and the watchdog's reason says what
+                return
             remedy = f"check that it is switched on and that this computer is in its network: ping {address}"
             self._event(Severity.ERROR, f"{name} does not answer at {address}; trying on", remedy)
             self._child.degrade(f"{name} does not answer at {address}")

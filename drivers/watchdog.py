@@ -123,7 +123,7 @@ class Watchdog:
         if self.mode not in (DriverMode.LANDED, DriverMode.CUT):
             return "the vehicle was not heard yet" if self.mode is DriverMode.CONNECTING else f"already {self.mode}"
         if not self.vehicle.fresh:
-            return "no telemetry from the vehicle"
+            return self.vehicle.silence
         if self.vehicle.flight_state not in STANDING:
             return f"the vehicle says {self.vehicle.flight_state}"
         if battery is None or battery < self.limits.battery_min:
@@ -140,7 +140,7 @@ class Watchdog:
         if self.mode not in FREE:
             return f"the vehicle is {self.mode}"
         if not self.vehicle.fresh:
-            return "no telemetry from the vehicle"
+            return self.vehicle.silence
         if self.vehicle.flight_state in STANDING | {FlightState.LANDING}:
             return f"the vehicle says {self.vehicle.flight_state}"
         refusal = self._upstream_refusal()
@@ -222,7 +222,7 @@ class Watchdog:
             (up.stop_requested, "the driver was told to stop"),
             (dead_s >= limits.brake_s, "the supervisor is dead"),
             (frozen_s >= noticed_s, "the supervisor does not answer"),
-            (lost_s >= noticed_s, "no telemetry from the vehicle"),
+            (lost_s >= noticed_s, vehicle.silence),
             (low and low_s >= limits.battery_hold_s, "battery below its limit"),
             (self._take_off_overdue(now_ns), "take-off took too long"),
             (self._tracker_silent(now_ns), "no setpoint from the tracker"),
@@ -237,7 +237,7 @@ class Watchdog:
             (gap_s > limits.gap_s, f"this driver stood still for {gap_s:.1f} s"),
             (not up.supervisor_alive, "the supervisor is dead"),
             (frozen_s >= limits.resume_within_s, "the supervisor does not answer"),
-            (lost_s >= limits.resume_within_s, "no telemetry from the vehicle"),
+            (lost_s >= limits.resume_within_s, vehicle.silence),
             (paused, "no setpoint from the tracker"),
         )
         for applies, reason in suspensions:

@@ -1,6 +1,6 @@
 """Vocabulary of the watchdog: modes, actions, what it is told, what it answers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from groundstation.bus.messages import AckStage, FlightState, Vector3, Verb
@@ -68,7 +68,8 @@ class AuthorityLimits:
 class VehicleView:
     """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or "".
 
-    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before.
+    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before. unsound: why
+    what it says of its motion cannot be true, or ""; its telemetry then counts as silent.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -76,6 +77,17 @@ class VehicleView:
     battery: float | None = None
     not_ready: str = ""
     configured: bool = True
+    unsound: str = ""
+
+    @property
+    def believed(self) -> "VehicleView":
+        """Return the view that may be acted upon: what cannot be true did not arrive."""
+        return replace(self, fresh=False) if self.unsound and self.fresh else self
+
+    @property
+    def silence(self) -> str:
+        """Return why nothing is heard of the vehicle, in words; it counts while the view is not fresh."""
+        return f"its sensors cannot be believed: {self.unsound}" if self.unsound else "no telemetry from the vehicle"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
-from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, Demo, PhysMeasures
+from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, TIME, Demo, PhysMeasures
 from drivers.ardrone.wire.state import ControlState, StateBit, split_control_state
+from drivers.plausibility.motion import MotionSample
 from groundstation.bus.messages import FlightState, Vector3
 from groundstation.geometry.angles import difference, wrap
 
@@ -106,6 +107,19 @@ def _imu_from_phys(phys: PhysMeasures) -> tuple[Vector3, Vector3]:
         raise WireError("implausible", "PHYS_MEASURES")
     rates = (wx * _RAD_FROM_DEG, -wy * _RAD_FROM_DEG, -wz * _RAD_FROM_DEG)
     return rates, (ax * _M_S2_FROM_MG, -ay * _M_S2_FROM_MG, -az * _M_S2_FROM_MG)
+
+
+def sample_from_motion(stamp_ns: int, packet: Navdata, motion: NavdataMotion) -> MotionSample:
+    """Return what of a packet its plausibility is judged by; raises WireError (option_size)."""
+    time = packet.read(TIME)
+    return MotionSample(
+        stamp_ns,
+        motion.velocity_m_s[:2],
+        motion.roll_rad,
+        motion.pitch_rad,
+        (*(motion.rates_rad_s or ()), *(motion.specific_force_m_s2 or ())),
+        None if time is None else round(time.seconds * 1e9),
+    )
 
 
 def flight_state_from_navdata(state: int, control_state: int | None) -> FlightState:

@@ -27,6 +27,9 @@ from drivers.ardrone.wire.state import StateBit, bit_names
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
+from drivers.plausibility.health import Health
+from drivers.plausibility.limits import ARDRONE
+from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity
@@ -83,6 +86,7 @@ class ArDrone:
         self._scale = scale_from_settings(settings)
         self._loop = VelocityLoop(settings.limits)
         self._motion = MotionMean()
+        self._plausibility = MotionMonitor(ARDRONE)
         self._applied_ns = 0
         self._video_refused = False
         self._refused: Counter[str] = Counter()
@@ -120,8 +124,10 @@ class ArDrone:
         flight_state = convert.flight_state_from_navdata(telemetry.state, telemetry.control_state)
         self.telemetry = replace(telemetry, flight_state=flight_state)
         if motion is not None:
+            sample = convert.sample_from_motion(now_ns, packet, motion)
+            report = self._plausibility.update(sample, flight_state)
             self._motion.add(motion)
-            self._publisher.publish(now_ns, motion)
+            self._publisher.publish(now_ns, motion, report)
 
     # -- sender loop --------------------------------------------------------------------------------------------------
 
@@ -130,7 +136,8 @@ class ArDrone:
         heard = self.telemetry
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         configured = self._session.phase is SessionPhase.READY
-        return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard), configured)
+        unsound = self._plausibility.report.reason(Health.BAD, ARDRONE.essential)
+        return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard), configured, unsound)
 
     def _not_ready(self, heard: LatestNavdata) -> str:
         if self._session.phase is not SessionPhase.READY:

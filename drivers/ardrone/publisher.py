@@ -3,6 +3,7 @@
 from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry
 from groundstation.bus.topics import IMU, ODOMETRY
@@ -12,6 +13,8 @@ from groundstation.geometry.angles import quaternion_from_euler
 _CLIMB_STD_M_S = 0.15
 # It says nothing while the ultrasound hears another drone.
 _VOID_CLIMB_STD_M_S = 2.0
+# What a doubtful velocity is worth.
+_SUSPECT_STD_M_S = 0.5
 
 
 class Decimator:
@@ -40,18 +43,23 @@ class NavdataPublisher:
         self.heights = HeightWatch()
         self._odometry = Decimator(settings.odometry_hz)
         self._imu = Decimator(settings.imu_hz)
-        horizontal = settings.odometry.velocity_std_m_s**2
-        self._covariance, self._void_covariance = (
-            (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, std**2)
-            for std in (_CLIMB_STD_M_S, _VOID_CLIMB_STD_M_S)
-        )
+        self._covariances = {
+            (suspect, sound): (std**2, 0.0, 0.0, 0.0, std**2, 0.0, 0.0, 0.0, climb_std**2)
+            for suspect, std in ((False, settings.odometry.velocity_std_m_s), (True, _SUSPECT_STD_M_S))
+            for sound, climb_std in ((True, _CLIMB_STD_M_S), (False, _VOID_CLIMB_STD_M_S))
+        }
 
-    def publish(self, stamp_ns: int, motion: NavdataMotion) -> None:
-        """Publish what is due; every motion counts for the heading's jumps."""
+    def publish(self, stamp_ns: int, motion: NavdataMotion, health: HealthReport = ALL_GOOD) -> None:
+        """Publish what is due and not BAD; every motion counts for the heading's jumps."""
         reset = self._heading.update(stamp_ns, motion)
         sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
-        if self._odometry.is_due(stamp_ns):
-            self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset, sound))
+        all_values = health.of(Sensor.TELEMETRY, Sensor.CLOCK)
+        velocity = max(all_values, health.of(Sensor.VELOCITY))
+        if velocity < Health.BAD and self._odometry.is_due(stamp_ns):
+            covariance = self._covariances[velocity is Health.SUSPECT, sound]
+            self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset, sound, covariance))
+        if max(all_values, health.of(Sensor.IMU)) is Health.BAD:
+            return
         if motion.rates_rad_s is not None and motion.specific_force_m_s2 is not None and self._imu.is_due(stamp_ns):
             sample = ImuSample(
                 header=self._bus.header(self._name, stamp_ns),
@@ -61,11 +69,13 @@ class NavdataPublisher:
             )
             self._bus.publish(IMU, sample)
 
-    def _odometry_message(self, stamp_ns: int, motion: NavdataMotion, reset: int, sound: bool) -> Odometry:
+    def _odometry_message(
+        self, stamp_ns: int, motion: NavdataMotion, reset: int, sound: bool, covariance: tuple[float, ...]
+    ) -> Odometry:
         return Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=motion.velocity_m_s,
-            velocity_covariance=self._covariance if sound else self._void_covariance,
+            velocity_covariance=covariance,
             yaw_rad=motion.yaw_rad,
             roll_rad=motion.roll_rad,
             pitch_rad=motion.pitch_rad,

@@ -20,6 +20,7 @@ from drivers.mavlink.wire.names import (
     land_mode,
 )
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
+from drivers.plausibility.motion import MotionSample
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
 from groundstation.geometry.angles import quaternion_from_euler, wrap
 
@@ -79,6 +80,16 @@ def velocity_from_local(message: LocalPositionNed, attitude: BaseAttitude) -> Ve
     c, s = math.cos(attitude.yaw_rad), math.sin(attitude.yaw_rad)
     x, y = north, -east
     return c * x + s * y, c * y - s * x, -down
+
+
+def sample_from_local(
+    stamp_ns: int, message: LocalPositionNed, attitude: BaseAttitude, inertial: tuple[float, ...]
+) -> MotionSample:
+    """Return what the plausibility of a velocity is judged by: in the axes in which it is told, where it can stand."""
+    tilt = (attitude.roll_rad, attitude.pitch_rad)
+    return MotionSample(
+        stamp_ns, (message.vx, -message.vy), *tilt, inertial, message.time_boot_ms * 1_000_000, attitude.yaw_rad
+    )
 
 
 def position_from_local(message: LocalPositionNed) -> Vector3:

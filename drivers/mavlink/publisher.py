@@ -9,6 +9,7 @@ import math
 
 from drivers.mavlink.convert import BaseAttitude, attitude_quaternion
 from drivers.mavlink.settings import VehicleSettings
+from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
 from groundstation.bus.topics import IMU, ODOMETRY
@@ -16,6 +17,8 @@ from groundstation.geometry.angles import wrap
 
 _GAP_S = 0.5
 _CLIMB_SHARE = 1.5
+# What a doubtful velocity is worth.
+_SUSPECT_STD_M_S = 0.5
 
 
 class GyroHeading:
@@ -48,20 +51,24 @@ class TelemetryPublisher:
     def __init__(self, settings: VehicleSettings, bus: Bus) -> None:
         self._name, self._bus = settings.name, bus
         self._heading = GyroHeading()
-        horizontal = settings.velocity_std_m_s**2
-        vertical = horizontal * _CLIMB_SHARE**2
-        self._covariance = (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical)
+        self._covariance = _covariance(settings.velocity_std_m_s)
+        self._suspect_covariance = _covariance(max(settings.velocity_std_m_s, _SUSPECT_STD_M_S))
 
     def attitude(self, stamp_ns: int, attitude: BaseAttitude) -> None:
         """Take an attitude: its turn rate moves the heading."""
         self._heading.update(stamp_ns, attitude)
 
-    def velocity(self, stamp_ns: int, velocity_m_s: Vector3, attitude: BaseAttitude) -> None:
-        """Publish a velocity [base_stabilized]."""
+    def velocity(
+        self, stamp_ns: int, velocity_m_s: Vector3, attitude: BaseAttitude, health: HealthReport = ALL_GOOD
+    ) -> None:
+        """Publish a velocity [base_stabilized] unless it is BAD."""
+        believed = health.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY)
+        if believed is Health.BAD:
+            return
         message = Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=velocity_m_s,
-            velocity_covariance=self._covariance,
+            velocity_covariance=self._suspect_covariance if believed is Health.SUSPECT else self._covariance,
             yaw_rad=self._heading.yaw_rad,
             roll_rad=attitude.roll_rad,
             pitch_rad=attitude.pitch_rad,
@@ -78,3 +85,8 @@ class TelemetryPublisher:
             attitude=None if attitude is None else attitude_quaternion(attitude),
         )
         self._bus.publish(IMU, sample)
+
+
+def _covariance(std_m_s: float) -> tuple[float, ...]:
+    horizontal = std_m_s**2
+    return (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, horizontal * _CLIMB_SHARE**2)

@@ -19,6 +19,9 @@ from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, SensorBits
+from drivers.plausibility.health import Health
+from drivers.plausibility.limits import MAVLINK
+from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -49,6 +52,7 @@ class LatestTelemetry:
     ekf: int = 0
     battery: float | None = None
     attitude: BaseAttitude | None = None
+    inertial: tuple[float, ...] = ()
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     position_m: Vector3 | None = None
 
@@ -76,6 +80,7 @@ class MavlinkVehicle:
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
         self._traffic = Traffic()
+        self._plausibility = MotionMonitor(MAVLINK)
         self._refused: Counter[str] = Counter()
         self._said, self._boot_clock = Texts(), BootClock()
         self._jumps: deque[int] = deque(maxlen=8)
@@ -107,9 +112,9 @@ class MavlinkVehicle:
                 self._publisher.attitude(now_ns, attitude)
                 known = replace(known, attitude=attitude)
             case telemetry.HighresImu():
-                self._publisher.imu(now_ns, *convert.imu_from_highres(message), known.attitude)
+                known = self._felt(now_ns, *convert.imu_from_highres(message), known)
             case telemetry.RawImu():
-                self._publisher.imu(now_ns, *convert.imu_from_raw(message), known.attitude)
+                known = self._felt(now_ns, *convert.imu_from_raw(message), known)
             case telemetry.Heartbeat():
                 mode = (message.base_mode, message.custom_mode, message.system_status)
                 known = replace(known, heartbeat_ns=now_ns, base_mode=mode[0], custom_mode=mode[1], status=mode[2])
@@ -129,8 +134,14 @@ class MavlinkVehicle:
             return known
         velocity = convert.velocity_from_local(message, known.attitude)
         position = convert.position_from_local(message)
-        self._publisher.velocity(now_ns, velocity, known.attitude)
+        sample = convert.sample_from_local(now_ns, message, known.attitude, known.inertial)
+        report = self._plausibility.update(sample, self._state(known))
+        self._publisher.velocity(now_ns, velocity, known.attitude, report)
         return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
+
+    def _felt(self, now_ns: int, rates: Vector3, force: Vector3, known: LatestTelemetry) -> LatestTelemetry:
+        self._publisher.imu(now_ns, rates, force, known.attitude)
+        return replace(known, inertial=(*rates, *force))
 
     def _take_rare(self, now_ns: int, message: tuple[object, ...], known: LatestTelemetry) -> LatestTelemetry:
         match message:
@@ -167,14 +178,18 @@ class MavlinkVehicle:
         """Return what the vehicle last said."""
         known = self.telemetry
         fresh = self._is_heard(now_ns, known)
-        state = convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
+        state = self._state(known)
+        unsound = self._plausibility.report.reason(Health.BAD, MAVLINK.essential)
         if not known.heartbeat_ns or not known.landed:
             state = FlightState.UNKNOWN
         elif state is FlightState.FLYING and convert.is_still(known.velocity_m_s):
             state = FlightState.HOVERING
         elif state is FlightState.LANDED and self.orders.starting:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
-        return VehicleView(state, fresh, known.battery, self._not_ready(now_ns, known))
+        return VehicleView(state, fresh, known.battery, self._not_ready(now_ns, known), unsound=unsound)
+
+    def _state(self, known: LatestTelemetry) -> FlightState:
+        return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
 
     def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
         # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.

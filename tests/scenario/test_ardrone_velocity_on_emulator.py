@@ -7,7 +7,7 @@ import pytest
 
 from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.commands import orders_from_decision
-from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata
+from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata, sample_from_motion
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.driver import RATE_HZ
 from drivers.ardrone.session import ArdroneSession
@@ -15,6 +15,8 @@ from drivers.ardrone.settings import ArDroneDriverSettings, VelocityScale
 from drivers.ardrone.velocity_loop import HOVER, VelocityLoop
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.options import DEMO
+from drivers.plausibility.limits import ARDRONE
+from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
 from sim_bridge.devices.ardrone_control import FlightControl
@@ -61,6 +63,7 @@ class Flight:
         self.packet = navdata.Navdata(0, 0)
         self.motion = MotionMean()
         self.flight_state = FlightState.UNKNOWN
+        self.plausibility, self.doubts = MotionMonitor(ARDRONE), set()
 
     def tick(self, action, wanted=(0.0, 0.0, 0.0), yaw_rate=0.0):
         self.ticks += 1
@@ -86,6 +89,8 @@ class Flight:
         if motion is not None and demo is not None:
             self.motion.add(motion)
             self.flight_state = flight_state_from_navdata(self.packet.state, demo.control_state)
+            sample = sample_from_motion(now_ns, self.packet, motion)
+            self.doubts.update(self.plausibility.update(sample, self.flight_state).findings)
 
     def say(self, action, wanted, yaw_rate):
         attitude, dt_s = HOVER, SENDER_TICKS * TICK_S
@@ -165,6 +170,16 @@ def test_all_of_sixty_noisy_steps_hold_the_bar(capsys):
             print(f"\n{name:15s} least {least:5.2f}, median {median:5.2f}, 95 % {most_of_them:5.2f}, most {most:5.2f}")
     failed = [step[:4] for step in steps if step[2] > 1.2 or step[3] > 1.15 * 0.5]
     assert failed == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_healthy_flights_and_rest_on_the_floor_give_no_alarm(seed):
+    flight = Flight(seed).take_off()
+    flight.record(3.0, (0.5, -0.2, 0.1), 0.5)
+    flight.record(3.0, (0.0, 0.0, 0.0))
+    for _ in range(1200):
+        flight.tick(Action.LAND)
+    assert flight.flight_state is FlightState.LANDED and flight.doubts == set()
 
 
 def test_signs_of_climb_and_turn():

@@ -93,6 +93,7 @@ class ScriptedDrone:
         self.major = 2
         self.psi = self.force_mg = 0.0
         self.select = False
+        self.lie = ""  # frozen: every value repeats; stuck: the velocity does
         self.lines: list[tuple[str, int, str]] = []
         self.config: dict[str, str] = {}
         self.deaf_to: set[str] = set()
@@ -115,11 +116,16 @@ class ScriptedDrone:
         body = struct.pack("<IIII", 0x55667788, self.state, self.sequence, 0)
         if self.state & BOOTSTRAP:
             return checked(body)
+        # Nothing that flies says the same twice; float32 cannot tell less apart.
+        stir = 0.0 if self.lie == "frozen" else 6e-5 * (self.sequence % 2)
+        moved = 0.0 if self.lie else stir
         altitude = 800 if self.state & FLY else 0
         demo = struct.pack(
-            "<HHIIfffifffI", 0, 148, self.major << 16, 80, theta, 500.0, self.psi, altitude, 300.0, 200.0, 0, 0
+            "<HHIIfffifffI",
+            *(0, 148, self.major << 16, 80, theta + 2 * stir, 500.0, self.psi, altitude, 300.0 + moved, 200.0 + moved),
+            *(0, 0),
         )
-        phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, self.force_mg, 0.0, -1000.0, 1.0, 2.0, 3.0, 0, 0, 0)
+        phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, self.force_mg, 0.0, -1000.0 - 2 * stir, 1.0, 2.0, 3.0, 0, 0, 0)
         return checked(body + demo.ljust(148, b"\0") + phys)
 
     def turn(self) -> None:

@@ -246,3 +246,23 @@ def test_datagram_framing_round_trip_and_cuts():
     for length in (1, 11, 13, len(payload) - 1):
         with pytest.raises(ValueError, match="cut short"):
             datagrams.unpack(payload[:length])
+
+
+@pytest.mark.parametrize("fault", ["frozen", "stuck"])
+def test_values_that_cannot_be_true_stop_it_like_silence_and_the_operator_reads_why(new_rig, fault):
+    rig = new_rig()
+    rig.host = VehicleHost(rig.process, rig.drone, AuthorityLimits(land_after_s=1.3))
+    rig.take_off()
+    rig.tracking = True
+    rig.order(Verb.TRACK)
+    rig.until(lambda: rig.decision.action == "FLY")
+    rig.fake.lie = fault
+    began = time.monotonic()
+    rig.until(lambda: rig.decision.action == "HOVER")
+    assert time.monotonic() - began <= 1.3
+    rig.messages(ODOMETRY)
+    rig.until(lambda: rig.decision.action == "LAND")
+    assert rig.messages(ODOMETRY) == [], "what is BAD is not published"
+    word = "all values repeat" if fault == "frozen" else "its velocity is stuck at"
+    assert any(word in text for _, text, _ in rig.process.events), rig.process.events
+    rig.until(lambda: not rig.fake.state & FLY)

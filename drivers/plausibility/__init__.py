@@ -1,0 +1,1 @@
+"""Whether what a vehicle says of its motion can be true: health per sensor, from values and their times. Pure."""

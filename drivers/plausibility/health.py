@@ -1,0 +1,49 @@
+"""Vocabulary: sensors, their health, and what was found about them."""
+
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+
+class Health(IntEnum):
+    """How far a sensor is to be believed; a BAD one counts as silent."""
+
+    GOOD = 0
+    SUSPECT = 1
+    BAD = 2
+
+
+class Sensor(StrEnum):
+    """What is judged; TELEMETRY: all values together."""
+
+    TELEMETRY = "telemetry"
+    CLOCK = "clock"
+    VELOCITY = "velocity"
+    ATTITUDE = "attitude"
+    IMU = "IMU"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Health of a sensor, with the reason in words for the operator."""
+
+    sensor: Sensor
+    health: Health
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class HealthReport:
+    """What is not GOOD, the worst first."""
+
+    findings: tuple[Finding, ...] = ()
+
+    def of(self, *sensors: Sensor) -> Health:
+        """Return the worst health of some sensors."""
+        return max((one.health for one in self.findings if one.sensor in sensors), default=Health.GOOD)
+
+    def reason(self, health: Health, sensors: frozenset[Sensor]) -> str:
+        """Return the first reason why one of the sensors is at least this bad, or ""."""
+        return next((one.reason for one in self.findings if one.health >= health and one.sensor in sensors), "")
+
+
+ALL_GOOD = HealthReport()

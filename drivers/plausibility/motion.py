@@ -1,0 +1,174 @@
+"""The monitor of one vehicle: each sample of its motion in, the health of its sensors out. Pure.
+
+Judged in the air only: on the floor values may stand still, and attitudes may be anything. While it takes off or lands
+it may touch the floor: its velocity alone may stand then.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from drivers.plausibility.clock_watch import ClockWatch
+from drivers.plausibility.health import ALL_GOOD, Finding, Health, HealthReport, Sensor
+from drivers.plausibility.limits import PlausibilityLimits
+from drivers.plausibility.repeats import RepeatWatch, StandstillWatch
+from drivers.watchdog_types import AIRBORNE, UP
+from groundstation.bus.messages import FlightState
+
+_Judged = tuple[Sensor, Health, str]
+# After a pause no step between two values means anything.
+_GAP_S = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSample:
+    """What one packet says. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it tells none.
+
+    velocity_m_s: horizontal, as told, in axes of the vehicle's own choice; heading_rad: of the vehicle in these axes.
+    roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not told.
+    """
+
+    stamp_ns: int
+    velocity_m_s: tuple[float, float]
+    roll_rad: float
+    pitch_rad: float
+    inertial: tuple[float, ...] = ()
+    vehicle_ns: int | None = None
+    heading_rad: float = 0.0
+
+    @property
+    def lean_rad(self) -> tuple[float, float]:
+        """Return the small tilts towards the axes of the velocity."""
+        forward, left = self.pitch_rad, -self.roll_rad
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        return c * forward - s * left, s * forward + c * left
+
+
+class MotionMonitor:
+    """Health of the sensors of one vehicle; `report` is replaced as a whole, so that another thread may read it."""
+
+    def __init__(self, limits: PlausibilityLimits) -> None:
+        self.limits = limits
+        self._contents, self._attitude, self._inertial = RepeatWatch(), RepeatWatch(), RepeatWatch()
+        self._velocity = (StandstillWatch(), StandstillWatch())
+        self._clock = ClockWatch(limits.clock_wrap_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the vehicle stands."""
+        self.report = ALL_GOOD
+        for watch in (self._contents, self._attitude, self._inertial, *self._velocity, self._clock):
+            watch.reset()
+        self._before: MotionSample | None = None
+        self._beyond_ns: dict[Sensor, int] = {}
+        self._jumped_ns: dict[Sensor, deque[int]] = {}
+        self._held: dict[Sensor, tuple[int, Finding]] = {}
+
+    def update(self, sample: MotionSample, state: FlightState) -> HealthReport:
+        """Take a sample of a vehicle in some state; return what is known to be wrong now."""
+        if state not in AIRBORNE:
+            if self._before is not None:
+                self.reset()
+            return self.report
+        judged = [*self._judge_repeats(sample, state in UP), *self._judge_clock(sample), *self._judge_values(sample)]
+        self._before = sample
+        self.report = self._settle(sample.stamp_ns, judged)
+        return self.report
+
+    def _settle(self, now_ns: int, judged: list[_Judged]) -> HealthReport:
+        """Hold each verdict for a while, the worse one first."""
+        hold_ns = round(self.limits.hold_s * 1e9)
+        for sensor, health, reason in judged:
+            held = self._held.get(sensor)
+            if held is None or health >= held[1].health or now_ns - held[0] > hold_ns:
+                self._held[sensor] = (now_ns, Finding(sensor, health, reason))
+        if not self._held:
+            return ALL_GOOD
+        self._held = {sensor: held for sensor, held in self._held.items() if now_ns - held[0] <= hold_ns}
+        return HealthReport(tuple(sorted((one for _, one in self._held.values()), key=lambda one: -one.health)))
+
+    # -- what repeats -------------------------------------------------------------------------------------------------
+
+    def _judge_repeats(self, sample: MotionSample, flies: bool) -> list[_Judged]:
+        limits, stamp_ns = self.limits, sample.stamp_ns
+        tilt = (sample.roll_rad, sample.pitch_rad)
+        frozen_s = self._contents.update(stamp_ns, (sample.velocity_m_s, tilt, sample.inertial))
+        attitude_s = self._attitude.update(stamp_ns, tilt)
+        inertial_s = self._inertial.update(stamp_ns, sample.inertial) if sample.inertial else 0.0
+        judged = self._judge_standstill(sample, flies)
+        judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, "its telemetry is frozen: all values repeat")
+        judged += _repeated(Sensor.ATTITUDE, attitude_s, limits.stuck_s, "its attitude is stuck")
+        judged += _repeated(Sensor.IMU, inertial_s, limits.stuck_s, "its IMU is stuck")
+        return judged
+
+    def _judge_standstill(self, sample: MotionSample, flies: bool) -> list[_Judged]:
+        limits, judged = self.limits, list[_Judged]()
+        if not flies:
+            for watch in self._velocity:
+                watch.reset()
+            return judged
+        for watch, velocity, tilt in zip(self._velocity, sample.velocity_m_s, sample.lean_rad, strict=True):
+            held_s, change_m_s = watch.update(sample.stamp_ns, velocity, tilt)
+            needed_s = limits.stuck_s if change_m_s >= limits.stuck_m_s else limits.stuck_alone_s
+            judged += _repeated(Sensor.VELOCITY, held_s, needed_s, f"its velocity is stuck at {abs(velocity):.2f} m/s")
+        return judged
+
+    # -- its clock ----------------------------------------------------------------------------------------------------
+
+    def _judge_clock(self, sample: MotionSample) -> list[_Judged]:
+        if sample.vehicle_ns is None:
+            return []
+        limits = self.limits
+        stands_s, late_s = self._clock.update(sample.stamp_ns, sample.vehicle_ns)
+        if stands_s >= limits.clock_stands_s:
+            return [(Sensor.CLOCK, Health.BAD, "its clock stands")]
+        if late_s < limits.clock_suspect_s:
+            return []
+        health = Health.BAD if late_s >= limits.clock_late_s else Health.SUSPECT
+        return [(Sensor.CLOCK, health, f"its telemetry is {late_s:.1f} s late")]
+
+    # -- values and steps ---------------------------------------------------------------------------------------------
+
+    def _judge_values(self, sample: MotionSample) -> list[_Judged]:
+        limits, before = self.limits, self._before
+        speed = math.hypot(*sample.velocity_m_s)
+        tilt = max(abs(sample.roll_rad), abs(sample.pitch_rad))
+        judged = self._beyond(Sensor.VELOCITY, sample, speed > limits.speed_m_s, f"{speed:.1f} m/s")
+        judged += self._beyond(
+            Sensor.ATTITUDE, sample, tilt > limits.tilt_rad, f"a tilt of {math.degrees(tilt):.0f} deg"
+        )
+        elapsed_s = math.inf if before is None else (sample.stamp_ns - before.stamp_ns) * 1e-9
+        if before is None or elapsed_s > _GAP_S:
+            return judged
+        step = math.dist(sample.velocity_m_s, before.velocity_m_s)
+        turned = max(abs(sample.roll_rad - before.roll_rad), abs(sample.pitch_rad - before.pitch_rad))
+        jumps = step > limits.jump_m_s + limits.acceleration_m_s2 * elapsed_s
+        judged += self._jumps(Sensor.VELOCITY, sample, jumps, f"its velocity jumps by {step:.1f} m/s")
+        jumps = turned > limits.jump_rad + limits.turn_rad_s * elapsed_s
+        return judged + self._jumps(
+            Sensor.ATTITUDE, sample, jumps, f"its attitude jumps by {math.degrees(turned):.0f} deg"
+        )
+
+    def _beyond(self, sensor: Sensor, sample: MotionSample, beyond: bool, value: str) -> list[_Judged]:
+        if not beyond:
+            self._beyond_ns.pop(sensor, None)
+            return []
+        since_ns = self._beyond_ns.setdefault(sensor, sample.stamp_ns)
+        bad = sample.stamp_ns - since_ns >= self.limits.beyond_s * 1e9
+        return [(sensor, Health.BAD if bad else Health.SUSPECT, f"it claims {value}, which it cannot do")]
+
+    def _jumps(self, sensor: Sensor, sample: MotionSample, jumps: bool, reason: str) -> list[_Judged]:
+        if not jumps:
+            return []
+        limits = self.limits
+        times = self._jumped_ns.setdefault(sensor, deque(maxlen=limits.jumps))
+        times.append(sample.stamp_ns)
+        often = len(times) == limits.jumps and times[-1] - times[0] <= limits.jumps_within_s * 1e9
+        return [(sensor, Health.BAD if often else Health.SUSPECT, reason)]
+
+
+def _repeated(sensor: Sensor, held_s: float, limit_s: float, reason: str) -> list[_Judged]:
+    # Half of the time is reason to doubt.
+    if held_s < limit_s / 2:
+        return []
+    return [(sensor, Health.BAD if held_s >= limit_s else Health.SUSPECT, reason)]

@@ -1,0 +1,57 @@
+"""For how long a value has been the same to the last bit. Pure.
+
+Estimates and measurements in flight never are: in a recorded flight of an AR.Drone no velocity came twice, and no
+attitude for longer than 24 ms.
+"""
+
+import math
+
+_GRAVITY_M_S2 = 9.81
+# Two datagrams of one moment are no standstill.
+_LEAST_SAMPLES = 4
+
+
+class RepeatWatch:
+    """Counts how long a value stands. Nothing is known of a value that did not come for `gap_s`."""
+
+    def __init__(self, gap_s: float = 0.3) -> None:
+        self._gap_ns = round(gap_s * 1e9)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._value: object = None
+        self._since_ns = self._last_ns = 0
+        self._samples = 0
+
+    def update(self, stamp_ns: int, value: object) -> float:
+        """Take a value [hashable or tuple]; return for how long it has stood [s]."""
+        if value != self._value or stamp_ns - self._last_ns > self._gap_ns:
+            self._value, self._since_ns, self._samples = value, stamp_ns, 0
+        self._last_ns = stamp_ns
+        self._samples += 1
+        return (stamp_ns - self._since_ns) * 1e-9 if self._samples >= _LEAST_SAMPLES else 0.0
+
+
+class StandstillWatch:
+    """A velocity along one axis that stands, and the change of speed that the tilt accounts for meanwhile."""
+
+    def __init__(self) -> None:
+        self._repeats = RepeatWatch()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._repeats.reset()
+        self._stamp_ns = 0
+        self._change_m_s = 0.0
+
+    def update(self, stamp_ns: int, velocity_m_s: float, tilt_rad: float) -> tuple[float, float]:
+        """Take a velocity and the tilt towards it; return (how long it has stood [s], size of the change [m/s])."""
+        held_s = self._repeats.update(stamp_ns, velocity_m_s)
+        if held_s == 0.0:
+            self._change_m_s = 0.0
+        else:
+            self._change_m_s += _GRAVITY_M_S2 * math.tan(tilt_rad) * (stamp_ns - self._stamp_ns) * 1e-9
+        self._stamp_ns = stamp_ns
+        return held_s, abs(self._change_m_s)

@@ -1,0 +1,114 @@
+"""A vehicle whose values arrive and are wrong: its driver stops it as if it were silent, and says why."""
+
+import math
+
+import pytest
+
+from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
+from groundstation.bus.messages import Verb
+from groundstation.bus.topics import IMU, ODOMETRY
+
+MOVING = (LocalPositionNed, AttitudeQuaternion, HighresImu, RawImu)
+
+
+class Liar:
+    """Replaces messages of a vehicle on their way to the driver."""
+
+    def __init__(self, link):
+        self.change = None
+        self._receive = link.receive
+        self._first = {}
+        link.receive = self.receive
+
+    def receive(self):
+        heard = self._receive()
+        if self.change is None:
+            return heard
+        frames = [self.change(one.frame) for one in heard]
+        return [one._replace(frame=frame) for one, frame in zip(heard, frames, strict=True) if frame is not None]
+
+    def freeze(self, *kinds, but=()):
+        def frozen(frame):
+            if not isinstance(frame.message, kinds):
+                return frame
+            first = self._first.setdefault(type(frame.message), frame.message)
+            kept = {name: getattr(frame.message, name) for name in but if hasattr(frame.message, name)}
+            return frame._replace(message=first._replace(**kept))
+
+        self.change = frozen
+
+    def set(self, kind, **values):
+        self.change = lambda frame: (
+            frame._replace(message=frame.message._replace(**values)) if isinstance(frame.message, kind) else frame
+        )
+
+
+FAULTS = {
+    "all frozen": (lambda liar: liar.freeze(*MOVING), "all values repeat"),
+    "all frozen but the clock": (lambda liar: liar.freeze(*MOVING, but=("time_boot_ms",)), "all values repeat"),
+    "velocity stuck at 0": (lambda liar: liar.set(LocalPositionNed, vx=0.0, vy=0.0), "stuck at 0.00 m/s"),
+    "velocity stuck at 0.5": (lambda liar: liar.set(LocalPositionNed, vx=0.5), "stuck at 0.50 m/s"),
+    "attitude stuck": (lambda liar: liar.freeze(AttitudeQuaternion), "attitude is stuck"),
+    "far too fast": (lambda liar: liar.set(LocalPositionNed, vx=20.0), "cannot do"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_it_hovers_within_a_second_and_lands_within_3_5_s(rig, name):
+    rig.track_on()
+    rig.wanted = ((0.5, 0.0, 0.0), 0.2)
+    rig.run(1.0)
+    break_it, word = FAULTS[name]
+    break_it(Liar(rig.link))
+    times = {}
+    for step in range(700):
+        rig.tick()
+        decision = rig.host.watchdog.step(rig.hand.now, rig.host.watchdog.vehicle, rig.host.watchdog.upstream)
+        times.setdefault(str(decision.action), step * 0.005)
+    assert times["HOVER"] <= 1.0 and times["LAND"] <= 3.5
+    assert word in rig.host.watchdog.reason
+    assert any(word in text for text in rig.process.texts), "the operator reads why"
+    assert not any("does not answer" in text for text in rig.process.texts)
+
+
+def test_what_is_bad_is_not_published(rig):
+    rig.track_on()
+    Liar(rig.link).set(LocalPositionNed, vx=0.0, vy=0.0)
+    rig.run(1.0)
+    rig.messages(ODOMETRY), rig.messages(IMU)
+    rig.run(0.5)
+    assert not rig.messages(ODOMETRY) and rig.messages(IMU)
+
+
+def test_a_lie_that_ends_in_time_leaves_a_hover_that_waits_for_resume(rig):
+    rig.track_on()
+    liar = Liar(rig.link)
+    liar.freeze(*MOVING)
+    rig.run(0.8)
+    liar.change = None
+    rig.run(2.5)
+    assert rig.mode == "HOVER" and "RESUME is needed" in rig.host.watchdog.reason
+    rig.order(Verb.RESUME)
+    rig.until(lambda: rig.mode == "TRACK", 1.0)
+
+
+def test_healthy_flights_and_rest_on_the_floor_give_no_alarm(rig_of, flavour):
+    doubts = []
+    for seed in range(2):
+        rig = rig_of(flavour, seed=seed)
+        update = rig.vehicle._plausibility.update
+
+        def watched(sample, state, update=update):
+            report = update(sample, state)
+            doubts.extend(report.findings)
+            return report
+
+        rig.vehicle._plausibility.update = watched
+        rig.connect().run(2.0).track_on()
+        for turn in range(4):
+            rig.wanted = ((0.5 * math.cos(turn), 0.5 * math.sin(2 * turn), 0.1), 0.5)
+            rig.run(1.5)
+        rig.order(Verb.LAND)
+        rig.until(lambda rig=rig: rig.mode == "LANDED")
+        rig.run(1.0)
+    assert doubts == []

@@ -49,4 +49,5 @@ class SilenceLimits(DriverSection):
             unseen_land_after_s=self.unseen_land_after_s,
             battery_min=limits.battery_min,
             battery_hold_s=limits.battery_hold_s,
+            max_speed_m_s=limits.max_speed_m_s,
         )

@@ -48,7 +48,10 @@ class AuthorityLimits:
 
     resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
     of the tracker, whatever broke on the way from it; gap_s: a pause of our own loop after which it does; brake_s:
-    hover before landing where nobody knows what the vehicle was doing.
+    hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and
+    noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
+    it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it is told: from 1 m/s
+    it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled.
     """
 
     hover_after_s: float = 0.3
@@ -62,6 +65,16 @@ class AuthorityLimits:
     brake_s: float = 1.0
     take_off_s: float = 10.0
     clear_s: float = 2.0
+    max_speed_m_s: float = 0.6
+    fast_brake_s: float = 0.1
+    fast_resume_s: float = 0.5
+    fast_land_s: float = 1.6
+    stray_land_s: float = 1.6
+
+    @property
+    def tolerated_speed_m_s(self) -> float:
+        """Return the largest actual speed [m/s]."""
+        return 1.3 * self.max_speed_m_s + 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +82,9 @@ class VehicleView:
     """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or "".
 
     configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before. unsound: why
-    what it says of its motion cannot be true, or ""; its telemetry then counts as silent.
+    what it says of its motion cannot be true, or ""; its telemetry then counts as silent. velocity_m_s: true (scaled)
+    one that it reports, None if it reports none. speed_m_s, stray: what the host makes of that: horizontal speed, and
+    how the vehicle strays from what it is told, or "".
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -78,6 +93,9 @@ class VehicleView:
     not_ready: str = ""
     configured: bool = True
     unsound: str = ""
+    velocity_m_s: Vector3 | None = None
+    speed_m_s: float = 0.0
+    stray: str = ""
 
     @property
     def believed(self) -> "VehicleView":

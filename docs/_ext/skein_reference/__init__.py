@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from skein_reference.commands import commands
 from skein_reference.exit_codes import exit_codes
+from skein_reference.failsafes import failsafe_page
 from skein_reference.field_keys import field_keys, scenario_keys
 from skein_reference.import_picture import import_picture
 from skein_reference.messages import messages
@@ -23,6 +24,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "messages.md": messages,
     "commands.md": commands,
     "exit-codes.md": exit_codes,
+    "failsafes.md": failsafe_page,
     "processes.md": processes,
     "imports.svg": import_picture,
 }

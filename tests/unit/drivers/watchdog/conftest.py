@@ -1,6 +1,7 @@
 """A watchdog with a vehicle that obeys, under a clock of our own."""
 
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -22,7 +23,8 @@ class Bench:
         self.state = state
         self.fresh = True
         self.battery = 0.9
-        self.not_ready = ""
+        self.not_ready = self.unsound = self.stray = ""
+        self.speed = 0.0
         self.upstream = Upstream()
         self.epoch = 1
         self.ids = itertools.count()
@@ -46,7 +48,8 @@ class Bench:
 
     @property
     def view(self):
-        return VehicleView(self.state, self.fresh, self.battery, self.not_ready)
+        view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
+        return replace(view, speed_m_s=self.speed, stray=self.stray).believed
 
     def see(self):
         """Let the watchdog know what the vehicle says, as its host does before it hands over orders."""

@@ -94,6 +94,7 @@ def beats_orders(before, decision, said, silent_s, paused_s):
     grounds = {
         (DriverMode.CUT, "the vehicle reports an emergency"): FlightState.EMERGENCY in said,
         (DriverMode.LANDING, "the vehicle lands by itself"): FlightState.LANDING in said,
+        (DriverMode.HOVER, "the vehicle does not say what it does; RESUME is needed"): FlightState.UNKNOWN in said,
         (DriverMode.LANDING, "no setpoint from the tracker"): silent_s >= 3.0,
         (DriverMode.HOVER, "no setpoint from the tracker; RESUME is needed"): paused_s >= 0.5,
     }

@@ -167,7 +167,7 @@ def test_low_battery_lands_after_3_s(new_bench, mode):
     bench.battery = 0.1
     assert Action.LAND not in bench.run(2.9)
     bench.battery = 0.2
-    bench.step()
+    bench.run(15.0)
     bench.battery = 0.1
     assert Action.LAND not in bench.run(2.9)
     assert bench.run(0.3)[-1] is Action.LAND

@@ -5,10 +5,14 @@ import random
 
 import pytest
 
+from drivers.failsafe_table import Condition
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, FREE, Action, AuthorityLimits, DriverMode, Upstream, VehicleView
 from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
+LASTING = (
+    Condition.SUPERVISOR_DEAD, Condition.SUPERVISOR_SILENT, Condition.TELEMETRY_SILENT, Condition.BATTERY_LOW,
+)  # fmt: skip
 S = 1_000_000_000
 NOW = 1000 * S
 HEADER = Header(NOW, "clock", "drone_1", "tester", 5)
@@ -58,8 +62,8 @@ def watchdog_in(mode, setpoints="live", lease=True, aged_s=0.1):
         dog.accept_setpoint(NOW - 1, setpoint(epoch=2, stamp=NOW - 1))
     if lease:
         dog.accept_lease(NOW - 1, Lease(header=HEADER, holder="op", expires_ns=NOW + S))
-    for name in ("dead", "frozen", "lost", "battery"):
-        dog._since[name] = past
+    for condition in LASTING:
+        dog.evidence.charged_s[condition] = aged_s
     return dog
 
 

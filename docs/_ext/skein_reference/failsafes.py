@@ -1,0 +1,63 @@
+"""Page of the table of failsafes, from the table itself."""
+
+from drivers.failsafe_table import Condition, Failsafe, failsafes
+from drivers.watchdog_types import AuthorityLimits
+from skein_reference.markdown import code, page, prose, table
+
+_INTRODUCTION = """\
+Everything that stops a vehicle without an order, or keeps it from starting. Of the rows that apply the first one acts;
+an order of a person (CUT_MOTORS, LAND, HOLD) needs no row. Times are those of the default settings; where a setting
+gives them it stands behind.
+
+A condition that is over is forgotten at once, or by so many seconds for each second without it: what comes and goes
+adds up. What needs TRACK or RESUME begins anew with it."""
+
+EVIDENCE: dict[Condition, str] = {
+    Condition.EMERGENCY: "the vehicle says EMERGENCY, and no take-off is clearing one (2 s)",
+    Condition.FLEW_AT_START: "the vehicle's first word is that it flies",
+    Condition.UNORDERED_FLIGHT: "it says that it flies while it should stand",
+    Condition.LANDS_BY_ITSELF: "it says LANDING without a LAND",
+    Condition.STOP_REQUESTED: "SIGTERM to the driver",
+    Condition.SUPERVISOR_DEAD: "the supervisor's process is gone",
+    Condition.SUPERVISOR_SILENT: "no heartbeat of the supervisor for 0.3 s",
+    Condition.TELEMETRY_SILENT: "no telemetry for 0.3 s, or a BAD sensor",
+    Condition.STATE_UNKNOWN: "its state is UNKNOWN or LOST",
+    Condition.NOT_STANDING: "its state is neither LANDED nor EMERGENCY",
+    Condition.BATTERY_LOW: "battery below `limits.battery_min`",
+    Condition.BATTERY_UNKNOWN: "no charge was ever told",
+    Condition.TAKE_OFF_OVERDUE: "it does not say that it flies",
+    Condition.TRACKER_SILENT: "no setpoint of the authorised epoch",
+    Condition.UNSEEN: "no setpoint since take-off",
+    Condition.TRACKER_PAUSED: "no setpoint of the authorised epoch",
+    Condition.NOT_RESUMED: "a pause of the tracker, or patches, and no TRACK, RESUME or HOLD since",
+    Condition.NO_SETPOINT: "the newest setpoint has expired (0.3 s at most), or is another epoch's",
+    Condition.SETPOINTS_PATCHY: "the newest setpoint is older than 0.15 s",
+    Condition.UNCONVERGED: "setpoints that say so",
+    Condition.STRAYS: "reported or estimated velocity against what was commanded",
+    Condition.TOO_FAST: "reported or estimated speed above 1.3 `limits.max_speed_m_s` + 0.2 m/s",
+    Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
+    Condition.NOT_READY: "the driver's own reason",
+}
+
+
+def failsafe_page() -> str:
+    """Return the page."""
+    rows = [_row(number, one) for number, one in enumerate(failsafes(AuthorityLimits()), start=1)]
+    headings = ("priority", "condition", "evidence", "lasting", "forgotten", "in mode", "reaction", "until", "text")
+    return page("Failsafes", _INTRODUCTION, table(headings, rows))
+
+
+def _row(number: int, one: Failsafe) -> tuple[str, ...]:
+    lasting = "at once" if one.after_s == 0.0 else f"{one.after_s:.1f} s"
+    setting = f" ({code(one.limit)})" if one.limit else ""
+    return (
+        str(number),
+        code(one.condition),
+        prose(EVIDENCE[one.condition]),
+        lasting + setting,
+        "at once" if one.forgets is None else f"{one.forgets:g} s per s",
+        ", ".join(sorted(one.modes)),
+        f"{one.reaction}{', braking first' if one.brake else ''}",
+        str(one.latch),
+        prose(one.text.replace("{why}", "...")),
+    )

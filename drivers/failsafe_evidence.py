@@ -1,0 +1,155 @@
+"""Evidence for the conditions of the table of failsafes: which hold now, for how long they have, and why. Pure."""
+
+from dataclasses import dataclass
+
+from drivers.failsafe_table import Condition, Failsafe
+from drivers.setpoints import SetpointGate
+from drivers.watchdog_types import AIRBORNE, STANDING, AuthorityLimits, DriverMode, Upstream, VehicleView
+from groundstation.bus.messages import FlightState
+from groundstation.time_units import NS_PER_S
+
+# A setpoint older than this is not the stream that it should be.
+_STREAM_S = 0.15
+# What a condition is credited with when it is met anew, however long nobody looked.
+_FIRST_S = 0.05
+NAMELESS = frozenset({FlightState.UNKNOWN, FlightState.LOST})
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the watchdog knows at one moment; times in ns, gap_s: how long its own loop stood still.
+
+    clearing: an emergency is being cleared by a take-off, in time. paused_ns: last setpoint before a pause that needs
+    RESUME, None without.
+    """
+
+    now_ns: int
+    mode: DriverMode
+    reason: str
+    vehicle: VehicleView
+    upstream: Upstream
+    gate: SetpointGate
+    entered_ns: int = 0
+    take_off_ended_ns: int = 0
+    paused_ns: int | None = None
+    clearing: bool = False
+    gap_s: float = 0.0
+
+    def since_s(self, then_ns: int) -> float:
+        """Return how long ago a moment was [s]."""
+        return (self.now_ns - then_ns) / NS_PER_S
+
+
+def observed(at: Situation, limits: AuthorityLimits) -> dict[Condition, str]:
+    """Return the conditions that hold at this moment, with what is to be said of them."""
+    vehicle, up = at.vehicle, at.upstream
+    holding: dict[Condition, str] = {}
+    if up.stop_requested:
+        holding[Condition.STOP_REQUESTED] = ""
+    if not up.supervisor_alive:
+        holding[Condition.SUPERVISOR_DEAD] = ""
+    if not up.supervisor_fresh:
+        holding[Condition.SUPERVISOR_SILENT] = ""
+    if at.gap_s > limits.gap_s:
+        holding[Condition.DRIVER_STOOD] = f"{at.gap_s:.1f} s"
+    if vehicle.battery is None:
+        holding[Condition.BATTERY_UNKNOWN] = f"{limits.battery_min:.0%}"
+    elif vehicle.battery < limits.battery_min:
+        holding[Condition.BATTERY_LOW] = f"{vehicle.battery:.0%}, at least {limits.battery_min:.0%}"
+    if vehicle.not_ready:
+        holding[Condition.NOT_READY] = vehicle.not_ready
+    _observe_state(at, holding)
+    _observe_setpoints(at, holding)
+    _observe_motion(vehicle, limits, holding)
+    return holding
+
+
+def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
+    """Note what the vehicle says, and what it does against its orders."""
+    vehicle, state = at.vehicle, at.vehicle.flight_state
+    if state in NAMELESS:
+        holding[Condition.STATE_UNKNOWN] = ""
+    if state not in STANDING:
+        holding[Condition.NOT_STANDING] = str(state)
+    if not vehicle.fresh:
+        holding[Condition.TELEMETRY_SILENT] = vehicle.silence
+        return
+    if state is FlightState.EMERGENCY and not at.clearing:
+        holding[Condition.EMERGENCY] = ""
+    if state is FlightState.LANDING:
+        holding[Condition.LANDS_BY_ITSELF] = ""
+    if state in AIRBORNE and at.mode is DriverMode.CONNECTING:
+        holding[Condition.FLEW_AT_START] = ""
+    if state in AIRBORNE and at.mode is DriverMode.LANDED:
+        holding[Condition.UNORDERED_FLIGHT] = at.reason
+
+
+def _observe_setpoints(at: Situation, holding: dict[Condition, str]) -> None:
+    gate = at.gate
+    if gate.last_heard_ns is not None and at.since_s(gate.last_heard_ns) > _STREAM_S:
+        holding[Condition.SETPOINTS_PATCHY] = ""
+    newest = gate.live(at.now_ns)
+    if newest is None or newest.epoch != gate.epoch:
+        holding[Condition.NO_SETPOINT] = ""
+    elif not newest.converged:
+        holding[Condition.UNCONVERGED] = ""
+
+
+def _observe_motion(vehicle: VehicleView, limits: AuthorityLimits, holding: dict[Condition, str]) -> None:
+    if vehicle.stray:
+        holding[Condition.STRAYS] = vehicle.stray
+    if vehicle.speed_m_s > limits.tolerated_speed_m_s:
+        allowed = f"{limits.max_speed_m_s:.1f} are allowed"
+        holding[Condition.TOO_FAST] = f"it flies {vehicle.speed_m_s:.1f} m/s, {allowed}"
+
+
+def timed(at: Situation) -> dict[Condition, float]:
+    """Return for how long what has a beginning of its own has lasted [s]."""
+    if at.mode is DriverMode.TAKING_OFF:
+        return {Condition.TAKE_OFF_OVERDUE: at.since_s(at.entered_ns)}
+    heard_ns = at.gate.last_heard_ns
+    if heard_ns is None:
+        lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}
+    else:
+        # Whoever orders TRACK before the tracker speaks again means it: the pause counts from that order.
+        pause_s = at.since_s(max(heard_ns, at.entered_ns))
+        lasted = {Condition.TRACKER_SILENT: at.since_s(heard_ns), Condition.TRACKER_PAUSED: pause_s}
+    if at.paused_ns is not None:
+        # Setpoints that come back after a pause do not stop the land timer: only an order does.
+        lasted[Condition.NOT_RESUMED] = at.since_s(at.paused_ns)
+    return lasted
+
+
+class Evidence:
+    """Remembers for how long conditions have lasted; what is over is forgotten as the table says."""
+
+    def __init__(self, table: tuple[Failsafe, ...]) -> None:
+        self._forgets = {row.condition: row.forgets for row in table if row.forgets is not None}
+        self.holding: dict[Condition, str] = {}
+        self.charged_s: dict[Condition, float] = {}
+        self._last_ns: int | None = None
+
+    def step(self, at: Situation, limits: AuthorityLimits) -> None:
+        """Take the situation of one turn."""
+        elapsed_s = 0.0 if self._last_ns is None else at.since_s(self._last_ns)
+        self._last_ns = at.now_ns
+        before, self.holding = self.holding, observed(at, limits)
+        for condition in self.charged_s.keys() - self.holding.keys():
+            left_s = self.charged_s[condition] - self._forgets.get(condition, float("inf")) * max(elapsed_s, 1e-9)
+            self.charged_s[condition] = left_s
+            if left_s <= 0.0:
+                del self.charged_s[condition]
+        for condition in self.holding:
+            more_s = elapsed_s if condition in before else min(elapsed_s, _FIRST_S)
+            self.charged_s[condition] = self.charged_s.get(condition, 0.0) + more_s
+        for condition, lasted_s in timed(at).items():
+            self.holding[condition], self.charged_s[condition] = "", lasted_s
+
+    def lasted_s(self, condition: Condition) -> float | None:
+        """Return for how long a condition has lasted [s], or None if it does not hold."""
+        return self.charged_s.get(condition, 0.0) if condition in self.holding else None
+
+    def forget(self, *conditions: Condition) -> None:
+        """Begin anew with some conditions, or with all."""
+        for condition in conditions or tuple(self.charged_s):
+            self.charged_s.pop(condition, None)

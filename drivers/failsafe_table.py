@@ -1,0 +1,184 @@
+"""The table of failsafes: everything that stops a vehicle, or keeps it from starting, as data.
+
+Rows stand by priority: of those that apply the first one acts. The documentation's table is made from this one.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum, auto
+from functools import cache
+
+from drivers.watchdog_types import ALOFT, FREE, AuthorityLimits, DriverMode
+
+
+class Reaction(StrEnum):
+    """What is done; REFUSE: a TAKEOFF is not obeyed."""
+
+    CUT = "CUT"
+    LAND = "LAND"
+    HOVER = "HOVER"
+    REFUSE = "refuse take-off"
+
+
+class Latch(StrEnum):
+    """What ends a reaction."""
+
+    TAKEOFF = "a new TAKEOFF"
+    RESUME = "TRACK or RESUME"
+    NONE = "the end of its condition"
+
+
+class Condition(StrEnum):
+    """What can be wrong; evidence for it: `failsafe_evidence.py`."""
+
+    EMERGENCY = auto()
+    FLEW_AT_START = auto()
+    UNORDERED_FLIGHT = auto()
+    LANDS_BY_ITSELF = auto()
+    STOP_REQUESTED = auto()
+    SUPERVISOR_DEAD = auto()
+    SUPERVISOR_SILENT = auto()
+    TELEMETRY_SILENT = auto()
+    STATE_UNKNOWN = auto()
+    NOT_STANDING = auto()
+    BATTERY_LOW = auto()
+    BATTERY_UNKNOWN = auto()
+    TAKE_OFF_OVERDUE = auto()
+    TRACKER_SILENT = auto()
+    UNSEEN = auto()
+    TRACKER_PAUSED = auto()
+    NOT_RESUMED = auto()
+    NO_SETPOINT = auto()
+    SETPOINTS_PATCHY = auto()
+    UNCONVERGED = auto()
+    STRAYS = auto()
+    TOO_FAST = auto()
+    DRIVER_STOOD = auto()
+    NOT_READY = auto()
+
+
+# Seconds of a condition that a second without it makes forgotten: what fails one sixth of the time adds up.
+SLOWLY = 0.2
+EVENLY = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Failsafe:
+    """One row.
+
+    after_s: how long the condition must have lasted (its debounce). forgets: seconds forgotten per second without it
+    (its hysteresis); None: all at once. modes: in which it counts. text: for the operator; `{why}` is the evidence's
+    own word. brake: hover first, because nobody knows what the vehicle was doing. limit: the setting that says when.
+    """
+
+    condition: Condition
+    reaction: Reaction
+    text: str
+    after_s: float = 0.0
+    limit: str = ""
+    forgets: float | None = None
+    latch: Latch = Latch.TAKEOFF
+    modes: frozenset[DriverMode] = ALOFT
+    brake: bool = False
+
+    def applies(self, mode: DriverMode, lasted_s: float | None) -> bool:
+        """Return whether it acts in a mode, given for how long its condition has lasted (None: it does not hold)."""
+        return lasted_s is not None and mode in self.modes and lasted_s >= self.after_s
+
+
+# What a vehicle does while it is asked for nothing else.
+_TRACK = frozenset({DriverMode.TRACK})
+_STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
+
+
+@cache
+def failsafes(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+    """Return the table for a vehicle's limits, highest priority first."""
+    return (*_ends(limits), *_landings(limits), *_suspensions(limits), *_brakes(limits), *_refusals())
+
+
+def _ends(_limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+    emergency = ALOFT | {DriverMode.LANDING}
+    return (
+        Failsafe(Condition.EMERGENCY, Reaction.CUT, "the vehicle reports an emergency", modes=emergency),
+        Failsafe(Condition.FLEW_AT_START, Reaction.LAND, "it was flying when this driver started", brake=True,
+                 modes=frozenset({DriverMode.CONNECTING})),
+        Failsafe(Condition.UNORDERED_FLIGHT, Reaction.LAND, "airborne without a standing take-off order ({why})",
+                 modes=frozenset({DriverMode.LANDED})),
+        Failsafe(Condition.LANDS_BY_ITSELF, Reaction.LAND, "the vehicle lands by itself"),
+    )  # fmt: skip
+
+
+def _landings(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+    # Who is noticed to be silent has been silent for hover_after_s already.
+    noticed_s = limits.land_after_s - limits.hover_after_s
+    land, patience = Reaction.LAND, "safety.land_after_s"
+    return (
+        Failsafe(Condition.STOP_REQUESTED, land, "the driver was told to stop"),
+        Failsafe(Condition.SUPERVISOR_DEAD, land, "the supervisor is dead", limits.brake_s),
+        Failsafe(Condition.SUPERVISOR_SILENT, land, "the supervisor does not answer", noticed_s, patience, SLOWLY),
+        Failsafe(Condition.TELEMETRY_SILENT, land, "{why}", noticed_s, patience, SLOWLY),
+        Failsafe(Condition.STATE_UNKNOWN, land, "the vehicle does not say what it does", noticed_s, patience, SLOWLY),
+        Failsafe(Condition.BATTERY_LOW, land, "battery below its limit", limits.battery_hold_s,
+                 "limits.battery_hold_s", SLOWLY),
+        Failsafe(Condition.BATTERY_UNKNOWN, land, "its battery is unknown", limits.battery_hold_s,
+                 "limits.battery_hold_s", SLOWLY),
+        Failsafe(Condition.TAKE_OFF_OVERDUE, land, "take-off took too long", limits.take_off_s),
+        Failsafe(Condition.TRACKER_SILENT, land, "no setpoint from the tracker", limits.land_after_s, patience),
+        Failsafe(Condition.UNSEEN, land, "no setpoint from the tracker", limits.unseen_land_after_s,
+                 "safety.unseen_land_after_s"),
+        Failsafe(Condition.NOT_RESUMED, land, "the tracker paused, and nobody ordered RESUME", limits.land_after_s,
+                 patience),
+        Failsafe(Condition.UNCONVERGED, land, "the tracker does not know where it is", limits.unseen_land_after_s,
+                 "safety.unseen_land_after_s", EVENLY, modes=FREE),
+        Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),
+        Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
+    )  # fmt: skip
+
+
+def _suspensions(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+    rows = (
+        (Condition.DRIVER_STOOD, "this driver stood still for {why}", 0.0, None),
+        (Condition.SUPERVISOR_DEAD, "the supervisor is dead", 0.0, None),
+        (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", limits.resume_within_s, SLOWLY),
+        (Condition.TELEMETRY_SILENT, "{why}", limits.resume_within_s, SLOWLY),
+        (Condition.STATE_UNKNOWN, "the vehicle does not say what it does", limits.hover_after_s, SLOWLY),
+        (Condition.TRACKER_PAUSED, "no setpoint from the tracker", limits.tracker_resume_within_s, None),
+        (Condition.SETPOINTS_PATCHY, "setpoints come in bits only", limits.resume_within_s, SLOWLY),
+        (Condition.STRAYS, "it does not do what it is told: {why}", 0.0, None),
+        (Condition.TOO_FAST, "{why}", limits.fast_resume_s, SLOWLY),
+    )
+    return tuple(
+        Failsafe(condition, Reaction.HOVER, text, after_s, "", forgets, Latch.RESUME, _TRACK)
+        for condition, text, after_s, forgets in rows
+    )
+
+
+def _brakes(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+    rows = (
+        (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", 0.0),
+        (Condition.TELEMETRY_SILENT, "{why}", 0.0),
+        (Condition.NO_SETPOINT, "no setpoint from the tracker", 0.0),
+        (Condition.UNCONVERGED, "the tracker does not know where it is", 0.0),
+        (Condition.TOO_FAST, "{why}", limits.fast_brake_s),
+    )
+    return tuple(
+        Failsafe(condition, Reaction.HOVER, text, after_s, latch=Latch.NONE, modes=_TRACK)
+        for condition, text, after_s in rows
+    )
+
+
+def _refusals() -> tuple[Failsafe, ...]:
+    rows = (
+        (Condition.TELEMETRY_SILENT, "{why}", ""),
+        (Condition.NOT_STANDING, "the vehicle says {why}", ""),
+        (Condition.BATTERY_UNKNOWN, "battery unknown, at least {why} needed", "limits.battery_min"),
+        (Condition.BATTERY_LOW, "battery {why} needed", "limits.battery_min"),
+        (Condition.STOP_REQUESTED, "the ground station is stopping", ""),
+        (Condition.SUPERVISOR_DEAD, "the ground station is stopping", ""),
+        (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", ""),
+        (Condition.NOT_READY, "{why}", ""),
+    )
+    return tuple(
+        Failsafe(condition, Reaction.REFUSE, text, 0.0, limit, latch=Latch.NONE, modes=_STANDS)
+        for condition, text, limit in rows
+    )

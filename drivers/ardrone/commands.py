@@ -33,8 +33,8 @@ def _reference(action: Action, emergency: bool, flight_state: FlightState) -> At
             # After an emergency the button must be pressed once more before the drone starts.
             return at.ref(start=not emergency, select=emergency)
         case Action.FLY | Action.HOVER:
-            # Stay up, but never take off: a drone that says it stands is told to stand.
-            return at.ref(start=flight_state is not FlightState.LANDED)
+            # Stay up, but never take off: a drone that stands, or is told to land by others, is not lifted again.
+            return at.ref(start=flight_state not in (FlightState.LANDED, FlightState.LANDING))
         case Action.CUT:
             return at.ref(start=False, select=not emergency)
         case _:

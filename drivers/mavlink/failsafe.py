@@ -1,4 +1,4 @@
-"""What the supervisor tells a vehicle for a driver that died or hangs."""
+"""What supervisor or guardian tell a vehicle for a driver that died or hangs."""
 
 from drivers.limits import VehicleLimits
 from drivers.mavlink.convert import setpoint_from_velocity

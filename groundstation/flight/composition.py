@@ -12,6 +12,7 @@ from groundstation.flight.failsafe_datagrams import failsafe_datagrams
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, DriverSection, core_section, driver_sections, rerouted
 from groundstation.supervisor import process_table as rows
+from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
 from groundstation.supervisor.table import ProcessSpec
 
@@ -65,7 +66,7 @@ def process_table(
         table.append(replace(rows.CONSOLE, section=page))
     if monitor:
         table.append(replace(rows.MONITOR, section=core))
-    return tuple(table)
+    return guarded(tuple(table))
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:

@@ -1,4 +1,4 @@
-"""The bytes with which the supervisor stops and lands a drone whose driver is dead, for each kind of vehicle."""
+"""The bytes with which supervisor or guardian stop and land a drone whose driver is dead, for each kind of vehicle."""
 
 from drivers.ardrone.wire import at
 from groundstation.settings.drones import Mavlink, unknown_kind

@@ -79,6 +79,8 @@ class Child:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if error is None and self._block is not None:
+            self._block.end(self.spec.heartbeat_index)
         self._set_state(Lifecycle.STOPPING, str(error) if error else "")
         if error is not None:
             _log.error("ends by %s: %s", kind.__name__ if kind else "?", error)

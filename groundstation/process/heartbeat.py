@@ -13,7 +13,7 @@ from pathlib import Path
 
 SUPERVISOR_SLOT = 0
 _WORDS_PER_SLOT = 8  # one cache line each, so that two beating processes never share one
-_STAMP, _STATE, _PID = 0, 1, 2
+_STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE = 0, 1, 2, 3, 4, 5
 
 
 class SlotState(IntEnum):
@@ -62,15 +62,45 @@ class HeartbeatBlock:
         self._words[base + _PID] = os.getpid()
         self._words[base + _STAMP] = time.monotonic_ns()
         self._words[base + _STATE] = state
+        if state in (SlotState.READY, SlotState.DEGRADED):
+            self._words[base + _WORKED] = 1
+
+    def end(self, slot: int) -> None:
+        """Record that the work of this process is done: whatever it drives stands, or could not be heard any more."""
+        self._words[slot * _WORDS_PER_SLOT + _ENDED] = 1
+
+    def set_silent_since(self, slot: int, since_ns: int) -> None:
+        """Record since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
+        self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE] = since_ns
 
     def clear(self, slot: int) -> None:
-        """Forget the former holder of a slot, before its successor starts."""
+        """Forget the former holder of a slot, before its successor starts; not since when others speak for it."""
         base = slot * _WORDS_PER_SLOT
-        self._words[base : base + _WORDS_PER_SLOT] = memoryview(bytes(_WORDS_PER_SLOT * 8)).cast("q")
+        self._words[base : base + _SILENT_SINCE] = memoryview(bytes(_SILENT_SINCE * 8)).cast("q")
 
     def state(self, slot: int) -> SlotState:
         """Return the lifecycle state last recorded."""
         return SlotState(self._words[slot * _WORDS_PER_SLOT + _STATE])
+
+    def pid(self, slot: int) -> int:
+        """Return the process that holds a slot, 0 before it has attached."""
+        return self._words[slot * _WORDS_PER_SLOT + _PID]
+
+    def has_worked(self, slot: int) -> bool:
+        """Return whether the holder of a slot ever finished its start."""
+        return self._words[slot * _WORDS_PER_SLOT + _WORKED] != 0
+
+    def has_ended(self, slot: int) -> bool:
+        """Return whether the holder of a slot said that its work is done."""
+        return self._words[slot * _WORDS_PER_SLOT + _ENDED] != 0
+
+    def silent_since_ns(self, slot: int) -> int:
+        """Return since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
+        return self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE]
+
+    def beat_ns(self, slot: int) -> int:
+        """Return the time of the last beat [ns], 0 for a slot that never beat."""
+        return self._words[slot * _WORDS_PER_SLOT + _STAMP]
 
     def age_ns(self, slot: int, now_ns: int) -> int:
         """Return the time since the last beat [ns]; since boot for a slot that never beat."""

@@ -18,12 +18,12 @@ class LastWordsSender:
         self._speaking: dict[str, tuple[LastWords, int]] = {}
         self._next_ns = 0
 
-    def begin(self, name: str, words: LastWords, now_ns: int) -> bool:
-        """Start to speak for a driver, at once; returns whether that is news."""
+    def begin(self, name: str, words: LastWords, since_ns: int) -> bool:
+        """Start to speak, at once, for a driver that is silent since then; returns whether that is news."""
         if name in self._speaking:
             return False
-        self._speaking[name] = (words, now_ns)
-        self._next_ns = now_ns
+        self._speaking[name] = (words, since_ns)
+        self._next_ns = 0
         return True
 
     def end(self, name: str) -> bool:

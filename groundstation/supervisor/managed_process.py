@@ -7,6 +7,7 @@ from contextlib import suppress
 
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
 from groundstation.supervisor.runtime_file import start_time
+from groundstation.supervisor.silence import signs_of, silent_since
 from groundstation.supervisor.table import ProcessSpec
 from groundstation.time_units import NS_PER_S
 
@@ -69,6 +70,20 @@ class ManagedProcess:
         """Return the time since its last beat [ns]."""
         return self._block.age_ns(self.slot, now_ns)
 
+    @property
+    def silent_since_ns(self) -> int:
+        """Since when others speak for it [ns], 0: it speaks itself; the guardian reads and may change it."""
+        return self._block.silent_since_ns(self.slot)
+
+    @silent_since_ns.setter
+    def silent_since_ns(self, since_ns: int) -> None:
+        self._block.set_silent_since(self.slot, since_ns)
+
+    def judge_silence(self, now_ns: int, awake_since_ns: int, limit_ns: int, *, gone: bool = False) -> int:
+        """Return since when it is silent [ns], 0: it is not; awake_since_ns: since when silence could be heard."""
+        signs = signs_of(self._block, self.slot, gone=gone)
+        return silent_since(signs, self.silent_since_ns, now_ns, awake_since_ns, limit_ns)
+
     def reap(self) -> int | None:
         """Return the exit code if the process has ended (negative: by that signal), and forget its handle."""
         if self._handle is None or not _has_ended(self.pid):
@@ -79,6 +94,7 @@ class ManagedProcess:
         code = self._handle.wait()
         os.close(self.pidfd)
         self._handle, self.pidfd = None, -1
+        self.silent_since_ns = self.judge_silence(0, 0, 0, gone=True)
         self._block.clear(self.slot)
         return code
 

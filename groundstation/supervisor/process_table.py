@@ -7,6 +7,14 @@ import sys
 
 from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder
 
+GUARDIAN = ProcessSpec(
+    name="guardian",
+    role="guardian",
+    entry="groundstation.supervisor.guardian:run",
+    stop_order=StopOrder.GUARDS,
+    stop_limit_s=16.0,  # a drone whose driver died during the stop is told to hover for 3 s and to land for 10 s
+    on_bus=False,  # it needs nobody
+)
 ROUTER = ProcessSpec(
     name="router",
     role="router",
@@ -75,4 +83,4 @@ MONITOR = ProcessSpec(
     stop_order=StopOrder.DECIDES,  # the terminal is the operator's again before the shut-down writes on it
     on_terminal=True,
 )
-ROWS = (ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, CONSOLE, MONITOR)
+ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, CONSOLE, MONITOR)

@@ -1,4 +1,4 @@
-"""The start of a run: the router, then everything else at once, and the wait until it is up."""
+"""The start of a run: guardian and router, then everything else at once, and the wait until it is up."""
 
 import time
 
@@ -23,18 +23,18 @@ class Start:
         self._supervisor = supervisor
 
     def run(self) -> None:
-        """Start the router, then everything else at once; returns when the run can begin.
+        """Start guardian and router, then everything else at once; returns when the run can begin.
 
         Raises GroundStationError when a required process cannot be started, fails or is late, Interrupted when the
         operator stops it.
         """
         supervisor = self._supervisor
         supervisor.prepare()
-        routers = [p for p in supervisor.processes if p.spec.stop_order is StopOrder.CONNECTS]
-        self._launch_all(routers)
-        self._wait_for(routers)
+        first = [p for p in supervisor.processes if p.spec.stop_order >= StopOrder.CONNECTS]
+        self._launch_all(first)
+        self._wait_for(first)
         supervisor.connect()
-        others = [p for p in supervisor.processes if p not in routers and not p.spec.on_terminal]
+        others = [p for p in supervisor.processes if p not in first and not p.spec.on_terminal]
         self._launch_all(others)
         supervisor.write_runtime_file()
         self._wait_for([p for p in others if p.spec.required])

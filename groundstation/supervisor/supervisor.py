@@ -20,13 +20,14 @@ from groundstation.supervisor.interrupts import Interrupts
 from groundstation.supervisor.launcher import Launcher
 from groundstation.supervisor.managed_process import ManagedProcess, exit_text
 from groundstation.supervisor.status import StatusPublisher
-from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder
+from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder, slot_of
 from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
 SOURCE = "supervisor"
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200_000_000
+_HURRY_S = 1.0
 _log = logging.getLogger(__name__)
 
 
@@ -54,7 +55,7 @@ class Supervisor:
         self.interrupts = Interrupts()
         self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
         self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path))
-        self.processes = [ManagedProcess(spec, slot + 1, self._block) for slot, spec in enumerate(table)]
+        self.processes = [ManagedProcess(spec, slot_of(index), self._block) for index, spec in enumerate(table)]
         self._last_words = LastWordsSender()
         self.bus: ZenohBus | None = None
         self._statuses: Subscription | None = None
@@ -181,18 +182,22 @@ class Supervisor:
 
     def _watch_heartbeat(self, process: ManagedProcess, now_ns: int) -> None:
         process.ready_ns = process.ready_ns or now_ns
-        # Silence counts only while this loop was awake to hear.
-        silent_s = min(process.heartbeat_age_ns(now_ns), now_ns - self._awake_since_ns) / NS_PER_S
-        if silent_s < process.spec.silence_limit_s:
+        # Silence counts only while this loop was awake to hear, unless the guardian has heard it meanwhile.
+        heard_s = min(process.heartbeat_age_ns(now_ns), now_ns - self._awake_since_ns) / NS_PER_S
+        limit_ns = int(process.spec.silence_limit_s * NS_PER_S)
+        process.silent_since_ns = process.judge_silence(now_ns, self._awake_since_ns, limit_ns)
+        if not process.silent_since_ns:
             if self._last_words.end(process.spec.name):
                 self.events.event(Severity.INFO, process, "has the word again")
             return
-        self._speak_for(process, f"silent for {silent_s:.2f} s", now_ns)
-        self._kill(process, f"hung: no heartbeat for {silent_s:.2f} s", silent_s >= process.spec.hang_limit_s)
+        self._speak_for(process, f"silent for {heard_s:.2f} s", now_ns)
+        self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s", heard_s >= process.spec.hang_limit_s)
 
     def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
         words = process.spec.last_words
-        if words is not None and not self._stopping and self._last_words.begin(process.spec.name, words, now_ns):
+        if words is None or self._stopping:
+            return
+        if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns):
             self.events.event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
 
     def _kill(self, process: ManagedProcess, reason: str, due: bool) -> None:
@@ -227,10 +232,12 @@ class Supervisor:
     def stop(self) -> None:
         """Stop everything in order, each with its deadline; a hurrying operator gets all of it at once."""
         self._stopping = True
+        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian speaks for who dies
         for order in StopOrder:
-            group = [p for p in self.processes if p.spec.stop_order is order and p.running]
-            if self.interrupts.hurry:
-                group = [p for p in self.processes if p.running]
+            running = [p for p in self.processes if p.running]
+            group = [p for p in running if p.spec.stop_order is order]
+            if self.interrupts.hurry and order is not StopOrder.GUARDS:
+                group = [p for p in running if p.spec.stop_order is not StopOrder.GUARDS]
             self._stop_group(group)
         self._last_words.close()
 
@@ -241,12 +248,16 @@ class Supervisor:
         began = time.monotonic()
         while alive := [p for p in group if p.running]:
             self.step()
-            limit_s = 1.0 if self.interrupts.hurry else None
             for process in alive:
-                late = time.monotonic() - began > (limit_s or process.spec.stop_limit_s)
-                self._kill(process, "did not stop in time", late)
-                if late and process.running:
-                    _log.warning("%s did not stop in time: killed", process.spec.name)
+                # Who waits for the guardian waits for a drone to land.
+                hurry = self.interrupts.hurry and process.spec.stop_order is not StopOrder.GUARDS
+                late_s = time.monotonic() - began - (_HURRY_S if hurry else process.spec.stop_limit_s)
+                self._end_late(process, late_s)
+
+    def _end_late(self, process: ManagedProcess, late_s: float) -> None:
+        self._kill(process, "did not stop in time", late_s > 0)
+        if late_s > 0 and process.running:
+            _log.warning("%s did not stop in time: killed", process.spec.name)
 
     def close(self) -> None:
         """Leave nothing behind: bus, runtime file, heartbeat block, log files; idempotent."""

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
+from groundstation.process.heartbeat import SUPERVISOR_SLOT
+
 
 class Restart(StrEnum):
     """What the end of a process means to the run."""
@@ -19,13 +21,14 @@ class StopOrder(IntEnum):
     EMULATES = 2
     RECORDS = 3
     CONNECTS = 4
+    GUARDS = 5
 
 
 @dataclass(frozen=True, slots=True)
 class LastWords:
-    """What the supervisor tells a drone for a driver that died or hangs, in the drone's own protocol.
+    """What supervisor or guardian tell a drone for a driver that died or hangs, in the drone's own protocol.
 
-    hover is repeated until the driver is READY again; after land_after_s it is land instead.
+    hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead.
     """
 
     address: str
@@ -64,3 +67,8 @@ class ProcessSpec:
     on_bus: bool = True
     on_terminal: bool = False
     keep_open: tuple[int, ...] = ()
+
+
+def slot_of(index: int) -> int:
+    """Return the heartbeat slot of the row at an index of the table."""
+    return SUPERVISOR_SLOT + 1 + index

@@ -47,6 +47,27 @@ def test_hover_is_on_the_wire_in_time(sitl: Start, tap: Any, name: str, number: 
     run.until_gone(30 if name == "supervisor" else 5)
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=lambda number: number.name)
+def test_somebody_speaks_without_supervisor_and_driver(sitl: Start, tap: Any, number: signal.Signals) -> None:
+    run = sitl()
+    run.until_tracking()
+    addresses = {drone: run.address(drone) for drone in run.record.drones}
+    os.kill(run.pid("drone_1"), number)
+    os.kill(run.process.pid, number)
+    broken = time.monotonic()
+    _until_on_ground(run, run.record.drones, broken + 20)
+    if number is signal.SIGSTOP:
+        run.process.send_signal(signal.SIGCONT)
+        run.process.send_signal(signal.SIGTERM)
+        run.wait(40)
+    run.until_gone(30)
+    for address in addresses.values():
+        assert tap.first_stop(address, broken) <= HOVER_S
+        moved = tap.last_motion(address, broken, broken + 60)
+        assert moved is None or moved <= HOVER_S, f"moved {moved:.2f} s after the fault, unasked"
+        assert tap.first_landing(address, broken) <= LAND_S + HOVER_S
+
+
 def _until_on_ground(run: Any, drones: tuple[str, ...], deadline: float) -> None:
     while not all(run.on_ground(drone) for drone in drones):
         run.listen()

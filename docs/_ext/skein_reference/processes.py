@@ -9,13 +9,13 @@ from groundstation.supervisor.table import ProcessSpec
 from skein_reference.markdown import code, page, table
 
 _INTRODUCTION = """\
-Generated from the process table of `config/lab.yaml`. The supervisor starts the router first and then all others at
-once. A process whose heartbeat is older than its hang limit is killed and started again; the limit counts from READY
-on, before that the start limit holds. At the end of a run processes stop in the order of the last column, those of
-one group together.
+Generated from the process table of `config/lab.yaml`. The supervisor starts guardian and router first and then all
+others at once. A process whose heartbeat is older than its hang limit is killed and started again; the limit counts
+from READY on, before that the start limit holds. At the end of a run processes stop in the order of the last column,
+those of one group together.
 
 A driver that dies, or is silent for {silence}, is replaced at once by prepared datagrams of the supervisor to its
-drone: hover, then land."""
+drone, or of the guardian where the supervisor is silent as well: hover, then land."""
 
 
 def processes() -> str:

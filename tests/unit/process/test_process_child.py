@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,32 @@ def test_beat_is_seen_by_another_mapping(block: HeartbeatBlock) -> None:
     other.clear(2)
     assert block.state(2) is SlotState.EMPTY
     other.close()
+
+
+def test_a_successor_inherits_nothing_but_the_silence(block: HeartbeatBlock) -> None:
+    assert not block.has_worked(2) and not block.has_ended(2) and block.pid(2) == block.beat_ns(2) == 0
+    block.set_state(2, SlotState.STARTING)
+    assert not block.has_worked(2)
+    block.set_state(2, SlotState.DEGRADED)
+    block.end(2)
+    block.set_silent_since(2, 5)
+    block.set_silent_since(3, 6)
+    assert block.has_worked(2) and block.has_ended(2) and block.pid(2) == os.getpid() and block.beat_ns(2)
+    block.clear(2)
+    assert not block.has_worked(2) and not block.has_ended(2) and block.pid(2) == block.beat_ns(2) == 0
+    assert (block.silent_since_ns(2), block.silent_since_ns(3)) == (5, 6)
+
+
+@pytest.mark.parametrize(("error", "ended"), [(None, True), (RuntimeError, False)])
+def test_only_an_ordinary_end_is_recorded_as_one(
+    block: HeartbeatBlock, error: type[Exception] | None, ended: bool
+) -> None:
+    spec = ChildSpec("one", "driver", "", "lab", str(block.path), 1)
+    with suppress(RuntimeError), Child(spec) as child:
+        child.ready()
+        if error:
+            raise error
+    assert block.has_ended(1) is ended and block.state(1) is SlotState.STOPPING
 
 
 def test_attaching_to_a_block_that_is_gone_fails(tmp_path: Path) -> None:

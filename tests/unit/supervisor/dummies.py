@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import time
 
 
@@ -48,3 +49,14 @@ def never_ready(child):
 def killed_when_ready(child):
     child.ready()
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def flying(child):
+    """Speak to a drone 30 times a second, whatever happens above."""
+    drone = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    child.ready()
+    while not child.stop_requested:
+        child.beat()
+        drone.sendto(b"fly", ("127.0.0.1", json.loads(child.section)["port"]))
+        child.sleep_until(time.monotonic_ns() + 33_000_000)
+    return 0

@@ -213,6 +213,7 @@ EMERGENCY = int(StateBit.EMERGENCY)
         (Action.TAKE_OFF, EMERGENCY, FlightState.EMERGENCY, 1 << 8),
         (Action.HOVER, FLY, FlightState.HOVERING, 1 << 9),
         (Action.HOVER, 0, FlightState.LANDED, 0),
+        (Action.HOVER, FLY, FlightState.LANDING, 0),
         (Action.FLY, FLY, FlightState.FLYING, 1 << 9),
         (Action.FLY, 0, FlightState.LANDED, 0),
         (Action.LAND, FLY, FlightState.FLYING, 0),

@@ -1,0 +1,35 @@
+"""What the guardian is told: which slots of the heartbeat block it watches, and what their drones are told."""
+
+from dataclasses import replace
+
+import msgspec
+
+from groundstation.supervisor.process_table import GUARDIAN
+from groundstation.supervisor.table import LastWords, ProcessSpec, slot_of
+
+
+class Post(msgspec.Struct, frozen=True):
+    """One guarded driver: its name, its slot in the heartbeat block, what its drone is told."""
+
+    name: str
+    slot: int
+    words: LastWords
+
+
+class GuardOrder(msgspec.Struct, frozen=True):
+    """The guardian's section; landing_s: how long LAND is said before it may end; down from 3 m takes as long."""
+
+    posts: tuple[Post, ...]
+    landing_s: float = 10.0
+
+
+def guarded(table: tuple[ProcessSpec, ...]) -> tuple[ProcessSpec, ...]:
+    """Return the table with a guardian ahead, if there is a drone that others than its driver can speak to."""
+    posts = tuple(
+        Post(spec.name, slot_of(index), spec.last_words)
+        for index, spec in enumerate(table, start=1)
+        if spec.last_words is not None
+    )
+    if not posts:
+        return table
+    return (replace(GUARDIAN, section=msgspec.json.encode(GuardOrder(posts)).decode()), *table)

@@ -1,0 +1,170 @@
+"""Who speaks to a drone, and what, when its driver is silent. Pure: signs of life in, words out.
+
+Precedence: the driver; the supervisor; the guardian. Both substitutes derive their words from one time alone, the
+last beat of the driver, so that they agree whenever they overlap. Proof: tests/property/test_somebody_speaks.py.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from groundstation.process.heartbeat import HeartbeatBlock, SlotState
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+# Of driver and supervisor alike. Shorter than the supervisor's own patience: after this the guardian has no time left.
+SILENCE_NS = 300 * NS_PER_MS
+# After this the supervisor would have spoken (0.4 s, and its turn), had it not just woken up itself.
+OVERDUE_NS = 450 * NS_PER_MS
+# As the supervisor's limit for drivers: who was replaced for so long must not come back and contradict.
+HANG_NS = 800 * NS_PER_MS
+# As the watchdog's: without a supervisor that could take over again, there is nothing to hover for.
+BRAKE_NS = NS_PER_S
+
+
+class Word(Enum):
+    """What a drone without driver is told."""
+
+    NONE = 0
+    HOVER = 1
+    LAND = 2
+
+
+class SupervisorState(Enum):
+    """Whether the supervisor speaks for drivers: it does, not while it stops the run, or it is frozen or dead."""
+
+    SPEAKS = 0
+    STOPS = 1
+    FROZEN = 2
+    DEAD = 3
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorSigns:
+    """What is known of the supervisor: its last beat, whether it lives, whether it stops the run."""
+
+    beat_ns: int
+    alive: bool = True
+    stops: bool = False
+
+    def state(self, now_ns: int) -> SupervisorState:
+        """Return what it does now."""
+        if not self.alive:
+            return SupervisorState.DEAD
+        if now_ns - self.beat_ns >= SILENCE_NS:
+            return SupervisorState.FROZEN
+        return SupervisorState.STOPS if self.stops else SupervisorState.SPEAKS
+
+
+@dataclass(frozen=True, slots=True)
+class DriverSigns:
+    """What is known of a driver's process: its slot of the heartbeat block, and whether the kernel has it still.
+
+    worked: it finished its start once; ended: it said that its work is done; gone: it is dead.
+    """
+
+    state: SlotState = SlotState.EMPTY
+    beat_ns: int = 0
+    worked: bool = False
+    ended: bool = False
+    gone: bool = False
+
+    @property
+    def driving(self) -> bool:
+        """Whether it has the drone: it finished its start, and is neither ending nor dead."""
+        return self.state in (SlotState.READY, SlotState.DEGRADED) and not self.ended and not self.gone
+
+    def heard_silent_ns(self, now_ns: int, awake_since_ns: int) -> int:
+        """Return for how long it was silent while the listener was awake [ns]."""
+        return max(0, now_ns - max(self.beat_ns, awake_since_ns))
+
+
+def signs_of(block: HeartbeatBlock, slot: int, *, gone: bool = False) -> DriverSigns:
+    """Return what a slot says of its holder; gone: the kernel's word."""
+    return DriverSigns(block.state(slot), block.beat_ns(slot), block.has_worked(slot), block.has_ended(slot), gone)
+
+
+def silent_since(signs: DriverSigns, before_ns: int, now_ns: int, awake_since_ns: int, limit_ns: int) -> int:
+    """Return since when a drone is without its driver [ns], 0: it has one, or never had, or does not need one any more.
+
+    before_ns: the same as recorded last; only a driver that finished its start resets it.
+    """
+    if not signs.worked:
+        return before_ns
+    if signs.ended:
+        return 0
+    if signs.driving:
+        if now_ns - signs.beat_ns < limit_ns:
+            return 0
+        if signs.heard_silent_ns(now_ns, awake_since_ns) < limit_ns:
+            return before_ns
+    return before_ns or signs.beat_ns
+
+
+def word_at(since_ns: int, now_ns: int, land_after_s: float) -> Word:
+    """Return what a drone is told that is without its driver since then (0: it is not)."""
+    if not since_ns:
+        return Word.NONE
+    return Word.LAND if now_ns - since_ns >= land_after_s * NS_PER_S else Word.HOVER
+
+
+@dataclass(frozen=True, slots=True)
+class GuardDecision:
+    """What the guardian does about one drone.
+
+    since_ns: to be recorded, if the guardian speaks; kill: the driver hangs, and nobody else ends it; settled: the
+    drone needs no guardian any more.
+    """
+
+    word: Word
+    since_ns: int
+    kill: bool
+    settled: bool
+
+
+class Guard:
+    """The guardian's rule for one drone; remembers only since when LAND is said, by whomever."""
+
+    def __init__(self, land_after_s: float, landing_s: float) -> None:
+        self._land_after_s, self._landing_s = land_after_s, landing_s
+        # LAND comes earlier by this where a driver that lives would land earlier, too.
+        self._earlier_ns = max(0, round(land_after_s * NS_PER_S) - BRAKE_NS)
+        self._land_since_ns = 0
+
+    def step(
+        self, now_ns: int, signs: DriverSigns, before_ns: int, supervisor: SupervisorSigns, awake_since_ns: int
+    ) -> GuardDecision:
+        """Return what to do now; before_ns: since when others speak for the driver, as recorded."""
+        state = supervisor.state(now_ns)
+        heard_silent_ns = signs.heard_silent_ns(now_ns, awake_since_ns)
+        overdue = signs.driving and not before_ns and heard_silent_ns >= OVERDUE_NS
+        supervised = state is SupervisorState.SPEAKS and not overdue
+        since_ns = before_ns
+        if not supervised:
+            since_ns = silent_since(signs, before_ns, now_ns, awake_since_ns, SILENCE_NS)
+            since_ns = since_ns and self._as_driver_would(since_ns, before_ns, supervisor.beat_ns, state)
+        word = word_at(since_ns, now_ns, self._land_after_s)
+        self._land_since_ns = (self._land_since_ns or now_ns) if word is Word.LAND else 0
+        landed = word is Word.LAND and now_ns - self._land_since_ns >= self._landing_s * NS_PER_S
+        # Before LAND is said, who hangs is ended: it might wake up and take LAND back.
+        hangs = heard_silent_ns >= HANG_NS or word is Word.LAND
+        lost = state in (SupervisorState.FROZEN, SupervisorState.DEAD)
+        return GuardDecision(
+            word=Word.NONE if supervised else word,
+            since_ns=since_ns,
+            kill=lost and bool(since_ns) and signs.driving and hangs,
+            settled=landed or (not since_ns and not signs.driving),
+        )
+
+    def _as_driver_would(self, since_ns: int, before_ns: int, supervisor_ns: int, state: SupervisorState) -> int:
+        """Return the time that leads to LAND when a living driver would have landed: it heeds the supervisor's silence.
+
+        A driver that dies while it lands for that reason is so not followed by hover.
+        """
+        match state:
+            case SupervisorState.DEAD:
+                return max(1, min(since_ns, supervisor_ns - self._earlier_ns))
+            case SupervisorState.FROZEN:
+                return max(1, min(since_ns, supervisor_ns))
+            case SupervisorState.STOPS:
+                return before_ns or max(1, since_ns - self._earlier_ns)
+            case SupervisorState.SPEAKS:
+                return since_ns

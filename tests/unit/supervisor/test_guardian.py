@@ -1,0 +1,216 @@
+"""The guardian against real processes: who speaks to a fake drone when driver and supervisor die, freeze and end."""
+
+import json
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise, product
+from pathlib import Path
+
+import msgspec
+import pytest
+from dummy_table import spec, until
+
+from groundstation.supervisor.guard_order import GuardOrder, guarded
+from groundstation.supervisor.runtime_file import start_time
+from groundstation.supervisor.supervisor import Run, Supervisor
+from groundstation.supervisor.table import LastWords, ProcessSpec
+from groundstation.supervisor.terminal import Terminal
+
+HERE = Path(__file__).parent
+LAND_AFTER_S, LANDING_S = 1.0, 0.4
+
+
+class FakeDrone:
+    """A UDP port on loopback that notes (time [s], datagram)."""
+
+    def __init__(self) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self.port = int(self._socket.getsockname()[1])
+
+    def listen(self, for_s: float) -> list[tuple[float, bytes]]:
+        heard, end = [], time.monotonic() + for_s
+        while (left := end - time.monotonic()) > 0:
+            self._socket.settimeout(left)
+            try:
+                heard.append((self._socket.recv(100), time.monotonic()))
+            except TimeoutError:
+                break
+        return [(at, data) for data, at in heard]
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture
+def drone() -> Iterator[FakeDrone]:
+    made = FakeDrone()
+    yield made
+    made.close()
+
+
+def table(drone: FakeDrone, entry: str, **options: object) -> tuple[ProcessSpec, ...]:
+    """Return a guardian that is content early, and a driver of a dummy's kind."""
+    words = LastWords("127.0.0.1", drone.port, b"hover", b"land", LAND_AFTER_S)
+    section = json.dumps({"port": drone.port})
+    guardian, driver = guarded((spec("drone_1", entry, section=section, last_words=words, on_bus=False, **options),))
+    order = msgspec.json.decode(guardian.section, type=GuardOrder)
+    brief = msgspec.json.encode(GuardOrder(order.posts, LANDING_S)).decode()
+    return replace(guardian, section=brief), driver
+
+
+@pytest.fixture
+def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Supervisor]]:
+    monkeypatch.setenv("PYTHONPATH", str(HERE))
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    made: list[Supervisor] = []
+    sink = os.open(tmp_path / "terminal", os.O_WRONLY | os.O_CREAT)
+
+    def begin(rows: tuple[ProcessSpec, ...]) -> Supervisor:
+        supervisor = Supervisor(Run("lab", "lab", "", tmp_path / "run", ()), rows, Terminal(sink))
+        made.append(supervisor)
+        supervisor.prepare()
+        for process in supervisor.processes:
+            supervisor.launch(process)
+        until(supervisor, lambda: all(process.is_up for process in supervisor.processes))
+        return supervisor
+
+    yield begin
+    for supervisor in made:
+        supervisor.close()
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    os.close(sink)
+
+
+SCRIPT = """
+    import json, pickle, sys
+    from pathlib import Path
+    from groundstation.supervisor.supervisor import Run, Supervisor
+    from groundstation.supervisor.terminal import Terminal
+    folder, rows = Path(sys.argv[1]), pickle.loads(bytes.fromhex(sys.argv[2]))
+    supervisor = Supervisor(Run("lab", "lab", "", folder, ()), rows, Terminal())
+    supervisor.prepare()
+    for process in supervisor.processes:
+        supervisor.launch(process)
+    while not all(process.is_up for process in supervisor.processes):
+        supervisor.step()
+    print(json.dumps({p.spec.name: p.pid for p in supervisor.processes}), flush=True)
+    while True:
+        supervisor.step()
+"""
+
+
+class SupervisedRun:
+    """A supervisor in a process of its own; `pids` are those of its children by name."""
+
+    def __init__(self, folder: Path, rows: tuple[ProcessSpec, ...]) -> None:
+        command = [sys.executable, "-c", textwrap.dedent(SCRIPT), str(folder), pickle.dumps(rows).hex()]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE)
+        assert self.process.stdout is not None
+        self.pids: dict[str, int] = json.loads(self.process.stdout.readline())
+
+    def alive(self, name: str) -> bool:
+        return start_time(self.pids[name]) is not None
+
+    def until_gone(self, *names: str, limit_s: float = 5.0) -> None:
+        deadline = time.monotonic() + limit_s
+        while any(map(self.alive, names)):
+            assert time.monotonic() < deadline, f"orphans among {names}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+        for name, pid in self.pids.items():
+            if self.alive(name):
+                os.kill(pid, signal.SIGKILL)
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drone: FakeDrone) -> Iterator[SupervisedRun]:
+    monkeypatch.setenv("PYTHONPATH", f"{HERE}:{os.environ.get('PYTHONPATH', '')}")
+    made = SupervisedRun(tmp_path / "run", table(drone, "flying"))
+    yield made
+    made.close()
+
+
+FATES = list(product((signal.SIGKILL, signal.SIGSTOP), repeat=2))
+
+
+@pytest.mark.parametrize(("above", "below"), FATES, ids=[f"{a.name}-{b.name}" for a, b in FATES])
+def test_hovers_and_lands_a_drone_without_supervisor_and_driver(
+    run: SupervisedRun, drone: FakeDrone, above: signal.Signals, below: signal.Signals
+) -> None:
+    assert {data for _, data in drone.listen(0.3)} == {b"fly"}
+    broken = time.monotonic()
+    os.kill(run.pids["drone_1"], below)
+    run.process.send_signal(above)
+    heard = [(at - broken, data) for at, data in drone.listen(2.0)]
+    stops = [at for at, data in heard if data != b"fly"]
+    lands = [at for at, data in heard if data == b"land"]
+    assert stops[0] <= 0.5 and lands[0] <= LAND_AFTER_S + 0.5
+    assert all(data != b"fly" for at, data in heard if at > stops[0]), "hover, then land, and nothing else"
+    assert all(data == b"land" for at, data in heard if at > lands[0])
+    times = [0.0, *(at for at, _ in heard), 1.4]
+    assert max(b - a for a, b in pairwise(times)) <= 0.5, "somebody always speaks"
+    run.until_gone("drone_1")
+    if above is signal.SIGSTOP:
+        assert run.alive("guardian"), "the supervisor may wake up"
+        run.process.kill()
+    run.until_gone("guardian")
+
+
+def test_is_silent_while_the_driver_lives(run: SupervisedRun, drone: FakeDrone) -> None:
+    run.process.kill()
+    heard = drone.listen(1.5)
+    assert len(heard) > 30 and {data for _, data in heard} == {b"fly"}
+    assert run.alive("guardian")
+    os.kill(run.pids["drone_1"], signal.SIGTERM)  # it ends as one that has landed
+    run.until_gone("drone_1", "guardian")
+    assert {data for _, data in drone.listen(0.2)} <= {b"fly"}
+
+
+def test_a_supervisor_that_wakes_up_goes_on_with_land(run: SupervisedRun, drone: FakeDrone) -> None:
+    os.kill(run.pids["drone_1"], signal.SIGKILL)
+    run.process.send_signal(signal.SIGSTOP)
+    said = [data for _, data in drone.listen(1.6)]
+    assert said[-1] == b"land"
+    run.process.send_signal(signal.SIGCONT)
+    assert b"hover" not in {data for _, data in drone.listen(0.3)}
+    said = [data for _, data in drone.listen(3.0)]
+    assert said[-1] == b"fly", "the driver was started again"
+
+
+def test_is_started_again_and_ends_with_the_run(start: Callable[..., Supervisor], drone: FakeDrone) -> None:
+    supervisor = start(table(drone, "flying"))
+    guardian, driver = supervisor.processes
+    pids = guardian.pid, driver.pid
+    os.kill(guardian.pid, signal.SIGKILL)
+    until(supervisor, lambda: guardian.is_up and guardian.pid != pids[0])
+    os.kill(guardian.pid, signal.SIGSTOP)
+    pids = guardian.pid, driver.pid
+    until(supervisor, lambda: guardian.is_up and guardian.pid != pids[0])
+    assert driver.pid == pids[1]
+    began = time.monotonic()
+    supervisor.stop()
+    assert time.monotonic() - began < 1.5
+    assert {data for _, data in drone.listen(0.1)} == {b"fly"}
+
+
+def test_lands_a_drone_whose_driver_is_killed_during_the_stop(
+    start: Callable[..., Supervisor], drone: FakeDrone
+) -> None:
+    supervisor = start(table(drone, "deaf", stop_limit_s=0.2))
+    supervisor.stop()
+    said = [data for _, data in drone.listen(0.1)]
+    assert said[0] == b"hover" and said[-1] == b"land"
+    assert not any(process.running for process in supervisor.processes)

@@ -11,9 +11,12 @@ import time
 from enum import IntEnum
 from pathlib import Path
 
+from groundstation.errors import GroundStationError
+
 SUPERVISOR_SLOT = 0
 _WORDS_PER_SLOT = 8  # one cache line each, so that two beating processes never share one
 _STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE = 0, 1, 2, 3, 4, 5
+_LEFT_BEHIND_NS = 10_000_000_000
 
 
 class SlotState(IntEnum):
@@ -43,9 +46,20 @@ class HeartbeatBlock:
 
     @classmethod
     def create(cls, name: str, slots: int) -> "HeartbeatBlock":
-        """Return a new zeroed block in memory-backed storage where the host has it."""
+        """Return a new zeroed block in memory-backed storage where the host has it.
+
+        A block of that name that nobody beats any more is replaced; raises GroundStationError for any other.
+        """
         folder = Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())
-        return cls(folder / name, slots, create=True)
+        path = folder / name
+        try:
+            if path.exists() and not _is_live(path):
+                path.unlink()
+            return cls(path, slots, create=True)
+        except FileExistsError:
+            raise GroundStationError(f"another run beats in {path}: end it") from None
+        except OSError as error:
+            raise GroundStationError(f"cannot make the heartbeat block {path}: {error.strerror}; remove it") from error
 
     @classmethod
     def attach(cls, path: str) -> "HeartbeatBlock":
@@ -112,3 +126,16 @@ class HeartbeatBlock:
         self._map.close()
         if remove:
             self.path.unlink(missing_ok=True)
+
+
+def _is_live(path: Path) -> bool:
+    """Return whether somebody has beaten in a block of late; raises OSError when it cannot be read."""
+    try:
+        block = HeartbeatBlock.attach(str(path))
+    except ValueError:  # empty: its creator died in between
+        return False
+    now_ns = time.monotonic_ns()
+    slots = range(len(block._words) // _WORDS_PER_SLOT)
+    live = any(block.beat_ns(slot) and block.age_ns(slot, now_ns) < _LEFT_BEHIND_NS for slot in slots)
+    block.close()
+    return live

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.errors import GroundStationError
 from groundstation.process.child import Child, ChildSpec
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.parent import ParentWatch
@@ -53,6 +54,16 @@ def test_a_successor_inherits_nothing_but_the_silence(block: HeartbeatBlock) -> 
     block.clear(2)
     assert not block.has_worked(2) and not block.has_ended(2) and block.pid(2) == block.beat_ns(2) == 0
     assert (block.silent_since_ns(2), block.silent_since_ns(3)) == (5, 6)
+
+
+def test_a_block_that_a_dead_run_left_is_replaced(block: HeartbeatBlock) -> None:
+    block.path.write_bytes(b"")  # not even its size was set
+    HeartbeatBlock.create(block.path.name, 2).close()
+    made = HeartbeatBlock.create(block.path.name, 2)
+    made.beat(1)
+    with pytest.raises(GroundStationError, match="another run beats in"):
+        HeartbeatBlock.create(block.path.name, 2)
+    made.close()
 
 
 @pytest.mark.parametrize(("error", "ended"), [(None, True), (RuntimeError, False)])

@@ -98,6 +98,13 @@ class ManagedProcess:
         self._block.clear(self.slot)
         return code
 
+    def abandon(self) -> None:
+        """Forget a process that even SIGKILL does not end; the kernel ends it when it can."""
+        if self._handle is not None:
+            os.close(self.pidfd)
+            self._handle.returncode = -signal.SIGKILL  # else its destructor would complain
+            self._handle, self.pidfd = None, -1
+
     def signal(self, number: int) -> None:
         """Signal the process, if it still runs."""
         if self._handle is not None:

@@ -28,6 +28,8 @@ SOURCE = "supervisor"
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200_000_000
 _HURRY_S = 1.0
+# A process that is killed and still there hangs in the kernel, on a device or a network disk.
+_KERNEL_S = 3.0
 _log = logging.getLogger(__name__)
 
 
@@ -258,6 +260,9 @@ class Supervisor:
         self._kill(process, "did not stop in time", late_s > 0)
         if late_s > 0 and process.running:
             _log.warning("%s did not stop in time: killed", process.spec.name)
+        if late_s > _KERNEL_S and process.running:
+            process.abandon()
+            self.events.event(Severity.ERROR, process, f"cannot be killed (pid {process.pid}): left behind")
 
     def close(self) -> None:
         """Leave nothing behind: bus, runtime file, heartbeat block, log files; idempotent."""

@@ -19,6 +19,7 @@ import pytest
 from dummy_table import spec, until
 
 from groundstation.supervisor.guard_order import GuardOrder, guarded
+from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.supervisor.runtime_file import start_time
 from groundstation.supervisor.supervisor import Run, Supervisor
 from groundstation.supervisor.table import LastWords, ProcessSpec
@@ -214,3 +215,17 @@ def test_lands_a_drone_whose_driver_is_killed_during_the_stop(
     said = [data for _, data in drone.listen(0.1)]
     assert said[0] == b"hover" and said[-1] == b"land"
     assert not any(process.running for process in supervisor.processes)
+
+
+def test_who_cannot_be_killed_is_left_behind(
+    start: Callable[..., Supervisor], drone: FakeDrone, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("groundstation.supervisor.supervisor._KERNEL_S", 0.2)
+    supervisor = start(table(drone, "deaf", stop_limit_s=0.2)[1:])
+    (driver,) = supervisor.processes
+    with monkeypatch.context() as kernel:
+        kernel.setattr(ManagedProcess, "signal_group", lambda self, number: None)
+        supervisor.stop()
+    assert not driver.running
+    os.kill(driver.pid, signal.SIGKILL)
+    os.waitpid(driver.pid, 0)

@@ -5,10 +5,10 @@ from pathlib import Path
 from groundstation.engineering_views.extras import require_rerun
 from groundstation.engineering_views.field import field_of
 from groundstation.errors import MessageError
+from groundstation.recording.file_topics import is_picture
 from groundstation.recording.outputs import OutputError, new_file
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
-from groundstation.recording.schemas import is_picture
 
 APPLICATION = "skein"
 

@@ -13,7 +13,7 @@ from groundstation.engineering_views.rerun_file import APPLICATION
 from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
 from groundstation.errors import GroundStationError, MessageError
 from groundstation.field.resolved import ResolvedField
-from groundstation.recording.schemas import is_picture
+from groundstation.recording.file_topics import is_picture
 from groundstation.recording.timeline import Timeline
 
 HOST = "127.0.0.1"

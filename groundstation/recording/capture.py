@@ -13,7 +13,8 @@ from groundstation.bus.messages import ClockOffset, Header
 from groundstation.bus.topics import CLOCK
 from groundstation.errors import MessageError
 from groundstation.recording import viewers
-from groundstation.recording.schemas import Description, description_of, is_picture
+from groundstation.recording.file_topics import is_picture
+from groundstation.recording.schemas import Description, description_of
 from groundstation.recording.timeline import Timeline
 
 

@@ -21,10 +21,9 @@ from groundstation.bus.topics import Topic
 from groundstation.errors import MessageError
 from groundstation.recording.chunks import UNREADABLE, RawRecord, chunk_data, chunk_records, frames
 from groundstation.recording.compatibility import RecordingError, require_ours, require_readable
-from groundstation.recording.file_topics import STATE
+from groundstation.recording.file_topics import STATE, is_picture
 from groundstation.recording.part_names import numbered_parts
 from groundstation.recording.preamble import FIELD_NAME
-from groundstation.recording.schemas import is_picture
 from groundstation.recording.viewers import picture_parts
 
 __all__ = [

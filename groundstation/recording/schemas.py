@@ -14,6 +14,7 @@ import msgspec
 
 from groundstation.bus.messages import Header, Message
 from groundstation.bus.topics import Topic
+from groundstation.recording.file_topics import is_picture
 from groundstation.recording.viewers import viewer_descriptor
 
 JsonSchema = dict[str, Any]
@@ -39,11 +40,6 @@ class Description:
     schema_name: str
     schema_encoding: str
     schema: bytes
-
-
-def is_picture(topic: Topic) -> bool:
-    """Return whether the raw bytes of a topic are pictures."""
-    return topic.type is None and topic.encoding.startswith(("image/", "video/"))
 
 
 def recorded_type(topic: Topic) -> RecordedType:

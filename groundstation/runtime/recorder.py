@@ -4,6 +4,7 @@ Started as `groundstation.runtime.recorder:run`. See groundstation/recording for
 """
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -14,10 +15,11 @@ from groundstation.field.resolved import field_from_json
 from groundstation.process.child import Child
 from groundstation.recording.disk_space import Space, assess, free_bytes
 from groundstation.recording.file_topics import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
-from groundstation.recording.rotating_file import FileSeries, Rotation
 from groundstation.recording.timeline import Timeline
-from groundstation.recording.writing import RunWriter
 from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+if TYPE_CHECKING:
+    from groundstation.recording.rotating_file import FileSeries, Rotation
 
 # 15 turns a second: the heartbeat needs 10, and each turn costs a wake-up of the interpreter.
 _PERIOD_NS = 66 * NS_PER_MS
@@ -37,8 +39,10 @@ class RecorderSection(msgspec.Struct, frozen=True):
     epoch: int = 0
 
 
-def _rotation(settings: RecordingValues) -> Rotation:
+def _rotation(settings: RecordingValues) -> "Rotation":
     """Return when a part is full."""
+    from groundstation.recording.rotating_file import Rotation
+
     return Rotation(round(settings.rotate_mb * 1e6), round(settings.rotate_minutes * 60 * NS_PER_S))
 
 
@@ -46,10 +50,18 @@ class Recorder:
     """Drains the bus into the files of one run."""
 
     def __init__(self, child: Child, section: RecorderSection) -> None:
+        # First of all: what is said from now on waits in these queues, whatever writing it still takes to load. Bounded
+        # in bytes as well as in number: a picture is a hundred times a state message.
+        settings = field_from_json(section.field).recording
+        self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
+        self._image_queue = child.bus.subscribe(IMAGE_TOPICS, capacity=64)
+        self._datagram_queue = child.bus.subscribe(DATAGRAM_TOPICS if settings.raw_datagrams else (), capacity=4096)
+        # Only here: formats and compression take half a second, which a recorder that was killed does not have.
+        from groundstation.recording.writing import RunWriter
+
         self._child = child
         self._folder = Path(section.run_dir)
         self._folder.mkdir(parents=True, exist_ok=True)
-        settings = field_from_json(section.field).recording
         timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
         self._space = Space.AMPLE
         self._space_ns = 0
@@ -57,10 +69,6 @@ class Recorder:
             self._folder, bytes(section.field), section.epoch, timeline, self._has_room, _rotation(settings)
         )
         self._series = (self._writer.state, self._writer.raw)
-        # Bounded in bytes as well as in number: a picture is a hundred times a state message.
-        self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
-        self._image_queue = child.bus.subscribe(IMAGE_TOPICS, capacity=64)
-        self._datagram_queue = child.bus.subscribe(DATAGRAM_TOPICS if settings.raw_datagrams else (), capacity=4096)
 
     def turn(self) -> None:
         """Write what has arrived, flush when due, watch the disk."""
@@ -76,7 +84,7 @@ class Recorder:
         for series in self._series:
             self._report(series)
 
-    def _report(self, series: FileSeries) -> None:
+    def _report(self, series: "FileSeries") -> None:
         for trouble in series.take_troubles():
             severity = Severity.INFO if trouble.recovered else Severity.ERROR
             remedy = (

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from groundstation.recording import disk_space
 from groundstation.recording import rotating_file as series_module
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.reader import open_recording, parts
+from groundstation.recording.writing import RunWriter
 from groundstation.runtime import recorder as recorder_module
 from groundstation.runtime.recorder import Recorder, RecorderSection
 from groundstation.settings.files import find_field
@@ -115,6 +118,27 @@ def test_low_disk_warns_then_drops_pictures_only(
     assert recorder._space is disk_space.Space.NO_IMAGES
     assert len(list(open_recording(tmp_path / "raw.mcap").raw_records())) == 2
     assert len(list(open_recording(tmp_path / "state.mcap").raw_records())) == 3
+
+
+def test_what_is_said_while_the_writer_loads_is_recorded(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, child = sender
+
+    def load_slowly(*arguments: Any) -> RunWriter:
+        _say(bus, "meanwhile")
+        return RunWriter(*arguments)
+
+    monkeypatch.setattr("groundstation.recording.writing.RunWriter", load_slowly)
+    _recorder(child, tmp_path).close()
+    (raw,) = open_recording(tmp_path / "state.mcap").raw_records()
+    assert b"meanwhile" in raw.data
+
+
+def test_a_recorder_that_starts_again_loads_formats_only_after_it_listens() -> None:
+    script = "import groundstation.runtime.recorder, sys; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "mcap", "zstandard", "google.protobuf"} & set(loaded)
 
 
 def test_datagrams_are_left_out_on_request(sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path) -> None:

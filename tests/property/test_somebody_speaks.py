@@ -56,7 +56,7 @@ def fates(*spans_ms: int) -> list[Fate]:
     return [Fate("dead", at) for at in ONSETS_MS] + freezes
 
 
-COARSE = fates(700, FOREVER)
+COARSE = fates(700, 4_000, FOREVER)
 FINE = fates(340, 600, 700, 1_300, 4_000, FOREVER)
 
 
@@ -83,6 +83,7 @@ class World:
     lands: bool = False
     hovers: bool = False
     up_at: int = 0
+    noticed: dict[str, int] = field(default_factory=dict)
     # Of the supervisor's, the guardian's.
     supervisor_turn: int = 0
     supervisor_awake: int = 0
@@ -125,12 +126,19 @@ class World:
                 self.state, self.ended, self.gone = SlotState.STOPPING, True, True  # it never heard the drone
                 return
             self.state, self.worked, self.lands = SlotState.READY, True, True
-        self.hovers |= t - self.last_turn > 500
-        silent = t - self.supervisor_beat
-        self.hovers |= silent >= 1_000
-        self.lands |= silent >= 3_000 or (self.supervisor.dead(t) and silent >= 1_000)
+        dead, frozen = self.lasted("dead", self.supervisor.dead(t), t), self.lasted("frozen", self.stale(t), t)
+        self.hovers |= t - self.last_turn > 500 or frozen >= 1_000
+        self.lands |= dead >= 1_000 or frozen >= 2_700
         self.last_turn = self.beat = t
-        self.say(t, "driver", LAND if self.lands else HOVER if self.hovers or silent >= 300 else FLY)
+        self.say(t, "driver", LAND if self.lands else HOVER if self.hovers or self.stale(t) else FLY)
+
+    def stale(self, t: int) -> bool:
+        return t - self.supervisor_beat >= 300
+
+    def lasted(self, what: str, condition: bool, t: int) -> int:
+        """Return for how long a driver has noticed something: one that wakes up notices late."""
+        since = self.noticed.setdefault(what, t) if condition else self.noticed.pop(what, t)
+        return t - since
 
     def turn_supervisor(self, t: int) -> None:
         """Speak after 400 ms, kill after 800 ms, start again what ended."""

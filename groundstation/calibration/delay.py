@@ -1,74 +1,36 @@
 """How late is each sensor? Found in a recorded flight, from what sensors say of the same motion.
 
 A fixed camera sees headings, which a vehicle's gyroscopes tell without delay: that dates its pictures. Its positions
-then date the vehicles' velocities and heights. Cameras on vehicles are dated by the filter: with wrongly dated pictures
-it predicts what they see worse.
+then date the vehicles' velocities and heights. Cameras on vehicles are dated by the filter: it predicts what all
+cameras see worse where one is dated wrongly.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-import msgspec
 import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import Message, Odometry, RelativeObservation
-from groundstation.calibration.recorded_likelihood import Change as Dating
-from groundstation.calibration.recorded_likelihood import Flown, Surprise
+from groundstation.calibration.camera_delays import onboard_cameras
+from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
 from groundstation.calibration.time_offset import Part, across, briefly, interpolated, rate_hz, shift_between
 from groundstation.estimation.models import OdometryRobot
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import WorldCamera
-from groundstation.geometry.parabola import least
 from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
 
 M = TypeVar("M", bound=Message)
 
 # A height is told by climbs of so much within the window, for so long.
 _CLIMB_M, _CLIMBING_S = 0.2, 10.0
-_LEAST_PAIRS = 60
-_SHIFTS_MS = np.arange(-80.0, 101.0, 20.0)
-# Errors of successive pictures are alike: so many say the same.
-_NEIGHBOURS = 3.0
-_ROUNDS = 2
 _TURN = "turn the drones to and fro in its sight, or let the target circle them"
 _DASH = "dash to and fro in sight of a fixed camera, or chase a target that keeps turning back; or fly four minutes"
 _CLIMB = "take off and land some five times in sight of a fixed camera, in one recording"
-_TARGET_ONLY = "doubtful: it saw hardly any other drone, and how the target moves nobody knows"
-_WATCH = "turn and move while it sees another drone"
-_UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
-
-
-@dataclass(frozen=True, slots=True)
-class Delay:
-    """One sensor: the setting, what it says [ms], what was measured and one sigma of it.
-
-    reason: why it was not measured, or why what was measured is not to be trusted.
-    flight: which flight would tell it.
-    """
-
-    sensor: str
-    setting: str
-    now_ms: float
-    measured_ms: float | None = None
-    std_ms: float | None = None
-    reason: str = ""
-    flight: str = ""
-
-    @property
-    def sure(self) -> bool:
-        """Return whether the recording tells it to better than 15 ms."""
-        return self.measured_ms is not None and self.std_ms is not None and self.std_ms <= _UNSURE_MS
-
-    @property
-    def differs(self) -> bool:
-        """Return whether something trustworthy contradicts the setting: by three sigmas, and by more than 10 ms."""
-        if self.measured_ms is None or self.std_ms is None or not self.sure or self.reason:
-            return False
-        return abs(self.measured_ms - self.now_ms) > max(_TOLERATED_MS, 3.0 * self.std_ms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +71,8 @@ def delays(flown: Flown, resolved: ResolvedField) -> list[Delay]:
         name, track = max(seen, key=lambda pair: len(pair[1].times))
         moved = _Track(track.times + exposure_s[name], track.positions, track.headings)
         found += _odometry(drone, settings, habits[drone], moved, own[drone])
-    later_ms = {name: -1e3 * shift for name, shift in exposure_s.items()}
-    return found + _onboard_cameras(flown, resolved, later_ms)
+    fixed = {one.sensor: one for one in found if one.sensor in resolved.cameras}
+    return found + onboard_cameras(flown, resolved, fixed)
 
 
 def _track(flown: Flown, name: str, camera: WorldCamera, drone: str) -> _Track:
@@ -147,7 +109,7 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
     now_ms = camera.video_delay_ms
     parts: list[Part] = []
     for drone, track in tracks.items():
-        if len(track.times) > _LEAST_PAIRS and len(own[drone].times) > _LEAST_PAIRS:
+        if len(track.times) > LEAST_SEEN and len(own[drone].times) > LEAST_SEEN:
             mine = own[drone]
             turned = interpolated(mine.times, mine.heading[:, None])
             parts.append(Part(track.times, track.headings[:, None], turned, across(track.times)))
@@ -167,7 +129,7 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
 def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _Track, own: _Own) -> list[Delay]:
     names = [f"drones.{drone}.odometry.{kind}_delay_ms" for kind in ("velocity", "height")]
     now_ms = [settings.odometry.velocity_delay_ms, settings.odometry.height_delay_ms]
-    if len(track.times) < _LEAST_PAIRS or len(own.times) < _LEAST_PAIRS:
+    if len(track.times) < LEAST_SEEN or len(own.times) < LEAST_SEEN:
         reason = "no fixed camera saw it long enough"
         told = zip(("velocity", "height"), names, now_ms, (_DASH, _CLIMB), strict=True)
         return [Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight) for kind, name, now, flight in told]
@@ -178,7 +140,7 @@ def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _T
     height = None
     in_a_second = across(track.times)
     climbing = np.abs(in_a_second(body[:, 2:])) > _CLIMB_M
-    if known.sum() > _LEAST_PAIRS and climbing.sum() >= _CLIMBING_S * rate_hz(track.times):
+    if known.sum() > LEAST_SEEN and climbing.sum() >= _CLIMBING_S * rate_hz(track.times):
         reported = interpolated(own.times[known], own.height[known, None])
         height = shift_between([Part(track.times, body[:, 2:], reported, in_a_second)], False)
     reasons = ("it moved too little in sight of a fixed camera", "it climbed too little, or reports no height")
@@ -217,50 +179,3 @@ def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
         return np.column_stack([np.interp(times, then, summed[:, k]) for k in range(2)])
 
     return path
-
-
-def _onboard_cameras(flown: Flown, resolved: ResolvedField, later_ms: dict[str, float]) -> list[Delay]:
-    """Return the delays of the cameras on vehicles, one after the other: each is judged by what the others saw.
-
-    later_ms: by how much others are known to be later than their settings say; is added to.
-    """
-    found: dict[str, Delay] = {}
-    for _ in range(_ROUNDS):
-        for drone, settings in resolved.drones.items():
-            one = _onboard_camera(flown, resolved, drone, settings.camera.video_delay_ms, later_ms)
-            found[drone] = one
-            later_ms[drone] = (one.measured_ms or one.now_ms) - one.now_ms if one.sure else 0.0
-    return list(found.values())
-
-
-def _onboard_camera(
-    flown: Flown, resolved: ResolvedField, drone: str, now_ms: float, later_ms: Mapping[str, float]
-) -> Delay:
-    setting = f"drones.{drone}.camera.video_delay_ms"
-    surprise = Surprise(flown, resolved, drone)
-    if not surprise.enough:
-        return Delay(f"{drone} camera", setting, now_ms, reason="it saw too little", flight=_WATCH)
-    costs = np.array([surprise.of(resolved, _dated({**later_ms, drone: float(shift)})) for shift in _SHIFTS_MS])
-    found = least(_SHIFTS_MS, costs, 2)
-    if found is None:
-        return Delay(
-            f"{drone} camera", setting, now_ms, reason="none within 80 ms of the setting fits best", flight=_WATCH
-        )
-    if found.curvature <= 0:
-        return Delay(f"{drone} camera", setting, now_ms, reason="the recording does not tell", flight=_WATCH)
-    std_ms = float(np.sqrt(_NEIGHBOURS / found.curvature))
-    drones = sum(m.observer == drone and m.subject in resolved.drones for m in _messages(flown, RelativeObservation))
-    doubt = "" if drones >= _LEAST_PAIRS else _TARGET_ONLY
-    return Delay(f"{drone} camera", setting, now_ms, now_ms + found.place, std_ms, doubt, _WATCH)
-
-
-def _dated(later_ms: Mapping[str, float]) -> Dating:
-    """Return a change that dates observers' pictures as if they had been so much longer on their way."""
-
-    def change(message: Message) -> Message:
-        if not isinstance(message, RelativeObservation) or not later_ms.get(message.observer):
-            return message
-        stamp_ns = message.header.stamp_ns - round(later_ms[message.observer] * 1e6)
-        return msgspec.structs.replace(message, header=msgspec.structs.replace(message.header, stamp_ns=stamp_ns))
-
-    return change

@@ -1,16 +1,17 @@
-"""A recorded flight, lived again by today's filter under assumptions of choice: how likely does it find what was seen?
+"""A recorded flight, lived again by today's filter under delays of choice: how likely does it find what was seen?
 
 No planner, no truth: only what the tracker took in, tick by tick.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
+import msgspec
 import numpy as np
 
 from groundstation.bus.messages import Message, RelativeObservation
+from groundstation.calibration.likeliest import Costs
 from groundstation.errors import OperatorMistake
 from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
@@ -21,9 +22,6 @@ from groundstation.tracker import tracker_from_field
 # A correction counts like one of Student's distribution with so many degrees of freedom: outliers must not decide.
 _FREEDOM = 8.0
 _SETTLING_NS = 3_000_000_000
-_LEAST_SEEN = 60
-
-Change = Callable[[Message], Message]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,44 +60,38 @@ def flown_of(source: Source) -> Flown:
     return Flown(tuple(longest), clock, cameras)
 
 
-def corrections(flown: Flown, resolved: ResolvedField, change: Change = lambda message: message) -> list[Correction]:
-    """Return what became of each observation once the filter has settled."""
+def costs(flown: Flown, resolved: ResolvedField, later_ms: Mapping[str, float]) -> Costs:
+    """Return minus twice the log-likelihood of each observation of any observer, once the filter has settled.
+
+    later_ms: by how much longer than their settings say observers' pictures are on their way. What one camera sees is
+    predicted from what all saw: only the sum over all is the likelihood of a delay. A camera by itself is predicted
+    well also where its delay is blamed on the target.
+    """
+    shifts_ns = {name: round(later * 1e6) for name, later in later_ms.items()}
     tracker = tracker_from_field(resolved, flown.clock, 1)
     settled_ns = flown.ticks[0][0] + _SETTLING_NS
-    found: list[Correction] = []
+    found: dict[tuple[str, str, int], float] = {}
     for now_ns, inputs in flown.ticks:
         for key, message in inputs:
-            tracker.ingest(key, change(message), now_ns)
+            tracker.ingest(key, _dated(message, shifts_ns), now_ns)
         tracker.advance(now_ns)
-        done = tracker.take_corrections()
         tracker.take_notices()
-        if now_ns >= settled_ns:
-            found += done
+        for c in tracker.take_corrections():
+            if now_ns >= settled_ns and c.nis is not None:
+                stamp_ns = now_ns - round(c.latency_ms * 1e6) + shifts_ns.get(c.observer, 0)
+                found[c.observer, c.subject, stamp_ns] = _cost(c)
     return found
 
 
-class Surprise:
-    """How badly the filter predicts what one observer sees, as chi-square: under any settings, dated in any way.
+def _cost(correction: Correction) -> float:
+    y = np.array(correction.residual)
+    S = np.reshape(correction.covariance, (len(y), len(y)))
+    square = float(y @ np.linalg.solve(S, y))
+    return (_FREEDOM + len(y)) * math.log1p(square / _FREEDOM) + float(np.linalg.slogdet(S)[1])
 
-    Every observation is weighed as the filter with the recorded settings weighs such ones: a filter that knows less is
-    not surprised either. `enough`: there is something to judge by.
-    """
 
-    def __init__(self, flown: Flown, resolved: ResolvedField, observer: str) -> None:
-        self._flown, self._observer = flown, observer
-        seen = [c for c in corrections(flown, resolved) if c.observer == observer and c.nis is not None]
-        self.enough = len(seen) >= _LEAST_SEEN
-        self._weights: dict[tuple[str, int], Any] = {}
-        for kind in sorted({(c.subject, len(c.residual)) for c in seen}):
-            mine = [np.reshape(c.covariance, (kind[1], kind[1])) for c in seen if (c.subject, len(c.residual)) == kind]
-            self._weights[kind] = np.linalg.inv(np.median(mine, axis=0))
-
-    def of(self, resolved: ResolvedField, change: Change = lambda message: message) -> float:
-        """Return it for these settings and changed messages."""
-        total = 0.0
-        for c in corrections(self._flown, resolved, change):
-            weight = self._weights.get((c.subject, len(c.residual))) if c.observer == self._observer else None
-            if weight is not None:
-                y = np.array(c.residual)
-                total += (_FREEDOM + len(y)) * math.log1p(float(y @ weight @ y) / _FREEDOM)
-        return total
+def _dated(message: Message, shifts_ns: Mapping[str, int]) -> Message:
+    if not isinstance(message, RelativeObservation) or not shifts_ns.get(message.observer):
+        return message
+    stamp_ns = message.header.stamp_ns - shifts_ns[message.observer]
+    return msgspec.structs.replace(message, header=msgspec.structs.replace(message.header, stamp_ns=stamp_ns))

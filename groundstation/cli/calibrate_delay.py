@@ -10,7 +10,7 @@ import click
 from groundstation.cli.exits import ExitCode
 
 if TYPE_CHECKING:
-    from groundstation.calibration.delay import Delay
+    from groundstation.calibration.sensor_delay import Delay
 
 
 @click.command(

@@ -6,8 +6,9 @@ import msgspec
 import pytest
 
 from groundstation.bus.messages import Message, RelativeObservation, Severity
-from groundstation.calibration.delay import Delay, delays
+from groundstation.calibration.delay import delays
 from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.sensor_delay import Delay
 from groundstation.field.resolved import ResolvedField
 from groundstation.runtime.latency_watch import PictureAge
 from sim_bridge.scenario import Scenario

@@ -23,6 +23,7 @@ from groundstation.geometry.rotations import (
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.devices.ardrone_firmware import FIRMWARES
 from sim_bridge.devices.ardrone_video import VideoMode
+from sim_bridge.fault_kinds import FaultKind, exchanged
 from sim_bridge.render.spec import (
     BoardSpec,
     BodyShape,
@@ -34,7 +35,7 @@ from sim_bridge.render.spec import (
     RenderSpec,
     StreamKind,
 )
-from sim_bridge.scenario import CAMERA_FAULTS, FaultKind, Scenario
+from sim_bridge.scenario import Scenario
 from sim_bridge.site import Lens, Site
 
 Stream = tuple[str, int]
@@ -48,11 +49,12 @@ def render_specs(
     site: Site, scenario: Scenario, streams: dict[str, Stream], truth_name: str, seed: int
 ) -> list[RenderSpec]:
     """Return the orders of all render processes; raises GroundStationError for a stream of no known camera."""
+    body_at = exchanged(scenario.faults)
     return [
         RenderSpec(
             camera=name,
-            mount=_mount(site, name),
-            intrinsics=_lens(site, name).intrinsics,
+            mount=_mount(site, body_at.get(name, name)),
+            intrinsics=_lens(site, body_at.get(name, name)).intrinsics,
             boards=_boards(site),
             truth_name=truth_name,
             bodies=site.bodies,
@@ -121,10 +123,16 @@ def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
     outages = tuple(
         Outage(kinds[fault.kind], fault.start_s, fault.end_s)
         for fault in scenario.faults
-        if fault.kind in CAMERA_FAULTS and fault.entity == name
+        if fault.kind in kinds and fault.entity == name
+    )
+    own = (FaultKind.CAMERA_BUMPED, FaultKind.PICTURE_FROZEN, FaultKind.PICTURE_BLACK)
+    faults = tuple(
+        fault
+        for fault in scenario.faults
+        if fault.kind is FaultKind.WRONG_BOARD or (fault.kind in own and fault.entity == name)
     )
     figures = scenario.cameras.model_dump(exclude={"floor"})
-    return PictureQuality(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages)
+    return PictureQuality(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages, faults=faults)
 
 
 def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:

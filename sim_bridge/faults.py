@@ -1,45 +1,79 @@
 """Faults of a scenario: what breaks when, and what heals."""
 
 from collections.abc import Iterable, Mapping
+from typing import Protocol
 
-from sim_bridge.devices.ardrone import ArDroneEmulator
-from sim_bridge.devices.mavlink import MavlinkEmulator
-from sim_bridge.scenario import CAMERA_FAULTS, Fault, FaultKind
+from sim_bridge.fault_kinds import RULES, Fault, FaultKind
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.world import World
 
-Emulator = ArDroneEmulator | MavlinkEmulator
+
+class Control(Protocol):
+    """What obeys an AR.Drone's commands."""
+
+    blocked: bool
+
+
+class Emulator(Protocol):
+    """What a fault can switch in an emulated vehicle."""
+
+    silent: bool
+    deaf: bool
 
 
 class FaultSchedule:
-    """Applies the faults of drones as time passes; those of cameras are handed to the render processes."""
+    """Switches what faults do to the world and to links as time passes, and says so of all of them.
 
-    def __init__(self, faults: Iterable[Fault], world: World, emulators: Mapping[str, Emulator]) -> None:
-        self._world, self._emulators = world, emulators
+    Wrong values are applied by the vehicles' edges, those of cameras by the render processes, at the same times.
+    """
+
+    def __init__(
+        self, faults: Iterable[Fault], world: World, emulators: Mapping[str, Emulator], controls: Mapping[str, Control]
+    ) -> None:
+        self._world, self._emulators, self._controls = world, emulators, controls
         edges = []
         for fault in faults:
-            if fault.kind not in CAMERA_FAULTS:
-                edges.append((fault.start_s, True, fault))
-                if fault.end_s is not None:
-                    edges.append((fault.end_s, False, fault))
+            edges.append((fault.start_s, True, fault))
+            if fault.end_s is not None:
+                edges.append((fault.end_s, False, fault))
         self._edges = sorted(edges, key=lambda edge: edge[0], reverse=True)
 
-    def apply(self, now_s: float) -> list[str]:
-        """Break and heal what is due at this time of the world [s]; returns a line for each."""
+    def apply(self, now_s: float) -> list[tuple[str, str]]:
+        """Break and heal what is due at this time of the world [s]; returns (entity, line) for each."""
         lines = []
         while self._edges and self._edges[-1][0] <= now_s:
             _, begins, fault = self._edges.pop()
             self._switch(fault, begins)
-            lines.append(f"fault {fault.kind} of {fault.entity} {'begins' if begins else 'ends'}")
+            lines.append((fault.entity, f"fault {described(fault)} {'begins' if begins else 'ends'}"))
         return lines
 
     def _switch(self, fault: Fault, begins: bool) -> None:
-        if fault.kind is FaultKind.NAVDATA_SILENT:
-            self._emulators[fault.entity].silent = begins
-        elif fault.kind is FaultKind.AT_DEAF:
-            self._emulators[fault.entity].deaf = begins
-        elif fault.kind is FaultKind.BATTERY_DROP and begins and fault.value is not None:
-            self._world.drones[fault.entity].battery = fault.value
-        elif fault.kind is FaultKind.PROPELLER_BLOCKED:
-            emulator = self._emulators[fault.entity]
-            if isinstance(emulator, ArDroneEmulator):
-                emulator.control.blocked = begins
+        match fault.kind:
+            case FaultKind.NAVDATA_SILENT:
+                self._emulators[fault.entity].silent = begins
+            case FaultKind.AT_DEAF:
+                self._emulators[fault.entity].deaf = begins
+            case FaultKind.PROPELLER_BLOCKED:
+                self._controls[fault.entity].blocked = begins
+            case FaultKind.BATTERY_DROP if begins:
+                self._world.drones[fault.entity].battery = fault.amount
+            case FaultKind.WIND:
+                self._world.blow(fault.entity, fault.amount if begins else 0.0, fault.direction_deg)
+            case FaultKind.UNIFORM_FLOOR | FaultKind.OBSTACLE_BELOW:
+                self._look_down(self._world.drones[fault.entity], fault, begins)
+
+    @staticmethod
+    def _look_down(drone: object, fault: Fault, begins: bool) -> None:
+        if not isinstance(drone, Quadrotor):
+            return
+        if fault.kind is FaultKind.UNIFORM_FLOOR:
+            drone.autopilot.blind = begins
+        else:
+            drone.autopilot.floor_m = fault.amount if begins else 0.0
+
+
+def described(fault: Fault) -> str:
+    """Return a fault in words: kind, figure, entity."""
+    figure = f" {fault.amount:g}" if RULES[fault.kind].value is not None else ""
+    other = f", other: {fault.other}" if fault.other else ""
+    return f"{fault.kind}{figure} of {fault.entity}{other}"

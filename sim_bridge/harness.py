@@ -12,12 +12,14 @@ from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import FIRMWARES
 from sim_bridge.devices.mavlink_open import open_vehicle
+from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.unicycle import Unicycle
 from sim_bridge.world.world import World
+from sim_bridge.wrong_values import WrongValues
 
 _TRUTH_TICKS = 4  # 50 Hz
 _COMMAND_TICKS = 10
@@ -38,7 +40,9 @@ class Harness:
     def open(self) -> None:
         """Take the ports, share the truth, start the cameras; returns when everything listens."""
         self._open_emulators()
-        self._faults = FaultSchedule(self._order.scenario.faults, self.world, self._stage.emulators)
+        emulators = self._stage.emulators
+        controls = {name: one.control for name, one in emulators.items() if isinstance(one, ArDroneEmulator)}
+        self._faults = FaultSchedule(self._order.scenario.faults, self.world, emulators, controls)
         name = f"{os.getpid()}-{self._order.site.site}"
         self._stage.share_truth(name)
         order = self._order
@@ -88,15 +92,21 @@ class Harness:
         self._stage.close()
 
     def _open_emulators(self) -> None:
-        order = self._order
-        for name, copter in self.world.copters.items():
-            vehicle = open_vehicle(name, order.site.drones[name], copter, order)
+        order, world = self._order, self.world
+        faults = order.scenario.faults
+        body_at = exchanged(faults)
+        wrong = {name: WrongValues(fault for fault in faults if fault.entity == name) for name in world.drones}
+        copters, ardrones = world.copters, world.ardrones
+        for name in copters:
+            copter = copters[body_at.get(name, name)]
+            vehicle = open_vehicle(name, order.site.drones[name], copter, order, wrong[name])
             self._stage.add(name, vehicle, vehicle.socket.fileno())
-        for name, drone in self.world.ardrones.items():
-            address = order.addresses[name]
-            drones = order.scenario.drones
+        drones = order.scenario.drones
+        for name in ardrones:
+            body = body_at.get(name, name)
             firmware = FIRMWARES[drones.firmware_of(name)].without(drones.omit_options)
-            emulator = ArDroneEmulator(name, address, drone, self.world.onboard[name], drones.navdata_hz, firmware)
+            address, parts = order.addresses[name], (ardrones[body], world.onboard[body])
+            emulator = ArDroneEmulator(name, address, *parts, drones.navdata_hz, firmware, wrong[name])
             self._stage.add(name, emulator, emulator.fileno())
 
     @property
@@ -151,8 +161,8 @@ class Harness:
                 self._child.event(Severity.WARNING, f"order {command.action!r} to {name} not understood")
 
     def _break_things(self) -> None:
-        for line in self._faults.apply(self.world.time_s):
-            self._child.event(Severity.INFO, line)
+        for entity, line in self._faults.apply(self.world.time_s):
+            self._child.event(Severity.WARNING, line, "", entity)
 
 
 def steer(target: Unicycle, command: SimCommand) -> bool:

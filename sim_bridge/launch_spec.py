@@ -1,7 +1,7 @@
 """What the bridge is started with: `python -m sim_bridge --spec FILE`."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import SettingsError
 from groundstation.process.child import ChildSpec
-from sim_bridge.scenario import CAMERA_FAULTS, Fault, FaultKind, Scenario, describe_problems, parse_scenario
-from sim_bridge.site import Site, SiteDrone, parse_site
-
-_ARDRONE_FAULTS = frozenset({FaultKind.PROPELLER_BLOCKED})
+from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
+from sim_bridge.scenario import Scenario, describe_problems, parse_scenario
+from sim_bridge.site import Site, parse_site
 
 
 class _Envelope(BaseModel):
@@ -55,7 +54,7 @@ def read_order(path: Path) -> LaunchSpec:
         raise SettingsError(describe_problems(str(path), error)) from None
     site = parse_site(envelope.field)
     scenario = parse_scenario(json.dumps(envelope.scenario))
-    _check_faults(scenario.faults, site.drones, envelope.streams)
+    _check_faults(scenario.faults, site, envelope.streams)
     strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
     if strangers:
         names = ", ".join(site.drones)
@@ -70,16 +69,23 @@ def read_order(path: Path) -> LaunchSpec:
     return LaunchSpec(envelope.child, site, scenario, envelope.addresses, envelope.streams, seed)
 
 
-def _check_faults(faults: Iterable[Fault], drones: Mapping[str, SiteDrone], cameras: Iterable[str]) -> None:
+def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str]) -> None:
     """Raise SettingsError naming every fault of an entity that does not exist, or cannot have it."""
-    cameras = sorted(cameras)
+    ardrones = sorted(name for name, drone in site.drones.items() if drone.kind == "ardrone")
+    known = {
+        Part.VEHICLE: sorted(site.drones),
+        Part.ARDRONE: ardrones,
+        Part.CAMERA: sorted(cameras),
+        Part.MARKER: list(site.bodies),
+    }
     problems = []
     for number, fault in enumerate(faults):
-        if fault.kind in CAMERA_FAULTS:
-            known = cameras
-        else:
-            known = sorted(n for n, d in drones.items() if d.kind == "ardrone" or fault.kind not in _ARDRONE_FAULTS)
-        if fault.entity not in known:
-            problems.append(f"scenario: faults.{number}.entity: {fault.entity!r} is none of {', '.join(known)}")
+        names = known[RULES[fault.kind].part]
+        for key, name in (("entity", fault.entity), ("other", fault.other or fault.entity)):
+            if name not in names:
+                problems.append(f"scenario: faults.{number}.{key}: {name!r} is none of {', '.join(names)}")
+        pair = [site.drones[name].kind for name in (fault.entity, fault.other) if name in site.drones]
+        if fault.kind is FaultKind.IDS_SWAPPED and len(set(pair)) > 1:
+            problems.append(f"scenario: faults.{number}.other: {fault.entity} and {fault.other} are of different kinds")
     if problems:
-        raise SettingsError(problems)
+        raise SettingsError(list(dict.fromkeys(problems)))

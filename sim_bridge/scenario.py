@@ -6,18 +6,15 @@ here. Units are in the key names; a pair of numbers is a range that each drone d
 
 import math
 from collections.abc import Iterable
-from enum import StrEnum
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from drivers.ardrone.wire.tags import OPTION_SIZES
 from groundstation.errors import SettingsError
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+from sim_bridge.fault_kinds import Fault
+from sim_bridge.section import Section
 
 
 def _rising(interval: tuple[float, float]) -> tuple[float, float]:
@@ -35,7 +32,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Place = Annotated[float, Field(ge=-100, le=100)]
 
 
-class FigureEight(_Section):
+class FigureEight(Section):
     """A figure of eight (lemniscate) along world x, driven at constant speed."""
 
     shape: Literal["figure_eight"] = "figure_eight"
@@ -52,7 +49,7 @@ class FigureEight(_Section):
     """Centre of the path [x, y in m; world]."""
 
 
-class Standstill(_Section):
+class Standstill(Section):
     """A target that stands still until it is steered over `@sim`."""
 
     shape: Literal["none"] = "none"
@@ -63,7 +60,7 @@ class Standstill(_Section):
     """Its heading [deg; world], counter-clockwise."""
 
 
-class TargetScenario(_Section):
+class TargetScenario(Section):
     """A simulated target, a TurtleBot."""
 
     path: Annotated[FigureEight | Standstill, Field(discriminator="shape")] = FigureEight()
@@ -101,12 +98,12 @@ def _known_firmware(name: str) -> str:
 Firmware = Annotated[str, AfterValidator(_known_firmware)]
 
 
-class DroneScenario(_Section):
+class DroneScenario(Section):
     """Every emulated AR.Drone: firmware, errors of its navdata, battery, disturbances."""
 
     firmware: Firmware = "ar2-2.3"
     """Firmware that the drones emulate: version, size of the navdata packets, options and settings that exist."""
-    firmware_by_drone: dict[str, Firmware] = {}
+    firmware_by_drone: dict[str, Firmware] = Field(default={})
     """Firmware of single drones, by name, where it differs."""
     omit_options: tuple[Annotated[int, Field(ge=1, le=27)], ...] = ()
     """Numbers of navdata options that are never sent, for clients that expect something else there."""
@@ -140,6 +137,11 @@ class DroneScenario(_Section):
     """Charge that a minute of flight costs, as a share of the full charge."""
     air_unrest_m_s2: Annotated[float, Field(ge=0, le=5)] = 0.08
     """Random acceleration of a hovering drone by the air of the room, one sigma [m/s^2]."""
+    moving_air_lean_deg: Annotated[float, Field(ge=0, le=20)] = 0.0
+    """How far the moving air of the room makes a drone lean that holds its place, at most [deg]; the reported tilt does
+    not say so, as on a real one."""
+    moving_air_correlation_s: Annotated[float, Field(gt=0, le=1000)] = 10.0
+    """Correlation time of that air's speed and direction [s]."""
     downwash: bool = True
     """Whether drones disturb those below them."""
     ultrasound_crosstalk: bool = True
@@ -150,7 +152,7 @@ class DroneScenario(_Section):
         return self.firmware_by_drone.get(name, self.firmware)
 
 
-class CopterScenario(_Section):
+class CopterScenario(Section):
     """Every emulated MAVLink vehicle: errors of its inertial sensors, battery, disturbances."""
 
     configured: bool = True
@@ -167,7 +169,7 @@ class CopterScenario(_Section):
     """Random acceleration of a hovering vehicle by the air of the room, one sigma [m/s^2]."""
 
 
-class CameraScenario(_Section):
+class CameraScenario(Section):
     """Every emulated camera: its stream and the errors of its images."""
 
     fps: Annotated[float, Field(ge=0.1, le=60)] = 15.0
@@ -198,46 +200,7 @@ class CameraScenario(_Section):
     """What lies on the floor."""
 
 
-class FaultKind(StrEnum):
-    """What a scenario can break; `Fault.kind` explains each."""
-
-    NAVDATA_SILENT = "navdata_silent"
-    AT_DEAF = "at_deaf"
-    CAMERA_CUT = "camera_cut"
-    CAMERA_STALL = "camera_stall"
-    BATTERY_DROP = "battery_drop"
-    PROPELLER_BLOCKED = "propeller_blocked"
-
-
-CAMERA_FAULTS = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL})
-
-
-class Fault(_Section):
-    """One fault of a drone or camera."""
-
-    kind: FaultKind
-    """navdata_silent: a vehicle sends nothing; at_deaf: it hears nothing; camera_cut: a camera's connection is closed
-    and refused; camera_stall: it stays open, without images; battery_drop: the charge falls to value;
-    propeller_blocked: an AR.Drone's cut-out stops its motors, an emergency until it is free."""
-    entity: str
-    """The drone or camera."""
-    start_s: Annotated[float, Field(ge=0)]
-    """When it breaks [s after the simulator is ready]."""
-    end_s: Annotated[float, Field(ge=0)] | None = None
-    """When it heals [s after the simulator is ready]; none: it does not."""
-    value: Annotated[float, Field(ge=0, le=1)] | None = None
-    """battery_drop: the new charge, 0 to 1."""
-
-    @model_validator(mode="after")
-    def _complete(self) -> "Fault":
-        if self.end_s is not None and self.end_s <= self.start_s:
-            raise PydanticCustomError("order", "end_s must be after start_s")
-        if (self.kind is FaultKind.BATTERY_DROP) != (self.value is not None):
-            raise PydanticCustomError("value", "value belongs to battery_drop, and only there")
-        return self
-
-
-class Scenario(_Section):
+class Scenario(Section):
     """A scenario file; the defaults are the figures measured on real drones."""
 
     schema_version: Literal[1] = 1
@@ -247,7 +210,7 @@ class Scenario(_Section):
     target: TargetScenario = TargetScenario()
     """What the target does; with several, what each does that `targets` leaves out: one behind the other on the path,
     or 1 m apart."""
-    targets: dict[str, TargetScenario] = {}
+    targets: dict[str, TargetScenario] = Field(default={})
     """What single targets do, by name."""
     drones: DroneScenario = DroneScenario()
     """Every emulated AR.Drone."""

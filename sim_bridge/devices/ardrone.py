@@ -1,22 +1,21 @@
 """An AR.Drone at the wire: UDP 5554 (navdata), 5556 (AT commands) and its lesser ports, at its own loopback address."""
 
-import math
 import selectors
 import socket
 from contextlib import suppress
 
 from groundstation.errors import GroundStationError
 from sim_bridge.devices.ardrone_control import FlightControl
+from sim_bridge.devices.ardrone_edge import ArDroneEdge
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
-from sim_bridge.devices.ardrone_navdata import NavdataState, NavdataWriter
+from sim_bridge.devices.ardrone_navdata import NavdataWriter
 from sim_bridge.devices.ardrone_ports import Ports, open_udp
-from sim_bridge.devices.ardrone_state import control_state, state_word
+from sim_bridge.devices.ardrone_state import state_word
 from sim_bridge.devices.ardrone_subscribers import Listener
 from sim_bridge.world.ardrone import Quadrotor
-from sim_bridge.world.ardrone_autopilot import Phase
-from sim_bridge.world.ardrone_motors import flight_pwm, ramp_pwm
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.world import TICK_NS
+from sim_bridge.wrong_values import WrongValues
 
 NAVDATA_PORT = 5554
 AT_PORT = 5556
@@ -31,8 +30,8 @@ _RECEIVE_BUFFER = 1 << 20
 class ArDroneEmulator:
     """Sockets around one drone of the world: `receive`, then a step of the world, then `send`, once per tick.
 
-    `silent` stops the navdata, `deaf` drops what arrives (faults). Times are the world's, so a bridge that was
-    frozen does not see 2 s of silence that nobody kept.
+    `silent` stops the navdata, `deaf` drops what arrives, `wrong` changes what is reported (faults). Times are
+    the world's, so a bridge that was frozen does not see 2 s of silence that nobody kept.
     """
 
     def __init__(
@@ -43,15 +42,16 @@ class ArDroneEmulator:
         onboard: Onboard,
         navdata_hz: float = 200.0,
         firmware: ArdroneFirmware = FIRMWARES[DEFAULT],
+        wrong: WrongValues | None = None,
     ) -> None:
         self.name = name
         self.silent = False
         self.deaf = False
         self.control = FlightControl(drone, onboard, firmware)
-        self._drone, self._onboard = drone, onboard
+        self._drone = drone
+        self._edge = ArDroneEdge(drone, onboard, self.control, wrong)
         self._subsampling = max(1, round(200.0 / navdata_hz))
         self._writer = NavdataWriter(firmware)
-        self._state = NavdataState()
         self._ticks = 0
         self._selector = selectors.DefaultSelector()
         self._sockets: list[socket.socket] = []
@@ -78,6 +78,7 @@ class ArDroneEmulator:
         self._ticks += 1
         control = self.control
         control.watch(self._now_ns)
+        self._edge.step(self._now_ns)
         if control.dump_wanted or control.custom_dump_wanted:
             self._dump()
         listeners = list(control.audience)
@@ -150,31 +151,17 @@ class ArDroneEmulator:
         self._send(listener, self._writer.status(word, listener.next_sequence()))
 
     def _send_readings(self, listeners: list[Listener]) -> None:
-        control, state, session = self.control, self._state, self.control.session
-        state.word = state_word(self._drone, control, self._now_ns, bootstrap=False)
-        state.control_state = control_state(self._drone, control, self._now_ns)
-        state.pwm = self._pwm()
-        state.pcmd_sequence = control.pcmd_sequence
-        state.at_sequence, state.at_gap_ms = session.at_sequence, session.mean_gap_ms
+        control = self.control
+        state, readings, ticks = self._edge.reported(self._ticks)
         first, *others = listeners
         if control.demo:
             mask = control.configuration.integer("general:navdata_options")
-            packet = self._writer.demo(mask, state, self._onboard, self._ticks, first.next_sequence())
+            packet = self._writer.demo(mask, state, readings, ticks, first.next_sequence())
         else:
-            packet = self._writer.full(state, self._onboard, self._ticks, first.next_sequence())
+            packet = self._writer.full(state, readings, ticks, first.next_sequence())
         self._send(first, packet)
         for listener in others:
             self._send(listener, self._writer.again(listener.next_sequence()))
-
-    def _pwm(self) -> tuple[int, int, int, int]:
-        autopilot, body = self._drone.autopilot, self._drone.airframe
-        if not autopilot.motors_on:
-            return 0, 0, 0, 0
-        if autopilot.phase is Phase.TAKING_OFF and body.on_ground:
-            pwm = ramp_pwm(autopilot.since_s)
-        else:
-            pwm = flight_pwm(body.az, math.hypot(body.roll, body.pitch))
-        return pwm, pwm, pwm, pwm
 
     def _send(self, listener: Listener, packet: bytearray) -> None:
         if not self.silent:

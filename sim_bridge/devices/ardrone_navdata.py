@@ -13,6 +13,9 @@ import numpy as np
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2
 from sim_bridge.world.ardrone_sensors import Onboard
+from sim_bridge.world.readings import Readings
+
+Readable = Onboard | Readings
 
 DEFAULT_OPTIONS = 65537  # DEMO and VISION_DETECT
 _DEMO, _TIME, _RAW, _PHYS, _EULER, _REFERENCES, _PWM, _ALTITUDE = 0, 1, 2, 3, 5, 6, 9, 10
@@ -115,14 +118,14 @@ class NavdataWriter:
         """Return a packet of header and checksum only."""
         return self._status.finish(word, sequence)
 
-    def demo(self, mask: int, state: NavdataState, onboard: Onboard, ticks: int, sequence: int) -> bytearray:
+    def demo(self, mask: int, state: NavdataState, onboard: Readable, ticks: int, sequence: int) -> bytearray:
         """Return the packet of demo mode with the options of the mask; DEMO and VISION_DETECT always come."""
         if mask != self._mask:
             self._mask = mask
             self._demo = _Packet(self._firmware, mask | DEFAULT_OPTIONS)
         return self._fill(self._demo, state, onboard, ticks, sequence)
 
-    def full(self, state: NavdataState, onboard: Onboard, ticks: int, sequence: int) -> bytearray:
+    def full(self, state: NavdataState, onboard: Readable, ticks: int, sequence: int) -> bytearray:
         """Return the packet of full mode: all options of the firmware."""
         return self._fill(self._full, state, onboard, ticks, sequence)
 
@@ -130,7 +133,7 @@ class NavdataWriter:
         """Return the last packet that was not a status with another number, for the next client."""
         return self._last.finish(self._word, sequence)
 
-    def _fill(self, packet: _Packet, state: NavdataState, onboard: Onboard, ticks: int, sequence: int) -> bytearray:
+    def _fill(self, packet: _Packet, state: NavdataState, onboard: Readable, ticks: int, sequence: int) -> bytearray:
         buffer, at = packet.buffer, packet.at
         theta, phi, psi = -onboard.pitch * _MDEG, onboard.roll * _MDEG, -onboard.yaw * _MDEG
         height_mm = round(onboard.height * 1000)
@@ -148,7 +151,7 @@ class NavdataWriter:
         return packet.finish(state.word, sequence)
 
 
-def _fill_measures(buffer: bytearray, at: dict[int, int], onboard: Onboard, ticks: int) -> None:
+def _fill_measures(buffer: bytearray, at: dict[int, int], onboard: Readable, ticks: int) -> None:
     if _TIME in at:
         microseconds = ticks * _MICROSECONDS_PER_TICK
         seconds, rest = divmod(microseconds, 1_000_000)
@@ -171,7 +174,7 @@ def _fill_measures(buffer: bytearray, at: dict[int, int], onboard: Onboard, tick
         _EULER_FIELDS.pack_into(buffer, at[_EULER] + 4, math.atan2(fx, fz) * _MDEG, math.atan2(fy, fz) * _MDEG)
 
 
-def _fill_height(buffer: bytearray, at: dict[int, int], onboard: Onboard, height_mm: int) -> None:
+def _fill_height(buffer: bytearray, at: dict[int, int], onboard: Readable, height_mm: int) -> None:
     # WIRE: on the ground the ultrasound still reads about 240 mm while DEMO says 0.
     echo_mm = round(onboard.echo * 1000)
     if _ALTITUDE in at:
@@ -181,7 +184,7 @@ def _fill_height(buffer: bytearray, at: dict[int, int], onboard: Onboard, height
         _WORD.pack_into(buffer, at[_KALMAN] + 52, onboard.rejected)
 
 
-def _fill_control(buffer: bytearray, at: dict[int, int], state: NavdataState, onboard: Onboard, second: bool) -> None:
+def _fill_control(buffer: bytearray, at: dict[int, int], state: NavdataState, onboard: Readable, second: bool) -> None:
     if _PWM in at:
         _PWM_FIELDS.pack_into(buffer, at[_PWM] + 4, *state.pwm)
     if _VISION in at:

@@ -20,6 +20,7 @@ from sim_bridge.devices.mavlink_px4 import Px4
 from sim_bridge.devices.mavlink_services import Services
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS
+from sim_bridge.wrong_values import WrongValues
 
 PORT = 14550
 Address = tuple[str, int]
@@ -35,13 +36,15 @@ class MavlinkEmulator:
     """Socket and firmware around one body of the world: `receive`, a step of the world, then `send`, once per tick.
 
     calls: an address that it speaks to without being spoken to; video: what it says of its camera. `silent` stops what
-    it sends, `deaf` drops what arrives (faults). signing: only rightly signed frames count, and all of ours are signed.
+    it sends, `deaf` drops what arrives, `wrong` changes what is reported (faults). signing: only rightly signed frames
+    count, and all of ours are signed.
     Times are the world's.
     """
 
     def __init__(
         self, name: str, address: Address, parameters: Parameters, copter: MavlinkCopter, *,
         calls: Address | None = None, video: t.VideoStreamInformation | None = None, signing: Signing | None = None,
+        wrong: WrongValues | None = None,
     ) -> None:  # fmt: skip
         self.name = name
         self.silent = False
@@ -57,6 +60,7 @@ class MavlinkEmulator:
         self._ground_ns: int | None = None
         self._lists: dict[Address, int] = {}
         self._ticks = self._long_texts = 0
+        self._wrong = wrong or None
         self.socket = _open(name, address)
 
     @property
@@ -113,6 +117,8 @@ class MavlinkEmulator:
         self.speaker.boot_us = now_ns // 1000
         silence_s = 0.0 if self._ground_ns is None else (now_ns - self._ground_ns) / 1e9
         self.firmware.step(now_ns / 1e9, silence_s)
+        if self._wrong is not None:
+            self.speaker.report(now_ns / 1e9, self._wrong)
         for client in [c for c, heard_ns in self._clients.items() if now_ns - heard_ns > _FORGET_NS]:
             del self._clients[client]
             self._lists.pop(client, None)

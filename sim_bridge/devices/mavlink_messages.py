@@ -12,6 +12,10 @@ from drivers.mavlink.wire.frames import Message
 from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, SensorBits
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
+from sim_bridge.world.mavlink_estimator import InertialEstimate
+from sim_bridge.world.readings import Readings
+from sim_bridge.world.world import TICK_NS
+from sim_bridge.wrong_values import WrongValues
 
 _MG = 1000.0 / 9.80665
 _NO_CELL = 65535
@@ -19,11 +23,12 @@ _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
 
 
 class Speaker:
-    """Builds the messages of one vehicle."""
+    """Builds the messages of one vehicle; reported: what it says instead of what it believes, under a fault."""
 
     def __init__(self, firmware: AutopilotFirmware) -> None:
         self._firmware = firmware
-        self._copter, self._estimate = firmware.copter, firmware.copter.estimate
+        self._copter, self._honest = firmware.copter, firmware.copter.estimate
+        self.reported: Readings | None = None
         self.boot_us = 0
         self.builders: dict[type[Message], Callable[[], Message | None]] = {
             t.Heartbeat: self.heartbeat,
@@ -44,6 +49,34 @@ class Speaker:
         else:
             self.builders[t.EkfStatusReport] = self.ekf
 
+    def honest(self) -> Readings:
+        """Return what the vehicle believes now, as a value."""
+        e, ticks = self._honest, self.boot_us * 1000 // TICK_NS
+        readings = (e.velocity, e.roll, e.pitch, e.yaw, e.gyros, e.accelerometers, self._copter.battery)
+        return Readings(ticks, *readings, position=e.position, status=self._status)
+
+    def report(self, now_s: float, wrong: WrongValues) -> None:
+        """Pass the readings of a tick through its faults."""
+        self.reported = None
+        self.reported = wrong.report(now_s, self.honest())
+        self.boot_us = self.reported.ticks * TICK_NS // 1000
+
+    @property
+    def _estimate(self) -> InertialEstimate | Readings:
+        return self.reported or self._honest
+
+    @property
+    def _battery(self) -> float:
+        return (self.reported or self._copter).battery
+
+    @property
+    def _status(self) -> tuple[bool, int, int, bool]:
+        if self.reported is not None:
+            armed, mode, landed, airborne = self.reported.status
+            return armed, mode, landed, airborne
+        firmware = self._firmware
+        return firmware.armed, firmware.mode, firmware.landed, self._copter.airborne
+
     @property
     def boot_ms(self) -> int:
         """Return the time since power-on [ms]."""
@@ -51,10 +84,9 @@ class Speaker:
 
     def heartbeat(self) -> Message:
         """Return who it is and in which mode."""
-        firmware = self._firmware
-        status = 4 if self._copter.airborne else 3
-        base = 1 | (128 if firmware.armed else 0)
-        return t.Heartbeat(QUADROTOR, firmware.flavour, base, firmware.mode, status)
+        armed, mode, _, airborne = self._status
+        base = 1 | (128 if armed else 0)
+        return t.Heartbeat(QUADROTOR, self._firmware.flavour, base, mode, 4 if airborne else 3)
 
     def sys_status(self) -> Message:
         """Return health and battery."""
@@ -68,19 +100,19 @@ class Speaker:
 
     @property
     def _percent(self) -> int:
-        return round(100 * self._copter.battery)
+        return round(100 * self._battery)
 
     @property
     def _millivolts(self) -> int:
-        return round(1000 * (_VOLTS_EMPTY + _VOLTS_SPAN * self._copter.battery))
+        return round(1000 * (_VOLTS_EMPTY + _VOLTS_SPAN * self._battery))
 
     def extended(self) -> Message:
         """Return the landed state."""
-        return t.ExtendedSysState(0, self._firmware.landed)
+        return t.ExtendedSysState(0, self._status[2])
 
     def local_position(self) -> Message | None:
         """Return where it believes to be, if it does."""
-        if not self._estimate.has_position:
+        if not self._honest.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
         return t.LocalPositionNed(self.boot_ms, x, -y, -z, vx, -vy, -vz)
@@ -124,7 +156,7 @@ class Speaker:
 
     def odometry(self) -> Message | None:
         """WIRE (docs/reference/mavlink.md 2): PX4 sends its velocity in NED and says so by child frame 1."""
-        if not self._estimate.has_position:
+        if not self._honest.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
         pose = _diagonal(0.01, 0.01, 0.01, 0.001, 0.001, 0.003)

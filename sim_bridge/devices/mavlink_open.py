@@ -10,6 +10,7 @@ from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.site import Lens, SiteDrone
 from sim_bridge.world.mavlink_copter import MavlinkCopter
+from sim_bridge.wrong_values import WrongValues
 
 # WIRE (VIDEO_STREAM_TYPE, VIDEO_STREAM_ENCODING): JPEGs over HTTP have neither a type nor an encoding of their own.
 # MPEG over TCP, encoding unknown, is nearest, and the address says the rest; RTSP, 0, would mislead a client.
@@ -23,7 +24,9 @@ def announced(name: str, lens: Lens, fps: float, uri: str) -> VideoStreamInforma
     return VideoStreamInformation(1, 1, _TCP_MPEG, _RUNNING, fps, *size, 0, 0, hfov, name, uri, _UNKNOWN_ENCODING)
 
 
-def open_vehicle(name: str, drone: SiteDrone, copter: MavlinkCopter, order: LaunchSpec) -> MavlinkEmulator:
+def open_vehicle(
+    name: str, drone: SiteDrone, copter: MavlinkCopter, order: LaunchSpec, wrong: WrongValues | None = None
+) -> MavlinkEmulator:
     """Return the listening emulator of a MAVLink vehicle.
 
     Where the field's driver waits for its vehicles (`listen`), the vehicle calls it.
@@ -42,4 +45,5 @@ def open_vehicle(name: str, drone: SiteDrone, copter: MavlinkCopter, order: Laun
         copter,
         calls=(identity.local_address, identity.port) if identity.listen else None,
         video=video,
+        wrong=wrong,
     )

@@ -15,8 +15,8 @@ from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.time_units import NS_PER_MS
 from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder, VideoMode
 from sim_bridge.devices.camera_stream import CameraStream
-from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import Mount, RenderSpec, StreamKind
+from sim_bridge.render.wrong_pictures import WrongPictures
 
 # The drone was switched on a little before the world began.
 _POWER_ON_MS = 20_000
@@ -35,8 +35,8 @@ class Output(Protocol):
     def set_accepting(self, accepting: bool) -> None:
         """Cut all clients and refuse new ones (False), or serve (True)."""
 
-    def show(self, states: Array, exposure_ns: int, release_ns: int) -> None:
-        """Draw the true states and send the picture at a time [ns]."""
+    def show(self, states: Array, exposure_ns: int, release_ns: int, now_s: float) -> None:
+        """Draw the true states and send the picture at a time [ns]; now_s: since the first true state."""
 
     def close(self) -> None:
         """Stop serving."""
@@ -52,7 +52,7 @@ class MjpegOutput:
 
     def __init__(self, spec: RenderSpec) -> None:
         self._quality = (cv2.IMWRITE_JPEG_QUALITY, spec.scenario.jpeg_quality)
-        self._renderer = Renderer(spec)
+        self._renderer = WrongPictures(spec)
         self._stream = CameraStream(spec.address, spec.port)
         self.set_accepting = self._stream.set_accepting
         self.close = self._stream.close
@@ -62,9 +62,9 @@ class MjpegOutput:
         """Return how many are looking."""
         return self._stream.clients
 
-    def show(self, states: Array, exposure_ns: int, release_ns: int) -> None:
-        """Draw the true states and send the picture at a time [ns]."""
-        jpeg = cv2.imencode(".jpg", self._renderer.render(states), self._quality)[1].tobytes()
+    def show(self, states: Array, exposure_ns: int, release_ns: int, now_s: float) -> None:
+        """Draw the true states and send the picture at a time [ns]; now_s: since the first true state."""
+        jpeg = cv2.imencode(".jpg", self._renderer.render(states, now_s), self._quality)[1].tobytes()
         self._stream.send_at(release_ns, jpeg)
 
 
@@ -73,7 +73,7 @@ class ArDroneOutput:
 
     def __init__(self, spec: RenderSpec, modes: Connection | None) -> None:
         self._spec, self._modes = spec, modes
-        self._renderers: dict[tuple[bool, tuple[int, int]], Renderer] = {}
+        self._renderers: dict[tuple[bool, tuple[int, int]], WrongPictures] = {}
         self._encoder = VideoEncoder(VideoMode(), spec.scenario.fps, spec.video_header_bytes)
         self._renderer = self._renderer_of(VideoMode())
         self._first_ns = 0
@@ -86,12 +86,12 @@ class ArDroneOutput:
         """Return how many are looking."""
         return self._server.clients
 
-    def show(self, states: Array, exposure_ns: int, release_ns: int) -> None:
-        """Draw the true states and send the picture at a time [ns]."""
+    def show(self, states: Array, exposure_ns: int, release_ns: int, now_s: float) -> None:
+        """Draw the true states and send the picture at a time [ns]; now_s: since the first true state."""
         self._follow_configuration()
         self._first_ns = self._first_ns or exposure_ns
         timestamp_ms = _POWER_ON_MS + (exposure_ns - self._first_ns) // NS_PER_MS
-        picture = self._renderer.render(states)
+        picture = self._renderer.render(states, now_s)
         encoded = self._encoder.encode(picture, timestamp_ms, want_idr=self._server.take_newcomers())
         self._server.send_at(release_ns, encoded)
 
@@ -109,10 +109,10 @@ class ArDroneOutput:
             )
             self._renderer = self._renderer_of(mode)
 
-    def _renderer_of(self, mode: VideoMode) -> Renderer:
+    def _renderer_of(self, mode: VideoMode) -> WrongPictures:
         key = mode.bottom, mode.size
         if key not in self._renderers:
-            self._renderers[key] = Renderer(_shown(self._spec, mode))
+            self._renderers[key] = WrongPictures(_shown(self._spec, mode))
         return self._renderers[key]
 
 

@@ -115,11 +115,12 @@ class _Exposures:
             return
         self._first_ns = self._first_ns or exposure_ns
         self._last_ns = exposure_ns
-        outage = active_outage(self._spec.scenario.outages, (exposure_ns - self._first_ns) / NS_PER_S)
+        now_s = (exposure_ns - self._first_ns) / NS_PER_S
+        outage = active_outage(self._spec.scenario.outages, now_s)
         self._output.set_accepting(outage is not OutageKind.CUT)
         release_ns = self._link.release_ns(exposure_ns)
         if release_ns is None or outage is not None or not self._output.clients:
             return
-        self._output.show(states, exposure_ns, release_ns)
+        self._output.show(states, exposure_ns, release_ns, now_s)
         self._tally[1] += time.monotonic_ns() > release_ns
         self._tally[0] += 1

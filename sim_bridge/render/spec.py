@@ -6,6 +6,7 @@ from enum import StrEnum
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.tag import SquareTag
+from sim_bridge.fault_kinds import Fault
 
 
 class BodyShape(StrEnum):
@@ -81,7 +82,8 @@ class PictureQuality:
     where TCP repeats what is lost and nothing may be missing (AR.Drone), sent late;
     corner_noise_px: rms error of each board corner (print, lens model), pixel_noise: grey levels rms; blur_px: sigma
     of the defocus; exposure_ms: motion blur; rolling_shutter_ms: time from the first row to the last (the stamp is the
-    middle); light: share of a full exposure, shot_noise: rms of photon noise at white [grey levels].
+    middle); light: share of a full exposure, shot_noise: rms of photon noise at white [grey levels]; faults: of this
+    camera's pictures and of boards.
     """
 
     fps: float = 15.0
@@ -98,6 +100,7 @@ class PictureQuality:
     shot_noise: float = 0.0
     floor: FloorKind = FloorKind.CARPET
     outages: tuple[Outage, ...] = ()
+    faults: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

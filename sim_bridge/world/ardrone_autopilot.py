@@ -21,6 +21,8 @@ _CLIMB_RATE = 1.4  # 1/s: first order (tum_ardrone's identified model)
 _HEIGHT_GAIN = 0.8
 _BRAKE_GAIN, _HOLD_GAIN = 2.2, 1.0
 _BRAKED_M_S = 0.1
+# How fast a drone that holds its place finds out how far to lean against steady air.
+_BRACE_S = 1.0
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
 # The magnetometer is calibrated by one turn on the spot.
 _CALIBRATION_RAD_S, _CALIBRATION_S = -math.tau / 4.0, 4.1
@@ -65,7 +67,11 @@ class MotionReferences:
 
 
 class Autopilot:
-    """Turns requests into references for the airframe. Motion commands take effect after `COMMAND_DELAY_S`."""
+    """Turns requests into references for the airframe. Motion commands take effect after `COMMAND_DELAY_S`.
+
+    blind: optical flow finds nothing; floor_m: how high what the ultrasound looks at stands; braced: the acceleration
+    by the air that it leans against [m/s^2; world].
+    """
 
     def __init__(self, airframe: Airframe, tick_s: float, draw: Draw) -> None:
         self.phase = Phase.LANDED
@@ -76,6 +82,9 @@ class Autopilot:
         self._wanted: MotionReferences | None = None
         self._delayed: DelayLine[MotionReferences | None] = DelayLine(COMMAND_DELAY_S, tick_s, None)
         self._held_height_m: float | None = None
+        self.blind = False
+        self.floor_m = 0.0
+        self.braced = (0.0, 0.0)
         self._drift = (0.0, 0.0)
         self._stunt: Animation | None = None
         self._stunt_s = self._stunt_end_s = self._calibration_s = 0.0
@@ -147,6 +156,11 @@ class Autopilot:
         if self.phase is Phase.HOVERING:
             self._calibration_s = _CALIBRATION_S
 
+    def brace(self, air: tuple[float, float]) -> None:
+        """Learn from one tick how the air pushes [m/s^2; world]."""
+        share, (x, y) = self._tick_s / _BRACE_S, self.braced
+        self.braced = (x + share * (air[0] - x), y + share * (air[1] - y))
+
     def step(self, push: tuple[float, float, float]) -> None:
         """Advance the airframe by one tick; push: acceleration by the air [m/s^2; world]."""
         self._since_s += self._tick_s
@@ -204,7 +218,7 @@ class Autopilot:
         if motion is None:
             if self.phase is Phase.FLYING:
                 self._enter(Phase.BRAKING)
-            elif self.phase is Phase.BRAKING and math.hypot(body.vx, body.vy) < _BRAKED_M_S:
+            elif self.phase is Phase.BRAKING and (self.blind or math.hypot(body.vx, body.vy) < _BRAKED_M_S):
                 self._enter(Phase.HOVERING)
             turn = _CALIBRATION_RAD_S if self.calibrating else 0.0
             self._calibration_s -= self._tick_s
@@ -245,13 +259,14 @@ class Autopilot:
     def _climb(self, climb_m_s: float) -> float:
         """Return the vertical acceleration that follows a climb rate, or holds the height when it is zero."""
         body = self._airframe
+        height_m = body.z - self.floor_m
         if climb_m_s != 0.0:
             self._held_height_m = None
         else:
             if self._held_height_m is None:
-                self._held_height_m = body.z + body.vz / _CLIMB_RATE / 2
-            climb_m_s = _clamp(_HEIGHT_GAIN * (self._held_height_m - body.z), self.limits.climb_m_s)
-        ceiling = self.limits.height_m - body.z
+                self._held_height_m = height_m + body.vz / _CLIMB_RATE / 2
+            climb_m_s = _clamp(_HEIGHT_GAIN * (self._held_height_m - height_m), self.limits.climb_m_s)
+        ceiling = self.limits.height_m - height_m
         return _CLIMB_RATE * (min(climb_m_s, ceiling) - body.vz)
 
     def _hover_tilt(self) -> tuple[float, float]:
@@ -259,6 +274,8 @@ class Autopilot:
         forward, left = self._airframe.velocity_stabilized()
         forward += self._flow_error[0].step()
         left += self._flow_error[1].step()
+        if self.blind:
+            return 0.0, 0.0
         x, y = self._drift
         if math.hypot(forward, left) < 0.5:  # holds a place only once it has slowed down
             x, y = x + forward * self._tick_s, y + left * self._tick_s
@@ -266,6 +283,10 @@ class Autopilot:
         limit = self.limits.tilt_rad
         pitch = -(_BRAKE_GAIN * forward + _HOLD_GAIN * x) / GRAVITY_M_S2
         roll = (_BRAKE_GAIN * left + _HOLD_GAIN * y) / GRAVITY_M_S2
+        if self.braced != (0.0, 0.0):
+            c, s = math.cos(self._airframe.yaw), math.sin(self._airframe.yaw)
+            (ax, ay), g = self.braced, GRAVITY_M_S2
+            pitch, roll = pitch - (c * ax + s * ay) / g, roll + (c * ay - s * ax) / g
         return _clamp(roll, limit), _clamp(pitch, limit)
 
 

@@ -92,10 +92,13 @@ class Onboard:
         """Take the present attitude as level; the drone stands on the floor."""
         self._level = (0.0, 0.0)
 
-    def step(self, drone: Senses, motors_on: bool, crosstalk: bool = False) -> None:
+    def step(
+        self, drone: Senses, motors_on: bool, crosstalk: bool = False, air: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
         """Measure the true state once; call it once per tick.
 
-        crosstalk: another drone's ultrasound of the same rate is in reach.
+        crosstalk: another drone's ultrasound of the same rate is in reach. air: how moving air pushes [m/s^2; world];
+        the tilt that balances it is taken for level, as in a recorded flight, where navdata said 0 at 5 to 10 degrees.
         """
         body = drone.airframe
         draw = self._draw
@@ -109,6 +112,10 @@ class Onboard:
         self._measure_height(body, crosstalk)
         self.roll = body.roll + self._level[0] + self._tilt_error[0].step()
         self.pitch = body.pitch + self._level[1] + self._tilt_error[1].step()
+        if air != (0.0, 0.0) and not body.on_ground:
+            c, s = math.cos(body.yaw), math.sin(body.yaw)
+            self.pitch += math.atan((c * air[0] + s * air[1]) / GRAVITY_M_S2)
+            self.roll -= math.atan((c * air[1] - s * air[0]) / GRAVITY_M_S2)
         self._measure_yaw(body)
         self._measure_inertia(body, (_IDLING if body.on_ground else _FLYING) if motors_on else _STILL)
         self.battery = drone.battery

@@ -27,6 +27,7 @@ _HOLD_GAIN, _HOLD_M_S = 0.9, 0.5
 _TILT_TIME_S = 0.12
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
 _DRAG = 0.25  # 1/s, when only the attitude is held
+_BRACE_S = 1.0  # until it leans against steady air as far as it takes
 
 
 class Steering(Enum):
@@ -55,7 +56,10 @@ ARDUPILOT_RESPONSE = Response(dead_s=0.13, rate=3.5, damping=1.0, gain=1.0)
 
 
 class MavlinkCopter:
-    """A drone standing on its pad. `steering` and the methods take the requests, `airframe` holds the true state."""
+    """A drone standing on its pad. `steering` and the methods take the requests, `airframe` holds the true state.
+
+    wind: acceleration by the air that a fault moves [m/s^2; world].
+    """
 
     def __init__(
         self, pad_m: tuple[float, float], yaw_rad: float, scenario: CopterScenario, response: Response, tick_s: float,
@@ -77,6 +81,7 @@ class MavlinkCopter:
         self._delayed: DelayLine[tuple[Vector3, float]] = DelayLine(response.dead_s, tick_s, (_STILL, 0.0))
         self._acceleration = [0.0, 0.0, 0.0]  # heading frame
         self._held: Vector3 | None = None
+        self.wind = self._braced = (0.0, 0.0)
 
     @property
     def autopilot(self) -> "MavlinkCopter":
@@ -118,6 +123,7 @@ class MavlinkCopter:
                 wake[1] + self._unrest[1].step(),
                 wake[2] + self._unrest[2].step(),
             )
+            wake = self._blown(wake)
         match self.steering:
             case Steering.OFF:
                 if not body.on_ground:
@@ -141,6 +147,11 @@ class MavlinkCopter:
                 self._acceleration[0], self._acceleration[1] = -_DRAG * vx, -_DRAG * vy
                 self._vertical(-0.5 * self.estimate.velocity[2])
                 self._move(tuple(self._acceleration), 0.0, wake)
+
+    def _blown(self, push: Vector3) -> Vector3:
+        share, (x, y) = self._tick_s / _BRACE_S, self._braced
+        self._braced = (x + share * (self.wind[0] - x), y + share * (self.wind[1] - y))
+        return push[0] + self.wind[0] - self._braced[0], push[1] + self.wind[1] - self._braced[1], push[2]
 
     def _towards_held(self) -> Vector3:
         position = self.estimate.position
@@ -173,6 +184,8 @@ class MavlinkCopter:
         c, s = math.cos(body.yaw), math.sin(body.yaw)
         forward, left, up = acceleration
         body.ax, body.ay, body.az = c * forward - s * left + push[0], s * forward + c * left + push[1], up + push[2]
+        x, y = self._braced
+        forward, left = forward - c * x - s * y, left - c * y + s * x  # what is left of it as tilt
         share = dt / _TILT_TIME_S
         body.roll_rate = (math.atan(-left / GRAVITY_M_S2) - body.roll) / _TILT_TIME_S
         body.pitch_rate = (math.atan(forward / GRAVITY_M_S2) - body.pitch) / _TILT_TIME_S

@@ -85,7 +85,7 @@ class World:
             if isinstance(drone, MavlinkCopter):
                 drone.estimate.step(drone.airframe, drone.motors_on)
             else:
-                self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed)
+                self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed, drone.air)
         self._let_targets_depart()
         for target in self.targets.values():
             target.step()
@@ -106,6 +106,12 @@ class World:
             self._together_s += TICK_S
             for name, target in self.targets.items():
                 target.parked = target.parked and self._together_s < self._depart_after_s[name]
+
+    def blow(self, name: str, push_m_s2: float, direction_deg: float) -> None:
+        """Let the air push one drone [m/s^2], towards a direction [deg; world], counter-clockwise from x."""
+        angle = math.radians(direction_deg)
+        wind = (push_m_s2 * math.cos(angle), push_m_s2 * math.sin(angle)) if push_m_s2 else (0.0, 0.0)
+        self.drones[name].wind = wind
 
     @property
     def copters(self) -> dict[str, MavlinkCopter]:

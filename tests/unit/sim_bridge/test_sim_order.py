@@ -10,10 +10,11 @@ import pytest
 from groundstation.errors import GroundStationError, SettingsError
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import read_order
 from sim_bridge.render.spec import BodyShape, OutageKind
-from sim_bridge.scenario import Fault, FaultKind, Scenario
+from sim_bridge.scenario import Scenario
 from sim_bridge.tick_schedule import LATE_NS, Clockwork
 from sim_bridge.world.world import TICK_NS, World
 
@@ -197,8 +198,9 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
         ],
         world,
         emulators,
+        {name: emulator.control for name, emulator in emulators.items()},
     )
-    assert schedule.apply(0.5) == []
+    assert schedule.apply(0.5) == [("ceiling", "fault camera_cut of ceiling begins")]
     assert len(schedule.apply(1.6)) == 2
     assert emulators["drone_2"].deaf
     assert world.drones["drone_1"].battery == 0.1
@@ -209,7 +211,7 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
     assert emulators["drone_2"].control.blocked
     schedule.apply(2.95)
     assert not emulators["drone_2"].control.blocked
-    assert schedule.apply(3.1) == ["fault navdata_silent of drone_1 ends"]
+    assert schedule.apply(3.1) == [("drone_1", "fault navdata_silent of drone_1 ends")]
     assert not emulators["drone_1"].silent
     for emulator in emulators.values():
         emulator.close()
@@ -230,3 +232,38 @@ def test_a_run_whose_pictures_come_late_is_invalid() -> None:
     assert (clock.pictures, clock.late_pictures, clock.faults) == (1000, 10, [])
     clock.count_pictures(1060, 60)
     assert "pictures" in clock.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("entry", "named"),
+    [
+        ({"kind": "uniform_floor", "entity": "px4_1"}, "'px4_1' is none of drone_1, drone_2"),
+        ({"kind": "wrong_board", "entity": "drone_1", "other": "nobody"}, "other: 'nobody' is none of"),
+        ({"kind": "picture_black", "entity": "turtlebot"}, "'turtlebot' is none of ceiling, drone_1"),
+        ({"kind": "ids_swapped", "entity": "drone_1", "other": "px4_1"}, "drone_1 and px4_1 are of different kinds"),
+    ],
+)
+def test_wrong_values_of_what_cannot_have_them_are_refused(tmp_path: Path, entry: dict[str, Any], named: str) -> None:
+    content = order()
+    px4 = {"kind": "mavlink", "mavlink": {"flavour": "px4", "system_id": 11}, "pad_m": [1, 0], "marker": MARKER}
+    content["field"]["drones"]["px4_1"] = px4
+    content["addresses"]["px4_1"] = "127.1.2.13"
+    content["scenario"]["faults"] = [{"start_s": 0, **entry}]
+    with pytest.raises(SettingsError, match=named):
+        read_order(write(tmp_path, content))
+
+
+def test_cameras_are_told_their_faults_and_carried_by_the_body_behind_an_address(tmp_path: Path) -> None:
+    content = order()
+    content["scenario"] = {
+        "faults": [
+            {"kind": "ids_swapped", "entity": "drone_1", "other": "drone_2", "start_s": 0},
+            {"kind": "picture_frozen", "entity": "ceiling", "start_s": 3},
+            {"kind": "wrong_board", "entity": "drone_2", "other": "turtlebot", "start_s": 4},
+        ]
+    }
+    read = read_order(write(tmp_path, content))
+    ceiling, onboard = render_specs(read.site, read.scenario, read.streams, "board", 1)
+    assert [fault.kind for fault in ceiling.scenario.faults] == [FaultKind.PICTURE_FROZEN, FaultKind.WRONG_BOARD]
+    assert [fault.kind for fault in onboard.scenario.faults] == [FaultKind.WRONG_BOARD]
+    assert onboard.mount.body == "drone_2"

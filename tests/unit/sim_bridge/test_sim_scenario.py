@@ -1,6 +1,7 @@
 """Scenario files: every key is checked, and the default one flatters nobody."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def test_all_problems_are_named_at_once() -> None:
 def test_faults_need_what_they_use() -> None:
     with pytest.raises(SettingsError, match="end_s must be after start_s"):
         parse_scenario('{"faults": [{"kind": "navdata_silent", "entity": "d", "start_s": 2, "end_s": 1}]}')
-    with pytest.raises(SettingsError, match="value belongs to battery_drop"):
+    with pytest.raises(SettingsError, match="battery_drop needs a value"):
         parse_scenario('{"faults": [{"kind": "battery_drop", "entity": "d", "start_s": 2}]}')
 
 
@@ -90,3 +91,15 @@ def test_faults_need_what_they_use() -> None:
 def test_absurd_values_are_refused(scenario: dict[str, Any]) -> None:
     with pytest.raises(SettingsError):
         parse_scenario(json.dumps(scenario))
+
+
+def test_the_unkind_scenario_wanders_as_the_recorded_flight_did() -> None:
+    drones = parse_scenario(json.dumps(read("unkind.yaml"))).drones
+    share = 1.0 - math.exp(-60.0 / drones.yaw_wander_correlation_s)
+    assert drones.yaw_wander_deg * math.sqrt(2.0 * share) == pytest.approx(8.0, abs=0.1)
+    assert drones.moving_air_lean_deg == 10.0
+
+
+def test_the_shipped_scenarios_are_whole() -> None:
+    for path in SCENARIOS.glob("*.yaml"):
+        parse_scenario(json.dumps(read(path.name)))

@@ -1,6 +1,7 @@
 """Rendered pictures: corners where projection says, errors as the scenario says, and reproducible."""
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,10 +12,12 @@ from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.render.process import FrameDelay, active_outage
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
 from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, Outage, OutageKind, PictureQuality, RenderSpec
+from sim_bridge.render.wrong_pictures import WrongPictures, spec_under
 
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
 CEILING = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, (-0.12, 0.05, 0.0, 0.0, 0.0))
@@ -143,3 +146,40 @@ def test_outages():
     assert active_outage(outages, 2.5) is OutageKind.STALL
     assert active_outage(outages, 3.5) is OutageKind.CUT
     assert active_outage(outages, 1e6) is OutageKind.CUT
+
+
+def broken(kind, **more):
+    return Fault(kind=FaultKind(kind), **({"entity": "drone_1", "start_s": 2.0, "end_s": 4.0} | more))
+
+
+def pictures(*faults, camera="drone_1"):
+    return WrongPictures(make_spec(camera, replace(CLEAN, faults=faults)))
+
+
+STATES = [np.array([state(0, 0, 1.5), state(x, 0.0, 0.0)]) for x in (1.2, 1.4, 1.6)]
+
+
+def test_a_frozen_picture_repeats_and_a_black_one_shows_nothing():
+    frozen, black = pictures(broken("picture_frozen")), pictures(broken("picture_black"))
+    shown = [frozen.render(states, t) for states, t in zip(STATES, (1.9, 2.5, 4.0), strict=True)]
+    assert (shown[0] == shown[1]).all() and (shown[0] != shown[2]).any()
+    assert black.render(STATES[0], 3.0).max() == 0 and black.render(STATES[0], 5.0).max() > 0
+
+
+def test_in_a_bumped_camera_everything_moves():
+    camera = pictures(broken("camera_bumped", value=3.0))
+    honest, bumped = (camera.render(STATES[0], t) for t in (1.0, 3.0))
+    spec = make_spec()
+    truth = bot_corners(spec, STATES[0])
+    assert np.abs(refined(honest, truth) - truth).max() < 0.2
+    turned = bot_corners(spec_under(spec, [broken("camera_bumped", value=3.0)]), STATES[0])
+    assert np.abs(refined(bumped, turned) - turned).max() < 0.2
+    shift = (turned - truth).mean(axis=0)
+    assert shift[1] == pytest.approx(spec.intrinsics.fy_px * math.radians(3.0), rel=0.2), "it looks higher"
+
+
+def test_a_wrong_board_is_that_of_the_other():
+    swap = broken("wrong_board", entity="bot", other="drone_1", start_s=0.0, end_s=None)
+    found = spec_under(make_spec(), [swap]).boards
+    assert [(board.body, board.code) for board in found] == [("drone_1", 1), ("bot", 1)]
+    assert found[1].position_m == (0, 0, 0.4)

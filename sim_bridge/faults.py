@@ -1,5 +1,6 @@
 """Faults of a scenario: what breaks when, and what heals."""
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
@@ -36,13 +37,13 @@ class FaultSchedule:
             edges.append((fault.start_s, True, fault))
             if fault.end_s is not None:
                 edges.append((fault.end_s, False, fault))
-        self._edges = sorted(edges, key=lambda edge: edge[0], reverse=True)
+        self._edges = deque(sorted(edges, key=lambda edge: edge[0]))
 
     def apply(self, now_s: float) -> list[tuple[str, str]]:
         """Break and heal what is due at this time of the world [s]; returns (entity, line) for each."""
         lines = []
-        while self._edges and self._edges[-1][0] <= now_s:
-            _, begins, fault = self._edges.pop()
+        while self._edges and self._edges[0][0] <= now_s:
+            _, begins, fault = self._edges.popleft()
             self._switch(fault, begins)
             lines.append((fault.entity, f"fault {described(fault)} {'begins' if begins else 'ends'}"))
         return lines

@@ -1,7 +1,6 @@
 """`groundstation experiment`: the paper's planar simulations, seeded, with tables and pictures."""
 
 import json
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
+from groundstation.cli.experiment_faults import faults
 from groundstation.cli.experiment_mrclam import mrclam
 from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.progress import progress
 from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def experiment() -> None:
 
 
 experiment.add_command(mrclam)
+experiment.add_command(faults)
 
 
 @experiment.command()
@@ -183,7 +185,7 @@ def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: st
 
     folder = _folder(name, world)
     try:
-        rows = run_tasks(tasks, folder / "tasks" if name == "sweep" else None, scheduler, workers, _progress)
+        rows = run_tasks(tasks, folder / "tasks" if name == "sweep" else None, scheduler, workers, progress)
     except SweepError as error:
         raise GroundStationError(str(error)) from error
     entries = summarise(rows)
@@ -201,12 +203,6 @@ def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: st
 
 def _folder(name: str, world: dict[str, Any]) -> Path:
     return Path(world["out"] or Path("runs") / f"experiment-{name}")
-
-
-def _progress(done: int, total: int) -> None:
-    if sys.stderr.isatty():
-        bar = "#" * (40 * done // max(total, 1))
-        click.echo(f"\r\033[K[{bar:40}] {done}/{total}{chr(10) if done == total else ''}", err=True, nl=False)
 
 
 def _show(summary: dict[str, Any], entries: Sequence[dict[str, Any]], folder: Path, world: dict[str, Any]) -> None:

@@ -6,18 +6,31 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
-
-from groundstation.experiments.tasks import Task, execute
+from typing import Any, Protocol, TypeVar
 
 Tell = Callable[[int, int], None]
+
+
+class Keyed(Protocol):
+    """A value that says what is to be run; equal ones have equal keys and equal results."""
+
+    @property
+    def key(self) -> str:
+        """Return a name that is the same for equal tasks only."""
+
+    def __hash__(self) -> int:
+        """Return the hash: tasks are looked up."""
+
+
+T = TypeVar("T", bound=Keyed)
+Execute = Callable[[T], dict[str, Any]]
 
 
 class SweepError(RuntimeError):
     """A sweep that cannot go on: no scheduler, or tasks that failed. Finished results stay."""
 
 
-def result_file(folder: Path, task: Task) -> Path:
+def result_file(folder: Path, task: Keyed) -> Path:
     """Return where the result of a task is kept."""
     return folder / f"{task.key}.json"
 
@@ -40,24 +53,27 @@ def write_atomically(path: Path, text: str) -> None:
 
 
 def run_tasks(
-    tasks: Sequence[Task],
+    tasks: Sequence[T],
     folder: Path | None = None,
     scheduler: str = "",
     workers: int = 0,
     tell: Tell = lambda done, total: None,
+    run: Execute[T] | None = None,
 ) -> list[dict[str, Any]]:
     """Return the rows of all tasks, in their order; those whose result is in `folder` are read instead of run.
 
     scheduler: address of a dask cluster, `local` for one of our own with `workers` processes, empty for none.
+    run: what turns a task into its row, {"task", "merits", "timing"}; None: as the planar experiments do.
     Raises SweepError when a cluster cannot be reached or a task fails.
     """
-    rows: dict[Task, dict[str, Any]] = {}
+    run = run or _planar_run()
+    rows: dict[T, dict[str, Any]] = {}
     if folder is not None:
         found = {task: read_result(result_file(folder, task)) for task in tasks}
         rows = {task: row for task, row in found.items() if row is not None}
     missing = [task for task in dict.fromkeys(tasks) if task not in rows]
     tell(len(rows), len(tasks))
-    source = _on_cluster(missing, scheduler, workers) if scheduler and missing else _one_by_one(missing)
+    source = _on_cluster(missing, scheduler, workers, run) if scheduler and missing else _one_by_one(missing, run)
     for task, row in source:
         rows[task] = row
         if folder is not None:
@@ -66,17 +82,25 @@ def run_tasks(
     return [rows[task] for task in tasks]
 
 
+def _planar_run() -> Execute[Any]:
+    from groundstation.experiments.tasks import execute  # here: it compiles kernels that others do not need
+
+    return execute
+
+
 def dask_is_there() -> bool:
     """Return whether the optional extra `sweep` is installed."""
     return find_spec("distributed") is not None
 
 
-def _one_by_one(tasks: Sequence[Task]) -> Iterator[tuple[Task, dict[str, Any]]]:
+def _one_by_one(tasks: Sequence[T], run: Execute[T]) -> Iterator[tuple[T, dict[str, Any]]]:
     for task in tasks:
-        yield task, execute(task)
+        yield task, run(task)
 
 
-def _on_cluster(tasks: Sequence[Task], scheduler: str, workers: int) -> Iterator[tuple[Task, dict[str, Any]]]:
+def _on_cluster(
+    tasks: Sequence[T], scheduler: str, workers: int, run: Execute[T]
+) -> Iterator[tuple[T, dict[str, Any]]]:
     """Yield results as they come; a worker that dies is replaced by another one, its tasks are run again."""
     if not dask_is_there():
         raise SweepError("a cluster needs dask: pip install 'skein-groundstation[sweep]', or leave out --scheduler")
@@ -98,7 +122,7 @@ def _on_cluster(tasks: Sequence[Task], scheduler: str, workers: int) -> Iterator
         except (OSError, TimeoutError, ValueError) as error:
             raise SweepError(f"no dask scheduler answers at {scheduler}: {error}") from error
         try:
-            futures = {client.submit(execute, task, pure=False, retries=3): task for task in tasks}
+            futures = {client.submit(run, task, pure=False, retries=3): task for task in tasks}
             for future in as_completed(list(futures)):
                 if future.status != "finished":
                     raise SweepError(f"task {futures[future].key} failed: {future.exception()}")

@@ -58,6 +58,10 @@ def main() -> int:
         from sim_bridge.study.vision.command import main as vision
 
         return vision(sys.argv[2:])
+    if sys.argv[1:2] == ["faults"]:
+        from sim_bridge.study.faults.command import main as faults
+
+        return faults()
     arguments = _parser().parse_args()
     field = resolved_field(arguments.field, arguments.set)
     scenario = parse_scenario(Path(arguments.scenario).read_bytes()) if arguments.scenario else Scenario()

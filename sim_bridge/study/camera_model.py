@@ -16,6 +16,7 @@ from groundstation.geometry.rotations import (
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
+from sim_bridge.turned import turned_about
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0
@@ -82,11 +83,16 @@ class Eye:
             error = rotation_from_euler(*(turn * rng.standard_normal(3)))
             self._rotation = error @ world_from_downward_optical(mount.rotation_deg)
             self._position = mount.position_m + shift * rng.standard_normal(3)
+        self._mounted = self._rotation
         self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
         self._robots = frozenset(site.drones)
         self._scenario, self._outliers, self._rng = cameras, outliers, rng
         self._last_seen = {b.body: -math.inf for b in self._boards}
         self._seq = 0
+
+    def bump(self, angle_deg: float, axis_deg: float) -> None:
+        """Turn the camera away from its mounting, which the ground station does not know; 0: back to it."""
+        self._rotation = self._mounted @ turned_about(angle_deg, axis_deg) if angle_deg else self._mounted
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
         """Return what one exposure shows; stamps carry the error of a delay that is known as a mean only."""

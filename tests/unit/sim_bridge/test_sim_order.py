@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import Severity
 from groundstation.errors import GroundStationError, SettingsError
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.faults import FaultSchedule
+from sim_bridge.harness import Harness
 from sim_bridge.launch_spec import read_order
 from sim_bridge.render.spec import BodyShape, OutageKind
 from sim_bridge.scenario import Scenario
@@ -267,3 +270,48 @@ def test_cameras_are_told_their_faults_and_carried_by_the_body_behind_an_address
     assert [fault.kind for fault in ceiling.scenario.faults] == [FaultKind.PICTURE_FROZEN, FaultKind.WRONG_BOARD]
     assert [fault.kind for fault in onboard.scenario.faults] == [FaultKind.WRONG_BOARD]
     assert onboard.mount.body == "drone_2"
+
+
+class Process:
+    """The bridge's process as far as its loop uses it."""
+
+    name, stop_requested, supervisor_alive = "sim_bridge", False, True
+
+    def __init__(self) -> None:
+        self.bus = MemoryBus(MemoryExchange(), "lab", "sim_bridge")
+        self.events: list[tuple[str, str, str]] = []
+
+    def event(self, severity: Severity, text: str, remedy: str = "", entity: str = "") -> None:
+        self.events.append((str(severity), entity, text))
+
+    def tick_status(self, ticks: int = 0, overruns: int = 0) -> None:
+        pass
+
+    def ready(self, detail: str = "") -> None:
+        pass
+
+
+def test_injected_faults_are_events_of_their_entities_and_reach_the_wire(tmp_path: Path) -> None:
+    content = order()
+    content["streams"] = {}
+    content["addresses"] = {"drone_1": "127.90.1.11", "drone_2": "127.90.1.12"}
+    content["scenario"]["faults"] = [
+        {"kind": "velocity_stuck", "entity": "drone_1", "start_s": 0.1, "end_s": 0.3, "value": 0.5},
+        {"kind": "wind", "entity": "drone_2", "start_s": 0.1, "value": 1.0, "direction_deg": 90},
+    ]
+    process: Any = Process()
+    harness = Harness(process, read_order(write(tmp_path, content)))
+    harness.open()
+    try:
+        for tick in range(100):
+            harness.tick(tick * TICK_NS)
+        assert harness.world.drones["drone_2"].wind == pytest.approx((0.0, 1.0), abs=1e-12)
+        emulator = harness._stage.emulators["drone_1"]
+        assert isinstance(emulator, ArDroneEmulator) and emulator._edge._wrong is not None
+    finally:
+        harness.close()
+    assert process.events == [
+        ("WARNING", "drone_1", "fault velocity_stuck 0.5 of drone_1 begins"),
+        ("WARNING", "drone_2", "fault wind 1 of drone_2 begins"),
+        ("WARNING", "drone_1", "fault velocity_stuck 0.5 of drone_1 ends"),
+    ]

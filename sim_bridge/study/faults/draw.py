@@ -1,0 +1,121 @@
+"""What a seed of the campaign stands for: a field, a path of the target, and faults."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.scenario import FigureEight, Scenario
+from sim_bridge.world.noise import generator_of
+
+_HEALTHY_SHARE = 0.1
+# Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off.
+_PADS_X_M, _PADS_Y_M = 1.4, 0.75
+_LEAST_PADS_M, _TARGET_M = 1.1, 0.6
+
+# How each kind is drawn: least and greatest figure, None: it has none. Both signs where a sign makes sense.
+_FIGURES: dict[FaultKind, tuple[float, float] | None] = {
+    FaultKind.NAVDATA_SILENT: None,
+    FaultKind.AT_DEAF: None,
+    FaultKind.CAMERA_STALL: None,
+    FaultKind.BATTERY_DROP: (0.02, 0.14),
+    FaultKind.TELEMETRY_FROZEN: None,
+    FaultKind.TELEMETRY_DELAYED: (0.2, 2.0),
+    FaultKind.VELOCITY_STUCK: (-0.6, 0.6),
+    FaultKind.VELOCITY_SCALED: (-1.0, 2.5),
+    FaultKind.VELOCITY_DRIFTING: (0.02, 0.3),
+    FaultKind.VELOCITY_JUMPING: (0.1, 1.0),
+    FaultKind.HEADING_DRIFTING: (-5.0, 5.0),
+    FaultKind.HEADING_JUMPING: (-90.0, 90.0),
+    FaultKind.BATTERY_STUCK: (0.2, 1.0),
+    FaultKind.UNIFORM_FLOOR: None,
+    FaultKind.OBSTACLE_BELOW: (0.2, 0.8),
+    FaultKind.WIND: (0.3, 1.75),
+    FaultKind.CAMERA_BUMPED: (1.0, 10.0),
+    FaultKind.PICTURE_FROZEN: None,
+    FaultKind.PICTURE_BLACK: None,
+}
+KINDS = tuple(_FIGURES)
+_OF_CAMERAS = frozenset(
+    {FaultKind.CAMERA_STALL, FaultKind.CAMERA_BUMPED, FaultKind.PICTURE_FROZEN, FaultKind.PICTURE_BLACK}
+)
+_OF_ARDRONES = frozenset({FaultKind.UNIFORM_FLOOR, FaultKind.OBSTACLE_BELOW})
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """One flight: the field (plain values), the scenario with its faults, and the seed of all noise."""
+
+    field: dict[str, Any]
+    scenario: Scenario
+    seed: int
+
+
+def draw(
+    field: dict[str, Any],
+    base: Scenario,
+    seed: int,
+    window_s: tuple[float, float],
+    kinds: tuple[FaultKind, ...] = KINDS,
+) -> Drawn:
+    """Return the flight of a seed; window_s: between which times of the world faults begin [s]."""
+    rng = generator_of(seed, "campaign")
+    pads = _pads(field, rng)
+    drones = {
+        name: {**drone, "pad_m": pads[i], "pad_yaw_deg": math.degrees(math.atan2(-pads[i][1], -pads[i][0]))}
+        for i, (name, drone) in enumerate(field["drones"].items())
+    }
+    target = base.target.model_copy(update={"path": _path(field, rng)})
+    faults = _faults(field, rng, window_s, kinds)
+    scenario = base.model_copy(update={"target": target, "faults": faults, "seed": seed})
+    return Drawn({**field, "drones": drones}, scenario, seed)
+
+
+def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Return places before the ceiling camera, none near another or the target's start."""
+    pads: list[tuple[float, float]] = []
+    while len(pads) < len(field["drones"]):
+        place = (float(rng.uniform(-_PADS_X_M, _PADS_X_M)), float(rng.uniform(-_PADS_Y_M, _PADS_Y_M)))
+        if math.hypot(*place) >= _TARGET_M and all(math.dist(place, other) >= _LEAST_PADS_M for other in pads):
+            pads.append(place)
+    return pads
+
+
+def _path(field: dict[str, Any], rng: np.random.Generator) -> FigureEight:
+    fence = field["room"]["fence"]
+    return FigureEight(
+        half_length_m=float(rng.uniform(1.0, 0.85 * fence["x_m"][1])),
+        half_width_m=float(rng.uniform(0.3, 0.4 * fence["y_m"][1])),
+        speed_m_s=float(rng.uniform(0.15, 0.4)),
+        start_phase=float(rng.choice((0.0, 0.5))),
+    )
+
+
+def _faults(
+    field: dict[str, Any], rng: np.random.Generator, window_s: tuple[float, float], kinds: tuple[FaultKind, ...]
+) -> tuple[Fault, ...]:
+    if rng.random() < _HEALTHY_SHARE or not kinds:
+        return ()
+    count = 1 if rng.random() < 0.5 else 2
+    return tuple(_fault(field, rng, window_s, kinds[int(rng.integers(len(kinds)))]) for _ in range(count))
+
+
+def _fault(field: dict[str, Any], rng: np.random.Generator, window_s: tuple[float, float], kind: FaultKind) -> Fault:
+    drones = [n for n, d in field["drones"].items() if d["kind"] == "ardrone" or kind not in _OF_ARDRONES]
+    entities = [*field["cameras"], *field["drones"]] if kind in _OF_CAMERAS else drones
+    figures = _FIGURES[kind]
+    value = None if figures is None else float(rng.uniform(*figures))
+    if kind is FaultKind.VELOCITY_STUCK and rng.random() < 0.5:
+        value = 0.0  # what an AR.Drone says that sees no floor
+    start_s = float(rng.uniform(*window_s))
+    lasts_s = float(rng.uniform(1.0, 8.0)) if rng.random() < 0.25 and kind is not FaultKind.BATTERY_DROP else None
+    return Fault(
+        kind=kind,
+        entity=entities[int(rng.integers(len(entities)))],
+        start_s=start_s,
+        end_s=None if lasts_s is None else start_s + lasts_s,
+        value=value,
+        direction_deg=float(rng.uniform(-180.0, 180.0)),
+    )

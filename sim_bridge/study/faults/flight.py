@@ -1,0 +1,273 @@
+"""One flight of the campaign: world, emulated vehicles, drivers with watchdogs, tracker; one thread, a manual clock."""
+
+import heapq
+import itertools
+import math
+import time
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from drivers.watchdog_types import Action
+from groundstation.arrays import Array
+from groundstation.bus import clock
+from groundstation.bus.api import Received
+from groundstation.bus.keys import Key
+from groundstation.bus.messages import Message, RelativeObservation
+from groundstation.bus.topics import OBSERVATION
+from groundstation.errors import EstimatorFault
+from groundstation.field.resolved import field_from_json
+from groundstation.planning.plan import Planner
+from groundstation.runtime.inbox import TOPICS
+from groundstation.runtime.journal import Adoption
+from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking
+from groundstation.tracker import PlanRequest
+from sim_bridge.fault_kinds import Fault
+from sim_bridge.faults import FaultSchedule, described
+from sim_bridge.site import parse_site
+from sim_bridge.study.camera_model import Eye
+from sim_bridge.study.faults.ardrone_device import MemoryArDrone
+from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.judge import Judge
+from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
+from sim_bridge.study.faults.memory_network import MemoryNetwork
+from sim_bridge.study.faults.observed import ObservedValues
+from sim_bridge.study.faults.orders import TeamOrders
+from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
+from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of
+from sim_bridge.study.faults.wrong_cameras import WrongEye
+from sim_bridge.world.noise import generator_of
+from sim_bridge.world.world import TICK_NS, World
+
+_START_NS = 1_000_000_000_000
+_DETECTOR_MS = (10.0, 50.0)
+_JUDGE_TICKS = 10  # 20 Hz
+_ORDER_TICKS = 20
+# By when the team must track: AR.Drones take 8 s, MAVLink vehicles longer.
+TRACKING_BY_S = 30.0
+
+
+class Arrivals:
+    """What the tracker takes in at each tick."""
+
+    def __init__(self, bus: LocalBus) -> None:
+        self._subscription = bus.subscribe(TOPICS, capacity=8192)
+        self._keys: dict[Key, str] = {}
+        self.refused: Counter[str] = Counter()
+        self.overflowed = 0
+
+    def pop_ready(self) -> list[tuple[str, Message]]:
+        """Return (key, message) of all that has arrived, in order."""
+        keys = self._keys
+        ready = []
+        for received in self._subscription.drain():
+            if received.message is None:
+                continue
+            if (key := keys.get(received.key)) is None:
+                key = keys[received.key] = str(received.key)
+            ready.append((key, received.message))
+        return ready
+
+
+class InlineWorker:
+    """Plans at once on what it is given; the plan is adopted a tick later."""
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner = planner
+        self._done: Adoption | None = None
+
+    @property
+    def idle(self) -> bool:
+        """Return whether a request can be submitted."""
+        return self._done is None
+
+    def submit(self, tick: int, request: PlanRequest) -> None:
+        """Plan."""
+        try:
+            plan = self._planner.plan(request.belief, request.topology, request.warm_start, lambda: False)
+        except EstimatorFault:
+            self._done = Adoption(tick, None)
+            return
+        self._done = Adoption(tick, plan)
+
+    def poll(self) -> Adoption | None:
+        """Return and forget the finished plan."""
+        done, self._done = self._done, None
+        return done
+
+    def close(self) -> None:
+        """Nothing to stop."""
+
+
+class FaultFlight:
+    """A flight in progress. `run` flies it to its end and returns the verdict, with the time spent on each part."""
+
+    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float) -> None:
+        field = field_from_json(msgspec.json.encode(drawn.field))
+        self._drawn, self._seconds, self._field = drawn, seconds, field
+        scenario, seed = drawn.scenario, drawn.seed
+        self.site = parse_site(drawn.field)
+        self.world = World(self.site, scenario, seed)
+        self.said: list[tuple[str, str]] = []
+        self.events: list[tuple[float, str]] = []
+        self.spent_s: defaultdict[str, float] = defaultdict(float)
+        self._rng = generator_of(seed, "study")
+        self._exchange, self._network = LocalExchange(), MemoryNetwork()
+        self._queue: list[tuple[int, int, RelativeObservation]] = []
+        self._order = itertools.count()
+        faults = scenario.faults
+        self._values = {n: ObservedValues(fault for fault in faults if fault.entity == n) for n in self.world.drones}
+        addresses = {name: drone.address for name, drone in field.drones.items()}
+        with manual_clock(lambda: self.now_ns), in_memory(self._network) as self._readers:
+            world = self.world
+            self.devices = devices_of(self.site, world, scenario, self._values, addresses, self._network)
+            self.drivers = Drivers(sections, self._bus, self.said)
+        self._orders = TeamOrders(self._bus("operator"))
+        self._tracker_bus = self._bus("tracker")
+        section = TrackerSection(field, epoch=1)
+        feed = TrackerFeed(Arrivals(self._tracker_bus), InlineWorker, clock.clock_id())
+        self.tracking = Tracking(self._tracker_bus, section, feed)
+        self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
+        self._eyes = self._build_eyes()
+        controls = {name: one.control for name, one in self.devices.items() if isinstance(one, MemoryArDrone)}
+        self._schedule = FaultSchedule(scenario.faults, self.world, self.devices, controls)
+        limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
+        self.judge = Judge(drawn.field["room"]["fence"], limits, _JUDGE_TICKS * TICK_NS / 1e9)
+        self._tracking_since_s: float | None = None
+
+    def _bus(self, source: str) -> LocalBus:
+        return LocalBus(self._exchange, self._field.site, source)
+
+    def _build_eyes(self) -> list[WrongEye]:
+        site, cameras, seed = self.site, self._drawn.scenario.cameras, self._drawn.seed
+        eyes = []
+        for name, camera in site.cameras.items():
+            known, rng = self._field.cameras[name], generator_of(seed, f"{name}/eye")
+            mounting = (math.radians(known.attitude_std_deg), known.position_std_m)
+            eyes.append(Eye(name, camera.calibration, camera, site, cameras, 0.0, rng, mounting))
+        for name, drone in site.drones.items():
+            if drone.camera is not None:
+                rng = generator_of(seed, f"{name}/eye")
+                eyes.append(Eye(name, drone.camera.calibration, drone, site, cameras, 0.0, rng))
+        return [WrongEye(eye, self._drawn.scenario.faults) for eye in eyes]
+
+    @property
+    def now_ns(self) -> int:
+        """Return the manual clock."""
+        return _START_NS + self.world.ticks * TICK_NS
+
+    def run(self) -> dict[str, Any]:
+        """Fly to the end."""
+        began = time.process_time()
+        with manual_clock(lambda: self.now_ns):
+            while not self._is_over():
+                self.step()
+        self.spent_s["cpu"] = time.process_time() - began
+        return self._report()
+
+    def _is_over(self) -> bool:
+        since_s, now_s = self._tracking_since_s, self.world.time_s
+        return now_s >= TRACKING_BY_S if since_s is None else now_s - since_s >= self._seconds
+
+    def step(self) -> None:
+        """Advance the world by one tick, and everything that is due."""
+        mark = time.perf_counter()
+        for device in self.devices.values():
+            device.receive()
+        self.world.step()
+        for device in self.devices.values():
+            device.send()
+        mark = self._spent("world", mark)
+        self._look()
+        mark = self._spent("cameras", mark)
+        now_ns, ticks = self.now_ns, self.world.ticks
+        read_all(self._readers)
+        mark = self._spent("readers", mark)
+        self._deliver(now_ns)
+        if ticks % self._tick_every == 0:
+            self.tracking.tick(now_ns)
+            mark = self._spent("tracker", mark)
+        if ticks % _ORDER_TICKS == 0:
+            self._orders.step(now_ns, self.drivers.hosts)
+        self.drivers.turn(now_ns, ticks)
+        self._spent("drivers", mark)
+        if ticks % _JUDGE_TICKS == 0:
+            self._judge()
+
+    def _spent(self, what: str, mark: float) -> float:
+        now = time.perf_counter()
+        self.spent_s[what] += now - mark
+        return now
+
+    def _look(self) -> None:
+        world, now_ns = self.world, self.now_ns
+        for index, eye in enumerate(self._eyes):
+            phase = eye.period_s * index / len(self._eyes)
+            frame, before = (int((t - phase) / eye.period_s) for t in (world.time_s, world.time_s - TICK_NS / 1e9))
+            if frame == before:
+                continue
+            delay_ms = self._drawn.scenario.cameras.video_delay_ms + self._rng.uniform(*_DETECTOR_MS)
+            for sighting in eye.look(world, now_ns, clock.clock_id()):
+                arrival_ns = sighting.header.stamp_ns + round(delay_ms * 1e6)
+                heapq.heappush(self._queue, (arrival_ns, next(self._order), sighting))
+
+    def _deliver(self, now_ns: int) -> None:
+        while self._queue and self._queue[0][0] <= now_ns:
+            sighting = heapq.heappop(self._queue)[2]
+            key = Key(self._field.site, sighting.header.entity, OBSERVATION, sighting.header.source)
+            self._exchange.deliver(Received(key, sighting.header, sighting, b""))
+
+    def _judge(self) -> None:
+        now_s = self.world.time_s
+        for _, line in self._schedule.apply(now_s):
+            self.events.append((now_s, line))
+        for notice in self.tracking.notices:
+            self.events.append((now_s, notice.text))
+        self.tracking.notices.clear()
+        self.events += [(now_s, text) for _, text in self.said]
+        self.said.clear()
+        if self._orders.tracking and self._tracking_since_s is None:
+            self._tracking_since_s = now_s
+        if self._tracking_since_s is None:
+            return
+        truth = dict(zip(self.world.bodies, self.world.states().copy(), strict=True))
+        told = {name: decision.action is Action.FLY for name, decision in self.drivers.decisions.items()}
+        believed = {name: self._believed(name) for name in self.world.drones}
+        self.judge.see(now_s, truth, told, believed)
+
+    def _believed(self, name: str) -> Array | None:
+        belief = self.tracking.tracker.belief
+        return np.asarray(belief.mean_of(name)[:2]) if name in belief.layout else None
+
+    def _observable(self, fault: Fault) -> float | None:
+        values = self._values.get(fault.entity)
+        return fault.start_s if values is None else values.observable_s(fault)
+
+    def _report(self) -> dict[str, Any]:
+        faults = self._drawn.scenario.faults
+        observable = tuple(self._observable(fault) for fault in faults)
+        modes = {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}
+        reasons = {name: host.watchdog.reason for name, host in self.drivers.hosts.items()}
+        flown = self._tracking_since_s is not None
+        verdict = self.judge.verdict(faults, observable) if flown else {}
+        return {
+            "seed": self._drawn.seed,
+            "kinds": sorted(str(fault.kind) for fault in faults),
+            "faults": [
+                {
+                    "what": described(fault),
+                    "start_s": round(fault.start_s, 2),
+                    "end_s": fault.end_s,
+                    "observable_s": at_s,
+                }
+                for fault, at_s in zip(faults, observable, strict=True)
+            ],
+            "tracking_since_s": self._tracking_since_s,
+            "modes": modes,
+            "reasons": reasons,
+            **verdict,
+            "spent_s": {name: round(value, 3) for name, value in self.spent_s.items()},
+        }

@@ -1,0 +1,135 @@
+"""How a flight with faults is judged, by truth alone."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from groundstation.arrays import Array
+from sim_bridge.fault_kinds import Fault, FaultKind
+
+SEPARATION_M = 0.6
+HOVER_S, REST_S = 1.0, 3.5
+REST_M_S = 0.1
+FASTER_M_S = 0.3  # than the drone's limit: what a gust, or a correction, may add
+LOST_M, LOST_S = 0.5, 1.0
+_MEAN_S = 0.5
+# What tells a stopped drone from one that pauses.
+_STAYS_S = 1.0
+# After these nobody may fly on: the vehicle cannot be steered by what it says.
+MUST_STOP = frozenset(
+    {
+        FaultKind.NAVDATA_SILENT,
+        FaultKind.TELEMETRY_FROZEN,
+        FaultKind.VELOCITY_STUCK,
+        FaultKind.UNIFORM_FLOOR,
+    }
+)
+
+
+@dataclass(slots=True)
+class _Flown:
+    """One drone's history: times [s], smoothed speed [m/s], whether it stands, whether it is told a velocity."""
+
+    times: list[float] = field(default_factory=list)
+    places: list[tuple[float, float]] = field(default_factory=list)
+    grounded: list[bool] = field(default_factory=list)
+    told: list[bool] = field(default_factory=list)
+
+
+class Judge:
+    """Call `see` at an even rate while the team tracks; `verdict` says what came of it."""
+
+    def __init__(self, fence: Mapping[str, Any], limits_m_s: Mapping[str, float], period_s: float) -> None:
+        self._fence = np.array([fence["x_m"], fence["y_m"], fence["z_m"]])
+        self._limits, self._period_s = limits_m_s, period_s
+        self._flown = {name: _Flown() for name in limits_m_s}
+        self._lost_s = dict.fromkeys(limits_m_s, 0.0)
+        self.separation_m, self.fence_m, self.speed_m_s, self.lost_s = math.inf, 0.0, 0.0, 0.0
+        self.first: dict[str, float] = {}
+
+    def see(
+        self, now_s: float, truth: Mapping[str, Array], told: Mapping[str, bool], believed: Mapping[str, Array | None]
+    ) -> None:
+        """Take one moment. truth: rows of the truth board; told: who is told a velocity; believed: x, y of each."""
+        aloft = {name: row for name, row in truth.items() if name in self._flown and not row[12]}
+        for a, b in combinations(aloft.values(), 2):
+            self._worst(now_s, "separation", float(np.linalg.norm(a[:3] - b[:3])))
+        for name, flown in self._flown.items():
+            row = truth[name]
+            flown.times.append(now_s)
+            flown.places.append((float(row[0]), float(row[1])))
+            flown.grounded.append(bool(row[12]))
+            flown.told.append(told[name])
+            if name in aloft:
+                self._see_one(now_s, name, row, told[name], believed[name])
+
+    def _see_one(self, now_s: float, name: str, row: Array, told: bool, believed: Array | None) -> None:
+        outside = np.maximum(self._fence[:, 0] - row[:3], row[:3] - self._fence[:, 1])
+        self._worst(now_s, "fence", float(outside.max()))
+        self._worst(now_s, "speed", math.hypot(row[3], row[4]), self._limits[name] + FASTER_M_S)
+        off_m = math.inf if believed is None else float(np.hypot(*(believed - row[:2])))
+        self._lost_s[name] = self._lost_s[name] + self._period_s if told and off_m > LOST_M else 0.0
+        self._worst(now_s, "unlocalised", self._lost_s[name])
+
+    def _worst(self, now_s: float, what: str, figure: float, limit: float = 0.0) -> None:
+        match what:
+            case "separation":
+                self.separation_m, bad = min(self.separation_m, figure), figure < SEPARATION_M
+            case "fence":
+                self.fence_m, bad = max(self.fence_m, figure), figure > 0.0
+            case "speed":
+                self.speed_m_s, bad = max(self.speed_m_s, figure), figure > limit
+            case _:
+                self.lost_s, bad = max(self.lost_s, figure), figure > LOST_S
+        if bad:
+            self.first.setdefault(what, round(now_s, 2))
+
+    def verdict(self, faults: tuple[Fault, ...], observable_s: tuple[float | None, ...]) -> dict[str, Any]:
+        """Return the figures; unsafe: what was violated, with the time at which [s]."""
+        hover, rest = 0.0, 0.0
+        for fault, since_s in zip(faults, observable_s, strict=True):
+            if since_s is None or fault.entity not in self._flown or fault.kind not in MUST_STOP:
+                continue
+            if fault.end_s is not None and fault.end_s - since_s < REST_S:
+                continue  # it healed before anything was due
+            flown = self._flown[fault.entity]
+            if flown.times[-1] - since_s < REST_S + _STAYS_S:
+                continue
+            hover, rest = max(hover, _until_hover(flown, since_s)), max(rest, _until_rest(flown, since_s))
+            if hover > HOVER_S:
+                self.first.setdefault("hover", round(since_s, 2))
+            if rest > REST_S:
+                self.first.setdefault("rest", round(since_s, 2))
+        return {
+            "separation_m": round(self.separation_m, 3) if math.isfinite(self.separation_m) else None,
+            "fence_m": round(max(0.0, self.fence_m), 3),
+            "speed_m_s": round(self.speed_m_s, 3),
+            "unlocalised_s": round(self.lost_s, 2),
+            "hover_s": round(hover, 2),
+            "rest_s": round(rest, 2),
+            "unsafe": dict(sorted(self.first.items(), key=lambda item: item[1])),
+        }
+
+
+def _until_hover(flown: _Flown, since_s: float) -> float:
+    """Return the time until the drone is no longer told to move, or stands [s]."""
+    for time_s, told, grounded in zip(flown.times, flown.told, flown.grounded, strict=True):
+        if time_s >= since_s and (grounded or not told):
+            return time_s - since_s
+    return flown.times[-1] - since_s
+
+
+def _until_rest(flown: _Flown, since_s: float) -> float:
+    """Return the time until the drone stays below the speed of rest, or stands [s]."""
+    step = max(1, round(_MEAN_S / (flown.times[1] - flown.times[0])))
+    stays = 2 * step * round(_STAYS_S / _MEAN_S) // 2
+    speeds = [math.dist(flown.places[i], flown.places[max(0, i - step)]) / _MEAN_S for i in range(len(flown.times))]
+    still = [ground or speed < REST_M_S for ground, speed in zip(flown.grounded, speeds, strict=True)]
+    for i, time_s in enumerate(flown.times):
+        if time_s >= since_s and (flown.grounded[i] or all(still[i : i + stays])):
+            return time_s - since_s
+    return flown.times[-1] - since_s

@@ -1,0 +1,71 @@
+"""What takes the place of clock, threads and sockets while the code that flies is hosted in one thread."""
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from unittest.mock import patch
+
+from drivers.ardrone import driver as ardrone_driver
+from groundstation.bus import clock
+from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
+
+
+class HostedThread:
+    """Stands in for a reader thread: `started` of them run when `read_all` calls them."""
+
+    started: list["HostedThread"] = []  # noqa: RUF012 - emptied by whoever hosts them
+
+    def __init__(self, target: Callable[[], None], name: str = "", daemon: bool = True) -> None:
+        self.target, self.name, self.daemon = target, name, daemon
+
+    def start(self) -> None:
+        """Wait to be called."""
+        HostedThread.started.append(self)
+
+    def join(self, timeout: float | None = None) -> None:
+        """Nothing to wait for."""
+
+
+class NoTcp:
+    """An AR.Drone whose TCP ports do not answer: neither a version nor a dump of its configuration."""
+
+    version, dump, listening = "", b"", False
+
+    def __init__(self, *_: object) -> None:
+        """Take what a `TcpInquirer` takes."""
+
+    def ask_version(self) -> None:
+        """Answer nothing."""
+
+    def ask_dump(self) -> None:
+        """Answer nothing."""
+
+
+def read_all(readers: list[HostedThread]) -> None:
+    """Let each reader take what waits for it."""
+    for reader in readers:
+        try:
+            reader.target()
+        except NothingWaits:
+            continue
+
+
+@contextmanager
+def manual_clock(now_ns: Callable[[], int]) -> Iterator[None]:
+    """Let everybody in this process read another clock than the host's."""
+    with patch.object(clock, "now_ns", now_ns):
+        yield
+
+
+@contextmanager
+def in_memory(network: MemoryNetwork) -> Iterator[list[HostedThread]]:
+    """Let drivers and emulators that are built inside use the network in memory; yields the drivers' readers."""
+    readers: list[HostedThread] = []
+    HostedThread.started = readers
+    with (
+        patch.object(socket, "socket", network.socket),
+        patch.object(threading, "Thread", HostedThread),
+        patch.object(ardrone_driver, "TcpInquirer", NoTcp),
+    ):
+        yield readers

@@ -1,0 +1,124 @@
+"""The drivers of a field, as they fly, with their watchdogs: hosted in one thread, at the emulated vehicles' wire."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+
+from drivers.ardrone.driver import RATE_HZ as ARDRONE_HZ
+from drivers.ardrone.driver import ArDrone
+from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.host import VehicleHost
+from drivers.mavlink.driver import RATE_HZ as MAVLINK_HZ
+from drivers.mavlink.driver import Fleet, hosts_of
+from drivers.mavlink.settings import MavlinkDriverSettings
+from drivers.mavlink.wire.names import Flavour
+from drivers.watchdog_types import WatchdogDecision
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Severity
+from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.scenario import Scenario
+from sim_bridge.site import Site
+from sim_bridge.study.faults.ardrone_device import MemoryArDrone
+from sim_bridge.study.faults.memory_network import MemoryNetwork
+from sim_bridge.world.world import TICK_NS, World
+from sim_bridge.wrong_values import WrongValues
+
+Device = MemoryArDrone | MavlinkEmulator
+# One order of a driver process: its kind, and its section of the settings as the supervisor would hand it over.
+Section = tuple[str, str]
+BusOf = Callable[[str], Bus]
+
+
+class HostedProcess:
+    """What a driver asks of its process; `said` keeps its events."""
+
+    def __init__(self, name: str, bus: Bus, said: list[tuple[str, str]]) -> None:
+        self.name, self.section = name, "{}"
+        self.bus: Bus = bus
+        self.stop_requested = False
+        self.supervisor_alive = self.supervisor_fresh = True
+        self._said = said
+
+    def beat(self) -> None:
+        """Nobody watches."""
+
+    def ready(self, detail: str = "") -> None:
+        """Nobody waits."""
+
+    def degrade(self, detail: str) -> None:
+        """Nobody waits."""
+
+    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
+        """Nobody watches."""
+
+    def sleep_until(self, deadline_ns: int) -> bool:
+        """Never asked to stop."""
+        return True
+
+    def wake(self) -> None:
+        """Turns are given by the study."""
+
+    def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
+        """Keep what is said."""
+        self._said.append((str(severity), text))
+
+
+def devices_of(
+    site: Site, world: World, scenario: Scenario, wrong: Mapping[str, WrongValues], addresses: Mapping[str, str],
+    network: MemoryNetwork,
+) -> dict[str, Device]:  # fmt: skip
+    """Return the emulated vehicles; call it where sockets are in memory."""
+    devices: dict[str, Device] = {}
+    for name, drone in world.ardrones.items():
+        firmware = scenario.drones.firmware_of(name)
+        devices[name] = MemoryArDrone(addresses[name], drone, world.onboard[name], firmware, wrong[name], network)
+    for name, copter in world.copters.items():
+        identity = site.drones[name].require_mavlink()
+        flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
+        calls = (identity.local_address, identity.port) if identity.listen else None
+        place = (addresses[name], identity.port)
+        devices[name] = MavlinkEmulator(
+            name, place, flavour, identity.system_id, copter,
+            configured=scenario.mavlink.configured, calls=calls, wrong=wrong[name],
+        )  # fmt: skip
+    return devices
+
+
+class Drivers:
+    """All drivers of a field. Build it where threads and sockets are stood in for; call `turn` once per tick."""
+
+    def __init__(self, sections: Sequence[Section], bus_of: BusOf, said: list[tuple[str, str]]) -> None:
+        self.hosts: dict[str, VehicleHost] = {}
+        self.decisions: dict[str, WatchdogDecision] = {}
+        self._fleets: list[tuple[Fleet, list[VehicleHost]]] = []
+        self._alone: list[VehicleHost] = []
+        for kind, section in sections:
+            if kind == "ardrone":
+                settings = ArDroneDriverSettings.model_validate_json(section)
+                process = HostedProcess(settings.name, bus_of(settings.name), said)
+                self._alone.append(VehicleHost(process, ArDrone(settings, process.bus), settings.authority))
+            elif kind == "mavlink":
+                self._open_fleet(section, bus_of, said)
+        for host in (*self._alone, *(host for _, hosts in self._fleets for host in hosts)):
+            self.hosts[host.vehicle.name] = host
+
+    def _open_fleet(self, section: str, bus_of: BusOf, said: list[tuple[str, str]]) -> None:
+        # MAVSDK is a native program with threads and sockets of its own: its frames are those of pymavlink.
+        plain = json.loads(section)
+        plain["link"]["kind"] = "pymavlink"
+        settings = MavlinkDriverSettings.model_validate(plain)
+        process = HostedProcess(settings.vehicles[0].name, bus_of(settings.vehicles[0].name), said)
+        fleet = Fleet(process, settings)
+        self._fleets.append((fleet, list(hosts_of(process, fleet, settings))))
+
+    def turn(self, now_ns: int, tick: int) -> None:
+        """Let each driver turn that is due, or that an order wakes."""
+        if tick % round(1e9 / ARDRONE_HZ / TICK_NS) == 0:
+            for host in self._alone:
+                self.decisions[host.vehicle.name] = host.turn(now_ns)
+        due = tick % round(1e9 / MAVLINK_HZ / TICK_NS) == 0
+        for fleet, hosts in self._fleets:
+            if due:
+                fleet.turn(now_ns)
+            for host in hosts:
+                if due or host.has_orders:
+                    self.decisions[host.vehicle.name] = host.turn(now_ns)

@@ -1,0 +1,57 @@
+"""Flights of the campaign: the drivers that fly, their watchdogs and the tracker, hosted in one thread."""
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+from groundstation.settings.sections import DriverKind, driver_sections
+from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.scenario import Scenario
+from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.flight import FaultFlight
+
+SECONDS = 10.0
+
+
+def fly(field_name: str, *faults: Fault, seconds: float = SECONDS, seed: int = 3) -> dict[str, Any]:
+    field = load_field(find_field(field_name), ("recording.raw_datagrams=false",))
+    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    scenario = Scenario().model_copy(update={"faults": faults})
+    flight = FaultFlight(Drawn(msgspec.to_builtins(resolved_field(field)), scenario, seed), sections, seconds)
+    return flight.run() | {"events": [line for _, line in flight.events]}
+
+
+@pytest.fixture(scope="module")
+def silent() -> dict[str, Any]:
+    return fly("lab", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_1", start_s=9.0))
+
+
+def test_a_silent_drone_is_stopped_and_landed_by_its_driver(silent: dict[str, Any]) -> None:
+    assert silent["unsafe"] == {}
+    assert silent["hover_s"] <= 0.5
+    assert silent["modes"]["drone_1"] in ("LANDING", "LANDED")
+    assert silent["modes"]["drone_2"] == "TRACK"
+    assert "no telemetry from the vehicle" in silent["reasons"]["drone_1"]
+
+
+def test_what_was_broken_is_said_with_the_rest(silent: dict[str, Any]) -> None:
+    assert "fault navdata_silent of drone_1 begins" in silent["events"]
+    assert any(line.startswith("drone_1 LANDING: no telemetry") for line in silent["events"])
+
+
+@pytest.mark.slow
+def test_a_seed_ends_the_same_again(silent: dict[str, Any]) -> None:
+    again = fly("lab", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_1", start_s=9.0))
+    assert {k: v for k, v in again.items() if k != "spent_s"} == {k: v for k, v in silent.items() if k != "spent_s"}
+
+
+@pytest.mark.slow
+def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
+    flown = fly("mixed-team", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=18.0), seconds=12.0)
+    assert flown["tracking_since_s"] is not None
+    assert flown["modes"]["drone_1"] == flown["modes"]["drone_3"] == "TRACK"
+    assert flown["modes"]["drone_2"] != "TRACK"

@@ -1,0 +1,298 @@
+"""The fault campaign: what is drawn, how truth judges, what stands in for threads and sockets, and its table."""
+
+import json
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.bus import clock
+from groundstation.bus.messages import FlightState, VehicleStatus
+from groundstation.bus.topics import ODOMETRY, VEHICLE_STATUS
+from groundstation.cli.main import groundstation
+from groundstation.experiments.faults import HEALTHY, batches, by_kind, table, totals
+from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.scenario import Scenario
+from sim_bridge.study.faults.draw import KINDS, draw
+from sim_bridge.study.faults.judge import Judge
+from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
+from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
+from sim_bridge.study.faults.observed import ObservedValues
+from sim_bridge.study.faults.stand_ins import HostedThread, in_memory, manual_clock, read_all
+from sim_bridge.study.faults.wrong_cameras import WrongEye
+from sim_bridge.world.readings import Readings
+
+FENCE = {"x_m": (-3.7, 3.7), "y_m": (-2.7, 2.7), "z_m": (0.0, 2.8)}
+FIELD: dict[str, Any] = {
+    "room": {"fence": FENCE},
+    "cameras": {"ceiling": {}},
+    "drones": {"drone_1": {"kind": "ardrone"}, "px4_1": {"kind": "mavlink"}},
+}
+PERIOD_S = 0.05
+
+
+def fault(kind: str, **more: Any) -> Fault:
+    return Fault(**({"kind": FaultKind(kind), "entity": "a", "start_s": 10.0} | more))
+
+
+# -- what is drawn --------------------------------------------------------------------------------------------------
+
+
+def test_a_seed_is_one_flight_and_seeds_differ() -> None:
+    drawn = [draw(FIELD, Scenario(), seed, (11.0, 20.0)) for seed in (1, 1, 2)]
+    assert drawn[0] == drawn[1]
+    assert drawn[0].field["drones"] != drawn[2].field["drones"]
+
+
+def test_all_kinds_come_one_or_two_at_once_within_the_window_and_some_flights_are_healthy() -> None:
+    flights = [draw(FIELD, Scenario(), seed, (11.0, 20.0)).scenario.faults for seed in range(400)]
+    assert {fault.kind for faults in flights for fault in faults} == set(KINDS)
+    assert {len(faults) for faults in flights} == {0, 1, 2}
+    assert all(11.0 <= fault.start_s <= 20.0 for faults in flights for fault in faults)
+    of_ardrones = {f.entity for faults in flights for f in faults if f.kind is FaultKind.UNIFORM_FLOOR}
+    assert of_ardrones == {"drone_1"}
+
+
+def test_pads_are_apart() -> None:
+    for seed in range(100):
+        pads = [d["pad_m"] for d in draw(FIELD, Scenario(), seed, (11.0, 20.0)).field["drones"].values()]
+        assert math.dist(*pads) >= 1.1
+
+
+# -- judged by truth ------------------------------------------------------------------------------------------------
+
+
+def row(x: float, y: float, vx: float = 0.0, ground: bool = False) -> Any:
+    return np.array([x, y, 1.2, vx, 0.0, 0.0, 0, 0, 0, 0, 0, 0, float(ground)])
+
+
+def judged(rows: Any, told: Any = lambda t: True, off_m: float = 0.0, faults: tuple[Fault, ...] = ()) -> dict[str, Any]:
+    """Return the verdict on 15 s in which drone a flies rows(t) and drone b stands still 3 m away."""
+    judge = Judge(FENCE, {"a": 0.6, "b": 0.6}, PERIOD_S)
+    for n in range(300):
+        t = 5.0 + n * PERIOD_S
+        truth = {"a": rows(t), "b": row(0.0, -2.0)}
+        believed = {name: truth[name][:2] + np.array([off_m, 0.0]) for name in truth}
+        judge.see(t, truth, {"a": told(t), "b": False}, believed)
+    return judge.verdict(faults, tuple(fault.start_s for fault in faults))
+
+
+@pytest.mark.parametrize(
+    ("rows", "broken"),
+    [
+        (lambda t: row(0.0, 0.0), {}),
+        (lambda t: row(0.0, -1.5), {"separation": 5.0}),
+        (lambda t: row(3.8 if t > 9.99 else 3.0, 0.0), {"fence": 10.0}),
+        (lambda t: row(0.0, 0.0, vx=0.95), {"speed": 5.0}),
+        (lambda t: row(0.0, 0.0, vx=0.85), {}),
+        (lambda t: row(0.0, -1.5, ground=True), {}),
+    ],
+)
+def test_separation_fence_and_speed(rows: Any, broken: dict[str, float]) -> None:
+    assert judged(rows)["unsafe"] == pytest.approx(broken)
+
+
+def test_to_fly_on_a_wrong_belief_is_unsafe_and_to_hover_is_not() -> None:
+    assert set(judged(lambda t: row(0.0, 0.0), off_m=0.6)["unsafe"]) == {"unlocalised"}
+    assert judged(lambda t: row(0.0, 0.0), told=lambda t: False, off_m=0.6)["unsafe"] == {}
+    assert judged(lambda t: row(0.0, 0.0), off_m=0.4)["unsafe"] == {}
+
+
+def flown(stops_s: float, rests_s: float) -> Any:
+    """A drone that moves at 0.3 m/s until it rests, and is told to until it stops."""
+    return {
+        "rows": lambda t: row(-1.0 + 0.3 * (min(t, rests_s) - 5.0), 0.0, 0.3 * (t < rests_s)),
+        "told": lambda t: t < stops_s,
+    }
+
+
+@pytest.mark.parametrize(
+    ("stops_s", "rests_s", "broken"),
+    [(10.5, 13.0, set()), (11.5, 13.0, {"hover"}), (10.5, 14.5, {"rest"}), (99.0, 99.0, {"hover", "rest"})],
+)
+def test_after_useless_words_hover_and_rest_are_due(stops_s: float, rests_s: float, broken: set[str]) -> None:
+    verdict = judged(**flown(stops_s, rests_s), faults=(fault("telemetry_frozen"),))
+    assert set(verdict["unsafe"]) == broken
+    assert verdict["hover_s"] == pytest.approx(min(stops_s, 19.95) - 10.0, abs=0.11)
+
+
+def test_nothing_is_due_after_a_fault_that_need_not_stop_or_healed_at_once() -> None:
+    for harmless in (fault("camera_bumped", entity="ceiling"), fault("wind"), fault("velocity_stuck", end_s=11.0)):
+        assert judged(**flown(99.0, 99.0), faults=(harmless,))["unsafe"] == {}
+
+
+# -- from when on it shows ------------------------------------------------------------------------------------------
+
+
+def test_a_stuck_velocity_shows_once_the_drone_moves() -> None:
+    stuck, frozen = fault("velocity_stuck"), fault("telemetry_frozen", start_s=30.0)
+    values = ObservedValues((stuck, frozen))
+    for n in range(400):
+        t = n * PERIOD_S
+        honest = Readings(n, (0.3 if t > 12 else 0.0, 0.0, 0.0), 0, 0, 0, (0, 0, 0), (0, 0, 9.8), 1.0)
+        values.report(t, honest)
+    assert values.observable_s(stuck) == pytest.approx(12.05)
+    assert values.observable_s(frozen) == 30.0
+    assert ObservedValues((stuck,)).observable_s(stuck) is None
+
+
+# -- stand-ins ------------------------------------------------------------------------------------------------------
+
+
+def test_datagrams_stay_in_the_process_and_a_reader_ends_where_it_would_wait() -> None:
+    import socket
+    import threading
+
+    network = MemoryNetwork()
+    heard: list[bytes] = []
+    with in_memory(network) as readers:
+        server, client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), socket.socket()
+        server.bind(("127.0.0.2", 5554))
+        server.settimeout(0.1)
+
+        def read() -> None:
+            while True:
+                heard.append(server.recvfrom(100)[0])
+
+        threading.Thread(target=read, name="reader", daemon=True).start()
+    assert socket.socket is not network.socket and threading.Thread is not HostedThread
+    for word in (b"one", b"two"):
+        client.sendto(word, ("127.0.0.2", 5554))
+    client.sendto(b"lost", ("127.0.0.3", 5554))
+    read_all(readers)
+    assert heard == [b"one", b"two"]
+    with pytest.raises(OSError, match="in use"):
+        client.bind(("127.0.0.2", 5554))
+    server.close()
+    client.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        client.recvfrom(100)
+    client.settimeout(1.0)
+    with pytest.raises(NothingWaits):
+        client.recvfrom(100)
+
+
+def test_everybody_reads_the_manual_clock_while_it_runs() -> None:
+    with manual_clock(lambda: 42):
+        assert clock.now_ns() == 42
+    assert clock.now_ns() > 42
+
+
+def test_the_local_bus_hands_messages_over_as_they_are() -> None:
+    exchange = LocalExchange()
+    driver, tracker = (LocalBus(exchange, "lab", name) for name in ("drone_1", "tracker"))
+    everything, one = tracker.subscribe([VEHICLE_STATUS, ODOMETRY]), tracker.subscribe([VEHICLE_STATUS], "drone_2")
+    newest = tracker.subscribe([VEHICLE_STATUS], newest=True)
+    said = [VehicleStatus(header=driver.header("drone_1"), flight_state=FlightState.LANDED, mode=mode) for mode in "ab"]
+    for message in said:
+        driver.publish(VEHICLE_STATUS, message)
+    assert [received.message for received in everything.drain()] == said
+    assert everything.waiting is False
+    assert one.drain() == []
+    assert [received.message for received in newest.drain()] == said[1:]
+
+
+class Eye:
+    """Sees one thing after the other."""
+
+    name, period_s = "a", 0.1
+
+    def __init__(self) -> None:
+        self.bumps: list[float] = []
+        self.n = 0
+
+    def bump(self, angle_deg: float, axis_deg: float) -> None:
+        self.bumps.append(angle_deg)
+
+    def look(self, world: Any, stamp_ns: int, clock: str) -> list[Any]:
+        from groundstation.bus.messages import Header, RelativeObservation
+
+        self.n += 1
+        header = Header(stamp_ns, clock, "a", "a_camera", self.n)
+        return [
+            RelativeObservation(
+                header=header, observer="a", subject="b", camera="a_camera", position_m=(float(self.n), 0.0, 1.0),
+                yaw_rad=0.0, covariance=(1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0), margin=2.0,
+                roll_rad=0.0, pitch_rad=0.0,
+            )
+        ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "seen"), [("picture_frozen", [1, 1, 1, 4]), ("picture_black", [1, 4]), ("camera_stall", [1, 4])]
+)
+def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
+    eye: Any = Eye()
+    camera = WrongEye(eye, [fault(kind, start_s=1.0, end_s=3.0)])
+    found = []
+    for t in (0.5, 1.0, 2.0, 3.0):
+        world: Any = SimpleNamespace(time_s=t)
+        eye.n = round(t)  # what an honest picture would show
+        found += camera.look(world, int(t * 1e9), "c")
+    assert [one.position_m[0] for one in found] == seen
+    assert len({(one.header.stamp_ns, one.header.seq) for one in found}) == len(found)
+
+
+def test_a_bumped_camera_stays_turned_until_it_is_put_back() -> None:
+    eye: Any = Eye()
+    camera = WrongEye(eye, [fault("camera_bumped", start_s=1.0, end_s=2.0, value=4.0)])
+    for t in (0.0, 1.0, 2.0):
+        world: Any = SimpleNamespace(time_s=t)
+        camera.look(world, 0, "c")
+    assert eye.bumps == [0.0, 4.0, 0.0]
+
+
+# -- the table ------------------------------------------------------------------------------------------------------
+
+
+def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
+    return {
+        "seed": seed, "kinds": kinds, "faults": [{}] * len(kinds), "tracking_since_s": 6.0, "modes": {"a": mode},
+        "separation_m": 1.0, "fence_m": 0.0, "speed_m_s": 0.5, "unlocalised_s": 0.0, "hover_s": 0.0, "rest_s": 0.0,
+        "unsafe": unsafe,
+    } | more  # fmt: skip
+
+
+FLIGHTS = [
+    flight(1, ["wind"], {}),
+    flight(2, ["velocity_stuck", "wind"], {"speed": 12.0, "fence": 13.0}, separation_m=0.4),
+    flight(3, ["velocity_stuck"], {"hover": 11.0}, "LANDED", hover_s=2.5),
+    flight(4, [], {}),
+    flight(5, [], {}, "LANDED"),
+    flight(6, ["wind"], {}, tracking_since_s=None, separation_m=None),
+]
+
+
+def test_the_table_counts_by_kind_and_names_seeds() -> None:
+    rows = {row["kind"]: row for row in by_kind(FLIGHTS)}
+    assert set(rows) == {"wind", "velocity_stuck", HEALTHY}
+    stuck, wind = rows["velocity_stuck"], rows["wind"]
+    assert (stuck["flights"], stuck["unsafe"], stuck["alone"], stuck["unsafe_alone"]) == (2, 2, 1, 1)
+    assert stuck["seeds"] == [3, 2], "those with this fault alone first"
+    assert stuck["why"] == {"hover": 1, "speed": 1}
+    assert (stuck["separation_m"], stuck["hover_s"]) == (0.4, 2.5)
+    assert (wind["flights"], wind["not_flown"], wind["unsafe"], wind["unsafe_alone"]) == (2, 1, 1, 0)
+    text = "\n".join(table(list(rows.values())))
+    assert "velocity_stuck" in text and "hover 1, speed 1; 3 2" in text
+
+
+def test_totals_name_false_alarms_and_where_time_goes() -> None:
+    summary = totals(FLIGHTS, [{"tracker": 3.0, "world": 1.0, "cpu": 4.5}] * len(FLIGHTS))
+    assert (summary["flights"], summary["unsafe"], summary["not_flown"]) == (5, 2, [6])
+    assert summary["false_alarms"] == [5]
+    assert summary["time_shares"] == {"tracker": 0.75, "world": 0.25}
+    assert summary["cpu_s_per_flight"] == 4.5
+
+
+def test_batches_cover_all_seeds_once() -> None:
+    found = batches(json.dumps({"x": 1}), 7, 45, size=20)
+    assert [batch.seeds[0] for batch in found] == [7, 27, 47]
+    assert sum((batch.seeds for batch in found), ()) == tuple(range(7, 52))
+    assert len({batch.key for batch in found}) == 3
+
+
+def test_the_command_is_there() -> None:
+    experiment: Any = groundstation.get_command(None, "experiment")  # type: ignore[arg-type]
+    assert "faults" in experiment.commands

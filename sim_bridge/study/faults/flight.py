@@ -20,7 +20,7 @@ from groundstation.bus.messages import Message, RelativeObservation
 from groundstation.bus.topics import OBSERVATION
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
-from groundstation.planning.plan import Planner
+from groundstation.planning.planner import Planner
 from groundstation.runtime.inbox import TOPICS
 from groundstation.runtime.journal import Adoption
 from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking

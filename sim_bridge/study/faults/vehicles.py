@@ -15,6 +15,7 @@ from drivers.watchdog_types import WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Severity
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site
 from sim_bridge.study.faults.ardrone_device import MemoryArDrone
@@ -77,8 +78,8 @@ def devices_of(
         calls = (identity.local_address, identity.port) if identity.listen else None
         place = (addresses[name], identity.port)
         devices[name] = MavlinkEmulator(
-            name, place, flavour, identity.system_id, copter,
-            configured=scenario.mavlink.configured, calls=calls, wrong=wrong[name],
+            name, place, Parameters(flavour, identity.system_id, scenario.mavlink.configured), copter,
+            calls=calls, wrong=wrong[name],
         )  # fmt: skip
     return devices
 

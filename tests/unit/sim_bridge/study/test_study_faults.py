@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,8 +12,9 @@ import pytest
 from groundstation.bus import clock
 from groundstation.bus.messages import FlightState, VehicleStatus
 from groundstation.bus.topics import ODOMETRY, VEHICLE_STATUS
-from groundstation.cli.main import groundstation
-from groundstation.experiments.faults import HEALTHY, batches, by_kind, table, totals
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.experiment import experiment
+from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, table, totals
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import KINDS, draw
@@ -293,6 +295,29 @@ def test_batches_cover_all_seeds_once() -> None:
     assert len({batch.key for batch in found}) == 3
 
 
-def test_the_command_is_there() -> None:
-    experiment: Any = groundstation.get_command(None, "experiment")  # type: ignore[arg-type]
-    assert "faults" in experiment.commands
+def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = []
+
+    def fly(batch: FlightBatch) -> dict[str, Any]:
+        told.append(json.loads(batch.order))
+        flights = [FLIGHTS[seed - 1] for seed in batch.seeds]
+        timing = [{"tracker": 1.0, "cpu": 1.0} for _ in flights]
+        return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": timing}}
+
+    monkeypatch.setattr("groundstation.experiments.faults.fly", fly)
+    monkeypatch.setattr("groundstation.experiments.runner._planar_run", lambda: pytest.fail("needs no kernels"))
+    options = ["--scheduler", "none", "--kinds", "wind, velocity_stuck", "--set", "safety.min_separation_m=0.7"]
+    arguments = ["faults", "--flights", "3", *options, "--out", str(tmp_path)]
+    code = experiment.main(arguments, standalone_mode=False)
+    assert code == ExitCode.FAILED
+    document = json.loads((tmp_path / "faults.json").read_text())
+    assert [flight["seed"] for flight in document["flights_flown"]] == [1, 2, 3]
+    assert document["unsafe"] == 2
+    assert "2 of 3 flights ended unsafe" in capsys.readouterr().out
+    order = told[0]
+    assert order["kinds"] == ["wind", "velocity_stuck"]
+    assert order["field"]["safety"]["min_separation_m"] == 0.7
+    assert [kind for kind, _ in order["sections"]] == ["ardrone", "ardrone"]
+    assert all(json.loads(section)["raw_datagrams"] is False for _, section in order["sections"])

@@ -32,10 +32,7 @@ from groundstation.errors import GroundStationError
 @click.option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
 @click.option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-faults.")
 @click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output.")
-def faults(
-    flights: int, seed: int, seconds: float, name: str, scenario: str, kinds: str, options: tuple[str, ...],
-    scheduler: str, workers: int, out: Path | None, as_json: bool,
-) -> int:  # fmt: skip
+def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path | None, as_json: bool, **flown: Any) -> int:
     """Fly random fields with one or two random faults; the drivers, watchdogs and tracker are those that fly.
 
     Message level: no processes, no pictures. Each seed is one flight and gives the same end again. Unsafe is a
@@ -45,7 +42,7 @@ def faults(
     from groundstation.experiments.faults import batches, by_kind, flights_of, fly, table, totals
     from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks, write_atomically
 
-    order = _order(name, scenario, options, seconds, kinds)
+    order = _order(**flown)
     if scheduler == "local" and (flights == 1 or not dask_is_there()):
         scheduler = "none"
     folder = Path(out or Path("runs") / "experiment-faults")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from drivers.base import HostProcess
 from drivers.camera import convert, jpeg
 from drivers.camera.context import Surroundings
 from drivers.camera.pipeline import Pipeline
@@ -20,7 +21,6 @@ from groundstation.bus import clock
 from groundstation.bus.messages import CameraStatus, Severity
 from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, VIDEO
 from groundstation.errors import SettingsError, without_password
-from groundstation.process.child import Child
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ _STATUS_PERIOD_NS = 500_000_000
 _LEVEL = (0.0, 0.0)
 
 
-def run(child: Child) -> int:
+def run(child: HostProcess) -> int:
     """Serve one camera until told to stop; returns the exit code."""
     try:
         settings = CameraDriverSettings.model_validate_json(child.section)
@@ -55,7 +55,7 @@ class CameraDriver:
     `counts` holds what was refused, by reason.
     """
 
-    def __init__(self, child: Child, settings: CameraDriverSettings, source: FrameSource) -> None:
+    def __init__(self, child: HostProcess, settings: CameraDriverSettings, source: FrameSource) -> None:
         self._child, self._settings, self._source = child, settings, source
         self._intrinsics = settings.calibration.intrinsics()
         self._delay_ns = round(settings.video_delay_ms * NS_PER_MS)

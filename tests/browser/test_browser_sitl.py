@@ -149,12 +149,6 @@ def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
     assert late_with < late + 0.03 + 2.0 * math.sqrt((late + 0.001) * 2 / without["ticks"])
 
 
-def _answers(url: str) -> bool:
-    with suppress(OSError), urllib.request.urlopen(f"{url}token", timeout=2):
-        return True
-    return False
-
-
 @contextmanager
 def idle_viewer(url: str) -> Iterator[None]:
     """A page that shakes hands, asks for all pictures, and then reads nothing any more."""

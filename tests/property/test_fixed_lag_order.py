@@ -2,6 +2,7 @@
 
 import math
 import random
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundstation.bus.messages import Verdict
+from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import Measurement, OdometrySample
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
@@ -18,6 +20,7 @@ from groundstation.geometry.rotations import base_from_tilted_optical
 MS = 1_000_000
 START = 5_000_000_000_000
 NOW = START + 400 * MS
+END = NOW + 60 * MS  # the last sighting comes 120 ms late
 
 
 def parameters() -> EstimatorParameters:
@@ -41,17 +44,58 @@ def diagonal(*variances: float) -> tuple[float, ...]:
     return tuple(np.diag(variances).ravel().tolist())
 
 
-def stream(seed: int):
-    """0.4 s of a flight as (kind, arguments): both robots seen, the target seen, one wild sighting, one reset."""
+class Arrival(Protocol):
+    """What arrives: `due_ns`, when it would come in flight, and how the filter takes it."""
+
+    @property
+    def due_ns(self) -> int: ...
+
+    def enter(self, joint: FixedLagFilter, now_ns: int) -> Verdict | None: ...
+
+
+class Airborne(NamedTuple):
+    entity: str
+    due_ns: int
+
+    def enter(self, joint: FixedLagFilter, now_ns: int) -> Verdict | None:
+        return joint.set_airborne(self.entity, True, self.due_ns, now_ns)
+
+
+class Motion(NamedTuple):
+    entity: str
+    sample: OdometrySample
+
+    @property
+    def due_ns(self) -> int:
+        return self.sample.stamp_ns
+
+    def enter(self, joint: FixedLagFilter, now_ns: int) -> Verdict | None:
+        return joint.add_motion(self.entity, self.sample, now_ns)
+
+
+class Sight(NamedTuple):
+    measurement: Measurement
+    key: str
+
+    @property
+    def due_ns(self) -> int:
+        return self.measurement.stamp_ns + 120 * MS
+
+    def enter(self, joint: FixedLagFilter, now_ns: int) -> Verdict | None:
+        return joint.add_observation(self.measurement, self.key, now_ns)
+
+
+def stream(seed: int) -> list[Arrival]:
+    """0.4 s of a flight: both robots seen, the target seen, one wild sighting, one reset."""
     rng = np.random.default_rng(seed)
-    flight = [("airborne", ("a", True, START)), ("airborne", ("b", True, START + 11 * MS))]
+    flight: list[Arrival] = [Airborne("a", START), Airborne("b", START + 11 * MS)]
     for k in range(80):
         stamp = START + 5 * MS * k + int(rng.integers(0, 2 * MS))
         for name, speed in (("a", 0.1), ("b", -0.05)):
             yaw = 0.002 * k + (2.0 if k > 50 else 0.0)
             height = 1.3 + 0.01 * float(rng.normal()) if k % 3 == 0 else None
             velocity = (speed + 0.02 * float(rng.normal()), 0.01, 0.0)
-            flight.append(("motion", (name, OdometrySample(stamp, velocity, yaw, height, int(k > 50)))))
+            flight.append(Motion(name, OdometrySample(stamp, velocity, yaw, height, int(k > 50))))
     four, three = diagonal(1e-4, 1e-4, 4e-4, 1e-3), diagonal(1e-4, 1e-4, 4e-4)
     for k in range(1, 6):
         stamp = START + 65 * MS * k + int(rng.integers(0, 9 * MS))
@@ -63,30 +107,24 @@ def stream(seed: int):
             ("a", "t", (0.1, 0.0, 1.2), three),
         ):
             place = tuple((np.array(position) + noise).tolist())
-            yaw = 0.1 if covariance is four else None
-            flight.append(
-                ("observation", (Measurement(stamp, camera, subject, place, yaw, covariance), f"{camera}{subject}{k}"))
-            )
+            turned = 0.1 if covariance is four else None
+            sight = Measurement(stamp, camera, subject, place, turned, covariance)
+            flight.append(Sight(sight, f"{camera}{subject}{k}"))
     return flight
 
 
-def feed(joint: FixedLagFilter, kind: str, arguments) -> None:
-    if kind == "motion":
-        assert joint.add_motion(*arguments, NOW) is Verdict.ACCEPTED
-    elif kind == "airborne":
-        assert joint.set_airborne(*arguments, NOW) is Verdict.ACCEPTED
-    else:
-        assert joint.add_observation(*arguments, NOW) is None
+def feed(joint: FixedLagFilter, arrival: Arrival) -> None:
+    assert arrival.enter(joint, NOW) is (None if isinstance(arrival, Sight) else Verdict.ACCEPTED)
 
 
-def final(flight, advance_every: int = 0):
+def final(flight: list[Arrival], advance_every: int = 0, begin_ns: int = NOW) -> JointBelief:
     joint = FixedLagFilter(parameters())
-    joint.advance(NOW)
-    for number, (kind, arguments) in enumerate(flight):
-        feed(joint, kind, arguments)
+    joint.advance(begin_ns)
+    for number, arrival in enumerate(flight):
+        feed(joint, arrival)
         if advance_every and number % advance_every == 0:
             joint.advance(NOW)
-    joint.advance(NOW + 20 * MS)
+    joint.advance(END)
     return joint.belief()
 
 
@@ -104,29 +142,18 @@ def test_any_order_of_arrival_gives_the_same_belief(seed: int, order: int, advan
 
 
 def test_the_stream_is_worth_permuting() -> None:
-    belief = final(stream(0))
+    belief = final(stream(0), begin_ns=START)
     assert set(belief.layout.robots) == {"a", "b"}
     assert belief.layout.targets == ("t",)
     # Seen as it came, in steps, with the observations 120 ms late.
     joint = FixedLagFilter(parameters())
-    arrivals = sorted(
-        ((a[0].stamp_ns + 120 * MS if k == "observation" else a[1].stamp_ns if k == "motion" else a[2]), i)
-        for i, (k, a) in enumerate(stream(0))
-    )
-    flight = stream(0)
     joint.advance(START)
-    for at, index in arrivals:
-        kind, arguments = flight[index]
-        if kind == "motion":
-            joint.add_motion(*arguments, at)
-        elif kind == "airborne":
-            joint.set_airborne(*arguments, at)
-        else:
-            joint.add_observation(*arguments, at)
-        joint.advance(at)
-    joint.advance(NOW + 20 * MS)
-    if max(at for at, _ in arrivals) <= NOW + 20 * MS:
-        np.testing.assert_allclose(joint.belief().mean, belief.mean, atol=1e-9, rtol=0)
+    for arrival in sorted(stream(0), key=lambda each: each.due_ns):
+        assert arrival.due_ns <= END
+        arrival.enter(joint, arrival.due_ns)
+        joint.advance(arrival.due_ns)
+    joint.advance(END)
+    np.testing.assert_allclose(joint.belief().mean, belief.mean, atol=1e-9, rtol=0)
 
 
 @pytest.mark.parametrize(("late_ms", "verdict"), [(499, None), (501, Verdict.LATE), (3_600_000, Verdict.LATE)])
@@ -146,8 +173,8 @@ def test_a_stamp_from_the_future_is_refused() -> None:
 def test_a_long_pause_is_survived() -> None:
     """The process was frozen: a minute passes between two calls, and late data are refused, not mixed up."""
     joint = FixedLagFilter(parameters())
-    for kind, arguments in stream(1):
-        feed(joint, kind, arguments)
+    for arrival in stream(1):
+        feed(joint, arrival)
     joint.advance(NOW)
     later = NOW + 60_000 * MS
     assert joint.add_motion("a", OdometrySample(NOW + MS, (1.0, 0.0, 0.0), 0.0), later) is Verdict.LATE

@@ -43,9 +43,12 @@ def sources() -> tuple[Path, ...]:
 
 def imports_of(path: Path) -> Iterator[Import]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
-        targets = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        if isinstance(node, ast.ImportFrom) and not node.level:
+        if isinstance(node, ast.Import):
+            targets = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
             targets = [node.module or ""]
+        else:
+            continue
         for target in targets:
             library, place = target.split(".")[0], f"{path.relative_to(ROOT)}:{node.lineno}"
             if library not in PACKAGES:

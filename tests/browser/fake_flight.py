@@ -136,9 +136,9 @@ class FakeFlight(threading.Thread):
             mean = (x + 0.04 * math.sin(3 * s), y + 0.04 * math.cos(2 * s), z, yaw)
             entities.append(m.EntityEstimate(name, "robot", mean, tuple(cov), (0.2, 0.1, 0.0), True, 0.05))
         x, y, vx, vy = self.target_at(s)
-        mean = (x + 0.06 * math.sin(1.3 * s), y + 0.05 * math.cos(1.1 * s))
+        place = (x + 0.06 * math.sin(1.3 * s), y + 0.05 * math.cos(1.1 * s))
         spread = (0.012 + 0.008 * math.sin(0.4 * s), 0.004, 0.004, 0.008)
-        entities.append(m.EntityEstimate(TARGET, "target", mean, spread, (vx, vy), True, 0.1))
+        entities.append(m.EntityEstimate(TARGET, "target", place, spread, (vx, vy), True, 0.1))
         bus.publish(t.ESTIMATE, m.Estimate(header=bus.header("team"), entities=tuple(entities), epoch=1))
         for name in self.drones:
             setpoint = m.VelocitySetpoint(

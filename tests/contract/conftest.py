@@ -41,7 +41,7 @@ class Bench:
             }
         )
         self.world = World(site, Scenario(drones=scenario or DroneScenario()), 1)
-        drone, onboard = self.world.drones["d"], self.world.onboard["d"]
+        drone, onboard = self.world.ardrones["d"], self.world.onboard["d"]
         self.body, self.autopilot = drone.airframe, drone.autopilot
         self.emulator = ArDroneEmulator("d", self.address, drone, onboard)
         self.navdata = self.client()
@@ -118,7 +118,7 @@ class Bench:
     def demo(self) -> tuple[int, int, float, float, float, int, float, float, float]:
         """Return control state, battery, theta, phi, psi [mdeg], altitude [mm], vx, vy, vz [mm/s]."""
         assert struct.unpack_from("<HH", self.packets[-1], 16) == (0, 148)
-        return struct.unpack_from("<IIfffifff", self.packets[-1], 20)  # type: ignore[return-value]
+        return struct.unpack_from("<IIfffifff", self.packets[-1], 20)
 
     @staticmethod
     def receive(udp: socket.socket) -> list[bytes]:

@@ -12,6 +12,7 @@ import av
 import numpy as np
 
 from drivers.camera.sources.container import has_parameters
+from drivers.camera.sources.frames import Packet
 from drivers.camera.sources.opening import open_source
 
 
@@ -51,7 +52,7 @@ class Camera:
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         self.closing = threading.Event()
-        self.connection = None
+        self.connection: socket.socket | None = None
         self.thread = threading.Thread(target=self.serve, daemon=True)
         self.thread.start()
 
@@ -107,6 +108,8 @@ class Camera:
                 sequence += 1
 
     def hang_up(self):
+        if self.connection is None:
+            return
         with suppress(OSError):
             self.connection.shutdown(socket.SHUT_RDWR)
 
@@ -131,7 +134,7 @@ def watching(in_band=True):
 
 
 def taken(source, count, seconds=15.0):
-    packets, deadline = [], time.monotonic() + seconds
+    packets, deadline = list[Packet](), time.monotonic() + seconds
     while len(packets) < count:
         assert time.monotonic() < deadline, (source.detail, source.received, source.rejected)
         packet = source.take_newest(0.1)

@@ -8,10 +8,11 @@ import hashlib
 import struct
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, dialect, dialect_faults, split
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, dialect_faults, split
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import INT32, REAL32, carried_from_value, value_from_carried
 from drivers.mavlink.wire.verification import Signing
@@ -175,7 +176,8 @@ def test_signed_frames():
     payload = struct.pack("<IBBBBB", 0, 2, 3, 1, 3, 3)
     stamp = 30_000_000_000_000
     link = FrameDecoder(Signing(KEY, stamp))
-    assert link.decode(signed(0, payload, 50, stamp + 1)).message.autopilot == 3
+    beat = link.decode(signed(0, payload, 50, stamp + 1)).message
+    assert isinstance(beat, telemetry.Heartbeat) and beat.autopilot == 3
     for raw, reason in (
         (signed(0, payload, 50, stamp + 1), "replayed"),
         (signed(0, payload, 50, stamp), "replayed"),

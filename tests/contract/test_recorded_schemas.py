@@ -43,7 +43,14 @@ def _check(value: Any, schema: dict[str, Any], path: str) -> None:
     if value is None:
         assert schema.get("nullable"), path
         return
-    types = {"string": str, "integer": int, "number": (int, float), "boolean": bool, "object": dict, "array": list}
+    types: dict[str, Any] = {
+        "string": str,
+        "integer": int,
+        "number": (int, float),
+        "boolean": bool,
+        "object": dict,
+        "array": list,
+    }
     assert isinstance(value, types[schema["type"]]), path
     assert "enum" not in schema or value in schema["enum"], path
     if schema["type"] == "object":

@@ -28,8 +28,8 @@ def _types(descriptor_set: bytes) -> dict[str, dict[int, tuple[Any, ...]]]:
         (package,) = _named(file, 2)
         for message in _named(file, 4):
             name = f"{package.decode()}.{_named(message, 1)[0].decode()}"
-            parts = [dict(fields(field)) for field in _named(message, 2)]
-            found[name] = {part[3]: (part[1], part[5], part[4], part.get(6)) for part in parts}  # type: ignore[index]
+            parts = [dict[int, Any](fields(field)) for field in _named(message, 2)]
+            found[name] = {part[3]: (part[1], part[5], part[4], part.get(6)) for part in parts}
     return found
 
 

@@ -8,6 +8,7 @@ from contextlib import closing
 import pytest
 
 from groundstation.bus import topics, zenoh_bus
+from groundstation.bus.api import Subscription
 from groundstation.bus.messages import Event, Severity
 from groundstation.errors import GroundStationError
 
@@ -26,7 +27,7 @@ def endpoint() -> Iterator[str]:
     router.close()
 
 
-def send_until_heard(sender: zenoh_bus.ZenohBus, subscription: zenoh_bus.Subscription) -> int:
+def send_until_heard(sender: zenoh_bus.ZenohBus, subscription: Subscription) -> int:
     """Publish until the subscription has been learnt everywhere; returns how many were heard."""
     for _ in range(100):
         sender.publish(topics.EVENT, Event(header=sender.header("drone_1"), severity=Severity.INFO, text="x"))

@@ -20,7 +20,7 @@ TEXT = st.text(st.characters(min_codepoint=32, max_codepoint=255, exclude_charac
 
 def full_packet(profile: str = "ar2-2.3") -> bytes:
     sizes = OPTION_SIZES[profile]
-    typed = {layout.tag: layout for layout in options.LAYOUTS if layout.start == 4}
+    typed = {int(layout.tag): layout for layout in options.LAYOUTS if layout.start == 4}
     values = {0: options.Demo(), 1: options.Time(), 3: options.PhysMeasures(), 10: options.Altitude()}
     payloads = [
         (tag, typed[tag].encode(values[tag], size) if tag in values else bytes(size - 4)) for tag, size in sizes.items()
@@ -60,7 +60,7 @@ def mutate(packet: bytes, count: int, seed: int) -> None:
         for _ in range(rng.randint(1, 4)):
             mutated[rng.choice((rng.randrange(len(mutated)), rng.randrange(200)))] = rng.randrange(256)
         if rng.random() < 0.5:
-            mutated[-4:] = navdata.checksum(mutated[:-8]).to_bytes(4, "little")
+            mutated[-4:] = navdata.checksum(bytes(mutated[:-8])).to_bytes(4, "little")
         try:
             read_all(bytes(mutated), strict=rng.random() < 0.5)
         except WireError as error:

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as widest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.convert import attitude_from_quaternion, imu_from_highres, velocity_from_local
 from drivers.mavlink.links.serial import StreamCutter
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, dialect, split
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.verification import Signing
 
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)
@@ -61,7 +62,7 @@ def mutate(rng: random.Random, frame: bytes) -> bytes:
 
 
 def fuzz(count: int, seed: int) -> Counter[str]:
-    rng, outcomes = random.Random(seed), Counter()
+    rng, outcomes = random.Random(seed), Counter[str]()
     frames = [FrameEncoder(1, 1).encode(message) for message in MESSAGES]
     decoder = FrameDecoder()
     for _ in range(count):
@@ -133,7 +134,7 @@ def noise(size: int, seed: int) -> bytes:
 def test_no_frame_is_found_in_noise():
     """A checksum of 16 bits lets through one candidate of a known kind in 65536: 0.03 of the 2190 here."""
     data = noise(100_000, 6)
-    cutter, candidates, outcomes = StreamCutter(), list[bytes](), Counter()
+    cutter, candidates, outcomes = StreamCutter(), list[bytes](), Counter[str]()
     for begin in range(0, len(data), 256):
         candidates += cutter.feed(data[begin : begin + 256])
     for begin in range(len(data)):  # what a datagram that begins there would hold
@@ -148,7 +149,7 @@ def test_no_frame_is_found_in_noise():
             outcomes[error.reason] += 1
     assert outcomes["checksum"] > 2000 and outcomes["unknown_kind"] > 500, "the noise must look like frames"
     assert outcomes["verified"] == 0
-    signed, decoder = Counter(), FrameDecoder(Signing(bytes(range(32)), 0))
+    signed, decoder = Counter[str](), FrameDecoder(Signing(bytes(range(32)), 0))
     for raw in candidates:
         with pytest.raises(WireError) as refused:
             decoder.decode(raw)

@@ -54,7 +54,9 @@ class Flight:
         self.drone = Quadrotor((0.0, 0.0), 0.4, scenario, TICK_S, generator_of(seed, "drone"))
         self.onboard = Onboard(scenario, TICK_S, self.drone.airframe, generator_of(seed, "onboard"))
         self.control = FlightControl(self.drone, self.onboard)
-        self.listener = self.control.audience.request(("127.0.0.1", 1), 0)
+        listener = self.control.audience.request(("127.0.0.1", 1), 0)
+        assert listener is not None
+        self.listener = listener
         self.writer, self.state = NavdataWriter(), NavdataState()
         self.session = ArdroneSession(partial(wishes, self.settings), ids_of("drone_1"), NoTcp())
         self.scale = scale_from_settings(self.settings)

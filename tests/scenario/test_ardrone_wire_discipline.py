@@ -24,18 +24,20 @@ COMMAND, BOOTSTRAP = 1 << 6, 1 << 11
 def drive(address: str) -> None:
     """Run the whole driver with a bus in memory and a real clock, until killed."""
     from drivers.ardrone.driver import run
+    from groundstation.bus.api import Bus
     from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 
     class Process:
         name, section = "drone_1", f'{{"name": "drone_1", "address": "{address}"}}'
         stop_requested, supervisor_alive, supervisor_fresh = False, True, True
-        bus = MemoryBus(MemoryExchange(), "lab", "drone_1")
+        bus: Bus = MemoryBus(MemoryExchange(), "lab", "drone_1")
 
         def beat(self): ...
         def ready(self, detail=""): ...
         def degrade(self, detail): ...
         def tick_status(self, ticks=0, overruns=0, overflowed=0): ...
         def event(self, severity, text, remedy="", entity=None): ...
+        def wake(self): ...
 
         def sleep_until(self, deadline_ns):
             time.sleep(max(0, deadline_ns - time.monotonic_ns()) / 1e9)
@@ -61,7 +63,8 @@ class Recorder:
         for udp in (self.navdata, self.at):
             udp.setblocking(False)
         self.body = bytearray(navdata[:-8])
-        self.state, self.number, self.client = BOOTSTRAP | 0x0F800000, 0, None
+        self.state, self.number = BOOTSTRAP | 0x0F800000, 0
+        self.client: tuple[str, int] | None = None
         self.came: list[tuple[int, bytes]] = []
 
     def close(self) -> None:

@@ -50,7 +50,7 @@ class Abused(Study):
             if correction.joined:
                 self.joined.append((self.world.time_s, correction.subject))
 
-        self.score.note = watch
+        self.score.note = watch  # type: ignore[method-assign] # listens in
         while self.world.time_s < until_s:
             self.step()
             if self.world.ticks % 10 == 0:
@@ -208,7 +208,7 @@ def test_who_joins_by_a_wild_sighting_is_put_right_by_the_next(lab_field: Resolv
         take(correction)
         joined.extend([True] if correction.joined and correction.subject == name else [])
 
-    flight.score.note = watch
+    flight.score.note = watch  # type: ignore[method-assign] # listens in
     while not joined:
         flight.step()
     assert used

@@ -131,6 +131,7 @@ def test_it_ends_with_its_parent(tmp_path):
     folder = os.path.dirname(os.path.abspath(__file__))  # noqa: PTH100, PTH120 - goes into sys.path as text
     script.write_text(_PARENT.format(path=[folder], name=name, port=free_port()))
     parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
     try:
         child = int(parent.stdout.readline())
         time.sleep(0.3)

@@ -14,6 +14,7 @@ _INTEROP = Path(__file__).parents[2] / ".interop"
 _SPEC = importlib.util.spec_from_file_location(
     "mavlink_hangar", Path(__file__).parents[1] / "contract" / "mavlink_links" / "conftest.py"
 )
+assert _SPEC is not None and _SPEC.loader is not None
 _hangar = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(_hangar)
 hangar, port = _hangar.hangar, _hangar.port
@@ -109,6 +110,7 @@ def test_mavproxy_flies_our_ardupilot(mavproxy, hangar, tmp_path):
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=tmp_path)
 
     def say(line):
+        assert process.stdin is not None
         process.stdin.write(line + "\n")
         process.stdin.flush()
 

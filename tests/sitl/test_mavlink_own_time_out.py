@@ -17,6 +17,7 @@ HERE = Path(__file__).parent
 _SPEC = importlib.util.spec_from_file_location(
     "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
 )
+assert _SPEC is not None and _SPEC.loader is not None
 _hangar = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(_hangar)
 hangar, port = _hangar.hangar, _hangar.port
@@ -62,7 +63,7 @@ def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_
         until(moving, 60, lambda: (said(), (tmp_path / "pilot.txt").read_text()[-2000:]))
         os.kill(pilot.pid, number)
         at_s = {flavour: emulator.firmware.now_s for flavour, (emulator, _) in flown.items()}
-        tracks = {flavour: [] for flavour in flown}
+        tracks: dict[str, list[tuple[float, tuple[float, float], object]]] = {flavour: [] for flavour in flown}
 
         def landed():
             for flavour, (emulator, copter) in flown.items():
@@ -74,9 +75,9 @@ def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_
         until(landed, 90, said)
         for flavour, (emulator, _) in flown.items():
             begin = STOPPED_S[flavour]
-            places = [place for at, place, _ in tracks[flavour] if begin <= at <= begin + 1.0]
-            assert places, "no sample of that second"
-            drift_m = math.dist(places[0], places[-1])
+            second = [place for at, place, _ in tracks[flavour] if begin <= at <= begin + 1.0]
+            assert second, "no sample of that second"
+            drift_m = math.dist(second[0], second[-1])
             assert drift_m < 0.25, f"{flavour} still flies: {drift_m:.2f} m within a second"
             lands_s = next(at for at, _, mode in tracks[flavour] if mode == emulator.firmware.landing)
             assert lands_s < LANDS_S[flavour], f"{flavour} lands after {lands_s:.1f} s only"

@@ -15,12 +15,12 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.probe import probe
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.setup import ParameterSetup
-from drivers.mavlink.wire.frames import dialect
 from drivers.mavlink.wire.names import Flavour
 from groundstation.bus.messages import Verb
 
@@ -32,6 +32,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(300)]
 _SPEC = importlib.util.spec_from_file_location(
     "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
 )
+assert _SPEC is not None and _SPEC.loader is not None
 _hangar = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(_hangar)
 hangar, port = _hangar.hangar, _hangar.port

@@ -1,6 +1,7 @@
 """The recorder as a real process: what is readable after kill -9, and after an orderly stop."""
 
 import json
+import operator
 import signal
 import socket
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -79,7 +81,7 @@ def test_recording_is_readable_after(number: signal.Signals, endpoint: str, tmp_
         process.wait()
     for stem, topic in (("state", TRUTH), ("raw", RAW_RX)):
         recording = open_recording(tmp_path / f"{stem}.mcap")
-        numbers = [raw.sequence for raw in recording.raw_records(lambda t, topic=topic: t is topic)]
+        numbers = [raw.sequence for raw in recording.raw_records(partial(operator.is_, topic))]
         assert numbers == sorted(numbers)
         assert len(numbers) >= 0.95 * len(sent)
         assert bool(recording.damage) == (number is signal.SIGKILL)

@@ -12,6 +12,7 @@ from drivers.ardrone.driver import ArDrone
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.host import VehicleHost
 from drivers.watchdog_types import AuthorityLimits
+from groundstation.bus.api import Bus
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Lease, Severity, VelocitySetpoint, Verb
 from groundstation.bus.topics import (
@@ -36,7 +37,8 @@ class Process:
     """What `Child` offers, without a process."""
 
     def __init__(self, bus: MemoryBus, section: str = "{}") -> None:
-        self.name, self.bus, self.section = bus.source, bus, section
+        self.name, self.section = bus.source, section
+        self.bus: Bus = bus
         self.stop_requested, self.supervisor_alive, self.supervisor_fresh = False, True, True
         self.events: list[tuple[Severity, str, str]] = []
         self.states: list[str] = []
@@ -58,6 +60,9 @@ class Process:
     def sleep_until(self, deadline_ns: int) -> bool:
         self.on_sleep()
         return True
+
+    def wake(self) -> None:
+        pass
 
     def event(self, severity, text, remedy="", entity=None) -> None:
         self.events.append((severity, text, remedy))

@@ -108,7 +108,8 @@ def test_bound_ports_are_used_and_a_taken_one_is_named(new_rig):
     rig = new_rig(local_address="127.0.0.1", local_navdata_port=45554, local_at_port=45556)
     rig.connect()
     assert rig.fake.client == ("127.0.0.1", 45554)
+    other = ArDroneDriverSettings(name="drone_2", address="127.0.0.2", local_address="127.0.0.1")
     for taken in ({"local_navdata_port": 45554}, {"local_at_port": 45556}):
-        settings = ArDroneDriverSettings(name="drone_2", address="127.0.0.2", local_address="127.0.0.1", **taken)
+        settings = other.model_copy(update=taken)
         with pytest.raises(DriverError, match=r"cannot bind 127.0.0.1:4555[46] \(UDP\)"):
             ArDroneLink(settings, DatagramLog(rig.process.bus, "drone_2"))

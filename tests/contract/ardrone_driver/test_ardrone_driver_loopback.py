@@ -206,7 +206,12 @@ def test_raw_datagrams_are_recorded_in_batches(rig):
 
 def test_stopping_lands_first_and_then_ends(rig):
     rig.take_off()
-    rig.process.on_sleep = lambda: (rig.fake.turn(), time.sleep(0.01))
+
+    def turn():
+        rig.fake.turn()
+        time.sleep(0.01)
+
+    rig.process.on_sleep = turn
     rig.process.stop_requested = True
     assert run_hosts(rig.process, [rig.host], rate_hz=100) == 0
     assert not rig.fake.state & FLY

@@ -6,7 +6,7 @@ Bytes go through both codecs; 20 s of flight take about a second.
 import itertools
 import math
 import sys
-from collections import deque
+from collections import Counter, deque
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +51,7 @@ class FakeSocket:
     """Collects what the emulator sends."""
 
     def __init__(self):
-        self.sent = deque()
+        self.sent = deque[bytes]()
 
     def sendto(self, data, address):
         self.sent.append(bytes(data))
@@ -67,9 +67,7 @@ class DirectLink:
     """A Link whose other end is an emulator in the same thread."""
 
     def __init__(self, emulator, system=255):
-        from collections import Counter
-
-        self.rejected = Counter()
+        self.rejected = Counter[str]()
         self.emulator = emulator
         self.encoder, self.decoder = FrameEncoder(system, 190), FrameDecoder()
         self.sent = []
@@ -84,6 +82,10 @@ class DirectLink:
                 except WireError as error:
                     self.rejected[error.reason] += 1
         return [] if self.cut else heard
+
+    def lose(self):
+        """Drop what the emulator has sent since."""
+        self.emulator.socket.sent.clear()
 
     def send(self, system, message):
         self.sent.append((clock.now_ns(), message))
@@ -164,7 +166,7 @@ class Rig:
             while self.vehicle.orders.events:
                 self.texts.append(self.vehicle.orders.events.popleft()[1])
         else:
-            self.emulator.socket.sent.clear()
+            self.link.lose()
 
     def track(self, now):
         self.seen_s = 0.0 if self.sees else self.seen_s + 0.02
@@ -173,7 +175,7 @@ class Rig:
             return
         b, sd = self.body, self.noise_m
         aloft = not b.on_ground
-        entities = ()
+        entities: tuple[EntityEstimate, ...] = ()
         if aloft:
             x, y, z = (
                 v + o + sd * self.rng.standard_normal() for v, o in zip((b.x, b.y, b.z), self.offset_m, strict=True)

@@ -21,6 +21,11 @@ CALM = CopterScenario(attitude_noise_deg=0, gyro_bias_deg_s=0, air_unrest_m_s2=0
 OFFBOARD, LAND, ALTITUDE = 6 << 16, 4 << 16 | 6 << 24, 2 << 16
 
 
+def sent_by(emulator):
+    """Return the datagrams that an emulator on a FakeSocket has sent."""
+    return emulator.socket.sent
+
+
 class Bench:
     """One vehicle, a client that speaks when told to, and eyes that can be closed."""
 
@@ -47,8 +52,9 @@ class Bench:
 
     def collect(self):
         came = []
-        while self.emulator.socket.sent:
-            came += [self.decoder.decode(raw).message for raw in split(self.emulator.socket.sent.popleft())]
+        sent = sent_by(self.emulator)
+        while sent:
+            came += [self.decoder.decode(raw).message for raw in split(sent.popleft())]
         self.heard += came
         return came
 

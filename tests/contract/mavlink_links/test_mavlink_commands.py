@@ -12,6 +12,7 @@ from pymavlink import mavutil
 
 from drivers.camera.sources.opening import open_source
 from drivers.mavlink.links.opening import open_link, signing_of
+from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire import telemetry
@@ -114,7 +115,7 @@ def test_signed_link_hears_only_who_has_the_key(hangar, tmp_path):
     other.write_bytes(os.urandom(32))
     wrong = open_link(LinkSettings(target=target, key_file=str(other)))
     try:
-        deadline, heard = time.monotonic() + 4, []
+        deadline, heard = time.monotonic() + 4, list[Heard]()
         while not heard and time.monotonic() < deadline:
             for each in (plain, wrong, link):
                 each.send(9, telemetry.Heartbeat(6, 8, 0, 0, 4))
@@ -159,6 +160,7 @@ def test_a_signed_link_refuses_what_is_unsigned_forged_or_played_again(tmp_path)
     key = tmp_path / "key"
     key.write_bytes(bytes(range(32)))
     ours = signing_of(LinkSettings(target="udpin:127.0.0.1:0", key_file=str(key)))
+    assert ours is not None
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"), ours)
     beat, place, now = telemetry.Heartbeat(2, 3, 1, 4, 3), ("127.0.0.2", 1), time.monotonic_ns()
     good, stale = (

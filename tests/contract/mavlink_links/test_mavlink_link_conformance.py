@@ -3,6 +3,7 @@
 import itertools
 import socket
 import time
+from typing import Any
 
 import pytest
 
@@ -60,6 +61,16 @@ def heartbeat(link, *systems):
     return send
 
 
+def noting(take, messages):
+    """Return `take` of an emulator's services, which appends the messages that it is given."""
+
+    def noted(frame, now):
+        messages.append(frame.message)
+        return take(frame, now)
+
+    return noted
+
+
 def test_it_speaks_first_and_is_answered_within_two_seconds(hangar, opened):
     _, _, (address, port) = hangar.add("px4", 7)
     link = opened(f"udpout:{address}:{port}")
@@ -87,11 +98,8 @@ def test_values_arrive_to_the_bit(hangar, opened):
     emulator, _, (address, port) = hangar.add("px4", 7)
     link = opened(f"udpout:{address}:{port}")
     collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, heartbeat(link, 7))
-    seen = []
-    emulator.services.take, original = (
-        (lambda frame, now: [*(seen.append(frame), original(frame, now))[1]]),
-        (emulator.services.take),
-    )
+    messages: list[Any] = []
+    emulator.services.take = noting(emulator.services.take, messages)
     sent = flight.OdometryMessage(
         2**53 + 12345, 1, 12, 1.5, -2.25, -0.125, (0.5, 0.5, -0.5, 0.5), 0.25, 0.0, -0.75, 0.0, 0.0, 0.5,
         tuple(i / 8 for i in range(21)), tuple(-i / 4 for i in range(21)), 3, 2, 100,
@@ -101,7 +109,6 @@ def test_values_arrive_to_the_bit(hangar, opened):
     link.send(7, setpoint)
     link.send(7, service.ParamRequestRead(7, 1, "COM_OF_LOSS_T", -1))
     heard = collect(link, lambda h: of(h, service.ParamValue))
-    messages = [frame.message for frame in seen]
     assert sent in messages and setpoint in messages
     assert of(heard, service.ParamValue)[0][:2] == ("COM_OF_LOSS_T", 1.0)
 
@@ -141,13 +148,11 @@ def test_a_pose_reaches_the_vehicle_it_is_of_and_no_other(hangar, opened, port):
     """ODOMETRY, VISION_POSITION_ESTIMATE and TIMESYNC name no target: on a shared port the address alone decides."""
     place = ("127.0.0.1", port)
     link = opened(f"udpin:127.0.0.1:{port}")
-    taken = {}
+    taken: dict[int, list[Any]] = {}
     for system in (21, 22):
         emulator, _, _ = hangar.add("px4", system, calls=place)
-        taken[system], original = [], emulator.services.take
-        emulator.services.take = lambda frame, now, o=original, s=system: (
-            taken[s].append(frame.message) or o(frame, now)
-        )
+        taken[system] = []
+        emulator.services.take = noting(emulator.services.take, taken[system])
     each = heartbeat(link, 21, 22)
     collect(link, lambda h: of(h, telemetry.Heartbeat, 21) and of(h, telemetry.Heartbeat, 22), 4.0, each)
     for system in (21, 22):

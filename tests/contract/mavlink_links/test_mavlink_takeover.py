@@ -3,13 +3,15 @@
 import socket
 import time
 from contextlib import ExitStack
+from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.flight import CommandLong
-from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, dialect
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.telemetry import Heartbeat
 from drivers.mavlink.wire.verification import Signing
@@ -61,7 +63,7 @@ def scene(monkeypatch):
 )
 def test_land_goes_to_the_vehicle_and_not_to_who_spoke_after_its_silence(scene, port, signing, sent, reason):
     vehicle, attacker, open_port = scene
-    sniffed = []
+    sniffed: list[Any] = []
     link = open_port(signing, port, sniffed)
     vehicle.sendto(FrameEncoder(11, 1, signing).encode(BEAT), ("127.0.0.1", port))
     assert [heard.frame.message for heard in link.receive()] == [BEAT]

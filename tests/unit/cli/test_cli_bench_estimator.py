@@ -10,9 +10,12 @@ from groundstation.bench import estimator as estimator_bench
 from groundstation.bench import estimator_path, estimator_peers
 from groundstation.bench.estimator_team import frame_of, joined_state, minimal_parameters, team_of
 from groundstation.bus import codec, keys
-from groundstation.bus.messages import Verdict
+from groundstation.bus.messages import Innovation, Verdict
 from groundstation.bus.topics import INNOVATION
 from groundstation.cli import bench_estimator
+from groundstation.estimation.records import EventRow
+
+Row = dict[str, float | str]
 
 
 def test_the_team_has_the_edges_that_are_asked_for():
@@ -32,7 +35,8 @@ def test_all_filters_have_the_same_belief_on_the_same_data():
 
 def test_a_batch_of_one_edge_is_a_correction_like_any_other():
     team, rng = team_of(minimal_parameters(4)), np.random.default_rng(2)
-    state, frame = joined_state(team, rng), frame_of(team, rng)[3:4]
+    state, frame = joined_state(team, rng), EventRow.rows(1)
+    np.asarray(frame)[:] = np.asarray(frame_of(team, rng))[3]
     peers = estimator_peers.contestants(team, state)
     for peer in peers.values():
         peer.correct(frame)
@@ -52,6 +56,7 @@ def test_the_path_explains_every_observation(late_ms):
     assert len(seen) == observations
     observer = json.loads(seen[-1])["observer"]
     last = codec.decode(keys.Key("lab", observer, INNOVATION, "tracker"), seen[-1])
+    assert isinstance(last, Innovation)
     assert last.verdict is Verdict.ACCEPTED
     assert last.latency_ms >= late_ms
     assert path.filter.belief().layout.robots == team.robots
@@ -70,9 +75,10 @@ def test_the_command_reports_rows_and_agreement():
 
 def test_the_path_of_blocks_as_flown_is_judged_on_its_own():
     kernels = [{"robots": 30, "blocks": "minimal", "method": "ours", "predict_us": 1.0, "correct_us": 1.0}]
-    about = {"robots": 30, "heights": False, "to_in_order": 1.0, "delay_ms": 0, "us_per_observation": 59.0}
-    late, flown = {"delay_ms": 120}, {"blocks": "product"}
-    heights = {"heights": True, "us_per_observation": 61.0}
+    about: Row = {"robots": 30, "heights": False, "to_in_order": 1.0, "delay_ms": 0, "us_per_observation": 59.0}
+    late: Row = {"delay_ms": 120}
+    flown: Row = {"blocks": "product"}
+    heights: Row = {"heights": True, "us_per_observation": 61.0}
     paths = [about | {"blocks": "minimal"}, about | {"blocks": "minimal"} | late, about | flown, about | flown | late]
     paths += [about | flown | heights, about | flown | heights | late]
     found = estimator_bench.targets({"kernels": kernels, "path": paths})

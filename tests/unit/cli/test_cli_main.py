@@ -1,5 +1,6 @@
 """The command line as an operator meets it: help, exit codes, messages, and no slow imports."""
 
+import importlib.util
 import json
 import shutil
 import subprocess
@@ -133,7 +134,7 @@ def test_errors_are_told_without_a_traceback(
 
 
 def test_mixed_installations_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    real = cli.find_spec
+    real = importlib.util.find_spec
 
     class Elsewhere:
         origin = str(tmp_path / "drivers" / "__init__.py")

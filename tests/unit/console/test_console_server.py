@@ -150,7 +150,7 @@ def test_a_viewer_that_does_not_answer_gets_a_window_full_and_then_the_newest() 
         assert texts[-1]["seq"] == WINDOW
         viewer.say("urgent")
         await asyncio.sleep(0.01)
-        assert sent[-1] == "urgent"  # answers are never held back
+        assert sent[-1:] == ["urgent"]  # answers are never held back
         viewer.saw(WINDOW)
         await asyncio.sleep(0.01)
         newest = json.loads(next(frame for frame in reversed(sent) if isinstance(frame, str) and frame != "urgent"))

@@ -6,13 +6,15 @@ from groundstation.estimation.event_log import observation_values, write_event
 from groundstation.estimation.events import observe
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.models import FixedMount, ManoeuvringTarget, MountedCamera
+from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.estimation.records import ACCEPTED, EventRow, OutcomeRow
 from groundstation.estimation.tables import empty_state, tables_from_parameters
 
 
 def test_a_mode_whose_innovation_has_no_covariance_is_not_corrected_and_loses_its_probability() -> None:
-    entities = {"ceiling": FixedMount((0.0, 0.0, 4.0), 0.004, 0.02), "rover": ManoeuvringTarget()}
+    mount = FixedMount((0.0, 0.0, 4.0), 0.004, 0.02)
+    entities: dict[str, MotionModel] = {"ceiling": mount, "rover": ManoeuvringTarget()}
     tables = tables_from_parameters(EstimatorParameters(entities, {"eye": MountedCamera("ceiling", WORLD_FROM_DOWN)}))
     state = empty_state(tables, [True, True])
     state.memory["active"][1] = 1
@@ -23,7 +25,8 @@ def test_a_mode_whose_innovation_has_no_covariance_is_not_corrected_and_loses_it
     means, covariances = state.means.copy(), state.covariances.copy()
     sight = Measurement(0, "eye", "rover", (0.3, 0.0, 3.6), None, tuple(np.diag([1e-4] * 3).ravel().tolist()))
     events, outcomes = EventRow.rows(1), OutcomeRow.rows(1)
-    write_event(events.view(np.uint8).data, 0, observation_values(sight, 0.0, 0, observer=0, subject=1, sensor=0))
+    values = observation_values(sight, 0.0, 0, observer=0, subject=1, sensor=0)
+    write_event(np.asarray(events).view(np.uint8).data, 0, values)
     observe(state, tables, events[0], outcomes[0])
     assert outcomes["verdict"][0] == ACCEPTED
     assert abs(state.means[0, rover.start] - 0.3) < 0.01

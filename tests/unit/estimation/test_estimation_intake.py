@@ -20,6 +20,7 @@ from groundstation.bus.messages import (
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.ingest import REASONS, Intake
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
+from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 
 MS = 1_000_000
@@ -32,7 +33,7 @@ class Desk:
     """An intake before a filter with one drone, a target and a ceiling camera; messages with numbers of their own."""
 
     def __init__(self) -> None:
-        entities = {
+        entities: dict[str, MotionModel] = {
             "drone": OdometryRobot(),
             "rover": ConstantVelocityTarget(),
             "ceiling": FixedMount((0.0, 0.0, 4.2), 0.003, 0.01),

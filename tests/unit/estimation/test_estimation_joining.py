@@ -11,6 +11,7 @@ from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.gating import gate
 from groundstation.estimation.measurement import Correction, Measurement, OdometrySample
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
+from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.geometry.rotations import base_from_tilted_optical
 
@@ -29,7 +30,7 @@ class Room:
 
     def __init__(self) -> None:
         drone = OdometryRobot(marker_position_m=(0.0, 0.0, 0.0))
-        entities = {
+        entities: dict[str, MotionModel] = {
             "drone": drone,
             "rover": ConstantVelocityTarget(marker_height_m=MARKER_M),
             "ceiling": FixedMount((0.0, 0.0, 4.2), 0.004, 0.01),
@@ -107,7 +108,7 @@ def test_sightings_that_keep_contradicting_the_observer_are_believed_with_care()
     """As those that keep contradicting the subject are: five in a row, over 0.6 s. They pull no further than a gate."""
     room = Room().known()
     spread_m = math.sqrt(room.belief.covariance_of("drone")[2, 2])
-    verdicts = []
+    verdicts: list[Verdict] = []
     while not verdicts or verdicts[-1] is Verdict.IMPLAUSIBLE:
         room.run(0.2)
         verdicts.append(room.ahead(0.9, too_high_m=0.3).verdict)

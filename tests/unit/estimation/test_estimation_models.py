@@ -22,6 +22,7 @@ from groundstation.estimation.models import (
     RangeBearingSensor,
 )
 from groundstation.estimation.models.odometry_robot import SLOW_STATES
+from groundstation.estimation.models.protocol import MotionModel, ObservationModel
 from groundstation.estimation.motion import predict
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.estimation.records import EntityMemory, EventRow, Innovation, SensorRow
@@ -32,7 +33,7 @@ from groundstation.kernel import Rows, kernel
 
 YAWS = (0.3, math.pi - 1e-9, -math.pi + 1e-9, 3.1, -2.0)
 ROBOT = OdometryRobot(marker_position_m=(0.05, -0.03, 0.08), slow_states=SLOW_STATES, velocity_bias_std_m_s=0.1)
-ENTITIES = {
+ENTITIES: dict[str, MotionModel] = {
     "full": ROBOT,
     "bare": OdometryRobot(marker_position_m=(0.05, -0.03, 0.08), slow_states=()),
     "ground": CommandedRobot(marker_position_m=(0.1, 0.02, 0.0)),
@@ -44,7 +45,7 @@ ENTITIES = {
     "post": Landmark((1.5, -0.7, 0.2)),
 }
 TILTED = base_from_tilted_optical(math.radians(45))
-SENSORS = {
+SENSORS: dict[str, ObservationModel] = {
     **{name: MountedCamera(name, TILTED, (0.09, 0.01, -0.02)) for name in ("full", "bare", "mount")},
     "both": RangeBearingSensor("ground"),
     "depth": RangeBearingSensor("ground", is_depth=True),
@@ -188,8 +189,8 @@ def test_observation_jacobians_agree_with_central_differences(sensor: str, subje
         numeric = np.empty_like(H)
         for j in range(mean.size):
             e = step * np.eye(mean.size)[j]
-            sides = [observed(mean + sign * e, sensor, subject, rows)[0] for sign in (1, -1)]
-            numeric[:, j] = difference(*sides, [a for a in angles if a < rows]) / (2 * step)
+            ahead, behind = (observed(mean + sign * e, sensor, subject, rows)[0] for sign in (1, -1))
+            numeric[:, j] = difference(ahead, behind, [a for a in angles if a < rows]) / (2 * step)
         np.testing.assert_allclose(H, numeric, atol=2e-7 * max(1.0, np.abs(H).max() ** 2))
 
 

@@ -223,12 +223,12 @@ def test_a_single_wild_height_moves_nothing() -> None:
     assert room.belief.mean_of("a")[2] == pytest.approx(1.3, abs=0.02)
 
 
-def ground(**settings: float) -> FixedLagFilter:
+def ground(repeats_s: float = 0.0) -> FixedLagFilter:
     """A ground robot at the origin before a post 2 m ahead."""
     joint = FixedLagFilter(
         EstimatorParameters(
             {"rover": CommandedRobot(range_bias_std_m=1e-3, range_scale_std=1e-3), "post": Landmark((2.0, 0.0, 0.0))},
-            {"eye": RangeBearingSensor("rover", **settings), "compass": HeadingSensor("rover")},
+            {"eye": RangeBearingSensor("rover", repeats_s=repeats_s), "compass": HeadingSensor("rover")},
         )
     )
     joint.place("rover", (0.0, 0.0, 0.0, 0.0), (0.09, 0.09, 1e-6, 0.04), START, START)

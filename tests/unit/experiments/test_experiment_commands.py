@@ -12,7 +12,7 @@ from groundstation.cli.main import run
 from groundstation.experiments import runner
 from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.runner import SweepError, read_result, result_file, run_tasks, write_atomically
-from groundstation.experiments.tasks import Task
+from groundstation.experiments.tasks import Task, execute
 
 ROW_KEYS = {
     "robots", "layout", "method", "cpu_ms_median", "cpu_ms_min", "cpu_ms_max", "topologies", "survivors", "evaluations",
@@ -97,24 +97,28 @@ def test_wrong_usage() -> None:
 
 def test_sweep_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     executed: list[Task] = []
-    original = runner.execute
 
     def stop_at_the_third(task: Task) -> dict[str, Any]:
         if len(executed) == 2:
             raise KeyboardInterrupt
         executed.append(task)
-        return original(task)
+        return execute(task)
 
     monkeypatch.setattr(runner, "execute", stop_at_the_third)
     with pytest.raises(KeyboardInterrupt):
         run_tasks(TASKS, tmp_path)
     assert len(list(tmp_path.glob("*.json"))) == 2
     again: list[Task] = []
-    monkeypatch.setattr(runner, "execute", lambda task: again.append(task) or original(task))
+
+    def note(task: Task) -> dict[str, Any]:
+        again.append(task)
+        return execute(task)
+
+    monkeypatch.setattr(runner, "execute", note)
     rows = run_tasks(TASKS, tmp_path)
     assert again == TASKS[2:]
     assert [row["task"]["seed"] for row in rows] == [1, 2, 1, 2]
-    assert [row["merits"] for row in rows] == [original(task)["merits"] for task in TASKS]
+    assert [row["merits"] for row in rows] == [execute(task)["merits"] for task in TASKS]
 
 
 def test_half_written_results_are_run_again(tmp_path: Path) -> None:

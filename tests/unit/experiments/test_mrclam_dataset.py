@@ -3,6 +3,7 @@
 import json
 import lzma
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ BARCODES = {1: 5, 2: 14, 3: 41, 4: 32, 5: 23, 6: 72, 7: 27}
 LANDMARKS = {6: (2.0, -1.0), 7: (2.0, 3.0)}
 
 
-def write(folder: Path, name: str, rows: list[tuple[float, ...]], packed: bool = False) -> None:
+def write(folder: Path, name: str, rows: Sequence[tuple[float, ...]], packed: bool = False) -> None:
     text = "# columns\n" + "\n".join(" \t ".join(f"{value:.6f}" for value in row) for row in rows) + "\n"
     if packed:
         (folder / f"{name}.dat.xz").write_bytes(lzma.compress(text.encode()))

@@ -27,7 +27,8 @@ class Stage:
         self.heard = self._drone.subscribe([t.EVENT])
         self.run = SimpleNamespace(drones=("drone_1",))
         self.interrupts = SimpleNamespace(stop_requested=not failure, hurry=False)
-        self.failure, self.unwell, self._state, self._start = failure, [], state, start
+        self.failure, self._state, self._start = failure, state, start
+        self.unwell: list[str] = []
         self.ends: list[m.Event] = []
 
     def start(self) -> None:

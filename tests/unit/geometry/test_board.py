@@ -39,7 +39,7 @@ def test_code_words_differ_in_at_least_four_cells():
 
 
 def test_blank_paper_and_a_solid_bar_are_as_far_from_four_words_as_from_any():
-    for bar in (0, 1):
+    for bar in np.array((0, 1)):
         distances = np.sort((bar != board.CODE_WORDS).sum(axis=1))
         assert (distances[:4] == 2).all()
 

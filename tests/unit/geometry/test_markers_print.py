@@ -32,7 +32,9 @@ def pages_of(pdf):
     pages = []
     boxes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", pdf)
     for box, stream in zip(boxes, re.findall(rb"stream\n(.*?)\nendstream", pdf, re.S), strict=True):
-        scale = float(re.match(rb"([\d.]+) 0 0 ([\d.]+) 0 0 cm", stream)[1])
+        scaling = re.match(rb"([\d.]+) 0 0 ([\d.]+) 0 0 cm", stream)
+        assert scaling is not None
+        scale = float(scaling[1])
         numbers = re.findall(rb"0 g (-?[\d.]+) (-?[\d.]+) ([\d.]+) ([\d.]+) re f", stream)
         pages.append(([float(side) / MM for side in box], np.array(numbers, dtype=float).reshape(-1, 4) * scale / MM))
     return pages
@@ -103,9 +105,11 @@ def test_the_detector_reads_the_printed_page(tmp_path, code):
     _, page = rasterised(tmp_path, 127)  # five pixels per millimetre: edges of 44 mm squares fall between pixels
     height, width = page.shape
     find = find_board(page, Window(0, 0, width, height), 220.0)
+    assert find is not None
     assert np.diff(find.corners.reshape(3, 4, 2)[:, :, 0], axis=1) == pytest.approx(220.0, abs=0.25)
     lens = CameraIntrinsics(width, height, 1000.0, 1000.0, width / 2, height / 2)
     reading = read_bar(page, find, lens)
+    assert reading is not None
     assert (reading.code, reading.margin > 3.0) == (code, True)
 
 

@@ -1,7 +1,10 @@
 """One planning step: what it chooses, why, and what it does when time or belief run out."""
 
+import itertools
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +28,7 @@ FLAT, STRING = Topology.parse("drone_1,drone_2"), Topology.parse("drone_1/drone_
 
 
 def belief(
-    robots: dict[str, tuple[float, ...]],
+    robots: Mapping[str, tuple[float, ...]],
     target: tuple[float, ...] | None,
     stamp_s: float = 0.0,
     target_std: float = 0.05,
@@ -101,12 +104,14 @@ def test_after_a_switch_it_dwells_unless_much_is_gained() -> None:
     assert chosen == [STRING, STRING, STRING, FLAT]
 
 
+def _exceeds(asked: Iterator[int], allowed: int) -> bool:
+    return next(asked) > allowed
+
+
 def test_a_stopped_plan_is_valid_and_repeats_from_its_evaluation_count() -> None:
     for allowed in (0, 1, 2, 3):
-        asked: list[int] = []
-        stopped = Planner(PARAMETERS, SENSORS).plan(
-            NEAR, FLAT, None, lambda asked=asked, n=allowed: asked.append(1) or len(asked) > n
-        )
+        asked = itertools.count(1)
+        stopped = Planner(PARAMETERS, SENSORS).plan(NEAR, FLAT, None, partial(_exceeds, asked, allowed))
         assert stopped.solver.status == "stopped"
         again = Planner(PARAMETERS, SENSORS).plan(NEAR, FLAT, None, lambda: False, stopped.solver.evaluations)
         assert again.cost == stopped.cost

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Event, Severity
 from groundstation.bus.topics import EVENT, IMAGE
@@ -51,10 +52,10 @@ def sender() -> tuple[MemoryBus, FakeChild]:
 
 @pytest.fixture
 def now(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    clock = [1_000_000_000]
-    monkeypatch.setattr(recorder_module.clock, "now_ns", lambda: clock[0])
+    now_ns = [1_000_000_000]
+    monkeypatch.setattr(clock, "now_ns", lambda: now_ns[0])
     monkeypatch.setattr(recorder_module, "free_bytes", lambda _folder: 10**12)
-    return clock
+    return now_ns
 
 
 def _recorder(child: Any, folder: Path, **recording: bool) -> Recorder:

@@ -39,10 +39,9 @@ def innovation(time_s: float, nis: float, verdict: m.Verdict = m.Verdict.ACCEPTE
 
 
 def plan(
-    time_s: float, topology: str, cost: float, others: dict[str, float], **control: object
+    time_s: float, topology: str, cost: float, others: dict[str, float], *controls: m.Control
 ) -> TimedMessage[m.Plan]:
     alternatives = tuple(m.Alternative(name, value) for name, value in others.items())
-    controls = (m.Control("drone_1", (0.1, 0.0, 0.0), 0.0, **control),) if control else ()
     solver = m.SolverReport("ok", 1, 0.001, 1, 1)
     return TimedMessage(time_s, m.Plan(header=HEADER, topology=topology, cost=cost, controls=controls, edges=(),
                                 alternatives=alternatives, solver=solver, mode="x"))  # fmt: skip
@@ -99,7 +98,8 @@ def test_every_switch_has_its_reason() -> None:
 
 def test_interventions_are_counted_in_episodes() -> None:
     times = (1.0, 1.1, 1.2, 5.0, 5.1)
-    plans = [plan(time_s, "a", 0.1, {}, limited_by=("fence",), wanted_m_s=(0.5, 0.3, 0.0)) for time_s in times]
+    limited = m.Control("drone_1", (0.1, 0.0, 0.0), 0.0, limited_by=("fence",), wanted_m_s=(0.5, 0.3, 0.0))
+    plans = [plan(time_s, "a", 0.1, {}, limited) for time_s in times]
     (found,) = interventions(run_with(plans=plans))
     assert (found.cause, found.episodes, found.plans) == ("fence", 2, 5)
     assert found.longest_s == pytest.approx(0.2)

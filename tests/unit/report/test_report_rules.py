@@ -62,7 +62,7 @@ def _plan(time_s: float, text: str) -> TimedMessage[m.Plan]:
 def _truth(ground: list[bool], z: float = 1.0) -> TruthTrack:
     count = len(ground)
     position = np.tile([0.0, 0.0, z], (count, 1))
-    return TruthTrack(np.arange(count) * 1.0, position, np.zeros(count), np.array(ground))
+    return TruthTrack(np.arange(count, dtype=np.float64), position, np.zeros(count), np.array(ground))
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_singular_covariance_gives_no_ratio_and_no_crash() -> None:
 
 def test_ellipse_holds_95_percent() -> None:
     major, minor, angle = semi_axes_95(1.0, 0.0, 4.0)
-    assert (major, minor) == (pytest.approx(2 * 2.4477, abs=1e-3), pytest.approx(2.4477, abs=1e-3))
+    assert (major, minor) == pytest.approx((2 * 2.4477, 2.4477), abs=1e-3)
     assert abs(np.sin(angle)) == pytest.approx(1.0)
     assert semi_axes_95(2.0, 1.0, 2.0)[2] == pytest.approx(np.pi / 4)
     smallest, largest = np.linalg.eigvalsh([[0.04, 0.015], [0.015, 0.02]])

@@ -14,6 +14,7 @@ from groundstation.runtime.team import Member, TeamStatus
 MS = 1_000_000
 S = 1_000_000_000
 NOW = 1000 * S
+Said = tuple[FlightState, float | None, float | None]
 UP, CLIMBS, STANDS = FlightState.HOVERING, FlightState.TAKING_OFF, FlightState.LANDED
 
 
@@ -55,7 +56,7 @@ def test_a_drone_that_was_not_seen_is_left_out_for_what_was_seen() -> None:
     assert why_unseen(member(UP, None, 0.1), NOW, 10) == "it flies, but its marker rose by 0.1 m"
 
 
-def watched(seconds: float, one: tuple, two: tuple, watch: LiftOffWatch | None = None) -> tuple[str, float]:
+def watched(seconds: float, one: Said, two: Said, watch: LiftOffWatch | None = None) -> tuple[str, float]:
     """Return (what the watch of drone_1 says, after how long [s]); each drone: state, reported height, rise."""
     watch = watch or LiftOffWatch()
     for number in range(round(seconds * 20) + 1):

@@ -56,8 +56,8 @@ class Flight:
 
     def odometry(self, name: str, **changes: Any) -> Odometry:
         trembling = 1e-9 * self.seq  # what never changes is taken for a frozen sensor
-        values = {"velocity_m_s": (0.0, 0.0, 0.0), "yaw_rad": 0.0, "roll_rad": trembling, "pitch_rad": 0.0}
-        values["height_m"] = 1.3
+        values: dict[str, Any] = {"velocity_m_s": (0.0, 0.0, 0.0), "yaw_rad": 0.0, "height_m": 1.3}
+        values |= {"roll_rad": trembling, "pitch_rad": 0.0}
         return Odometry(header=self.header(name), velocity_covariance=(0.01,) * 9, **(values | changes))
 
     def ceiling(self, name: str, age_ms: int = 50, **changes: Any) -> RelativeObservation:

@@ -87,7 +87,7 @@ def test_sections_may_be_left_out(tmp_path: Path) -> None:
 def test_the_field_travels_as_json_and_is_frozen(field: Field) -> None:
     assert Field.model_validate_json(field.model_dump_json()) == field
     with pytest.raises(ValueError, match="frozen"):
-        field.site = "elsewhere"  # type: ignore[misc]
+        field.site = "elsewhere"
 
 
 def test_the_resolved_file_is_a_field_file(field: Field, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import Measurement
-from groundstation.estimation.models import FixedMount, MountedCamera
+from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import parameters_from_field as planner_from_field
@@ -66,5 +66,6 @@ def test_estimator_and_planner_take_the_same_share_of_it_for_usual(lab_field: Re
     """0.26 of the figure over all the time; the planner's manoeuvres last 0.5 s."""
     usual = math.sqrt(0.07) * lab_field.tracked["turtlebot"].acceleration_std_m_s2
     target = parameters_from_field(lab_field).entities["turtlebot"]
+    assert isinstance(target, ConstantVelocityTarget)
     assert target.acceleration_std_m_s2 == pytest.approx(usual)
     assert planner_from_field(lab_field).noise.target_acceleration == pytest.approx(0.5 * usual**2)

@@ -189,7 +189,7 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
     world = World(read.site, Scenario(), 1)
     emulators = {
         name: ArDroneEmulator(name, "127.90.1.1" if name == "drone_1" else "127.90.1.2", drone, world.onboard[name])
-        for name, drone in world.drones.items()
+        for name, drone in world.ardrones.items()
     }
     schedule = FaultSchedule(
         [

@@ -56,7 +56,7 @@ def fly(wanted, seconds, gain=0.85, delay_s=0.03, drag=0.45, bias_deg=0.0, seed=
 
 
 def test_the_model_answers_like_the_recorded_drone():
-    tilt, times = Tilt(), {}
+    tilt, times = Tilt(), dict[float, float]()
     for i in range(200):
         angle = tilt.step(1.0)
         for share in (0.1, 0.63, 0.9):

@@ -101,7 +101,9 @@ def test_our_own_recipe_fits_the_photographs_better_than_the_published_lens(cali
     )
     errors = []
     for path in sorted(folder.glob("left*.jpg")):
-        corners = PATTERN.corners(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
+        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        assert picture is not None, path
+        corners = PATTERN.corners(np.asarray(picture, np.uint8))
         assert corners is not None
         camera = (published.matrix, np.array(published.distortion))
         _, turn, shift = cv2.solvePnP(PATTERN.points, corners.reshape(-1, 1, 2), *camera)

@@ -3,6 +3,8 @@
 import json
 import math
 from collections import Counter, deque
+from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,6 +15,7 @@ from drivers.camera.attitudes import AttitudeHistory
 from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import Matrix, Packet, Unit
 from groundstation.bus import clock
+from groundstation.bus.api import Subscription
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Odometry
 from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, VIDEO
@@ -23,7 +26,7 @@ from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 
-SECTION = {
+SECTION: dict[str, Any] = {
     "name": "drone_1_camera",
     "source": "http://127.0.0.1:9/video.mjpg",
     "calibration": {
@@ -52,8 +55,8 @@ def settings(**changes):
 
 class FakeSource:
     def __init__(self):
-        self.packets, self.received, self.connected, self.detail = deque(), 0, True, ""
-        self.units, self.rejected = [], Counter()
+        self.packets, self.received, self.connected, self.detail = deque[Packet](), 0, True, ""
+        self.units, self.rejected = list[Unit](), Counter[str]()
 
     def push(self, data, arrival_ns=None):
         self.received += 1
@@ -77,10 +80,10 @@ class FakeSource:
 
 
 class FakeChild:
-    stop_requested, supervisor_alive = False, True
+    stop_requested, supervisor_alive, supervisor_fresh = False, True, True
 
-    def __init__(self, bus):
-        self.bus, self.name = bus, "drone_1_camera"
+    def __init__(self, bus, section="{}"):
+        self.bus, self.name, self.section = bus, "drone_1_camera", section
         self.states, self.events, self.beats = [], [], 0
 
     def ready(self, detail=""):
@@ -95,8 +98,25 @@ class FakeChild:
     def beat(self):
         self.beats += 1
 
-    def tick_status(self, **_counters):
+    def tick_status(self, ticks=0, overruns=0, overflowed=0):
         pass
+
+    def sleep_until(self, deadline_ns):
+        return True
+
+    def wake(self):
+        pass
+
+
+@dataclass
+class Rig:
+    """The driver between a source and somebody who listens."""
+
+    camera: driver.CameraDriver
+    child: FakeChild
+    source: FakeSource
+    bus: MemoryBus
+    heard: Subscription
 
 
 @pytest.fixture
@@ -105,14 +125,7 @@ def rig():
     child, source = FakeChild(MemoryBus(exchange, "lab", "drone_1_camera")), FakeSource()
     listener = MemoryBus(exchange, "lab", "test")
     subscription = listener.subscribe([OBSERVATION, CAMERA_STATUS, IMAGE, VIDEO])
-
-    class Rig:
-        pass
-
-    rig = Rig()
-    rig.child, rig.source, rig.bus, rig.heard = child, source, listener, subscription
-    rig.camera = driver.CameraDriver(child, settings(), source)
-    return rig
+    return Rig(driver.CameraDriver(child, settings(), source), child, source, listener, subscription)
 
 
 @pytest.fixture(scope="module")
@@ -304,8 +317,7 @@ def test_attitudes_are_read_at_the_exposure():
     ],
 )
 def test_wrong_sections_are_named(change, named):
-    child = FakeChild(None)
-    child.section = json.dumps({**SECTION, **change})
+    child = FakeChild(None, json.dumps({**SECTION, **change}))
     with pytest.raises(SettingsError, match=named):
         driver.run(child)
 

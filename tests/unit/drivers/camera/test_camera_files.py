@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.camera.sources.container import device
+from drivers.camera.sources.frames import Packet
 from drivers.camera.sources.opening import open_source
 from drivers.camera.sources.reader_thread import Drain
 
@@ -43,7 +44,7 @@ def write_video(path, codec, count=6, rate=30, pixel_format="yuv420p"):
 
 def taken(source):
     """Return the pictures of a source until it has ended (10 s at most)."""
-    pictures = []
+    pictures: list[Packet] = []
     deadline = time.monotonic() + 10.0
     while "ended" not in source.detail or source.received != (pictures[-1].number if pictures else -1):
         assert time.monotonic() < deadline, source.detail

@@ -147,7 +147,9 @@ def test_a_camera_fixed_in_the_world_expects_robots():
     eyes = Foresight(mount, "ceiling", MARKERS[:1], lens)
     eyes.add(estimate(0, robot("drone_2", state(1.0, 0.5, 1.12))))
     # By hand: the marker is at z = 1.2, 3 m below; 1179 * 1.0 / 3 = 393 px to the right, 196.5 px up.
-    assert eyes.at(0, (0.0, 0.0))["drone_2"].centre == pytest.approx([639.5 + 393, 359.5 - 196.5], abs=0.5)
+    expected = eyes.at(0, (0.0, 0.0))["drone_2"]
+    assert expected is not None
+    assert expected.centre == pytest.approx([639.5 + 393, 359.5 - 196.5], abs=0.5)
 
 
 def test_boards_are_found_at_once_where_the_belief_has_them():
@@ -199,6 +201,7 @@ def test_two_boards_with_one_code_are_one_ambiguous_sighting_while_the_belief_li
         s.board.body: s.optical_from_marker.translation for s in compose_scene(renderer._spec, np.array(SCENE)).sights
     }
     assert sighting.choice.best.position_m == pytest.approx(truth["bot"], abs=0.03)
+    assert sighting.choice.alternative is not None
     assert sighting.choice.alternative.position_m == pytest.approx(truth["drone_2"], abs=0.03)
     (notice,) = pipeline.take_notices()
     assert "identity of bot" in notice.text

@@ -20,7 +20,7 @@ MS = 1_000_000
 def encoded(count, size=(160, 96), period=10):
     """Return (bytes, is key) of pictures whose brightness is 20 + 5 x number."""
     codec = av.CodecContext.create("libx264", "w")
-    codec.width, codec.height, codec.pix_fmt = *size, "yuv420p"
+    (codec.width, codec.height), codec.pix_fmt = size, "yuv420p"
     codec.time_base, codec.framerate = Fraction(1, 15), Fraction(15)
     codec.options = {
         "preset": "ultrafast",

@@ -25,13 +25,19 @@ def photographs(real_data):
     return sorted(real_data("camera_calibration").glob("*.jpg"))
 
 
+def read_grey(path):
+    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None, path
+    return picture
+
+
 def found_corners(picture):
     return Pattern(9, 6, 25.0).corners(picture)
 
 
 def test_all_boards_are_found_and_refined_to_a_fifth_of_a_pixel(photographs):
     """13 of 13; the residual is that of an own calibration with these corners, its lens model included."""
-    pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in photographs]
+    pictures = [read_grey(path) for path in photographs]
     corners = [found_corners(picture) for picture in pictures]
     assert len(corners) == 13
     assert all(found is not None for found in corners)
@@ -51,7 +57,7 @@ def test_a_picture_without_a_board_has_no_corners():
 @pytest.mark.parametrize("name", ["left01.jpg", "left03.jpg", "left05.jpg", "left12.jpg"])
 def test_our_lens_explains_real_corners(name, real_data):
     """A flat board seen through the published calibration: a homography of undistorted corners leaves little over."""
-    corners = found_corners(cv2.imread(str(real_data("camera_calibration") / name), cv2.IMREAD_GRAYSCALE))
+    corners = found_corners(read_grey(real_data("camera_calibration") / name))
     rays = LENS.normalised_from_pixels(corners)
     plane = np.array([[x, y] for y in range(6) for x in range(9)], dtype=np.float64)
     h, _ = cv2.findHomography(plane, rays)
@@ -63,7 +69,7 @@ def test_our_lens_explains_real_corners(name, real_data):
 def test_nearly_all_real_corners_are_seeds_of_the_search(photographs):
     shares = []
     for path in photographs:
-        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        picture = read_grey(path)
         seeds = saddle_points(picture).points
         corners = found_corners(picture)
         near = np.linalg.norm(corners[:, None] - seeds[None], axis=-1).min(axis=1)
@@ -74,5 +80,5 @@ def test_nearly_all_real_corners_are_seeds_of_the_search(photographs):
 
 def test_a_larger_board_is_not_taken_for_a_marker(photographs):
     for path in photographs:
-        picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        picture = read_grey(path)
         assert [spacing_px(find.corners) for find in search(picture, [])] == []

@@ -33,9 +33,9 @@ def corners_of(rotation, translation, random=None, noise_px=0.0):
 def test_exact_corners_give_the_exact_pose():
     random = np.random.default_rng(0)
     for _ in range(20):
-        rotation, translation, _, attitude = scene(random, 1.5)
+        rotation, translation, _, (roll, pitch) = scene(random, 1.5)
         poses = pose.planar_poses(corners_of(rotation, translation), POINTS, FRONT)
-        choice = pose.choose(poses, POINTS, FRONT, pose.Gravity(STABILIZED_FROM_OPTICAL, *attitude, True), 0.1, 6.0)
+        choice = pose.choose(poses, POINTS, FRONT, pose.Gravity(STABILIZED_FROM_OPTICAL, roll, pitch, True), 0.1, 6.0)
         assert choice.best.position_m == pytest.approx(translation, abs=1e-5)
         assert choice.residual_px < 1e-3
         assert wrap(
@@ -50,8 +50,8 @@ def test_gravity_picks_the_right_solution_where_the_residual_cannot():
     for _ in range(150):
         rotation, translation, _, attitude = scene(random, 3.0)
         poses = pose.planar_poses(corners_of(rotation, translation, random, 0.2), POINTS, FRONT)
-        measured = np.array(attitude) + np.radians(random.normal(0, 2, 2))
-        gravity = pose.Gravity(STABILIZED_FROM_OPTICAL, *measured, True)
+        roll, pitch = np.array(attitude) + np.radians(random.normal(0, 2, 2))
+        gravity = pose.Gravity(STABILIZED_FROM_OPTICAL, roll, pitch, True)
         tilt = [p.rotation[:, 2] @ rotation[:, 2] for p in poses]
         by_residual += tilt[int(np.argmin([p.squared_error for p in poses]))] < math.cos(math.radians(25))
         best = min(poses, key=lambda p: pose._cost(p, 0.04, gravity))
@@ -62,8 +62,8 @@ def test_gravity_picks_the_right_solution_where_the_residual_cannot():
 
 def test_covariance_matches_the_scatter():
     random = np.random.default_rng(2)
-    rotation, translation, _, attitude = scene(random, 2.0)
-    gravity = pose.Gravity(STABILIZED_FROM_OPTICAL, *attitude, True)
+    rotation, translation, _, (roll, pitch) = scene(random, 2.0)
+    gravity = pose.Gravity(STABILIZED_FROM_OPTICAL, roll, pitch, True)
     true_yaw = math.atan2(*(STABILIZED_FROM_OPTICAL @ rotation)[[1, 0], 0])
     errors, claimed = [], []
     for _ in range(300):
@@ -76,9 +76,9 @@ def test_covariance_matches_the_scatter():
 
 
 def test_the_floor_keeps_a_perfect_fit_from_claiming_certainty():
-    rotation, translation, _, attitude = scene(np.random.default_rng(3), 2.0)
+    rotation, translation, _, (roll, pitch) = scene(np.random.default_rng(3), 2.0)
     poses = pose.planar_poses(corners_of(rotation, translation), POINTS, FRONT)
-    gravity = pose.Gravity(STABILIZED_FROM_OPTICAL, *attitude, True)
+    gravity = pose.Gravity(STABILIZED_FROM_OPTICAL, roll, pitch, True)
     best = pose.choose(poses, POINTS, FRONT, gravity, 0.1, 6.0).best
     assert math.sqrt(best.covariance[2, 2]) > 0.003
     assert np.linalg.eigvalsh(best.covariance).min() > 0.0

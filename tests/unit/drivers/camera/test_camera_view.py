@@ -48,6 +48,7 @@ def test_pictures_are_annotated_and_told(files, capsys):
     # 460 px x 44 mm / 18 px
     assert "p0.png: marker 3 at 1.12 m" in said and "markers in 2 of them" in said
     drawn = cv2.imread(str(files / "out" / "p1.jpg"))
+    assert drawn is not None
     assert sorted(path.name for path in (files / "out").iterdir()) == ["p0.jpg", "p1.jpg"]
     plain = cv2.cvtColor(picture(), cv2.COLOR_GRAY2BGR)
     assert (np.abs(drawn.astype(int) - plain).max(axis=2) > 80).sum() > 200

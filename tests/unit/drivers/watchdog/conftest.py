@@ -59,15 +59,14 @@ class Bench:
         decisions = [self.step() for _ in range(round(seconds * S / STEP))]
         return [decision.action for decision in decisions]
 
-    def setpoint(self, velocity=(0.3, 0.0, 0.0), **changes):
-        fields = {"seq": next(self.numbers), "epoch": self.epoch, "lifetime": 300, "stamp": self.now, "clock": "clock"}
-        fields |= changes
+    def setpoint(self, velocity=(0.3, 0.0, 0.0), *, seq=None, epoch=None, lifetime=300, stamp=None, clock="clock"):
+        number = next(self.numbers)
         message = VelocitySetpoint(
-            header=self.header(fields["stamp"], fields["seq"], fields["clock"]),
+            header=self.header(stamp, number if seq is None else seq, clock),
             velocity_m_s=velocity,
             yaw_rate_rad_s=0.1,
-            lifetime_ms=fields["lifetime"],
-            epoch=fields["epoch"],
+            lifetime_ms=lifetime,
+            epoch=self.epoch if epoch is None else epoch,
             converged=self.converged,
         )
         return self.watchdog.accept_setpoint(self.now, message)

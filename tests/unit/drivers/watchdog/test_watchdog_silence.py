@@ -13,7 +13,7 @@ def test_lost_setpoints_hover_after_300_ms_and_land_after_3_s(new_bench):
     bench = new_bench().fly()
     bench.tracker_speaks = False
     began = bench.now
-    times = {}
+    times: dict[Action, float] = {}
     while bench.now - began < 5 * S:
         times.setdefault(bench.step().action, (bench.now - began) / S)
     assert times[Action.HOVER] == pytest.approx(0.3, abs=0.04)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from groundstation.bench.planner_peers import naive, numpy_adjoint
+from groundstation.bench.planner_peers.step import edges_of
 from groundstation.experiments.planar.dense import (
     cholesky_upper,
     negative_inverse,
@@ -83,7 +84,8 @@ def test_reference_vectors(real_data: Callable[[str], Path]) -> None:
     for v in json.loads(real_data("planner_vectors.json").read_text()):
         p = v["params"]
         names = ("sigma", "r", "s", "eps", "qr", "qt", "dt", "h", "gamma", "umax")
-        parameters = PlanarParameters(*(p[name] for name in names), tuple(p["vt"]))
+        values: list[Any] = [*(p[name] for name in names), tuple(p["vt"])]
+        parameters = PlanarParameters(*values)
         mean, covariance, level = np.array(v["mu"]), np.array(v["P"]), np.array(v["level"]) - 1
         cost, gradient = evaluate(mean, covariance, level, parameters, np.array(v["u"]) / p["umax"])
         assert cost == pytest.approx(v["cost"], rel=1e-9)
@@ -112,8 +114,8 @@ def test_cost_and_gradient_against_complex_step(robots: int, parameters: PlanarP
         exact = np.array([oracle.cost(x + step).imag for step in steps]) / 1e-30
         assert cost == pytest.approx(oracle.cost(x), rel=1e-12)
         assert np.abs(gradient - exact).max() <= 1e-12 * np.abs(exact).max()
-        full = np.kron(covariance, np.eye(2))
-        edges = numpy_adjoint.edges_of(tuple(int(k) for k in level))
+        full = np.asarray(np.kron(covariance, np.eye(2)), np.float64)
+        edges = edges_of(tuple(int(k) for k in level))
         assert cost == pytest.approx(naive.rollout_cost(x, mean, full, edges, parameters), rel=1e-9)
 
 

@@ -200,7 +200,8 @@ def test_three_hundred_robots() -> None:
 def test_bad_beliefs_are_named(change: Any, message: str) -> None:
     mean, covariance, level = bench_belief(3, "two-level", 1, P)
     with pytest.raises(ValueError, match=message):
-        PlanarPlanner(3, P).plan(*change(mean, covariance), level)
+        changed_mean, changed_covariance = change(mean, covariance)
+        PlanarPlanner(3, P).plan(changed_mean, changed_covariance, level)
 
 
 def test_bad_levels_and_settings_are_named() -> None:
@@ -211,8 +212,9 @@ def test_bad_levels_and_settings_are_named() -> None:
     with pytest.raises(ValueError, match="at least one robot"):
         PlanarPlanner(0, P)
     for name in ("sigma_m", "softness_m", "step_s", "max_speed_m_s"):
+        negative: dict[str, Any] = {name: -1.0}
         with pytest.raises(ValueError, match=name):
-            replace(P, **{name: -1.0})
+            replace(P, **negative)
     with pytest.raises(ValueError, match="hysteresis"):
         SearchOptions(hysteresis=1.0)
     with pytest.raises(ValueError, match="segments"):

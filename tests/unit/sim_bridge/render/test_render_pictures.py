@@ -49,7 +49,8 @@ def corner_errors(camera, scenario, poses, seed=0):
     renderer, random, errors = Renderer(spec), np.random.default_rng(seed), []
     for _ in range(poses):
         low, high = ([-1.2, -0.6, 0.0], [1.2, 0.6, 1.5]) if camera == "ceiling" else ([0.8, -0.4, 0.3], [1.5, 0.4, 0.8])
-        bot = state(*random.uniform(low, high), random.uniform(-3, 3), *random.normal(0, 0.15, 2))
+        (x, y, z), yaw, (roll, pitch) = random.uniform(low, high), random.uniform(-3, 3), random.normal(0, 0.15, 2)
+        bot = state(x, y, z, yaw, roll, pitch)
         states = np.array([state(0, 0, 2.0 if camera == "drone_1" else 9.0), bot])
         truth = bot_corners(spec, states)
         if not spec.intrinsics.contains(truth, 30.0).all():

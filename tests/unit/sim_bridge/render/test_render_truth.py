@@ -57,9 +57,10 @@ def cast(pose, window, code=5, square_m=0.044):
 
 def test_corners_agree_with_rays_to_hundredths_of_a_pixel():
     """The same corner finder on both pictures: what differs is the renderer's own error."""
-    renderer, random, errors = make(), np.random.default_rng(3), []
-    while len(errors) < 25:
-        states = [state(0, 0, 2.2), state(*random.uniform([1.2, -0.6], [2.6, 0.6]), 0.0, random.uniform(-3, 3))]
+    renderer, random, gaps = make(), np.random.default_rng(3), list[np.ndarray]()
+    while len(gaps) < 25:
+        x, y = random.uniform([1.2, -0.6], [2.6, 0.6])
+        states = [state(0, 0, 2.2), state(x, y, 0.0, random.uniform(-3, 3))]
         pose = sight_of(renderer, states).optical_from_marker
         corners, card = (
             FRONT.project(pose.apply(p)) for p in (Checkerboard(5, 44.0).corners(), Checkerboard(5, 44.0).outline())
@@ -67,14 +68,15 @@ def test_corners_agree_with_rays_to_hundredths_of_a_pixel():
         if not FRONT.contains(card, 8.0).all():
             continue
         window = window_around(card, 3.0, (360, 640))
-        rendered, truth = renderer.render(np.array(states)), None
+        assert window is not None
+        rendered = renderer.render(np.array(states))
         truth = rendered.copy()
         rays = cast(pose, window)
         part = truth[window.top : window.bottom, window.left : window.right]
         part[np.isfinite(rays)] = np.rint(rays[np.isfinite(rays)])
         sharp = [np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.7)) for picture in (rendered, truth)]
-        errors.append(refined(sharp[0], corners) - refined(sharp[1], corners))
-    errors = np.array(errors)
+        gaps.append(refined(sharp[0], corners) - refined(sharp[1], corners))
+    errors = np.array(gaps)
     assert np.abs(errors.mean(axis=(0, 1))).max() <= 0.01
     assert np.sqrt((errors**2).mean()) <= 0.1
 
@@ -137,6 +139,7 @@ def test_a_drone_hides_the_board_behind_it():
     )
     spacing = spacing_px(corners)
     window = window_around(corners, 1.6 * spacing + 6.0, (360, 640))
+    assert window is not None
     free = renderer.render(np.array([state(0, 0, 2.0), away, target]))
     hidden = renderer.render(np.array([state(0, 0, 2.0), between, target]))
     assert find_board(free, window, spacing) is not None

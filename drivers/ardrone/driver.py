@@ -32,7 +32,7 @@ from drivers.plausibility.limits import ARDRONE
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import FlightState, Severity
+from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
 from groundstation.errors import SettingsError
 from groundstation.process.priority import go_first
@@ -40,6 +40,8 @@ from groundstation.process.priority import go_first
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
 _FRESH_NS = 300_000_000
+# Long enough that the drone waits for RESUME.
+_DOUBTED_NS = 1_300_000_000
 _RATE_PERIOD_NS = 200_000_000
 _FAULTS = StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW
 _NO_AR1_VIDEO = Notice(
@@ -52,7 +54,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LatestNavdata:
-    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last told its motion."""
+    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last told its motion; velocity as reported."""
 
     heard_ns: int = 0
     moved_ns: int = 0
@@ -61,6 +63,7 @@ class LatestNavdata:
     flight_state: FlightState = FlightState.UNKNOWN
     battery: float | None = None
     model: Model = Model.UNKNOWN
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
 
 
 class ArDrone:
@@ -88,6 +91,7 @@ class ArDrone:
         self._motion = MotionMean()
         self._plausibility = MotionMonitor(ARDRONE)
         self._applied_ns = 0
+        self._doubted_ns = -_DOUBTED_NS
         self._video_refused = False
         self._refused: Counter[str] = Counter()
         self._closing = threading.Event()
@@ -117,6 +121,7 @@ class ArDrone:
             telemetry = replace(
                 telemetry,
                 moved_ns=now_ns,
+                velocity_m_s=motion.velocity_m_s,
                 control_state=demo.control_state,
                 battery=min(demo.battery_percent, 100) / 100,
                 model=self.telemetry.model if self.telemetry.model is not Model.UNKNOWN else model_from_navdata(packet),
@@ -137,7 +142,16 @@ class ArDrone:
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         configured = self._session.phase is SessionPhase.READY
         unsound = self._plausibility.report.reason(Health.BAD, ARDRONE.essential)
-        return VehicleView(heard.flight_state, fresh, heard.battery, self._not_ready(heard), configured, unsound)
+        if not unsound and now_ns - self._doubted_ns < _DOUBTED_NS:
+            unsound = "its velocity contradicts its tilt"
+        not_ready = self._not_ready(heard)
+        return VehicleView(
+            heard.flight_state, fresh, heard.battery, not_ready, configured, unsound, self._true(heard.velocity_m_s)
+        )
+
+    def _true(self, velocity_m_s: Vector3) -> Vector3:
+        scale = self._settings.odometry.velocity_scale
+        return velocity_m_s[0] * scale, velocity_m_s[1] * scale, velocity_m_s[2]
 
     def _not_ready(self, heard: LatestNavdata) -> str:
         if self._session.phase is not SessionPhase.READY:
@@ -181,16 +195,18 @@ class ArDrone:
     def _attitude(self, now_ns: int, decision: WatchdogDecision, heard: LatestNavdata) -> velocity_loop.AttitudeRequest:
         dt_s = (now_ns - self._applied_ns) * 1e-9
         self._applied_ns = now_ns
-        (vx, vy, vz), force = self._motion.drain()
+        velocity, force = self._motion.drain()
         fresh = now_ns - heard.moved_ns <= _FRESH_NS
         if decision.action is Action.IDLE and fresh and force is not None:
             self._loop.stand(force, dt_s)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER
-        scale = self._settings.odometry.velocity_scale
-        measured = (vx * scale, vy * scale, vz)
-        return self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force)
+        asked = self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, self._true(velocity), dt_s, force)
+        if self._loop.contradicted:
+            self._doubted_ns = now_ns
+            return velocity_loop.HOVER
+        return asked
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals of the link."""

@@ -44,6 +44,11 @@ class VelocityLoop:
         self._axes = (Axis(self._gains), Axis(self._gains))
         self.reset()
 
+    @property
+    def contradicted(self) -> bool:
+        """Whether the measured velocity contradicts tilts and accelerometers."""
+        return self._flying and any(axis.contradicted for axis in self._axes)
+
     def reset(self) -> None:
         """Forget the motion, not what was learned of the vehicle; for every time it was not flown by this loop."""
         self._flying = False
@@ -103,7 +108,8 @@ class VelocityLoop:
         asked = [0.0, 0.0]
         for i, axis in enumerate(axes):
             outside = axis.observe(measured_m_s[i], forces[i], turning[i], dt_s)
-            asked[i] = axis.wish(wanted[i], outside, dt_s) + centripetal[i]
+            wish = axis.wish(wanted[i], outside, dt_s)
+            asked[i] = axis.bounded(wish, wanted[i], outside, dt_s) + centripetal[i]
         x, y = _shortened(asked[0], asked[1], self._max_acceleration)
         axes[0].ask(x)
         axes[1].ask(y)

@@ -143,3 +143,52 @@ def test_limits_hold_whatever_is_asked():
 def test_left_is_negative_roll_and_forward_positive_pitch():
     out = VelocityLoop(ArDroneLimits()).step((0.3, 0.3, 0.0), 0.0, (0.0, 0.0, 0.0), 1 / 30)
     assert out.pitch_rad > 0 > out.roll_rad
+
+
+def fly_blindly(wanted, seconds, reported, sensed=True, heeds=True, noise=0.0):
+    """Return the true speeds when the odometry says one thing for ever, and when the loop contradicted it [s]."""
+    rng, loop, tilt = random.Random(0), VelocityLoop(ArDroneLimits()), Tilt()
+    speed, pitch, speeds, air, found_s = 0.0, 0.0, [], [], None
+    for i in range(round(seconds / TICK_S)):
+        angle = tilt.step(pitch)
+        brake = speed * (0.2 + 0.1 * abs(speed))  # slippery air
+        speed += (9.81 * math.tan(angle) - brake) * TICK_S
+        air.append(-0.92 * brake + rng.gauss(0, 0.045))
+        if i % 5 == 0:
+            force = (sum(air) / len(air), 0.0) if sensed else None
+            air.clear()
+            measured = (reported + rng.gauss(0, noise), 0.0, 0.0)
+            pitch = loop.step((wanted, 0.0, 0.0), 0.0, measured, 1 / 40, force).pitch_rad
+            if loop.contradicted and found_s is None:
+                found_s = i * TICK_S
+            if heeds and found_s is not None:
+                pitch = 0.0
+        speeds.append(speed)
+    return speeds, found_s
+
+
+@pytest.mark.parametrize("sensed", [True, False])
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+@pytest.mark.parametrize("wanted", [0.3, 0.6])
+def test_a_velocity_stuck_at_0_cannot_wind_up_tilt(wanted, noise, sensed):
+    """Whoever trusts it flew 1.76 m/s: tilt is bounded by what drag explains, and the contradiction is noticed."""
+    speeds, _ = fly_blindly(wanted, 20.0, 0.0, sensed, heeds=False, noise=noise)
+    assert max(speeds) <= 1.3, "if nobody heeds it, for ever"
+    speeds, found_s = fly_blindly(wanted, 20.0, 0.0, sensed, noise=noise)
+    assert found_s is not None and found_s <= 4.0 and max(speeds) <= 1.1
+
+
+@pytest.mark.parametrize("sensed", [True, False])
+def test_a_healthy_flight_is_never_contradicted(sensed, monkeypatch):
+    found = []
+    step = VelocityLoop.step
+
+    def watched(self, *arguments):
+        asked = step(self, *arguments)
+        found.append(self.contradicted)
+        return asked
+
+    monkeypatch.setattr(VelocityLoop, "step", watched)
+    for seed in range(3):
+        fly(lambda t: 0.5 * math.copysign(1.0, math.sin(0.8 * t)), 20.0, seed=seed, sensed=sensed, bias_deg=1.0)
+    assert len(found) > 2000 and not any(found)

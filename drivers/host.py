@@ -5,19 +5,21 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from drivers.base import HostProcess, Vehicle
+from drivers.control_error import ControlErrorMonitor, SeenVelocity
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, Ack, AuthorityLimits, DriverMode, Upstream, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     Command,
     CommandAck,
+    Estimate,
     FlightState,
     Lease,
     Severity,
     VehicleStatus,
     VelocitySetpoint,
 )
-from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, SETPOINT, VEHICLE_STATUS
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
 
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS = 200_000_000
@@ -47,6 +49,9 @@ class VehicleHost:
         self._heard_ns = self._unconfigured_ns = self._started_ns
         self._announced = (self.watchdog.mode, self.watchdog.reason)
         self._silent = False
+        self._estimates = self._bus.subscribe([ESTIMATE], newest=True)
+        self._seen, self._control_error = SeenVelocity(), ControlErrorMonitor()
+        self._told: WatchdogDecision | None = None
 
     def call_on_orders(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a setpoint or command arrives."""
@@ -62,7 +67,7 @@ class VehicleHost:
         for received in self._leases.drain():
             if isinstance(received.message, Lease):
                 self._count("lease", self.watchdog.accept_lease(now_ns, received.message))
-        view = self.vehicle.view(now_ns).believed
+        view = self._judge(now_ns, self.vehicle.view(now_ns).believed)
         self.watchdog.see(view, self._upstream())
         for received in self._commands.drain():
             if isinstance(received.message, Command):
@@ -71,9 +76,19 @@ class VehicleHost:
             if isinstance(received.message, VelocitySetpoint):
                 self._count("setpoint", self.watchdog.accept_setpoint(now_ns, received.message))
         decision = self.watchdog.step(now_ns, view, self._upstream())
+        self._told = decision
         self.vehicle.apply(now_ns, decision)
         self._report(now_ns, view, decision)
         return decision
+
+    def _judge(self, now_ns: int, view: VehicleView) -> VehicleView:
+        """Add to a view how the vehicle does what it was told."""
+        for received in self._estimates.drain():
+            if isinstance(received.message, Estimate):
+                for entity in received.message.entities:
+                    if entity.name == self.vehicle.name:
+                        self._seen.hear(now_ns, received.message.epoch, entity)
+        return self._control_error.judge(now_ns, view, self._told, self._seen.velocity(now_ns))
 
     def is_finished(self, now_ns: int) -> bool:
         """Whether a driver that is to exit may: no motor turns any more, or the vehicle was silent too long."""

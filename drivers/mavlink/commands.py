@@ -43,6 +43,10 @@ class Orders:
         self._taken_over = False
         self._blind_landing = False
 
+    def are_heeded(self, custom_mode: int) -> bool:
+        """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
+        return custom_mode == self._guided and not self._taken_over
+
     def last_words(self) -> str:
         """Return what the vehicle said of late, to go with a refusal."""
         return f" ({self.said[-1][1]})" if self.said else ""

@@ -186,7 +186,9 @@ class MavlinkVehicle:
             state = FlightState.HOVERING
         elif state is FlightState.LANDED and self.orders.starting:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
-        return VehicleView(state, fresh, known.battery, self._not_ready(now_ns, known), unsound=unsound)
+        velocity = known.velocity_m_s if self.orders.are_heeded(known.custom_mode) else None
+        not_ready = self._not_ready(now_ns, known)
+        return VehicleView(state, fresh, known.battery, not_ready, unsound=unsound, velocity_m_s=velocity)
 
     def _state(self, known: LatestTelemetry) -> FlightState:
         return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)

@@ -71,6 +71,31 @@ def test_it_hovers_within_a_second_and_lands_within_3_5_s(rig, name):
     assert not any("does not answer" in text for text in rig.process.texts)
 
 
+def swapped(frame):
+    message = frame.message
+    if not isinstance(message, LocalPositionNed):
+        return frame
+    return frame._replace(message=message._replace(vx=-message.vx, vy=-message.vy))
+
+
+def pushed(frame):
+    message = frame.message
+    if not isinstance(message, LocalPositionNed):
+        return frame
+    return frame._replace(message=message._replace(vx=message.vx + 0.7))
+
+
+@pytest.mark.parametrize(("lie", "word"), [(swapped, "does not do what it is told"), (pushed, "m/s")])
+def test_a_velocity_that_is_alive_and_wrong_stops_it_too(rig_of, lie, word):
+    rig = rig_of("ardupilot").track_on()
+    rig.wanted = ((0.45, 0.0, 0.0), 0.0)
+    rig.run(1.0)
+    Liar(rig.link).change = lie
+    rig.until(lambda: rig.mode != "TRACK", 1.5)
+    assert word in rig.host.watchdog.reason
+    rig.until(lambda: rig.mode == "LANDING" or math.hypot(*rig.velocity()) < 0.1, 2.5)
+
+
 def test_what_is_bad_is_not_published(rig):
     rig.track_on()
     Liar(rig.link).set(LocalPositionNed, vx=0.0, vy=0.0)

@@ -1,0 +1,180 @@
+"""Whether a vehicle does what it is told: commanded against reported velocity, and against what cameras see. Pure.
+
+Half of it holds for every kind of vehicle: whatever lags without overshoot stays between the command and where it was.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+
+from drivers.watchdog_types import FREE, UP, Action, VehicleView, WatchdogDecision
+from groundstation.bus.messages import EntityEstimate
+from groundstation.time_units import NS_PER_S
+
+# The slowest vehicle follows a command with this time constant; what is left of a step counts as told.
+_SLOWEST_S = 1.0
+# A velocity held in a turning frame lags behind by so much of the turn.
+_TURNING_S = 0.5
+_LONGEST_STEP_S = 0.2
+# What is left of a take-off.
+_FIRST_M_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """deviation_m_s: what noise, gusts and overshoot explain; excess_m: way flown beyond that before it counts.
+
+    forgets_m_s: how fast the excess shrinks while there is none; over_s: a vehicle that obeys for so long strays no
+    more.
+    """
+
+    deviation_m_s: float
+    excess_m: float
+    forgets_m_s: float = 0.2
+    over_s: float = 0.3
+
+
+# Reported velocities are noisy by 0.05 m/s; those of positions that cameras see by twice as much, and late.
+REPORTED = Tolerance(deviation_m_s=0.25, excess_m=0.2)
+SEEN = Tolerance(deviation_m_s=0.4, excess_m=0.4)
+
+
+class Envelope:
+    """Interval of one axis between the command and what a slow vehicle still makes of earlier ones."""
+
+    def __init__(self, start_m_s: float) -> None:
+        self.low = self.high = start_m_s
+
+    def step(self, wanted_m_s: float, dt_s: float) -> None:
+        """Take a command that holds for a while."""
+        share = min(1.0, dt_s / _SLOWEST_S)
+        self.high = max(wanted_m_s, self.high + (wanted_m_s - self.high) * share)
+        self.low = min(wanted_m_s, self.low + (wanted_m_s - self.low) * share)
+
+    def beyond(self, velocity_m_s: float) -> float:
+        """Return by how much a velocity is outside [m/s]."""
+        return max(0.0, velocity_m_s - self.high, self.low - velocity_m_s)
+
+
+class Excess:
+    """Cumulative sum (CUSUM) of what a velocity deviates more than tolerated."""
+
+    def __init__(self, tolerance: Tolerance) -> None:
+        self._tolerance = tolerance
+        self.excess_m = 0.0
+        self._obeys_s = math.inf
+
+    def step(self, deviation_m_s: float, extra_m_s: float, dt_s: float) -> bool:
+        """Take a deviation; extra_m_s is tolerated besides. Return whether the vehicle strays."""
+        tolerance = self._tolerance
+        over = deviation_m_s - tolerance.deviation_m_s - extra_m_s
+        if over > 0.0:
+            self.excess_m = min(self.excess_m + over * dt_s, 1.5 * tolerance.excess_m)
+            self._obeys_s = 0.0 if self.excess_m >= tolerance.excess_m else self._obeys_s
+        else:
+            self.excess_m = max(0.0, self.excess_m - tolerance.forgets_m_s * dt_s)
+            self._obeys_s += dt_s
+        return self._obeys_s < tolerance.over_s
+
+
+class ControlErrorMonitor:
+    """Judges one vehicle while its watchdog may move it and nobody else does."""
+
+    def __init__(self) -> None:
+        self._last_ns: int | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew: it takes off, lands, or is flown by somebody else."""
+        self._envelopes: tuple[Envelope, Envelope] | None = None
+        self._reported, self._seen = Excess(REPORTED), Excess(SEEN)
+
+    def judge(
+        self, now_ns: int, view: VehicleView, told: WatchdogDecision | None, seen_m_s: tuple[float, float] | None
+    ) -> VehicleView:
+        """Return the view with its speed, and whether it strays from what it was told last.
+
+        seen_m_s: velocity forward and left as cameras see it, None if they do not.
+        """
+        dt_s = 0.0 if self._last_ns is None else min((now_ns - self._last_ns) / NS_PER_S, _LONGEST_STEP_S)
+        self._last_ns = now_ns
+        if told is None or told.mode not in FREE or view.flight_state not in UP or view.velocity_m_s is None:
+            self.reset()
+            return view
+        reported = view.velocity_m_s[:2] if view.fresh else None
+        if self._envelopes is None:
+            x, y = reported or (0.0, 0.0)
+            self._envelopes = (Envelope(_clamp(x, _FIRST_M_S)), Envelope(_clamp(y, _FIRST_M_S)))
+        wanted = told.velocity_m_s[:2] if told.action is Action.FLY else (0.0, 0.0)
+        for envelope, command in zip(self._envelopes, wanted, strict=True):
+            envelope.step(command, dt_s)
+        turning = _TURNING_S * abs(told.yaw_rate_rad_s) * math.hypot(*wanted)
+        strays = self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported")
+        strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
+        speeds = [0.0 if reported is None else math.hypot(*reported)]
+        speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
+        return replace(view, speed_m_s=max(speeds), stray=strays)
+
+    def _judge_one(
+        self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,
+        wanted: tuple[float, float], how: str,
+    ) -> str:  # fmt: skip
+        assert self._envelopes is not None
+        if velocity is None:
+            return ""
+        deviation = math.hypot(*(e.beyond(v) for e, v in zip(self._envelopes, velocity, strict=True)))
+        if not excess.step(deviation, turning_m_s, dt_s):
+            return ""
+        return f"{math.hypot(*velocity):.1f} m/s {how}, {math.hypot(*wanted):.1f} m/s asked"
+
+
+_WINDOW_NS = 600_000_000
+_LEAST_WINDOW_NS = 450_000_000
+_SEEN_AGE_S = 0.5
+_MOST_VARIANCE_M2 = 0.1**2
+# Faster than this is no flight: the belief was set anew.
+_LEAP_M_S = 4.0
+_FRESH_NS = 300_000_000
+
+
+class SeenVelocity:
+    """Velocity of a vehicle by the positions that cameras correct, over half a second; reports nothing while unseen."""
+
+    def __init__(self) -> None:
+        self._places: deque[tuple[int, float, float]] = deque()
+        self._yaw_rad = 0.0
+        self._epoch: int | None = None
+
+    def hear(self, now_ns: int, epoch: int, entity: EntityEstimate) -> None:
+        """Take the tracker's estimate of the vehicle."""
+        worst = max(entity.covariance[0], entity.covariance[5]) if len(entity.covariance) == 16 else math.inf
+        good = entity.converged and entity.age_s <= _SEEN_AGE_S and worst <= _MOST_VARIANCE_M2
+        if not good or epoch != self._epoch:
+            self._places.clear()
+            self._epoch = epoch
+        if not good:
+            return
+        x, y, _, self._yaw_rad = entity.mean[:4]
+        if self._places:
+            then_ns, then_x, then_y = self._places[-1]
+            if math.hypot(x - then_x, y - then_y) > 0.1 + _LEAP_M_S * (now_ns - then_ns) / NS_PER_S:
+                self._places.clear()
+        self._places.append((now_ns, x, y))
+        while now_ns - self._places[0][0] > _WINDOW_NS:
+            self._places.popleft()
+
+    def velocity(self, now_ns: int) -> tuple[float, float] | None:
+        """Return the velocity forward and left [m/s], or None."""
+        if not self._places or now_ns - self._places[-1][0] > _FRESH_NS:
+            return None
+        (before_ns, x0, y0), (last_ns, x1, y1) = self._places[0], self._places[-1]
+        if last_ns - before_ns < _LEAST_WINDOW_NS:
+            return None
+        elapsed_s = (last_ns - before_ns) / NS_PER_S
+        vx, vy = (x1 - x0) / elapsed_s, (y1 - y0) / elapsed_s
+        c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        return c * vx + s * vy, c * vy - s * vx
+
+
+def _clamp(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)

@@ -135,11 +135,14 @@ def test_kernels_have_one_kind() -> None:
         if path == ROOT / "groundstation/kernel.py":
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
-            imported = isinstance(node, ast.ImportFrom) and node.module == "numba"
-            names = {alias.name for alias in node.names} if imported else set()
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "numba":
-                names = {node.attr}
-            found += [f"{path.relative_to(ROOT)}:{node.lineno}: {name}" for name in sorted(names & compiling)]
+            match node:
+                case ast.ImportFrom(module="numba", names=imported):
+                    names = {alias.name for alias in imported}
+                case ast.Attribute(value=ast.Name(id="numba"), attr=name):
+                    names = {name}
+                case _:
+                    names = set()
+            found += [f"{path.relative_to(ROOT)}: {name}" for name in sorted(names & compiling)]
     assert not found, "\n".join(found)
 
 

@@ -185,8 +185,8 @@ def worlds(faulty: int, choice: list[Fate]) -> Iterator[World]:
     """Yield every run in which that many of the three processes have one of these fates."""
     for chosen in combinations(("supervisor", "driver", "guardian"), faulty):
         for drawn in product(choice, repeat=faulty):
-            drawn_by_name = dict(zip(chosen, drawn, strict=True))
-            yield World(**dict.fromkeys(("supervisor", "driver", "guardian"), ALIVE) | drawn_by_name)
+            of = dict(zip(chosen, drawn, strict=True))
+            yield World(of.get("supervisor", ALIVE), of.get("driver", ALIVE), of.get("guardian", ALIVE))
 
 
 def contradictions(world: World) -> list[str]:

@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from typing import Any
 
 import pytest
 
@@ -65,7 +66,8 @@ class Flight:
         self.packet = navdata.Navdata(0, 0)
         self.motion = MotionMean()
         self.flight_state = FlightState.UNKNOWN
-        self.plausibility, self.doubts = MotionMonitor(ARDRONE), set()
+        self.plausibility = MotionMonitor(ARDRONE)
+        self.doubts: set[Any] = set()
 
     def tick(self, action, wanted=(0.0, 0.0, 0.0), yaw_rate=0.0):
         self.ticks += 1

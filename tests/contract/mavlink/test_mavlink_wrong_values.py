@@ -1,6 +1,7 @@
 """A vehicle whose values arrive and are wrong: its driver stops it as if it were silent, and says why."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -60,7 +61,7 @@ def test_it_hovers_within_a_second_and_lands_within_3_5_s(rig, name):
     rig.run(1.0)
     break_it, word = FAULTS[name]
     break_it(Liar(rig.link))
-    times = {}
+    times: dict[Any, float] = {}
     for step in range(700):
         rig.tick()
         decision = rig.host.watchdog.step(rig.hand.now, rig.host.watchdog.vehicle, rig.host.watchdog.upstream)

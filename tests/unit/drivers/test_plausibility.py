@@ -3,6 +3,7 @@
 import math
 import random
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,8 @@ def at_s(sample):
 
 def judge(samples, limits=ARDRONE, state=FLYING):
     """Return when each sensor was first SUSPECT and BAD, and all that was said."""
-    monitor, first, said = MotionMonitor(limits), {}, set()
+    first: dict[Any, Any] = {}
+    monitor, said = MotionMonitor(limits), set()
     for sample in samples:
         for one in monitor.update(sample, state).findings:
             said.add(one.reason)
@@ -189,7 +191,8 @@ def test_the_recorded_flight_gives_no_alarm(real_data):
     """A real AR.Drone 2 in moving air: it stands for 4.6 s, takes off, and flies."""
     flight = np.load(real_data("ardrone_flight") / "flight.npz")
     times, altitude = flight["nav_time_s"], flight["nav_altitude_mm"]
-    monitor, doubts = MotionMonitor(ARDRONE), []
+    doubts: list[Any] = []
+    monitor = MotionMonitor(ARDRONE)
     for at, velocity, rotation, force, height in zip(
         times, flight["nav_velocity_mm_s"], flight["nav_rotation_deg"], flight["nav_acceleration_g"], altitude,
         strict=True,
@@ -214,9 +217,8 @@ def test_the_recorded_flight_with_a_fault_gives_one(real_data):
     ):
         if at < 10.0 or found_s is not None:
             continue
-        sample = MotionSample(
-            round(at * 1e9), (0.0, 0.0), *(math.radians(angle) for angle in rotation[:2]), tuple(force.tolist())
-        )
+        roll, pitch = (math.radians(angle) for angle in rotation[:2])
+        sample = MotionSample(round(at * 1e9), (0.0, 0.0), roll, pitch, tuple(force.tolist()))
         if monitor.update(sample, FLYING).of(Sensor.VELOCITY) is Health.BAD:
             found_s = at - 10.0
     assert found_s is not None and found_s <= 0.6

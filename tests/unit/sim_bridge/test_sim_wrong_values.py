@@ -104,7 +104,7 @@ def test_on_the_floor_an_obstacle_changes_nothing() -> None:
 class Drone:
     """An emulated AR.Drone that flies, and its edge."""
 
-    def __init__(self, *faults: Fault, **scenario: float) -> None:
+    def __init__(self, *faults: Fault, **scenario: Any) -> None:
         figures = DroneScenario(**scenario)
         self.body = Quadrotor((0.0, 0.0), 0.7, figures, TICK_S, generator_of(1, "drone_1"))
         self.onboard = Onboard(figures, TICK_S, self.body.airframe, generator_of(1, "drone_1/onboard"))

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -150,7 +151,8 @@ def test_outages():
 
 
 def broken(kind, **more):
-    return Fault(kind=FaultKind(kind), **({"entity": "drone_1", "start_s": 2.0, "end_s": 4.0} | more))
+    given: dict[str, Any] = {"entity": "drone_1", "start_s": 2.0, "end_s": 4.0} | more
+    return Fault(kind=FaultKind(kind), **given)
 
 
 def pictures(*faults, camera="drone_1"):

@@ -22,7 +22,7 @@ from sim_bridge.study.faults.judge import Judge
 from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
 from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
 from sim_bridge.study.faults.observed import ObservedValues
-from sim_bridge.study.faults.stand_ins import HostedThread, in_memory, manual_clock, read_all
+from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
 from sim_bridge.study.faults.wrong_cameras import WrongEye
 from sim_bridge.world.readings import Readings
 
@@ -36,7 +36,8 @@ PERIOD_S = 0.05
 
 
 def fault(kind: str, **more: Any) -> Fault:
-    return Fault(**({"kind": FaultKind(kind), "entity": "a", "start_s": 10.0} | more))
+    given: dict[str, Any] = {"entity": "a", "start_s": 10.0} | more
+    return Fault(kind=FaultKind(kind), **given)
 
 
 # -- what is drawn --------------------------------------------------------------------------------------------------
@@ -148,6 +149,7 @@ def test_datagrams_stay_in_the_process_and_a_reader_ends_where_it_would_wait() -
     import threading
 
     network = MemoryNetwork()
+    real: tuple[type, type] = (socket.socket, threading.Thread)
     heard: list[bytes] = []
     with in_memory(network) as readers:
         server, client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), socket.socket()
@@ -159,7 +161,7 @@ def test_datagrams_stay_in_the_process_and_a_reader_ends_where_it_would_wait() -
                 heard.append(server.recvfrom(100)[0])
 
         threading.Thread(target=read, name="reader", daemon=True).start()
-    assert socket.socket is not network.socket and threading.Thread is not HostedThread
+    assert (socket.socket, threading.Thread) == real
     for word in (b"one", b"two"):
         client.sendto(word, ("127.0.0.2", 5554))
     client.sendto(b"lost", ("127.0.0.3", 5554))

@@ -2,6 +2,7 @@
 
 import math
 import random
+from typing import Any
 
 import pytest
 
@@ -122,7 +123,7 @@ def test_the_speed_is_the_faster_of_what_is_reported_and_seen():
 def seen_velocity(positions, yaw=0.0, **fields):
     seen, velocities = SeenVelocity(), []
     for turn, (x, y) in enumerate(positions):
-        values = {"converged": True, "age_s": 0.1, "covariance": (1e-4,) * 16} | fields
+        values: dict[str, Any] = {"converged": True, "age_s": 0.1, "covariance": (1e-4,) * 16} | fields
         entity = EntityEstimate(name="v", kind="robot", mean=(x, y, 0.8, yaw), velocity_m_s=(0.0, 0.0, 0.0), **values)
         seen.hear(turn * S // 50, 1, entity)
         velocities.append(seen.velocity(turn * S // 50))

@@ -90,4 +90,4 @@ def test_any_text(content: bytes) -> None:
     try:
         parse(text, "f.yaml").plain()
     except SettingsError as error:
-        assert all(problem.startswith("f.yaml") for problem in error.problems)
+        assert error.problems and all(problem.startswith("f.yaml") for problem in error.problems)

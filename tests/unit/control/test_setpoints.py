@@ -122,6 +122,7 @@ def test_without_a_fresh_target_they_search_and_look_different_ways(age: float |
 def test_a_fair_prediction_of_the_target_is_searched_around() -> None:
     at = belief((-1.0, 0.4, 1.5, 0.0), (-1.0, -0.4, 1.5, 0.0), (2.5, 0.0, 0.0, 0.0), target_std=0.5)
     out = setpoints(at, plan((1.5, 1.5)), age=4.0)
+    assert set(out) == set(NAMES)
     assert all(one.phase is FlightMode.SEARCH and one.velocity_m_s[0] > 0.1 for one in out.values())
 
 

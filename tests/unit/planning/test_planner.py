@@ -81,7 +81,9 @@ def test_a_plan_names_controls_slots_edges_and_alternatives() -> None:
 
 def test_controls_respect_the_limits_at_every_corner() -> None:
     for at in (NEAR, FAR, belief({"drone_1": (0, 0, 1.5, 3.0)}, (3.0, 0.0, 0.5, 0.5))):
-        for vx, vy, rate in plan(at, Topology.flat(at.layout.robots)).controls.values():
+        controls = plan(at, Topology.flat(at.layout.robots)).controls
+        assert set(controls) == set(at.layout.robots)
+        for vx, vy, rate in controls.values():
             assert math.hypot(vx, vy) <= 0.6 + 1e-9
             assert abs(rate) <= math.radians(60) + 1e-9
 

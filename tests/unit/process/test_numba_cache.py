@@ -46,6 +46,9 @@ def test_a_cache_counts_as_complete_only_when_all_was_compiled(monkeypatch: pyte
     assert not numba_cache.is_complete(folder)
 
 
-def test_another_process_compiles_what_it_is_asked_for(tmp_path: Path) -> None:
-    other = numba_cache.ParallelCompilation(["json", "a_module_that_is_missing"])
+def test_another_process_compiles_what_it_is_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "a_module_that_tells.py").write_text("import pathlib; pathlib.Path(__file__ + '.imported').touch()")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    other = numba_cache.ParallelCompilation(["a_module_that_tells", "a_module_that_is_missing"])
     other.finish()  # failing there is no failure here: what is missing is compiled where it is imported
+    assert (tmp_path / "a_module_that_tells.py.imported").exists()

@@ -49,7 +49,9 @@ def test_parts_are_begun_by_size_too(field: bytes, tmp_path: Path) -> None:
 
 
 def test_every_part_can_be_understood_alone(run_dir: Path) -> None:
-    for number, path in enumerate(parts(run_dir, "state"), 1):
+    state = parts(run_dir, "state")
+    assert len(state) > 1
+    for number, path in enumerate(state, 1):
         opened = open_recording(path)
         assert opened.metadata["part"] == {"stem": "state", "number": str(number)}
         assert opened.metadata["seeds"] == {"scenario": "realistic", "seed": "7"}

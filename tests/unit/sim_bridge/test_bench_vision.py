@@ -17,7 +17,9 @@ from sim_bridge.study.vision.scenes import CONDITIONS, shots
 
 
 def test_boards_stand_at_the_distance_and_angle_that_were_asked_for():
-    for shot in shots(6, 2.0, CONDITIONS[0], 1, steepness_deg=(30.0, 45.0)):
+    taken = list(shots(6, 2.0, CONDITIONS[0], 1, steepness_deg=(30.0, 45.0)))
+    assert len(taken) == 6
+    for shot in taken:
         assert np.linalg.norm(shot.truth.translation) == pytest.approx(2.0)
         sight = shot.truth.translation / np.linalg.norm(shot.truth.translation)
         assert 30.0 <= math.degrees(math.acos(-shot.truth.rotation[:, 2] @ sight)) <= 45.0

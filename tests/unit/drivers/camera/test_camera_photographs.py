@@ -79,6 +79,7 @@ def test_nearly_all_real_corners_are_seeds_of_the_search(photographs):
 
 
 def test_a_larger_board_is_not_taken_for_a_marker(photographs):
+    assert len(photographs) == 13
     for path in photographs:
         picture = read_grey(path)
         assert [spacing_px(find.corners) for find in search(picture, [])] == []

@@ -163,16 +163,18 @@ def test_covariance_is_honest_and_gravity_leaves_no_flips():
 
 def test_without_attitudes_the_other_pose_is_kept_or_right():
     """Nobody knows the attitudes, levelness is assumed loosely: an undecided case must say so."""
-    renderer, random = make_renderer(scenario=REAL), np.random.default_rng(8)
+    renderer, random, seen = make_renderer(scenario=REAL), np.random.default_rng(8), 0
     for _ in range(12):
         heading = random.uniform(-3, 3)
         states = [state(0, 0, 2.2), AWAY, state(2.0, random.uniform(-0.4, 0.4), 0, heading)]
         pipeline = make_pipeline()
         for k in range(2):
             out = pipeline.process(renderer.render(np.array(states)), k * FRAME_NS, lambda _: gravity(known=False))
+        seen += len(out)
         for sighting in out:
             flipped = abs(math.degrees(wrap(sighting.choice.best.yaw_rad - heading))) > 10.0
             assert not flipped or sighting.choice.alternative is not None
+    assert seen >= 10
 
 
 def test_identities_are_never_wrong():

@@ -26,7 +26,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     """Let a repetition pass in which there is nothing to repeat."""
-    nothing_to_repeat = session.config.getoption("last_failed_no_failures") == "none"
+    nothing_to_repeat = session.config.getoption("last_failed_no_failures", "all") == "none"
     if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and nothing_to_repeat:
         session.exitstatus = pytest.ExitCode.OK
 

@@ -276,11 +276,8 @@ def test_frames_of_odometry_that_are_taken(bench_of, flavour):
 
     def feed(frame, child):
         before = bench.copter.estimate.poses
-        bench.say(
-            f.OdometryMessage(
-                1, frame, child, 0, 0, 0, (1.0, 0, 0, 0), 0, 0, 0, 0, 0, 0, (0.1,) * 21, (0.1,) * 21, 0, 2, 0
-            )
-        )
+        doubt = (0.1,) * 21
+        bench.say(f.OdometryMessage(1, frame, child, 0, 0, 0, (1.0, 0, 0, 0), 0, 0, 0, 0, 0, 0, doubt, doubt, 0, 2, 0))
         return bench.copter.estimate.poses > before
 
     assert feed(20, 12)
@@ -303,8 +300,7 @@ def test_a_jump_is_believed_only_with_a_new_reset_counter(bench_of, flavour):
 
 def test_px4_follows_the_ground_stations_clock_and_bears_its_jump(bench_of):
     bench = bench_of("px4")
-    bench.seen = False
-    jump = 0
+    bench.seen, jump = False, 0
 
     def run(seconds):
         used = bench.copter.estimate.poses

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from drivers.camera import driver
-from drivers.camera.attitudes import AttitudeHistory
 from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import Matrix, Packet, Unit
 from groundstation.bus import clock
@@ -293,16 +292,6 @@ def test_a_detector_that_fails_does_not_end_the_process(rig, jpeg, monkeypatch):
     rig.source.push(jpeg)
     rig.camera.turn()
     assert rig.camera.counts["detector"] == 1
-
-
-def test_attitudes_are_read_at_the_exposure():
-    history = AttitudeHistory()
-    for k in range(20):
-        history.add("drone_1", k * 10_000_000, 0.01 * k, -0.02 * k)
-    assert history.at("drone_1", 55_000_000) == pytest.approx((0.055, -0.11))
-    assert history.at("drone_1", 190_000_000 + 150_000_000) == pytest.approx((0.19, -0.38))
-    assert history.at("drone_1", 190_000_000 + 250_000_000) is None
-    assert history.at("drone_2", 0) is None
 
 
 @pytest.mark.parametrize(

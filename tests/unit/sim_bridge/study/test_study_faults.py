@@ -1,8 +1,6 @@
 """The fault campaign: what is drawn, how truth judges, what stands in for threads and sockets, and its table."""
 
-import json
 import math
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,9 +10,6 @@ import pytest
 from groundstation.bus import clock
 from groundstation.bus.messages import FlightState, VehicleStatus
 from groundstation.bus.topics import ODOMETRY, VEHICLE_STATUS
-from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment import experiment
-from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, table, totals
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import KINDS, draw
@@ -246,80 +241,3 @@ def test_a_bumped_camera_stays_turned_until_it_is_put_back() -> None:
         world: Any = SimpleNamespace(time_s=t)
         camera.look(world, 0, "c")
     assert eye.bumps == [0.0, 4.0, 0.0]
-
-
-# -- the table ------------------------------------------------------------------------------------------------------
-
-
-def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
-    return {
-        "seed": seed, "kinds": kinds, "faults": [{}] * len(kinds), "tracking_since_s": 6.0, "modes": {"a": mode},
-        "separation_m": 1.0, "fence_m": 0.0, "speed_m_s": 0.5, "unlocalised_s": 0.0, "hover_s": 0.0, "rest_s": 0.0,
-        "unsafe": unsafe,
-    } | more  # fmt: skip
-
-
-FLIGHTS = [
-    flight(1, ["wind"], {}),
-    flight(2, ["velocity_stuck", "wind"], {"speed": 12.0, "fence": 13.0}, separation_m=0.4),
-    flight(3, ["velocity_stuck"], {"hover": 11.0}, "LANDED", hover_s=2.5),
-    flight(4, [], {}),
-    flight(5, [], {}, "LANDED"),
-    flight(6, ["wind"], {}, tracking_since_s=None, separation_m=None),
-]
-
-
-def test_the_table_counts_by_kind_and_names_seeds() -> None:
-    rows = {row["kind"]: row for row in by_kind(FLIGHTS)}
-    assert set(rows) == {"wind", "velocity_stuck", HEALTHY}
-    stuck, wind = rows["velocity_stuck"], rows["wind"]
-    assert (stuck["flights"], stuck["unsafe"], stuck["alone"], stuck["unsafe_alone"]) == (2, 2, 1, 1)
-    assert stuck["seeds"] == [3, 2], "those with this fault alone first"
-    assert stuck["why"] == {"hover": 1, "speed": 1}
-    assert (stuck["separation_m"], stuck["hover_s"]) == (0.4, 2.5)
-    assert (wind["flights"], wind["not_flown"], wind["unsafe"], wind["unsafe_alone"]) == (2, 1, 1, 0)
-    text = "\n".join(table(list(rows.values())))
-    assert "velocity_stuck" in text and "hover 1, speed 1; 3 2" in text
-
-
-def test_totals_name_false_alarms_and_where_time_goes() -> None:
-    summary = totals(FLIGHTS, [{"tracker": 3.0, "world": 1.0, "cpu": 4.5}] * len(FLIGHTS))
-    assert (summary["flights"], summary["unsafe"], summary["not_flown"]) == (5, 2, [6])
-    assert summary["false_alarms"] == [5]
-    assert summary["time_shares"] == {"tracker": 0.75, "world": 0.25}
-    assert summary["cpu_s_per_flight"] == 4.5
-
-
-def test_batches_cover_all_seeds_once() -> None:
-    found = batches(json.dumps({"x": 1}), 7, 45, size=20)
-    assert [batch.seeds[0] for batch in found] == [7, 27, 47]
-    assert sum((batch.seeds for batch in found), ()) == tuple(range(7, 52))
-    assert len({batch.key for batch in found}) == 3
-
-
-def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    told = []
-
-    def fly(batch: FlightBatch) -> dict[str, Any]:
-        told.append(json.loads(batch.order))
-        flights = [FLIGHTS[seed - 1] for seed in batch.seeds]
-        timing = [{"tracker": 1.0, "cpu": 1.0} for _ in flights]
-        return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": timing}}
-
-    monkeypatch.setattr("groundstation.experiments.faults.fly", fly)
-    monkeypatch.setattr("groundstation.experiments.runner._planar_run", lambda: pytest.fail("needs no kernels"))
-    options = ["--scheduler", "none", "--kinds", "wind, velocity_stuck", "--set", "safety.min_separation_m=0.7"]
-    arguments = ["faults", "--flights", "3", *options, "--out", str(tmp_path)]
-    code = experiment.main(arguments, standalone_mode=False)
-    assert code == ExitCode.FAILED
-    document = json.loads((tmp_path / "faults.json").read_text())
-    assert [flight["seed"] for flight in document["flights_flown"]] == [1, 2, 3]
-    assert document["unsafe"] == 2
-    assert "2 of 3 flights ended unsafe" in capsys.readouterr().out
-    order = told[0]
-    assert order["kinds"] == ["wind", "velocity_stuck"]
-    assert order["field"]["safety"]["min_separation_m"] == 0.7
-    assert [kind for kind, _ in order["sections"]] == ["ardrone", "ardrone"]
-    assert all(json.loads(section)["raw_datagrams"] is False for _, section in order["sections"])

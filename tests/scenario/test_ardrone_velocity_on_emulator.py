@@ -1,6 +1,7 @@
 """The driver's velocity loop against the emulated drone, byte for byte and tick by tick, without sockets or clock."""
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -16,6 +17,7 @@ from drivers.ardrone.settings import ArDroneDriverSettings, VelocityScale
 from drivers.ardrone.velocity_loop import HOVER, VelocityLoop
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.options import DEMO
+from drivers.plausibility.health import Health
 from drivers.plausibility.limits import ARDRONE
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action
@@ -68,6 +70,7 @@ class Flight:
         self.flight_state = FlightState.UNKNOWN
         self.plausibility = MotionMonitor(ARDRONE)
         self.doubts: set[Any] = set()
+        self.lie = lambda motion: motion
 
     def tick(self, action, wanted=(0.0, 0.0, 0.0), yaw_rate=0.0):
         self.ticks += 1
@@ -91,6 +94,7 @@ class Flight:
         self.packet = navdata.decode(bytes(datagram))
         motion, demo = motion_from_navdata(self.packet), self.packet.read(DEMO)
         if motion is not None and demo is not None:
+            motion = self.lie(motion)
             self.motion.add(motion)
             self.flight_state = flight_state_from_navdata(self.packet.state, demo.control_state)
             sample = sample_from_motion(now_ns, self.packet, motion)
@@ -184,6 +188,33 @@ def test_healthy_flights_and_rest_on_the_floor_give_no_alarm(seed):
     for _ in range(1200):
         flight.tick(Action.LAND)
     assert flight.flight_state is FlightState.LANDED and flight.doubts == set()
+
+
+def still(motion):
+    return replace(motion, velocity_m_s=(0.0, 0.0, motion.velocity_m_s[2]))
+
+
+def shaking(motion):
+    """A stuck velocity with the noise of a sensor that lives."""
+    stir = 0.03 * math.sin(1e6 * sum(motion.rates_rad_s))
+    return replace(motion, velocity_m_s=(stir, -stir, motion.velocity_m_s[2]))
+
+
+@pytest.mark.parametrize(("lie", "within_m"), [(still, 0.5), (shaking, 1.2)])
+def test_a_velocity_that_says_0_runs_away_no_more(lie, within_m):
+    """From hovering to 0.5 m/s: it was 1.76 m/s. What is noticed makes the drone hold its place, and brake."""
+    flight = Flight(7).take_off()
+    flight.lie, speeds, noticed_s, start = lie, [], None, (flight.drone.airframe.x, flight.drone.airframe.y)
+    for tick in range(round(6.0 / TICK_S)):
+        bad = flight.plausibility.report.reason(Health.BAD, ARDRONE.essential)
+        if noticed_s is None and (bad or flight.loop.contradicted):
+            noticed_s = tick * TICK_S
+        flight.tick(Action.FLY if noticed_s is None else Action.HOVER, (0.5, 0.0, 0.0))
+        body = flight.drone.airframe
+        speeds.append(math.hypot(*body.velocity_stabilized()))
+    assert noticed_s is not None and noticed_s <= (0.8 if lie is still else 2.0)
+    assert max(speeds) <= 0.8 and speeds[-1] <= 0.15
+    assert math.dist(start, (body.x, body.y)) <= within_m
 
 
 def test_signs_of_climb_and_turn():

@@ -134,6 +134,7 @@ def test_healthy_flights_and_rest_on_the_floor_give_no_alarm(rig_of, flavour):
         for turn in range(4):
             rig.wanted = ((0.5 * math.cos(turn), 0.5 * math.sin(2 * turn), 0.1), 0.5)
             rig.run(1.5)
+        assert rig.mode == "TRACK", rig.host.watchdog.reason
         rig.order(Verb.LAND)
         rig.until(lambda rig=rig: rig.mode == "LANDED")
         rig.run(1.0)

@@ -95,7 +95,7 @@ def test_wrong_usage() -> None:
         assert run(["experiment", *wrong]) == 2
 
 
-def test_sweep_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sweep_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     executed: list[Task] = []
 
     def stop_at_the_third(task: Task) -> dict[str, Any]:
@@ -104,18 +104,16 @@ def test_sweep_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.
         executed.append(task)
         return execute(task)
 
-    monkeypatch.setattr(runner, "execute", stop_at_the_third)
     with pytest.raises(KeyboardInterrupt):
-        run_tasks(TASKS, tmp_path)
+        run_tasks(TASKS, tmp_path, run=stop_at_the_third)
     assert len(list(tmp_path.glob("*.json"))) == 2
     again: list[Task] = []
 
-    def note(task: Task) -> dict[str, Any]:
+    def go_on(task: Task) -> dict[str, Any]:
         again.append(task)
         return execute(task)
 
-    monkeypatch.setattr(runner, "execute", note)
-    rows = run_tasks(TASKS, tmp_path)
+    rows = run_tasks(TASKS, tmp_path, run=go_on)
     assert again == TASKS[2:]
     assert [row["task"]["seed"] for row in rows] == [1, 2, 1, 2]
     assert [row["merits"] for row in rows] == [execute(task)["merits"] for task in TASKS]

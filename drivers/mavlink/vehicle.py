@@ -29,6 +29,8 @@ from groundstation.bus.messages import Estimate, FlightState, Vector3
 
 _FRESH_NS = 300_000_000
 _HEARTBEAT_NS = 4_000_000_000
+# Asked for twice a second; a charge this old is unknown.
+_BATTERY_NS = 10_000_000_000
 # A refusal is told once the vehicle has said why: its acknowledgement overtakes its texts.
 _EXPLAIN_NS = 700_000_000
 # ArduPilot repeats what keeps it from arming every 30 s.
@@ -51,6 +53,7 @@ class LatestTelemetry:
     healthy: int = 0
     ekf: int = 0
     battery: float | None = None
+    battery_ns: int = 0
     attitude: BaseAttitude | None = None
     inertial: tuple[float, ...] = ()
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
@@ -148,13 +151,10 @@ class MavlinkVehicle:
             case telemetry.ExtendedSysState():
                 return replace(known, landed=message.landed_state)
             case telemetry.SysStatus():
-                return replace(
-                    known,
-                    healthy=message.onboard_control_sensors_health,
-                    battery=_share(message.battery_remaining, known.battery),
-                )
+                known = replace(known, healthy=message.onboard_control_sensors_health)
+                return _charged(now_ns, message.battery_remaining, known)
             case telemetry.BatteryStatus():
-                return replace(known, battery=_share(message.battery_remaining, known.battery))
+                return _charged(now_ns, message.battery_remaining, known)
             case telemetry.EkfStatusReport():
                 return replace(known, ekf=message.flags)
             case telemetry.Statustext():
@@ -188,7 +188,8 @@ class MavlinkVehicle:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
         velocity = known.velocity_m_s if self.orders.are_heeded(known.custom_mode) else None
         not_ready = self._not_ready(now_ns, known)
-        return VehicleView(state, fresh, known.battery, not_ready, unsound=unsound, velocity_m_s=velocity)
+        battery = known.battery if now_ns - known.battery_ns < _BATTERY_NS else None
+        return VehicleView(state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity)
 
     def _state(self, known: LatestTelemetry) -> FlightState:
         return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
@@ -291,6 +292,6 @@ class MavlinkVehicle:
         """Nothing to do: the link is the driver's."""
 
 
-def _share(percent: int, before: float | None) -> float | None:
-    # WIRE: -1 means unknown; a vehicle that knew once has not forgotten.
-    return min(percent, 100) / 100 if percent >= 0 else before
+def _charged(now_ns: int, percent: int, known: LatestTelemetry) -> LatestTelemetry:
+    # WIRE: -1 means unknown; a vehicle that knew a moment ago has not forgotten.
+    return replace(known, battery=min(percent, 100) / 100, battery_ns=now_ns) if percent >= 0 else known

@@ -24,7 +24,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.STATE_UNKNOWN: "its state is UNKNOWN or LOST",
     Condition.NOT_STANDING: "its state is neither LANDED nor EMERGENCY",
     Condition.BATTERY_LOW: "battery below `limits.battery_min`",
-    Condition.BATTERY_UNKNOWN: "no charge was ever told",
+    Condition.BATTERY_UNKNOWN: "no charge told, or none for 10 s (MAVLink)",
     Condition.TAKE_OFF_OVERDUE: "it does not say that it flies",
     Condition.TRACKER_SILENT: "no setpoint of the authorised epoch",
     Condition.UNSEEN: "no setpoint since take-off",

@@ -5,7 +5,14 @@ from typing import Any
 
 import pytest
 
-from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
+from drivers.mavlink.wire.telemetry import (
+    AttitudeQuaternion,
+    BatteryStatus,
+    HighresImu,
+    LocalPositionNed,
+    RawImu,
+    SysStatus,
+)
 from groundstation.bus.messages import Verb
 from groundstation.bus.topics import IMU, ODOMETRY
 
@@ -95,6 +102,15 @@ def test_a_velocity_that_is_alive_and_wrong_stops_it_too(rig_of, lie, word):
     rig.until(lambda: rig.mode != "TRACK", 1.5)
     assert word in rig.host.watchdog.reason
     rig.until(lambda: rig.mode == "LANDING" or math.hypot(*rig.velocity()) < 0.1, 2.5)
+
+
+def test_a_battery_that_is_told_no_more_is_unknown_and_lands_it(rig_of):
+    rig = rig_of("px4").track_on()
+    Liar(rig.link).change = lambda frame: None if isinstance(frame.message, SysStatus | BatteryStatus) else frame
+    rig.run(8.0)
+    assert rig.mode == "TRACK"
+    rig.until(lambda: rig.mode == "LANDING", 6.0)
+    assert rig.host.watchdog.reason == "its battery is unknown"
 
 
 def test_what_is_bad_is_not_published(rig):

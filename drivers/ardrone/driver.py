@@ -143,7 +143,7 @@ class ArDrone:
         configured = self._session.phase is SessionPhase.READY
         unsound = self._plausibility.report.reason(Health.BAD, ARDRONE.essential)
         if not unsound and now_ns - self._doubted_ns < _DOUBTED_NS:
-            unsound = "its velocity contradicts its tilt"
+            unsound = "its velocity contradicts what was asked for"
         not_ready = self._not_ready(heard)
         return VehicleView(
             heard.flight_state, fresh, heard.battery, not_ready, configured, unsound, self._true(heard.velocity_m_s)

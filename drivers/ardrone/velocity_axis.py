@@ -23,9 +23,9 @@ class Gains:
     still: speeds below this are zero [m/s, rad/s]. settle_s: after so long at zero the drone holds its place by itself.
     standing_s: time constant with which a standing drone learns what its accelerometers show at rest. overshoot_m_s,
     disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone in still air, and how
-    much of a steady push (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m: size of the
-    innovation that noise, gusts and a wrong scale explain, and the integral of what exceeds it that nothing does.
-    held_m_s2, held_s: that bound holds back so much for so long if the measured speed does not follow.
+    much of a steady push (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m: difference between
+    the measured speed and that one which a wrong scale and gusts explain, and the integral of what exceeds it that
+    nothing does; answer_s: by how much the measured one is later.
     """
 
     proportional: float = 1.6
@@ -47,10 +47,9 @@ class Gains:
     standing_s: float = 2.0
     overshoot_m_s: float = 0.2
     disturbance_m_s2: float = 0.2
-    doubt_m_s: float = 0.22
-    doubt_m: float = 0.05
-    held_m_s2: float = 0.1
-    held_s: float = 1.5
+    doubt_m_s: float = 0.3
+    doubt_m: float = 0.1
+    answer_s: float = 0.3
 
 
 class Axis:
@@ -68,12 +67,13 @@ class Axis:
         self._reference_rate = self._tilt = self._tilt_rate = 0.0
         self._under_way = deque([0.0] * self._gains.dead_ticks)
         self.flown_m_s = self.speed_m_s
-        self._unexplained_m = self._held_s = 0.0
+        self._expected_m_s = self.flown_m_s
+        self._unexplained_m = 0.0
 
     @property
     def contradicted(self) -> bool:
-        """Whether the measured speed is not the one that tilts and accelerometers must have brought."""
-        return self._unexplained_m > self._gains.doubt_m or self._held_s > self._gains.held_s
+        """Whether the measured speed is not the one that the requests must have brought."""
+        return self._unexplained_m > self._gains.doubt_m
 
     def stand(self, force_m_s2: float, dt_s: float) -> None:
         """Learn from a drone that stands: after the flat trim, this is what its accelerometers show when level."""
@@ -93,7 +93,9 @@ class Axis:
         acceleration = self._answer(dt_s) + outside + turn_m_s2
         self.speed_m_s += acceleration * dt_s
         error = measured_m_s - (self.speed_m_s - gains.odometry_delay_s * acceleration)
-        self._unexplained_m = max(0.0, self._unexplained_m + (math.fabs(error) - gains.doubt_m_s) * dt_s)
+        self._expected_m_s += (self.flown_m_s - self._expected_m_s) * min(1.0, dt_s / gains.answer_s)
+        doubt = math.fabs(measured_m_s - self._expected_m_s) - gains.doubt_m_s
+        self._unexplained_m = max(0.0, self._unexplained_m + doubt * dt_s)
         bandwidth = gains.blind_observer_rad_s if blind else gains.observer_rad_s
         self.speed_m_s += min(1.0, 2 * gains.observer_damping * bandwidth * dt_s) * error
         self.bias_m_s2 = _clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
@@ -144,8 +146,6 @@ class Axis:
         least = (slowest - self.flown_m_s) * gains.reference_rad_s - slower
         asked = min(max(acceleration_m_s2, least), most)
         self.flown_m_s += (asked + slower) * dt_s
-        held = math.fabs(asked - acceleration_m_s2) > gains.held_m_s2
-        self._held_s = max(0.0, self._held_s + (dt_s if held else -dt_s))
         return asked
 
     def ask(self, acceleration_m_s2: float) -> None:

@@ -46,7 +46,7 @@ class VelocityLoop:
 
     @property
     def contradicted(self) -> bool:
-        """Whether the measured velocity contradicts tilts and accelerometers."""
+        """Whether the measured velocity contradicts what was asked for."""
         return self._flying and any(axis.contradicted for axis in self._axes)
 
     def reset(self) -> None:

@@ -18,6 +18,7 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import summary_of, yaml_of
 from groundstation.settings.scenario import load_scenario
 from groundstation.settings.schema import Field
+from sim_bridge.fault_kinds import FaultKind
 
 ROOT = Path(__file__).parents[3]
 FIXTURE = ROOT / "tests" / "fixtures" / "field" / "lab.yaml"
@@ -187,6 +188,8 @@ faults:
 def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     path.write_text(WRONG_SCENARIO.lstrip(), encoding="utf-8")
+    kinds = [f"'{kind}'" for kind in FaultKind][:-1]
+    assert len(kinds) == 22
     with pytest.raises(SettingsError) as caught:
         load_scenario(path, ["cameras.blur_px=20", "seed"])
     assert [problem.removeprefix(f"{path}") for problem in caught.value.problems] == [
@@ -196,8 +199,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
         ":4: target.path.half_lenght_m: unknown key, did you mean half_length_m?",
         ":6: cameras.fps: must be <= 60 (got 90)",
         ":7: cameras.corner_noise: unknown key, did you mean corner_noise_px?",
-        ":9: faults[0].kind: must be 'navdata_silent', 'at_deaf', 'camera_cut', 'camera_stall', 'battery_drop'"
-        " or 'propeller_blocked' (got \"camera_ct\"), did you mean camera_cut?",
+        f":9: faults[0].kind: must be {', '.join(kinds)} or 'wrong_board' (got \"camera_ct\"), did you mean camera_cut?",
     ]
     path.write_text("schema_version: 1\ntarget:\n  path: {shape: figure_eigth}\n", encoding="utf-8")
     with pytest.raises(SettingsError) as caught:

@@ -7,6 +7,7 @@ from operator import itemgetter
 from groundstation.bus.messages import (
     ClockOffset,
     FlightState,
+    ImuSample,
     Message,
     Odometry,
     PoseHypothesis,
@@ -14,9 +15,10 @@ from groundstation.bus.messages import (
     VehicleStatus,
     Verdict,
 )
+from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.frozen_sensor import FreezeWatch
-from groundstation.estimation.measurement import Measurement, OdometrySample
+from groundstation.estimation.measurement import Measurement
 
 _AIRBORNE = {
     FlightState.FLYING: True,
@@ -61,6 +63,8 @@ class Intake:
         self._seen: dict[str, dict[tuple[int, int], int]] = {}
         self._newest_status: dict[str, int] = {}
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
+        self._attitudes = AttitudeIntake(joint.parameters.inertial)
+        self._standing: set[str] = set()
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
         """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are none of ours."""
@@ -68,11 +72,15 @@ class Intake:
             if message.header.clock == self._clock:
                 self._offsets[message.of] = message.offset_ns
             return Verdict.ACCEPTED
-        if not isinstance(message, Odometry | RelativeObservation | VehicleStatus):
+        if not isinstance(message, Odometry | RelativeObservation | VehicleStatus | ImuSample):
             return Verdict.ACCEPTED
         stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
             return Verdict.UNSYNCED
+        if isinstance(message, ImuSample):
+            if stamp_ns > now_ns + FUTURE_NS:
+                return Verdict.IMPLAUSIBLE
+            return self._attitudes.imu(message, stamp_ns, message.header.entity in self._standing)
         if self._is_duplicate(key, message, stamp_ns, now_ns):
             return Verdict.DUPLICATE
         if isinstance(message, Odometry):
@@ -83,6 +91,10 @@ class Intake:
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
         entity, airborne = message.header.entity, _AIRBORNE.get(message.flight_state)
+        if message.flight_state is FlightState.LANDED:
+            self._standing.add(entity)
+        else:
+            self._standing.discard(entity)
         if airborne is None:
             return Verdict.ACCEPTED
         if stamp_ns > now_ns + FUTURE_NS:
@@ -102,16 +114,7 @@ class Intake:
         values = (message.velocity_m_s, *attitude, message.height_m)
         if self._odometry_watch.is_frozen(message.header.entity, values, stamp_ns):
             return Verdict.FROZEN
-        motion = OdometrySample(
-            stamp_ns,
-            message.velocity_m_s,
-            message.yaw_rad,
-            message.height_m,
-            message.reset,
-            roll_rad=message.roll_rad,
-            pitch_rad=message.pitch_rad,
-        )
-        return self._filter.add_motion(message.header.entity, motion, now_ns)
+        return self._filter.add_motion(message.header.entity, self._attitudes.motion(message, stamp_ns), now_ns)
 
     def _observation(self, key: str, message: RelativeObservation, stamp_ns: int, now_ns: int) -> Verdict:
         if message.header.entity != message.observer:
@@ -125,6 +128,8 @@ class Intake:
         values = (message.position_m, message.yaw_rad)
         if self._sight_watch.is_frozen((message.observer, message.camera, message.subject), values, stamp_ns):
             return Verdict.FROZEN
+        reported = (message.roll_rad, message.pitch_rad)
+        roll_rad, pitch_rad = self._attitudes.tilt(message.observer, stamp_ns, reported)
         measurement = Measurement(
             stamp_ns,
             message.camera if message.camera in self._cameras else message.observer,
@@ -132,8 +137,8 @@ class Intake:
             message.position_m,
             message.yaw_rad,
             message.covariance,
-            message.roll_rad,
-            message.pitch_rad,
+            roll_rad,
+            pitch_rad,
             message.alternative,
         )
         tie = f"{key}#{message.subject}#{message.header.seq}"

@@ -42,7 +42,10 @@ _STRAIGHT_SHARE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class _Habits:
-    """How long a kind of vehicle's errors last [s], and the error of its climb rate [m/s; of its highest: share]."""
+    """How long a kind of vehicle's errors last [s], and the error of its climb rate [m/s; of its highest: share].
+
+    tells_attitude: its own attitude is better than what we could make of its IMU.
+    """
 
     velocity_s: float
     attitude_s: float
@@ -50,13 +53,15 @@ class _Habits:
     climb_m_s: float
     climb_share: float
     reports_climb: bool
+    tells_attitude: bool
 
 
 # An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. A MAVLink vehicle flies on our
-# position: it has no height of its own to report; its velocity follows our errors as slowly as its filter does.
+# position: it has no height of its own to report; its velocity follows our errors as slowly as its filter does. An
+# AR.Drone's navdata call a drone level that leans into moving air.
 _HABITS = {
-    "ardrone": _Habits(0.4, 5.0, 0.7, 0.0, 0.2, False),
-    "mavlink": _Habits(5.0, 10.0, 2.0, 0.02, 0.0, True),
+    "ardrone": _Habits(0.4, 5.0, 0.7, 0.0, 0.2, False, False),
+    "mavlink": _Habits(5.0, 10.0, 2.0, 0.02, 0.0, True, True),
 }
 
 
@@ -66,7 +71,8 @@ class EstimatorParameters:
 
     step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
     wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
-    over at least divergence_s re-initialise the entity.
+    over at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where
+    they publish one (inertial.py), with their velocity scale.
     """
 
     entities: Mapping[str, MotionModel]
@@ -77,6 +83,7 @@ class EstimatorParameters:
     wild_gates: float = 6.0
     divergence_count: int = 5
     divergence_s: float = 0.6
+    inertial: Mapping[str, float] = field(default_factory=dict)
 
 
 def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
@@ -94,6 +101,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         cameras,
         max_lateness_s=estimator.max_lateness_s,
         gate_probability=estimator.gate_probability,
+        inertial={n: d.odometry.velocity_scale for n, d in drones.items() if not _HABITS[d.kind].tells_attitude},
     )
 
 

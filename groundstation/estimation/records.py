@@ -107,7 +107,8 @@ class EntityMemory(Record):
     active: 1 if it is in the state; admitted: 1 if it may be; unconfirmed: 1 until a second observation agrees.
     held_*, yaw_rate: inputs held during a step: velocity [m/s; base_stabilized], turn rate [rad/s], roll and pitch
     [rad]; slow_v*: the velocity smoothed; commanded_*: what a CommandedRobot was last told; odometry_age_s: since the
-    last velocity; last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before.
+    last velocity; attitude_std [rad], yaw_std [rad per root second]: errors as the odometry states them (0: the model's
+    own count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before.
     velocity_*: how fast x, y, z change [m/s; world], as last predicted.
     wild: observations far beyond the gate, the last of them at wild_at; refused: observations by which it would have
     joined, had they not contradicted their observer; corrected_at: last use of an observation.
@@ -127,6 +128,8 @@ class EntityMemory(Record):
     commanded_vx: float
     commanded_rate: float
     odometry_age_s: float
+    attitude_std: float
+    yaw_std: float
     last_yaw: float
     last_reset: float
     has_yaw: int
@@ -156,6 +159,8 @@ class CondensedOdometry(Record):
     newest_reset: float
     newest_roll: float
     newest_pitch: float
+    newest_attitude_std: float
+    newest_yaw_std: float
     height_sum: float
     height_count: float
 

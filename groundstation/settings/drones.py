@@ -93,9 +93,10 @@ class OdometryCalibration(SettingsSection):
     height_delay_ms: Delay = 85.0
     """Age [ms] of a height when it arrives."""
     attitude_std_deg: StdDeviation = 1.0
-    """Standard deviation [deg] of roll and of pitch."""
+    """Standard deviation [deg] of roll and of pitch as the vehicle reports them. An AR.Drone's are found by its IMU,
+    with an error of their own, as long as it publishes one."""
     yaw_rate_std_deg_s: StdDeviation = 1.0
-    """Standard deviation [deg/s] of the yaw rate."""
+    """Standard deviation [deg/s] of the yaw rate as the vehicle reports it; of an AR.Drone's IMU as above."""
 
     @property
     def attitude_std_rad(self) -> float:

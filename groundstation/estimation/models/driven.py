@@ -43,6 +43,7 @@ def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float)
     if memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset:
         memory.yaw_rate = wrap(odometry.newest_yaw - memory.last_yaw) / step
     memory.held_roll, memory.held_pitch = odometry.newest_roll, odometry.newest_pitch
+    memory.attitude_std, memory.yaw_std = odometry.newest_attitude_std, odometry.newest_yaw_std
     memory.last_yaw, memory.last_reset, memory.has_yaw = odometry.newest_yaw, odometry.newest_reset, 1
 
 

@@ -72,15 +72,18 @@ _own = own_parameters(RobotParameters)
 
 
 @kernel(inlined=True)
-def add_robot_noise(P: Matrix, entity: EntityRow, p: RobotParameters, age_s: float, dt: float, turn: float) -> None:
+def add_robot_noise(
+    P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float, turn: float
+) -> None:
     """Add the process noise of an odometry-driven robot over dt, in which it turned by `turn`."""
     start = entity.start
-    density = position_density(p.velocity_density, age_s, p.hold_s)
+    density = position_density(p.velocity_density, memory.odometry_age_s, p.hold_s)
+    turning = memory.yaw_std * memory.yaw_std if memory.yaw_std > 0.0 else p.yaw_density
     climbing = 1e-6 if p.at_climb >= 0 or p.has_climb_rate != 0.0 else p.climb_std * p.climb_std * p.climb_tau_s
     P[start, start] += density * dt
     P[start + 1, start + 1] += density * dt
     wander(P, start, Z, climbing * dt)
-    wander(P, start, YAW, p.yaw_density * dt + _TURN_SHARE * _TURN_SHARE * turn * turn)
+    wander(P, start, YAW, turning * dt + _TURN_SHARE * _TURN_SHARE * turn * turn)
     wander(P, start, p.at_velocity_scale, p.scale_density * dt)
     wander(P, start, p.at_floor, p.floor_density * dt)
     wander(P, start, entity.at_yaw_offset, p.yaw_offset_density * dt)
@@ -98,12 +101,15 @@ def turn_with_heading(P: Matrix, start: int, size: int, dx: float, dy: float) ->
 
 
 @kernel()
-def fade_errors(mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, dt: float) -> None:
+def fade_errors(
+    mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float
+) -> None:
     """Let all Gauss-Markov entries that the block has decay over dt."""
     start, size = entity.start, entity.size
+    attitude_std = memory.attitude_std if memory.attitude_std > 0.0 else p.attitude_std
     fade(mean, P, start, size, p.at_climb, p.climb_std, dt / p.climb_tau_s)
-    fade(mean, P, start, size, entity.at_roll_error, p.attitude_std, dt / p.attitude_tau_s)
-    fade(mean, P, start, size, entity.at_pitch_error, p.attitude_std, dt / p.attitude_tau_s)
+    fade(mean, P, start, size, entity.at_roll_error, attitude_std, dt / p.attitude_tau_s)
+    fade(mean, P, start, size, entity.at_pitch_error, attitude_std, dt / p.attitude_tau_s)
     fade(mean, P, start, size, p.at_height_error, p.height_std, dt / p.height_tau_s)
     fade(mean, P, start, size, p.at_velocity_bias_x, p.bias_std, dt / p.bias_tau_s)
     fade(mean, P, start, size, p.at_velocity_bias_y, p.bias_std, dt / p.bias_tau_s)
@@ -152,8 +158,8 @@ def predict_odometry_robot(belief: Belief, e: int, dt: float) -> None:
     if climb >= 0:
         depend(P, start, size, Z, climb, dt)
     if size > len(ROBOT_CORE):
-        fade_errors(mean, P, entity, p, dt)
-    add_robot_noise(P, entity, p, inputs.odometry_age_s, dt, turn)
+        fade_errors(mean, P, entity, p, inputs, dt)
+    add_robot_noise(P, entity, p, inputs, dt, turn)
     mirror(P, start, size, 2 if size == 4 else size)
 
 

@@ -1,0 +1,157 @@
+"""How a vehicle leans and turns, by its gyroscopes and accelerometers; values in, values out.
+
+Rates are integrated; what the accelerometers say, less the acceleration that the reported velocity shows, draws roll
+and pitch back over seconds (a complementary filter). On a real AR.Drone in moving air the error is 0.5 degrees where
+that of its own attitude is 5 (docs/explanation/estimation.md 9.2).
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from groundstation.bus.messages import Vector3
+from groundstation.estimation.gyro_bias import GyroBias
+from groundstation.geometry.angles import wrap
+from groundstation.time_units import NS_PER_S
+
+GRAVITY_M_S2 = 9.80665
+_LEVEL_S, _STANDING_S = 4.0, 0.5  # accelerometers draw the tilt back over this: in flight, on the ground
+_SMOOTH_S = 0.3  # velocities are smoothed over this before they are differentiated
+_SILENT_S = 0.3  # after so much silence the acceleration counts as none
+_GAP_S = 0.5  # nothing is integrated across a longer one
+_FRESH_NS = 100_000_000  # how far a sample speaks for a time beside it
+_KEPT = 256  # samples: more than a second
+# Of roll and pitch after a while; at the start, when one sample of a vehicle that may accelerate is all there is.
+_SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
+# A specific force beyond these is a blow, no gravity [m/s^2]; a gain of 8 % is usual.
+_LEAST_FORCE, _MOST_FORCE = 0.6 * GRAVITY_M_S2, 1.4 * GRAVITY_M_S2
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """How a vehicle leans and where it points [rad; odom].
+
+    resets: rises where the heading's increment is void; attitude_std_rad: of roll and of pitch; yaw_std_rad: what the
+    heading wanders per root second.
+    """
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    resets: int
+    attitude_std_rad: float
+    yaw_std_rad: float
+
+
+class InertialAttitude:
+    """The attitude of one vehicle; velocity_scale: its true speed over its reported speed."""
+
+    def __init__(self, velocity_scale: float = 1.0) -> None:
+        self._scale = velocity_scale
+        self._bias = GyroBias()
+        self._kept: deque[tuple[int, float, float]] = deque(maxlen=_KEPT)
+        self._roll = self._pitch = self._yaw = 0.0
+        self._resets = 0
+        self._variance = _FIRST_RAD**2
+        self._stamp_ns: int | None = None
+        self._velocity = (0.0, 0.0)
+        self._acceleration = (0.0, 0.0)
+        self._velocity_ns: int | None = None
+        self._rate = (0.0, 0.0, 0.0)
+
+    def take_imu(self, stamp_ns: int, rates_rad_s: Vector3, force_m_s2: Vector3, standing: bool) -> None:
+        """Take body rates and specific force [base, FLU]; standing: it is said to be on the ground."""
+        elapsed_s = math.inf if self._stamp_ns is None else (stamp_ns - self._stamp_ns) / NS_PER_S
+        if elapsed_s <= 0.0:
+            return
+        if standing:
+            self._bias.take_standing(stamp_ns, rates_rad_s)
+        else:
+            self._bias.leave_ground()
+        unbiased = tuple(rate - bias for rate, bias in zip(rates_rad_s, self._bias.rad_s, strict=True))
+        if elapsed_s > _GAP_S:
+            self._begin(force_m_s2)
+        else:
+            self._turn(unbiased[0], unbiased[1], unbiased[2], elapsed_s)
+            self._level(force_m_s2, stamp_ns, elapsed_s, _STANDING_S if standing else _LEVEL_S)
+        self._stamp_ns, self._rate = stamp_ns, (unbiased[0], unbiased[1], unbiased[2])
+        self._kept.append((stamp_ns, self._roll, self._pitch))
+
+    def take_velocity(self, stamp_ns: int, velocity_m_s: Vector3) -> None:
+        """Take a reported velocity [base_stabilized]: how it changes is no tilt."""
+        forward, left = self._scale * velocity_m_s[0], self._scale * velocity_m_s[1]
+        elapsed_s = math.inf if self._velocity_ns is None else (stamp_ns - self._velocity_ns) / NS_PER_S
+        if elapsed_s <= 0.0:
+            return
+        self._velocity_ns = stamp_ns
+        if elapsed_s > _SILENT_S:
+            self._velocity, self._acceleration = (forward, left), (0.0, 0.0)
+            return
+        share, (vx, vy) = elapsed_s / (_SMOOTH_S + elapsed_s), self._velocity
+        self._velocity = vx, vy = vx + share * (forward - vx), vy + share * (left - vy)
+        turn = self._rate[2]
+        self._acceleration = (forward - vx) / _SMOOTH_S - turn * vy, (left - vy) / _SMOOTH_S + turn * vx
+
+    def take_heading(self, stamp_ns: int, yaw_rad: float, reset: int) -> None:
+        """Take the vehicle's own heading: a doubtful reference, from which only the gyro's bias learns, and slowly."""
+        if self._is_fresh(stamp_ns):
+            self._bias.take_heading(stamp_ns, yaw_rad, self._yaw, reset + self._resets)
+
+    def at(self, stamp_ns: int) -> Attitude | None:
+        """Return the attitude at the time of the newest sample, or None where that is too far from `stamp_ns`."""
+        if not self._is_fresh(stamp_ns):
+            return None
+        assert self._stamp_ns is not None
+        yaw = wrap(self._yaw + self._heading_rate() * (stamp_ns - self._stamp_ns) / NS_PER_S)
+        attitude_std = math.sqrt(self._variance)
+        return Attitude(self._roll, self._pitch, yaw, self._resets, attitude_std, self._bias.yaw_std_rad)
+
+    def tilt_at(self, stamp_ns: int) -> tuple[float, float] | None:
+        """Return (roll, pitch) at an earlier time, of the nearest sample; None where there is none within 0.1 s."""
+        found = None
+        for sample in reversed(self._kept):
+            if found is None or abs(sample[0] - stamp_ns) < abs(found[0] - stamp_ns):
+                found = sample
+            if sample[0] <= stamp_ns:
+                break
+        return None if found is None or abs(found[0] - stamp_ns) > _FRESH_NS else (found[1], found[2])
+
+    def _is_fresh(self, stamp_ns: int) -> bool:
+        return self._stamp_ns is not None and abs(stamp_ns - self._stamp_ns) <= _FRESH_NS
+
+    def _begin(self, force: Vector3) -> None:
+        """Begin (again) with what one sample says; the heading goes on, but not by an increment."""
+        self._roll, self._pitch = _tilt_of(force)
+        self._variance = _FIRST_RAD**2
+        self._resets += 1
+
+    def _turn(self, wx: float, wy: float, wz: float, elapsed_s: float) -> None:
+        """Integrate body rates."""
+        sine, cosine, tangent = math.sin(self._roll), math.cos(self._roll), math.tan(self._pitch)
+        about_vertical = wy * sine + wz * cosine
+        self._yaw = wrap(self._yaw + elapsed_s * about_vertical / math.cos(self._pitch))
+        self._roll += elapsed_s * (wx + about_vertical * tangent)
+        self._pitch += elapsed_s * (wy * cosine - wz * sine)
+
+    def _heading_rate(self) -> float:
+        _, wy, wz = self._rate
+        return (wy * math.sin(self._roll) + wz * math.cos(self._roll)) / math.cos(self._pitch)
+
+    def _level(self, force: Vector3, stamp_ns: int, elapsed_s: float, within_s: float) -> None:
+        """Draw roll and pitch towards what the accelerometers say; what a gyro's bias does against it stays."""
+        if not _LEAST_FORCE < math.hypot(*force) < _MOST_FORCE:
+            return
+        roll, pitch = _tilt_of(force)
+        if self._velocity_ns is not None and abs(stamp_ns - self._velocity_ns) < _SILENT_S * NS_PER_S:
+            roll -= self._acceleration[1] / GRAVITY_M_S2
+            pitch += self._acceleration[0] / GRAVITY_M_S2
+        share = elapsed_s / (within_s + elapsed_s)
+        self._roll += share * (roll - self._roll)
+        self._pitch += share * (pitch - self._pitch)
+        settled = _SETTLED_RAD**2 + (within_s * self._bias.tilt_std_rad_s) ** 2
+        self._variance += 2.0 * share * (settled - self._variance)
+
+
+def _tilt_of(force: Vector3) -> tuple[float, float]:
+    """Return (roll, pitch) of a vehicle that does not accelerate."""
+    return math.atan2(force[1], force[2]), math.atan2(-force[0], math.hypot(force[1], force[2]))

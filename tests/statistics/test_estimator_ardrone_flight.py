@@ -1,0 +1,46 @@
+"""The tracker on a real AR.Drone's flight in moving air: where is a resting target that the leaning drone sees?
+
+The drone's navdata call it level while it leans 5 to 10 degrees, and its magnetic heading wanders by 7 degrees in 20 s.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from recorded_flight import Dark, Recording, figures, fly, read_recording
+
+from groundstation.field.resolved import ResolvedField
+
+LEAST_ANEES, MOST_ANEES, MOST_HEADING_NEES = 0.4, 1.5, 1.5
+
+
+@pytest.fixture(scope="module")
+def recording(real_data: Callable[[str], Path]) -> Recording:
+    return read_recording(real_data("ardrone_flight"))
+
+
+def test_the_target_is_where_it_is_while_the_ceiling_sees(recording: Recording, lab_field: ResolvedField) -> None:
+    found = figures(fly(recording, lab_field, Dark()).errors)
+    print(found)
+    assert found.target_m <= 0.03
+    assert LEAST_ANEES <= found.target_anees <= MOST_ANEES
+    assert found.heading_nees <= MOST_HEADING_NEES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("dark", "limit_m"), [(Dark(10.0, 15.0), 0.07), (Dark(25.0, 30.0), 0.10)])
+def test_the_target_is_held_while_the_ceiling_is_dark(
+    recording: Recording, lab_field: ResolvedField, dark: Dark, limit_m: float
+) -> None:
+    flights = [fly(recording, lab_field, dark, seed) for seed in (1, 2, 3)]
+    found = figures([row for flight in flights for row in flight.errors])
+    print(found)
+    assert found.target_m <= limit_m
+    assert LEAST_ANEES <= found.target_anees <= MOST_ANEES
+    assert found.heading_nees <= MOST_HEADING_NEES
+
+
+@pytest.mark.slow
+def test_without_an_imu_the_lean_goes_to_the_target(recording: Recording, lab_field: ResolvedField) -> None:
+    """What the IMU is worth: the same flight with navdata in demo mode."""
+    assert figures(fly(recording, lab_field, Dark(), inertial=False).errors).target_m >= 0.06

@@ -1,0 +1,180 @@
+"""Attitude by gyroscopes and accelerometers, against a vehicle whose motion is known; sensors as bad as real ones."""
+
+import math
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import Vector3
+from groundstation.estimation.gyro_bias import GyroBias
+from groundstation.estimation.inertial import GRAVITY_M_S2, InertialAttitude
+from groundstation.geometry.angles import difference
+from groundstation.geometry.rotations import rotation_from_euler
+
+STEP_NS, START = 10_000_000, 10**12
+GAIN, BIAS = 0.92, (0.004, -0.003, 0.01)
+
+
+class Vehicle:
+    """A vehicle that publishes its IMU and velocity; roll, pitch, yaw and the acceleration [level axes] are set."""
+
+    def __init__(self) -> None:
+        self.attitude = InertialAttitude(velocity_scale=1.25)
+        self.now, self.roll, self.pitch, self.yaw = START, 0.0, 0.0, 0.0
+        self.velocity = np.zeros(2)
+        self._rng = np.random.default_rng(7)
+
+    def run(
+        self, seconds: float, standing: bool = False, roll: float | None = None, turn: float = 0.0,
+        acceleration: tuple[float, float] = (0.0, 0.0), magnetic: float = 0.0,
+    ) -> None:  # fmt: skip
+        """Fly on; roll: what it shall be, at once; turn [rad/s]; magnetic: rate of the error of its own heading."""
+        rates = np.zeros(3)
+        for step in range(round(seconds * 1e9) // STEP_NS):
+            self.now += STEP_NS
+            elapsed_s = STEP_NS / 1e9
+            if step == 0 and roll is not None:
+                rates, self.roll = np.array([(roll - self.roll) / elapsed_s, 0.0, 0.0]), roll
+            else:
+                base = rotation_from_euler(self.roll, self.pitch, 0.0)
+                rates = base.T @ np.array([0.0, 0.0, turn])
+            self.yaw += turn * elapsed_s
+            self.velocity += np.array(acceleration) * elapsed_s
+            self._publish(rates, acceleration, standing)
+            own = self.yaw + magnetic * step * elapsed_s
+            self.attitude.take_heading(self.now, math.remainder(own, math.tau), 0)
+
+    def _publish(self, rates: np.ndarray, acceleration: tuple[float, float], standing: bool) -> None:
+        force = rotation_from_euler(self.roll, self.pitch, 0.0).T @ np.array([*acceleration, GRAVITY_M_S2])
+        noisy = GAIN * force + 0.05 * self._rng.standard_normal(3)
+        rates = rates + np.array(BIAS) + 0.003 * self._rng.standard_normal(3)
+        self.attitude.take_velocity(self.now, (*(self.velocity / 1.25).tolist(), 0.0))
+        self.attitude.take_imu(self.now, _three(rates), _three(noisy), standing)
+
+    @property
+    def tilt_error_deg(self) -> float:
+        found = self.attitude.at(self.now)
+        assert found is not None
+        return math.degrees(max(abs(found.roll_rad - self.roll), abs(found.pitch_rad - self.pitch)))
+
+    def yaw_error_deg(self, since: float) -> float:
+        found = self.attitude.at(self.now)
+        assert found is not None
+        return math.degrees(difference(found.yaw_rad - since, self.yaw))
+
+
+def _three(values: np.ndarray) -> Vector3:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+@pytest.fixture
+def flying() -> Vehicle:
+    """Three seconds on the ground taught it the bias."""
+    vehicle = Vehicle()
+    vehicle.run(3.0, standing=True)
+    return vehicle
+
+
+def test_a_lean_that_nobody_tells_is_found(flying: Vehicle) -> None:
+    flying.run(5.0, roll=math.radians(-8.0))
+    assert flying.tilt_error_deg < 0.5
+    found = flying.attitude.at(flying.now)
+    assert found is not None
+    assert math.degrees(found.attitude_std_rad) < 1.0
+
+
+def test_a_lean_that_was_not_followed_is_found_by_the_accelerometers_alone() -> None:
+    vehicle = Vehicle()
+    vehicle.roll = math.radians(6.0)
+    vehicle.run(1.0)
+    assert vehicle.tilt_error_deg < 0.5, "the first sample says it"
+    vehicle.roll = math.radians(-2.0)
+    vehicle.run(16.0)
+    found = vehicle.attitude.at(vehicle.now)
+    assert found is not None
+    assert vehicle.tilt_error_deg < math.degrees(found.attitude_std_rad), "its gyroscopes' bias is unknown, and counted"
+    assert vehicle.tilt_error_deg < 1.5, "without a rate, after four times what the accelerometers take"
+
+
+def test_an_acceleration_is_no_tilt(flying: Vehicle) -> None:
+    for sign in (1.0, -1.0, -1.0, 1.0):
+        flying.run(2.0, acceleration=(0.5 * sign, -0.7 * sign))
+        assert flying.tilt_error_deg < 0.9, "0.7 m/s^2 alone look like four degrees"
+
+
+def test_the_heading_follows_turns_of_a_leaning_vehicle(flying: Vehicle) -> None:
+    flying.run(0.1, roll=math.radians(10.0))
+    before = flying.attitude.at(flying.now)
+    assert before is not None
+    since = before.yaw_rad - flying.yaw
+    flying.run(10.0, turn=0.5)
+    flying.run(10.0, turn=-0.3)
+    assert abs(flying.yaw_error_deg(since)) < 0.6
+    after = flying.attitude.at(flying.now)
+    assert after is not None
+    assert math.degrees(after.yaw_std_rad) < 0.2
+    assert after.resets == before.resets
+
+
+def test_a_vehicle_that_is_carried_teaches_no_bias() -> None:
+    vehicle = Vehicle()
+    vehicle.run(3.0, standing=True, turn=0.3)
+    found = vehicle.attitude.at(vehicle.now)
+    assert found is not None
+    assert math.degrees(found.yaw_std_rad) > 2.0, "the bias is as unknown as before"
+
+
+def test_a_wandering_magnetic_heading_teaches_little(flying: Vehicle) -> None:
+    found = flying.attitude.at(flying.now)
+    assert found is not None
+    since = found.yaw_rad - flying.yaw
+    flying.run(20.0, magnetic=math.radians(8.0) / 20.0)
+    assert abs(flying.yaw_error_deg(since)) < 1.0, "its own heading is wrong by 8 degrees by now"
+
+
+def test_without_time_on_the_ground_the_heading_teaches_the_bias_slowly() -> None:
+    rng, bias, magnetic = np.random.default_rng(3), 0.0, 0.0
+    learner = GyroBias()
+    yaw = 0.0
+    unsure = learner.yaw_std_rad
+    for k in range(60):
+        magnetic += math.radians(1.7) * math.sqrt(2.0) * rng.standard_normal()
+        yaw += 2.0 * (0.02 - learner.rad_s[2])
+        learner.take_heading(
+            START + k * 2 * 10**9, math.remainder(magnetic, math.tau), math.remainder(yaw, math.tau), 0
+        )
+    bias = learner.rad_s[2]
+    claimed = math.sqrt(learner._variance)
+    assert abs(bias - 0.02) < 3.0 * claimed
+    assert claimed < 0.5 * math.radians(0.5)
+    assert learner.yaw_std_rad < 0.6 * unsure
+
+
+def test_a_gap_voids_the_increment_and_silence_has_no_attitude(flying: Vehicle) -> None:
+    before = flying.attitude.at(flying.now)
+    assert before is not None
+    assert flying.attitude.at(flying.now + 200_000_000) is None
+    flying.now += 600_000_000
+    flying.run(0.1)
+    after = flying.attitude.at(flying.now)
+    assert after is not None
+    assert after.resets == before.resets + 1
+    assert after.attitude_std_rad > 3.0 * before.attitude_std_rad
+
+
+def test_the_tilt_of_a_moment_ago_is_remembered(flying: Vehicle) -> None:
+    flying.run(0.3, roll=math.radians(5.0))
+    then = flying.now
+    flying.run(0.3, roll=math.radians(-5.0))
+    tilt = flying.attitude.tilt_at(then - 20_000_000)
+    assert tilt is not None
+    assert math.degrees(tilt[0]) == pytest.approx(5.0, abs=0.5)
+    assert flying.attitude.tilt_at(START - 10**9) is None
+
+
+def test_a_blow_is_no_gravity(flying: Vehicle) -> None:
+    for _ in range(20):
+        flying.now += STEP_NS
+        flying.attitude.take_imu(flying.now, BIAS, (30.0, 0.0, 5.0), False)
+    assert flying.tilt_error_deg < 0.5

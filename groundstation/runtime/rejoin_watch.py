@@ -1,0 +1,57 @@
+"""Beliefs that are given up for what a camera says: who is the likely culprit? Said once, not at each time.
+
+One robot that is re-initialised was lost. All that one camera sees at once, or one again and again, have a cause that
+re-initialising does not mend.
+"""
+
+from collections.abc import Iterable
+
+from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
+from groundstation.estimation.measurement import Correction
+
+_AT_ONCE_NS, _AGAIN_NS, _QUIET_NS = 3_000_000_000, 20_000_000_000, 20_000_000_000
+_AGAIN = 3
+_CAMERA_REMEDY = "check that it was not moved and that its picture is live; land what depends on it"
+_EITHER_REMEDY = "its odometry or that camera is wrong; hold or land it and look at both"
+
+
+class RejoinWatch:
+    """Fed with what became of observations; robots: the names of those that fly."""
+
+    def __init__(self, robots: Iterable[str]) -> None:
+        self._robots = frozenset(robots)
+        self._given_up: dict[tuple[str, str], list[int]] = {}
+        self._told: dict[str, int] = {}
+
+    def take(self, corrections: Iterable[Correction], now_ns: int) -> list[Notice]:
+        """Take corrections; returns what is worth telling now."""
+        found = []
+        for c in corrections:
+            if c.joined and c.nis is not None and c.subject in self._robots:
+                times = self._given_up.setdefault((c.observer, c.subject), [])
+                times[:] = [at for at in times if now_ns - at <= _AGAIN_NS] + [now_ns]
+                found += self._judge(c.observer, c.subject, now_ns)
+        return found
+
+    def _judge(self, observer: str, subject: str, now_ns: int) -> list[Notice]:
+        lost = sorted(
+            name
+            for (by, name), times in self._given_up.items()
+            if by == observer and times and now_ns - times[-1] <= _AT_ONCE_NS
+        )
+        if len(lost) > 1:
+            text = f"{' and '.join(lost)} re-initialised by {observer} at once: suspect {observer}, not them"
+            return self._once(observer, text, _CAMERA_REMEDY, now_ns)
+        count = len(self._given_up[observer, subject])
+        if count >= _AGAIN:
+            text = f"re-initialised by {observer} {count} times in {_AGAIN_NS // 10**9} s"
+            return self._once(subject, text, _EITHER_REMEDY, now_ns)
+        return []
+
+    def _once(self, culprit: str, text: str, remedy: str, now_ns: int) -> list[Notice]:
+        before = self._told.get(culprit)
+        if before is not None and now_ns - before < _QUIET_NS:
+            return []
+        self._told[culprit] = now_ns
+        return [Notice(Severity.WARNING, text, remedy, culprit)]

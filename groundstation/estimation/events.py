@@ -13,7 +13,7 @@ from groundstation.estimation.filter_state import Belief, Hypothesis, State, Tab
 from groundstation.estimation.joining import admit
 from groundstation.estimation.model_kernels import handle
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.outliers import blame
+from groundstation.estimation.outliers import blame, doubt_velocity
 from groundstation.estimation.records import (
     ACCEPTED,
     ADMITTED,
@@ -21,6 +21,7 @@ from groundstation.estimation.records import (
     DISMISSED,
     EVENT_KINDS,
     INFLATED,
+    KIND_CAMERA,
     KIND_ROBOT,
     MAX_ROWS,
     OBSERVATION,
@@ -110,6 +111,8 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             joins = True
         elif excess == 1.0:
             subject.wild.count = subject.refused.count = subject.unconfirmed = 0
+        elif first.entities[event.observer].kind == KIND_CAMERA:
+            doubt_velocity(subject)
     out.verdict = INFLATED if excess > 1.0 else ACCEPTED
     if joins:
         out.verdict = admit(state, tables, event, rows, used)

@@ -21,6 +21,7 @@ from groundstation.estimation.update import linearise
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
+_FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
 
 
 @kernel()
@@ -72,6 +73,15 @@ def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
         return True
     memory.wild_at = at
     return insists(memory.wild, settings, at)
+
+
+@kernel()
+def doubt_velocity(memory: EntityMemory) -> None:
+    """Doubt what a vehicle says of its velocity: a fixed camera saw it beyond the gate.
+
+    One surprise says little, and one that is wild nothing of a velocity: such a jump has another cause.
+    """
+    memory.velocity_doubt = min(_MOST_DOUBT_M_S, _FIRST_DOUBT_M_S + _DOUBT_GROWS * memory.velocity_doubt)
 
 
 @kernel()

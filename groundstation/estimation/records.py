@@ -109,7 +109,8 @@ class EntityMemory(Record):
     [rad]; slow_v*: the velocity smoothed; commanded_*: what a CommandedRobot was last told; odometry_age_s: since the
     last velocity; attitude_std [rad], yaw_std [rad per root second]: errors as the odometry states them (0: the model's
     own count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before.
-    velocity_*: how fast x, y, z change [m/s; world], as last predicted.
+    velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed
+    camera's surprises add to the error of the reported velocity.
     wild: observations far beyond the gate, the last of them at wild_at; refused: observations by which it would have
     joined, had they not contradicted their observer; corrected_at: last use of an observation.
     """
@@ -136,6 +137,7 @@ class EntityMemory(Record):
     velocity_x: float
     velocity_y: float
     velocity_z: float
+    velocity_doubt: float
     wild: Streak
     wild_at: float
     refused: Streak

@@ -31,6 +31,9 @@ SLOW_STATES = (
 )
 AERIAL = SLOW_STATES[:6]
 _TURN_SHARE = 0.02  # of each turn is in error
+# Beyond so many deviations a velocity's error is not a sound sensor's: it may be as large as it looks, and last.
+_BELIEVABLE, _LIE_S = 3.0, 2.0
+_DOUBT_S = 1.0  # the doubt that surprises raise is forgotten over this
 
 
 class RobotParameters(Record):
@@ -100,6 +103,29 @@ def turn_with_heading(P: Matrix, start: int, size: int, dx: float, dy: float) ->
     add_column(P, start, size, start + 1, start + YAW, dx)
 
 
+@kernel(inlined=True)
+def fade_velocity_bias(
+    mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float
+) -> None:
+    """Let the velocity's error decay over dt; one that no sound sensor has is given room, and stays longer.
+
+    A heavy tail of its prior (docs/decisions/0096-velocities-are-claims.md): where sightings have drawn the error out
+    of it, the deviation follows the error, so that the next ones count for more than the vehicle's word. Surprises of
+    fixed cameras add to it before that.
+    """
+    start, size = entity.start, entity.size
+    x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]
+    believable = _BELIEVABLE * _BELIEVABLE * p.bias_std * p.bias_std
+    square, variance, lasts_s = x * x + y * y, p.bias_std * p.bias_std, p.bias_tau_s
+    variance += memory.velocity_doubt * memory.velocity_doubt
+    if square > believable:
+        variance += square - believable
+        lasts_s = max(lasts_s, lasts_s + (_LIE_S - lasts_s) * (1.0 - believable / square))
+    deviation = math.sqrt(variance)
+    fade(mean, P, start, size, p.at_velocity_bias_x, deviation, dt / lasts_s)
+    fade(mean, P, start, size, p.at_velocity_bias_y, deviation, dt / lasts_s)
+
+
 @kernel()
 def fade_errors(
     mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float
@@ -111,8 +137,8 @@ def fade_errors(
     fade(mean, P, start, size, entity.at_roll_error, attitude_std, dt / p.attitude_tau_s)
     fade(mean, P, start, size, entity.at_pitch_error, attitude_std, dt / p.attitude_tau_s)
     fade(mean, P, start, size, p.at_height_error, p.height_std, dt / p.height_tau_s)
-    fade(mean, P, start, size, p.at_velocity_bias_x, p.bias_std, dt / p.bias_tau_s)
-    fade(mean, P, start, size, p.at_velocity_bias_y, p.bias_std, dt / p.bias_tau_s)
+    if p.at_velocity_bias_x >= 0:
+        fade_velocity_bias(mean, P, entity, p, memory, dt)
 
 
 @kernel()
@@ -170,6 +196,7 @@ def begin_odometry_robot(belief: Belief, odometry: CondensedOdometry, e: int, st
     start, p = entity.start, _own(entity)
     hold_velocity(odometry, memory, p.hold_s, step_s)
     take_heading(odometry, memory, step_s)
+    memory.velocity_doubt *= math.exp(-step_s / _DOUBT_S)
     if memory.active == 0 or memory.unconfirmed != 0 or odometry.height_count == 0.0:
         return
     error = start + p.at_height_error if p.at_height_error >= 0 else -1

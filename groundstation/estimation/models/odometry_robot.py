@@ -109,7 +109,7 @@ def fade_velocity_bias(
 ) -> None:
     """Let the velocity's error decay over dt; one that no sound sensor has is given room, and stays longer.
 
-    A heavy tail of its prior (docs/decisions/0096-velocities-are-claims.md): where sightings have drawn the error out
+    A heavy tail of its prior (docs/decisions/0078-velocities-are-claims.md): where sightings have drawn the error out
     of it, the deviation follows the error, so that the next ones count for more than the vehicle's word. Surprises of
     fixed cameras add to it before that.
     """

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from drivers.failsafe_table import Condition, Failsafe
 from drivers.setpoints import SetpointGate
-from drivers.watchdog_types import AIRBORNE, STANDING, AuthorityLimits, DriverMode, Upstream, VehicleView
+from drivers.watchdog_types import AIRBORNE, STANDING, DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import FlightState
 from groundstation.time_units import NS_PER_S
 
@@ -40,7 +40,7 @@ class Situation:
         return (self.now_ns - then_ns) / NS_PER_S
 
 
-def observed(at: Situation, limits: AuthorityLimits) -> dict[Condition, str]:
+def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
     """Return the conditions that hold at this moment, with what is to be said of them."""
     vehicle, up = at.vehicle, at.upstream
     holding: dict[Condition, str] = {}
@@ -95,7 +95,7 @@ def _observe_setpoints(at: Situation, holding: dict[Condition, str]) -> None:
         holding[Condition.UNCONVERGED] = ""
 
 
-def _observe_motion(vehicle: VehicleView, limits: AuthorityLimits, holding: dict[Condition, str]) -> None:
+def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[Condition, str]) -> None:
     if vehicle.stray:
         holding[Condition.STRAYS] = vehicle.stray
     if vehicle.speed_m_s > limits.tolerated_speed_m_s:
@@ -129,7 +129,7 @@ class Evidence:
         self.charged_s: dict[Condition, float] = {}
         self._last_ns: int | None = None
 
-    def step(self, at: Situation, limits: AuthorityLimits) -> None:
+    def step(self, at: Situation, limits: WatchdogLimits) -> None:
         """Take the situation of one turn."""
         elapsed_s = 0.0 if self._last_ns is None else at.since_s(self._last_ns)
         self._last_ns = at.now_ns

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum, auto
 from functools import cache
 
-from drivers.watchdog_types import ALOFT, FREE, AuthorityLimits, DriverMode
+from drivers.watchdog_types import ALOFT, FREE, DriverMode, WatchdogLimits
 
 
 class Reaction(StrEnum):
@@ -91,12 +91,12 @@ _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
 
 
 @cache
-def failsafes(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+def failsafes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     """Return the table for a vehicle's limits, highest priority first."""
     return (*_ends(limits), *_landings(limits), *_suspensions(limits), *_brakes(limits), *_refusals())
 
 
-def _ends(_limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+def _ends(_limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     emergency = ALOFT | {DriverMode.LANDING}
     return (
         Failsafe(Condition.EMERGENCY, Reaction.CUT, "the vehicle reports an emergency", modes=emergency),
@@ -108,7 +108,7 @@ def _ends(_limits: AuthorityLimits) -> tuple[Failsafe, ...]:
     )  # fmt: skip
 
 
-def _landings(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     # Who is noticed to be silent has been silent for hover_after_s already.
     noticed_s = limits.land_after_s - limits.hover_after_s
     land, patience = Reaction.LAND, "safety.land_after_s"
@@ -135,7 +135,7 @@ def _landings(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
     )  # fmt: skip
 
 
-def _suspensions(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+def _suspensions(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     rows = (
         (Condition.DRIVER_STOOD, "this driver stood still for {why}", 0.0, None),
         (Condition.SUPERVISOR_DEAD, "the supervisor is dead", 0.0, None),
@@ -153,7 +153,7 @@ def _suspensions(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
     )
 
 
-def _brakes(limits: AuthorityLimits) -> tuple[Failsafe, ...]:
+def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     rows = (
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", 0.0),
         (Condition.TELEMETRY_SILENT, "{why}", 0.0),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from drivers.base import HostProcess, Vehicle
 from drivers.control_error import ControlErrorMonitor, SeenVelocity
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import AIRBORNE, Ack, AuthorityLimits, DriverMode, Upstream, VehicleView, WatchdogDecision
+from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     Command,
@@ -35,7 +35,7 @@ _LOUD = {DriverMode.CUT: Severity.ERROR, DriverMode.LANDING: Severity.WARNING}
 class VehicleHost:
     """One vehicle on the bus: feeds its watchdog, applies the decisions, tells everybody."""
 
-    def __init__(self, child: HostProcess, vehicle: Vehicle, limits: AuthorityLimits) -> None:
+    def __init__(self, child: HostProcess, vehicle: Vehicle, limits: WatchdogLimits) -> None:
         self.vehicle = vehicle
         self.watchdog = Watchdog(limits, clock.clock_id())
         self._child = child

@@ -18,11 +18,11 @@ from drivers.watchdog_types import (
     UP,
     Ack,
     Action,
-    AuthorityLimits,
     DriverMode,
     Upstream,
     VehicleView,
     WatchdogDecision,
+    WatchdogLimits,
 )
 from groundstation.bus.messages import AckStage, Command, FlightState, Lease, VelocitySetpoint, Verb
 from groundstation.time_units import NS_PER_S
@@ -36,7 +36,7 @@ class Watchdog:
     mode, reason: see `WatchdogDecision`. The vehicle's and upstream's last words are remembered between steps.
     """
 
-    def __init__(self, limits: AuthorityLimits, clock: str) -> None:
+    def __init__(self, limits: WatchdogLimits, clock: str) -> None:
         self.limits = limits
         self.table = failsafes(limits)
         self._acting = tuple(row for row in self.table if row.reaction is not Reaction.REFUSE)

@@ -43,7 +43,7 @@ ALOFT = FREE | {DriverMode.TAKING_OFF}
 
 
 @dataclass(frozen=True, slots=True)
-class AuthorityLimits:
+class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
     resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.limits import DriverSection, Name, Port, Positive, SilenceLimits, VehicleLimits
-from drivers.watchdog_types import AuthorityLimits
+from drivers.vehicle_settings import DriverSection, Name, Port, Positive, SilenceLimits, VehicleLimits
+from drivers.watchdog_types import WatchdogLimits
 
 VideoCodec = Literal["h264_360p", "h264_720p"]
 
@@ -74,6 +74,6 @@ class ArDroneDriverSettings(DriverSection):
     strict_checksum: bool = True
 
     @property
-    def authority(self) -> AuthorityLimits:
+    def authority(self) -> WatchdogLimits:
         """Return the limits of the shared watchdog."""
         return self.safety.authority(self.limits)

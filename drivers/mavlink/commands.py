@@ -47,7 +47,7 @@ class Orders:
         """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
         return custom_mode == self._guided and not self._taken_over
 
-    def last_words(self) -> str:
+    def failsafe_datagrams(self) -> str:
         """Return what the vehicle said of late, to go with a refusal."""
         return f" ({self.said[-1][1]})" if self.said else ""
 
@@ -120,7 +120,7 @@ class Orders:
         elif not self._taken_over and now_ns - self._guided_ns > _TAKEN_OVER_NS:
             self._taken_over = True
             text = f"{self._vehicle.name} is in {mode_name(self._flavour, custom_mode)}: not ours to fly until RESUME"
-            self.events.append((_WARNING, text + self.last_words()))
+            self.events.append((_WARNING, text + self.failsafe_datagrams()))
 
     def _take_off(self, now_ns: int, armed: bool, guided: bool, landed: int) -> SetPositionTargetLocalNed | None:
         px4 = self._flavour is Flavour.PX4

@@ -7,7 +7,6 @@ its local NED is the world turned upside down about x: north = world x, east = -
 import math
 from dataclasses import dataclass
 
-from drivers.limits import VehicleLimits
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import OdometryMessage, SetPositionTargetLocalNed, VisionPositionEstimate
 from drivers.mavlink.wire.names import (
@@ -21,6 +20,7 @@ from drivers.mavlink.wire.names import (
 )
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
 from drivers.plausibility.motion import MotionSample
+from drivers.vehicle_settings import VehicleLimits
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
 from groundstation.geometry.angles import quaternion_from_euler, wrap
 

@@ -1,10 +1,10 @@
 """What supervisor or guardian tell a vehicle for a driver that died or hangs."""
 
-from drivers.limits import VehicleLimits
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
+from drivers.vehicle_settings import VehicleLimits
 
 
 def hover_and_land(system: int, our_system: int = 255) -> tuple[bytes, bytes]:

@@ -4,8 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from drivers.limits import DriverSection, Name, Positive, SilenceLimits, VehicleLimits
-from drivers.watchdog_types import AuthorityLimits
+from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits
+from drivers.watchdog_types import WatchdogLimits
 
 
 class VisionFeedback(DriverSection):
@@ -94,6 +94,6 @@ class MavlinkDriverSettings(DriverSection):
                 raise ValueError(f"two vehicles on {self.link.target} have the same {what}")
         return self
 
-    def authority(self, vehicle: VehicleSettings) -> AuthorityLimits:
+    def authority(self, vehicle: VehicleSettings) -> WatchdogLimits:
         """Return the limits of one vehicle's watchdog."""
         return self.safety.authority(vehicle.limits)

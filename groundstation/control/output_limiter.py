@@ -1,4 +1,4 @@
-"""The last word on every setpoint: it may only shrink a velocity or hover, never add to it."""
+"""The last step before a setpoint is sent: it may only shrink a velocity or hover, never add to it."""
 
 import math
 from collections.abc import Mapping

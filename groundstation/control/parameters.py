@@ -48,7 +48,7 @@ class ControlParameters:
 
 @dataclass(frozen=True, slots=True)
 class SafetyParameters:
-    """Settings of the last word.
+    """Settings of the output limiter.
 
     fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity;
     margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief.
@@ -83,7 +83,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
 
 
 def safety_from_field(field: ResolvedField) -> SafetyParameters:
-    """Return the last word's settings of a resolved field."""
+    """Return the output limiter's settings of a resolved field."""
     fence, safety = field.room.fence, field.safety
     return SafetyParameters(
         fence=(fence.x_m, fence.y_m, fence.z_m),

@@ -13,11 +13,11 @@ from groundstation.bus.messages import Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.correction import is_distribution
 from groundstation.estimation.event_log import EventLog, change_values, observation_values
-from groundstation.estimation.events import event_kernels
 from groundstation.estimation.filter_state import Belief, Inputs, Moments, Span
 from groundstation.estimation.layout import EntityKind, StateLayout
 from groundstation.estimation.measurement import Correction, Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models.protocol import DrivenModel
+from groundstation.estimation.observe import event_kernels
 from groundstation.estimation.odometry_ring import OdometryRing
 from groundstation.estimation.parameters import EstimatorParameters
 from groundstation.estimation.records import ADMITTED, DISMISSED, PENDING, PLACED

@@ -8,8 +8,8 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.estimation import model_kernels as declared
+from groundstation.estimation.chi_square import gate
 from groundstation.estimation.filter_state import Checkpoints, Settings, State, Tables
-from groundstation.estimation.gating import gate
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.models.protocol import MotionModel, ObservationModel, SwitchingModel, place_of
 from groundstation.estimation.parameters import EstimatorParameters

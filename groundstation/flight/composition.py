@@ -14,7 +14,7 @@ from groundstation.settings.sections import DriverKind, DriverSection, core_sect
 from groundstation.supervisor import process_table as rows
 from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
-from groundstation.supervisor.table import ProcessSpec
+from groundstation.supervisor.process_spec import ProcessSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def _driver(section: DriverSection, field: Field) -> ProcessSpec:
     spec = replace(row, name=section.name, entry=entry_point(section.kind), section=section.section)
     if section.kind is DriverKind.CAMERA:
         return spec
-    return replace(spec, last_words=failsafe_datagrams(field, section))
+    return replace(spec, failsafe_datagrams=failsafe_datagrams(field, section))
 
 
 def _sim_bridge(field: Field, simulation: Simulation) -> ProcessSpec:

@@ -12,7 +12,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
-from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking
+from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
 from groundstation.tracker import PlanRequest
 
 Words = list[tuple[Topic, Message]]

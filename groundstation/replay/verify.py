@@ -15,7 +15,7 @@ from groundstation.replay.difference import MessageDifference, first_difference
 from groundstation.replay.rerun import Rerun, Words
 from groundstation.replay.source import Source
 from groundstation.replay.tick_log import OUTPUTS, Tape, Tick
-from groundstation.runtime.tracking import EPOCHS_PER_LIFE
+from groundstation.runtime.tracker_loop import EPOCHS_PER_LIFE
 
 _KEPT_DIFFERENCES = 200
 # A plan is stamped when it was begun; one that was begun shortly before the end may never have been adopted.

@@ -13,8 +13,8 @@ from drivers.ardrone.settings import (
     Video,
 )
 from drivers.camera.settings import SourceKind, parse_source
-from drivers.limits import SilenceLimits, VehicleLimits
 from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
+from drivers.vehicle_settings import SilenceLimits, VehicleLimits
 from groundstation.field.drones import camera_name
 from groundstation.settings.behaviour import SafetySettings
 from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera

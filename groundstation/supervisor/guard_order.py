@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import msgspec
 
+from groundstation.supervisor.process_spec import FailsafeDatagrams, ProcessSpec, slot_of
 from groundstation.supervisor.process_table import GUARDIAN
-from groundstation.supervisor.table import LastWords, ProcessSpec, slot_of
 
 
 class Post(msgspec.Struct, frozen=True):
@@ -13,7 +13,7 @@ class Post(msgspec.Struct, frozen=True):
 
     name: str
     slot: int
-    words: LastWords
+    words: FailsafeDatagrams
 
 
 class GuardOrder(msgspec.Struct, frozen=True):
@@ -26,9 +26,9 @@ class GuardOrder(msgspec.Struct, frozen=True):
 def guarded(table: tuple[ProcessSpec, ...]) -> tuple[ProcessSpec, ...]:
     """Return the table with a guardian ahead, if there is a drone that others than its driver can speak to."""
     posts = tuple(
-        Post(spec.name, slot_of(index), spec.last_words)
+        Post(spec.name, slot_of(index), spec.failsafe_datagrams)
         for index, spec in enumerate(table, start=1)
-        if spec.last_words is not None
+        if spec.failsafe_datagrams is not None
     )
     if not posts:
         return table

@@ -15,7 +15,7 @@ import msgspec
 from groundstation.process.child import Child
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.priority import go_first
-from groundstation.supervisor.failsafe import LastWordsSender
+from groundstation.supervisor.failsafe_sender import FailsafeSender
 from groundstation.supervisor.guard_order import GuardOrder, Post
 from groundstation.supervisor.silence import DriverSigns, Guard, SupervisorSigns, SupervisorState, Word, signs_of
 from groundstation.time_units import NS_PER_MS
@@ -69,7 +69,7 @@ class Guardian:
     def __init__(self, order: GuardOrder, block: HeartbeatBlock) -> None:
         self._block = block
         self._drivers = [GuardedDriver(post, order.landing_s, block) for post in order.posts]
-        self._sender = LastWordsSender()
+        self._sender = FailsafeSender()
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
         self.settled = False
 

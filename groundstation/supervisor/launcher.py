@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from groundstation.errors import GroundStationError
 from groundstation.process.child import ChildSpec
-from groundstation.supervisor.table import ProcessSpec
+from groundstation.supervisor.process_spec import ProcessSpec
 
 # 13 processes on 2 cores: a thread pool per process would only fight over them.
 _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")

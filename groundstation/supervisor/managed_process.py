@@ -6,9 +6,9 @@ import subprocess
 from contextlib import suppress
 
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
+from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.runtime_file import start_time
 from groundstation.supervisor.silence import signs_of, silent_since
-from groundstation.supervisor.table import ProcessSpec
 from groundstation.time_units import NS_PER_S
 
 _BACK_OFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)

@@ -5,7 +5,7 @@ A run completes the rows with its sections and addresses (`groundstation/flight/
 
 import sys
 
-from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder
+from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder
 
 GUARDIAN = ProcessSpec(
     name="guardian",
@@ -36,7 +36,7 @@ SIM_BRIDGE = ProcessSpec(
 TRACKER = ProcessSpec(
     name="tracker",
     role="tracker",
-    entry="groundstation.runtime.node:run",
+    entry="groundstation.runtime.tracker_process:run",
     numbered=True,  # drivers obey the newest tracker, and hover until the operator resumes
     start_limit_s=180.0,  # kernels that are compiled for the first time, on a busy machine, need minutes
     hang_limit_s=0.5,  # as long as a drone flies on without setpoints

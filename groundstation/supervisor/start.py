@@ -5,8 +5,8 @@ import time
 from groundstation.bus.messages import Severity
 from groundstation.errors import GroundStationError
 from groundstation.supervisor.managed_process import ManagedProcess
+from groundstation.supervisor.process_spec import StopOrder
 from groundstation.supervisor.supervisor import Supervisor
-from groundstation.supervisor.table import StopOrder
 from groundstation.supervisor.waiting import Waiting
 
 _OPTIONAL_GRACE_S = 5.0

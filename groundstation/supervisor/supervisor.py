@@ -15,12 +15,12 @@ from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.events import ProcessEvents
-from groundstation.supervisor.failsafe import LastWordsSender
+from groundstation.supervisor.failsafe_sender import FailsafeSender
 from groundstation.supervisor.interrupts import Interrupts
 from groundstation.supervisor.launcher import Launcher
 from groundstation.supervisor.managed_process import ManagedProcess, exit_text
+from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder, slot_of
 from groundstation.supervisor.status import StatusPublisher
-from groundstation.supervisor.table import ProcessSpec, Restart, StopOrder, slot_of
 from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
@@ -58,7 +58,7 @@ class Supervisor:
         self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
         self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path))
         self.processes = [ManagedProcess(spec, slot_of(index), self._block) for index, spec in enumerate(table)]
-        self._last_words = LastWordsSender()
+        self._last_words = FailsafeSender()
         self.bus: ZenohBus | None = None
         self._statuses: Subscription | None = None
         self._publisher: StatusPublisher | None = None
@@ -196,7 +196,7 @@ class Supervisor:
         self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s", heard_s >= process.spec.hang_limit_s)
 
     def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
-        words = process.spec.last_words
+        words = process.spec.failsafe_datagrams
         if words is None or self._stopping:
             return
         if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns):

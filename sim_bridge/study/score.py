@@ -12,7 +12,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.gating import gate
+from groundstation.estimation.chi_square import gate
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
 

@@ -1,4 +1,4 @@
-"""The last word: never faster than asked or allowed, never through the fence, never into each other."""
+"""The output limiter: never faster than asked or allowed, never through the fence, never into each other."""
 
 import math
 from dataclasses import replace
@@ -34,7 +34,7 @@ def belief(poses: Array, std: float = 0.03) -> JointBelief:
 
 
 def stop_at_rest(states: Array, velocities: Array, seconds: float, commands: Array, known: bool) -> list[Array]:
-    """Fly two robots with velocity lag under constant wishes through the last word; returns their places."""
+    """Fly two robots with velocity lag under constant wishes through the limiter; returns their places."""
     dt, trail = 0.05, []
     for _ in range(round(seconds / dt)):
         at = belief(states)

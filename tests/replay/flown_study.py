@@ -18,7 +18,7 @@ from groundstation.recording.preamble import Preamble, preamble_of_run
 from groundstation.recording.timeline import Timeline
 from groundstation.replay.rerun import JournalBus
 from groundstation.runtime.journal import Adoption
-from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking
+from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
 from groundstation.tracker import PlanRequest
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import CLOCK, Study, StudyOptions

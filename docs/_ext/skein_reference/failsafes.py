@@ -1,7 +1,7 @@
 """Page of the table of failsafes, from the table itself."""
 
 from drivers.failsafe_table import Condition, Failsafe, failsafes
-from drivers.watchdog_types import AuthorityLimits
+from drivers.watchdog_types import WatchdogLimits
 from skein_reference.markdown import code, page, prose, table
 
 _INTRODUCTION = """\
@@ -42,7 +42,7 @@ EVIDENCE: dict[Condition, str] = {
 
 def failsafe_page() -> str:
     """Return the page."""
-    rows = [_row(number, one) for number, one in enumerate(failsafes(AuthorityLimits()), start=1)]
+    rows = [_row(number, one) for number, one in enumerate(failsafes(WatchdogLimits()), start=1)]
     headings = ("priority", "condition", "evidence", "lasting", "forgotten", "in mode", "reaction", "until", "text")
     return page("Failsafes", _INTRODUCTION, table(headings, rows))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from groundstation.flight.composition import fly_endpoint, process_table
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
-from groundstation.supervisor.table import ProcessSpec
+from groundstation.supervisor.process_spec import ProcessSpec
 from skein_reference.markdown import code, page, table
 
 _INTRODUCTION = """\
@@ -22,7 +22,7 @@ def processes() -> str:
     """Return the page."""
     field = load_field(find_field("lab"))
     specs = process_table(field, fly_endpoint(field), Path("runs"), simulation=None, monitor=True)
-    silence = " or ".join(sorted({f"{spec.silence_limit_s:g} s" for spec in specs if spec.last_words}))
+    silence = " or ".join(sorted({f"{spec.silence_limit_s:g} s" for spec in specs if spec.failsafe_datagrams}))
     headings = ("process", "role", "entry", "hang limit", "start limit", "when it ends", "stops in group")
     return page("Processes", _INTRODUCTION.format(silence=silence), table(headings, map(_row, specs)))
 

@@ -9,7 +9,7 @@ from collections import Counter
 from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
-from drivers.camera.sources.jitter_filter import SettledClock
+from drivers.camera.sources.jitter_filter import SenderClock
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from drivers.camera.sources.tcp import Line
 from groundstation.bus import clock
@@ -27,7 +27,7 @@ class Assembly:
     """PaVE frames to access units: joins slices, sees gaps, and gives each its settled arrival. Pure."""
 
     def __init__(self) -> None:
-        self._clock = SettledClock()
+        self._clock = SenderClock()
         self._slices: list[PaveFrame] = []
         self._last: PaveFrame | None = None
 

@@ -10,7 +10,7 @@ import av
 
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
-from drivers.camera.sources.jitter_filter import SettledClock
+from drivers.camera.sources.jitter_filter import SenderClock
 from drivers.camera.sources.raw import RawDecoder
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from groundstation.bus import clock
@@ -43,7 +43,7 @@ class ContainerReader:
                 raise DriverError("there is no video in it")
             prepared = self._prepare(stream)
             drain.opened()
-            settled = SettledClock()
+            settled = SenderClock()
             try:
                 for packet in container.demux(stream):
                     if drain.closing:
@@ -81,7 +81,7 @@ class ContainerReader:
 
 
 def _units(
-    packet: "av.Packet[av.VideoStream]", prepared: Callable[[bytes, bool], bytes], settled: SettledClock
+    packet: "av.Packet[av.VideoStream]", prepared: Callable[[bytes, bool], bytes], settled: SenderClock
 ) -> list[Unit]:
     if packet.size == 0:
         return []

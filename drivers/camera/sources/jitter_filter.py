@@ -13,7 +13,7 @@ _FRAMES = 151
 _JUMP_NS = 5_000_000_000
 
 
-class SettledClock:
+class SenderClock:
     """Learns the usual delay of one stream."""
 
     def __init__(self) -> None:

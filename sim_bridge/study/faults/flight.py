@@ -23,7 +23,7 @@ from groundstation.field.resolved import field_from_json
 from groundstation.planning.planner import Planner
 from groundstation.runtime.inbox import TOPICS
 from groundstation.runtime.journal import Adoption
-from groundstation.runtime.tracking import TrackerFeed, TrackerSection, Tracking
+from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
 from groundstation.tracker import PlanRequest
 from sim_bridge.fault_kinds import Fault
 from sim_bridge.faults import FaultSchedule, described

@@ -11,7 +11,7 @@ import pytest
 from drivers.ardrone.driver import ArDrone
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.host import VehicleHost
-from drivers.watchdog_types import AuthorityLimits
+from drivers.watchdog_types import WatchdogLimits
 from groundstation.bus.api import Bus
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Lease, Severity, VelocitySetpoint, Verb
@@ -86,7 +86,7 @@ class Rig:
             name="drone_1", address=self.fake.address, odometry_hz=200, imu_hz=200, **settings
         )
         self.drone = ArDrone(self.settings, self.process.bus)
-        self.host = VehicleHost(self.process, self.drone, AuthorityLimits())
+        self.host = VehicleHost(self.process, self.drone, WatchdogLimits())
         self.speaking = True
         self.tracking = False
         self.ids = itertools.count()

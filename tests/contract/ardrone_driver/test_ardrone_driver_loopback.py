@@ -9,7 +9,7 @@ import pytest
 from drivers import datagrams
 from drivers.ardrone.driver import ArDrone, run
 from drivers.host import VehicleHost, run_hosts
-from drivers.watchdog_types import AuthorityLimits
+from drivers.watchdog_types import WatchdogLimits
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Severity, Verb
 from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, RAW_RX, RAW_TX, VEHICLE_STATUS
@@ -149,7 +149,7 @@ def test_a_restarted_driver_lands_a_flying_drone_and_never_starts_a_standing_one
     rig.fake.client = None
     rig.fake.lines.clear()
     second = ArDrone(rig.settings, rig.process.bus)
-    rig.drone, rig.host = second, VehicleHost(rig.process, second, AuthorityLimits(brake_s=0.05))
+    rig.drone, rig.host = second, VehicleHost(rig.process, second, WatchdogLimits(brake_s=0.05))
     rig.tracking = True
     rig.until(lambda: not rig.fake.state & FLY)
     references = rig.fake.said("REF")
@@ -256,7 +256,7 @@ def test_datagram_framing_round_trip_and_cuts():
 @pytest.mark.parametrize("fault", ["frozen", "stuck"])
 def test_values_that_cannot_be_true_stop_it_like_silence_and_the_operator_reads_why(new_rig, fault):
     rig = new_rig()
-    rig.host = VehicleHost(rig.process, rig.drone, AuthorityLimits(land_after_s=1.3))
+    rig.host = VehicleHost(rig.process, rig.drone, WatchdogLimits(land_after_s=1.3))
     rig.take_off()
     rig.tracking = True
     rig.order(Verb.TRACK)

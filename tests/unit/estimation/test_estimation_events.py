@@ -3,10 +3,10 @@
 import numpy as np
 
 from groundstation.estimation.event_log import observation_values, write_event
-from groundstation.estimation.events import observe
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.models import FixedMount, ManoeuvringTarget, MountedCamera
 from groundstation.estimation.models.protocol import MotionModel
+from groundstation.estimation.observe import observe
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.estimation.records import ACCEPTED, EventRow, OutcomeRow
 from groundstation.estimation.tables import empty_state, tables_from_parameters

@@ -7,8 +7,8 @@ import pytest
 
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.chi_square import gate
 from groundstation.estimation.fixed_lag import FixedLagFilter
-from groundstation.estimation.gating import gate
 from groundstation.estimation.measurement import Correction, Measurement, OdometrySample
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
 from groundstation.estimation.models.protocol import MotionModel

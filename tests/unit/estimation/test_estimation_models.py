@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from groundstation.arrays import Vector
+from groundstation.estimation.chi_square import gate
 from groundstation.estimation.filter_state import Belief
-from groundstation.estimation.gating import gate
 from groundstation.estimation.model_kernels import call_locate
 from groundstation.estimation.models import (
     CommandedRobot,

@@ -45,7 +45,7 @@ from groundstation.replay.difference import first_difference
 from groundstation.replay.rerun import Rerun
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime.health import Deadlines, UnseenWatch
-from groundstation.runtime.tracking import TrackerSection, Tracking
+from groundstation.runtime.tracker_loop import TrackerSection, Tracking
 from groundstation.runtime.warm_up import warm_up
 
 MS = 1_000_000

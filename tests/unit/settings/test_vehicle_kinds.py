@@ -12,7 +12,7 @@ from groundstation.settings.drones import VehicleKind
 from groundstation.settings.load import load_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, driver_sections, rerouted
-from groundstation.supervisor.table import LastWords
+from groundstation.supervisor.process_spec import FailsafeDatagrams
 
 CONFIG = Path(__file__).parents[3] / "config"
 REFUSED = r"kind: tello is not known; known: ardrone, mavlink"
@@ -31,13 +31,13 @@ def third(field: Field) -> Field:
     return field.model_copy(update={"drones": field.drones | {name: other}})
 
 
-def last_words(field: Field, tmp_path: Path) -> dict[str, LastWords | None]:
+def failsafe_datagrams(field: Field, tmp_path: Path) -> dict[str, FailsafeDatagrams | None]:
     table = process_table(field, "tcp/127.0.0.1:1", tmp_path, simulation=None, monitor=False)
-    return {spec.name: spec.last_words for spec in table if spec.role == "driver"}
+    return {spec.name: spec.failsafe_datagrams for spec in table if spec.role == "driver"}
 
 
 def test_each_kind_gets_last_words_of_its_own_protocol(field: Field, tmp_path: Path) -> None:
-    spoken = {name: words for name, words in last_words(field, tmp_path).items() if words is not None}
+    spoken = {name: words for name, words in failsafe_datagrams(field, tmp_path).items() if words is not None}
     assert {field.drones[name].kind for name in spoken} == {"ardrone", "mavlink"}
     for name, words in spoken.items():
         begin = b"AT*" if field.drones[name].kind == "ardrone" else b"\xfd"
@@ -46,7 +46,7 @@ def test_each_kind_gets_last_words_of_its_own_protocol(field: Field, tmp_path: P
 
 def test_a_third_kind_gets_no_process_and_no_last_words(third: Field, tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=REFUSED):
-        last_words(third, tmp_path)
+        failsafe_datagrams(third, tmp_path)
 
 
 def test_a_third_kind_whose_driver_is_registered_gets_no_last_words_of_another(
@@ -54,7 +54,7 @@ def test_a_third_kind_whose_driver_is_registered_gets_no_last_words_of_another(
 ) -> None:
     monkeypatch.setattr("groundstation.flight.composition.driver_sections", lambda _: driver_sections(field))
     with pytest.raises(SettingsError, match=REFUSED):
-        last_words(third, tmp_path)
+        failsafe_datagrams(third, tmp_path)
 
 
 def test_a_third_kind_has_no_section_and_no_place_in_a_simulation(third: Field) -> None:
@@ -67,7 +67,7 @@ def test_a_third_kind_has_no_section_and_no_place_in_a_simulation(third: Field) 
 def test_a_mavlink_vehicle_without_its_section_is_refused_too(field: Field, tmp_path: Path) -> None:
     bare = {n: d.model_copy(update={"mavlink": None}) if d.kind == "mavlink" else d for n, d in field.drones.items()}
     with pytest.raises(SettingsError, match="kind: mavlink has no mavlink section"):
-        last_words(field.model_copy(update={"drones": bare}), tmp_path)
+        failsafe_datagrams(field.model_copy(update={"drones": bare}), tmp_path)
 
 
 def test_settings_drivers_and_registry_know_the_same_kinds() -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.supervisor.process_spec import ProcessSpec, StopOrder
 from groundstation.supervisor.supervisor import Run, Supervisor
-from groundstation.supervisor.table import ProcessSpec, StopOrder
 from groundstation.supervisor.terminal import Terminal
 
 HERE = Path(__file__).parent

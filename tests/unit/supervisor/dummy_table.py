@@ -4,9 +4,9 @@ import socket
 import time
 from collections.abc import Callable
 
+from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.start import Start
 from groundstation.supervisor.supervisor import Supervisor
-from groundstation.supervisor.table import ProcessSpec
 
 
 def free_port() -> int:

@@ -20,9 +20,9 @@ from dummy_table import spec, until
 
 from groundstation.supervisor.guard_order import GuardOrder, guarded
 from groundstation.supervisor.managed_process import ManagedProcess
+from groundstation.supervisor.process_spec import FailsafeDatagrams, ProcessSpec
 from groundstation.supervisor.runtime_file import start_time
 from groundstation.supervisor.supervisor import Run, Supervisor
-from groundstation.supervisor.table import LastWords, ProcessSpec
 from groundstation.supervisor.terminal import Terminal
 
 HERE = Path(__file__).parent
@@ -60,9 +60,11 @@ def drone() -> Iterator[FakeDrone]:
 
 def table(drone: FakeDrone, entry: str, **options: object) -> tuple[ProcessSpec, ...]:
     """Return a guardian that is content early, and a driver of a dummy's kind."""
-    words = LastWords("127.0.0.1", drone.port, b"hover", b"land", LAND_AFTER_S)
+    words = FailsafeDatagrams("127.0.0.1", drone.port, b"hover", b"land", LAND_AFTER_S)
     section = json.dumps({"port": drone.port})
-    guardian, driver = guarded((spec("drone_1", entry, section=section, last_words=words, on_bus=False, **options),))
+    guardian, driver = guarded(
+        (spec("drone_1", entry, section=section, failsafe_datagrams=words, on_bus=False, **options),)
+    )
     order = msgspec.json.decode(guardian.section, type=GuardOrder)
     brief = msgspec.json.encode(GuardOrder(order.posts, LANDING_S)).decode()
     return replace(guardian, section=brief), driver

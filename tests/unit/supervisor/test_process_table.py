@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.process_table import ROWS
-from groundstation.supervisor.table import ProcessSpec
 
 
 @pytest.mark.parametrize("row", [row for row in ROWS if row.entry], ids=lambda row: row.role)

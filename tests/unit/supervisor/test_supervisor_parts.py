@@ -1,4 +1,4 @@
-"""Runtime file, terminal, interrupts, last words: each alone."""
+"""Runtime file, terminal, interrupts, fail-safe datagrams: each alone."""
 
 import os
 import signal
@@ -13,10 +13,10 @@ import pytest
 
 from groundstation.errors import GroundStationError
 from groundstation.supervisor import runtime_file
-from groundstation.supervisor.failsafe import LastWordsSender
+from groundstation.supervisor.failsafe_sender import FailsafeSender
 from groundstation.supervisor.interrupts import Interrupts
+from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
-from groundstation.supervisor.table import LastWords
 from groundstation.supervisor.terminal import Terminal
 
 
@@ -143,11 +143,11 @@ def test_closing_terminal_never_hurries(interrupts: Interrupts) -> None:
 
 
 def test_last_words_repeat_and_then_land() -> None:
-    sender = LastWordsSender()
+    sender = FailsafeSender()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
         drone.bind(("127.0.0.1", 0))
         drone.settimeout(2)
-        words = LastWords("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=3.0)
+        words = FailsafeDatagrams("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=3.0)
         assert sender.begin("drone_1", words, 0)
         assert not sender.begin("drone_1", words, 10)
         sent = {}

@@ -14,8 +14,8 @@ import pytest
 from dummy_table import free_port, spec, start, until
 
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.process_spec import FailsafeDatagrams, Restart
 from groundstation.supervisor.supervisor import Supervisor
-from groundstation.supervisor.table import LastWords, Restart
 
 
 def test_children_ignore_the_terminals_interrupt(make: Callable[..., Supervisor]) -> None:
@@ -54,9 +54,9 @@ def test_frozen_process_gets_last_words_then_is_replaced(make: Callable[..., Sup
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
         drone.bind(("127.0.0.1", 0))
         drone.setblocking(False)
-        words = LastWords("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=0.0)
+        words = FailsafeDatagrams("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=0.0)
         supervisor = make(
-            spec("drone_1", "obedient", last_words=words, silence_limit_s=0.4, hang_limit_s=1.5),
+            spec("drone_1", "obedient", failsafe_datagrams=words, silence_limit_s=0.4, hang_limit_s=1.5),
             spec("drone_2", "obedient"),
         )
         start(supervisor)
@@ -134,7 +134,7 @@ def test_killed_supervisor_leaves_no_orphan(tmp_path: Path, monkeypatch: pytest.
         from pathlib import Path
         from groundstation.supervisor.start import Start
         from groundstation.supervisor.supervisor import Run, Supervisor
-        from groundstation.supervisor.table import *
+        from groundstation.supervisor.process_spec import *
         from groundstation.supervisor.terminal import Terminal
         endpoint = "tcp/127.0.0.1:{free_port()}"
         table = (

@@ -14,9 +14,9 @@ from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.process_spec import ProcessSpec, StopOrder
 from groundstation.supervisor.start import Interrupted
 from groundstation.supervisor.supervisor import Supervisor
-from groundstation.supervisor.table import ProcessSpec, StopOrder
 from groundstation.supervisor.terminal import Terminal
 
 

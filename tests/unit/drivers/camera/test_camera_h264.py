@@ -11,7 +11,7 @@ from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame
 from drivers.camera.sources.ardrone import Assembly
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
-from drivers.camera.sources.jitter_filter import SettledClock
+from drivers.camera.sources.jitter_filter import SenderClock
 from groundstation.errors import DriverError
 
 MS = 1_000_000
@@ -142,7 +142,7 @@ def test_other_codecs_are_named(codec, named):
 
 def test_jitter_and_late_frames_do_not_move_the_exposure():
     random = np.random.default_rng(1)
-    clock, wrong_ms = SettledClock(), []
+    clock, wrong_ms = SenderClock(), []
     for index in range(300):
         exposed = 1000 + index * 66
         late = 200 * (random.random() < 0.05)
@@ -155,7 +155,7 @@ def test_jitter_and_late_frames_do_not_move_the_exposure():
 
 
 def test_frames_that_waited_together_say_nothing_of_the_delay_but_the_last():
-    clock = SettledClock()
+    clock = SenderClock()
     for index in range(10):
         clock.settle([index * 66 * MS], (index * 66 + 100) * MS)
     settled = clock.settle([660 * MS, 726 * MS, 792 * MS], (792 + 100) * MS)
@@ -163,7 +163,7 @@ def test_frames_that_waited_together_say_nothing_of_the_delay_but_the_last():
 
 
 def test_a_clock_that_jumps_or_stands_still_is_not_believed():
-    clock = SettledClock()
+    clock = SenderClock()
     clock.settle([5000 * MS], 100_000 * MS)
     assert clock.settle([100 * MS], 100_066 * MS) == [100_066 * MS]
     assert clock.settle([100 * MS], 100_132 * MS) == [100_132 * MS]

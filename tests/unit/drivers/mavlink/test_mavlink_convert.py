@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from drivers.limits import VehicleLimits
 from drivers.mavlink import convert
 from drivers.mavlink.convert import BaseAttitude, VisionPose
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
+from drivers.vehicle_settings import VehicleLimits
 
 H = math.sqrt(0.5)
 LEVEL = BaseAttitude(0.0, 0.0, 0.0, (0.0, 0.0, 0.0))

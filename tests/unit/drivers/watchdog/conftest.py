@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import Action, AuthorityLimits, Upstream, VehicleView
+from drivers.watchdog_types import Action, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
 MS = 1_000_000
@@ -18,7 +18,7 @@ class Bench:
     """A watchdog with a vehicle that obeys, driven step by step under a clock of our own."""
 
     def __init__(self, state=FlightState.LANDED, **limits):
-        self.watchdog = Watchdog(AuthorityLimits(**limits), "clock")
+        self.watchdog = Watchdog(WatchdogLimits(**limits), "clock")
         self.now = 100 * S
         self.state = state
         self.fresh = True

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from drivers.failsafe_table import Condition, Reaction, failsafes
-from drivers.watchdog_types import FREE, Action, AuthorityLimits, DriverMode, Upstream
+from drivers.watchdog_types import FREE, Action, DriverMode, Upstream, WatchdogLimits
 from groundstation.bus.messages import AckStage, FlightState, Verb
 
 S = 1_000_000_000
 TURN_S = 0.1
 LONG_S = 16.0
 DOWN = {Action.LAND, Action.IDLE, Action.CUT}
-TABLE = failsafes(AuthorityLimits())
+TABLE = failsafes(WatchdogLimits())
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.failsafe_table import Condition
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import AIRBORNE, FREE, Action, AuthorityLimits, DriverMode, Upstream, VehicleView
+from drivers.watchdog_types import AIRBORNE, FREE, Action, DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
 LASTING = (
@@ -45,7 +45,7 @@ def setpoint(epoch=1, converged=True, seq=5, stamp=NOW):
 
 def watchdog_in(mode, setpoints="live", lease=True, aged_s=0.1):
     """Return a watchdog in a mode, entered `aged_s` ago, with everything else as its arguments say."""
-    dog = Watchdog(AuthorityLimits(), "clock")
+    dog = Watchdog(WatchdogLimits(), "clock")
     dog.mode, dog.reason = mode, "test"
     dog._entered_ns = dog._take_off_ended_ns = NOW - int(aged_s * S)
     dog._last_step_ns = NOW - S // 30
@@ -215,7 +215,7 @@ def test_no_sequence_of_inputs_flies_after_land_without_a_take_off():
     """Random walks over inputs with time: the latches and the lease hold whatever the order."""
     for seed in range(60):
         rng = random.Random(seed)
-        dog = Watchdog(AuthorityLimits(), "clock")
+        dog = Watchdog(WatchdogLimits(), "clock")
         now, latched, started, lease_until = NOW, True, False, 0
         for number in range(400):
             now += rng.choice((S // 30, S // 30, S // 30, S // 4, S, 4 * S))

@@ -3,22 +3,22 @@
 import socket
 from contextlib import suppress
 
-from groundstation.supervisor.table import LastWords
+from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.time_units import NS_PER_S
 
 _PERIOD_NS = 100_000_000
 
 
-class LastWordsSender:
-    """Repeats each silent driver's last words every 100 ms until they are called off."""
+class FailsafeSender:
+    """Repeats the datagrams of each silent driver every 100 ms until they are called off."""
 
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._speaking: dict[str, tuple[LastWords, int]] = {}
+        self._speaking: dict[str, tuple[FailsafeDatagrams, int]] = {}
         self._next_ns = 0
 
-    def begin(self, name: str, words: LastWords, since_ns: int) -> bool:
+    def begin(self, name: str, words: FailsafeDatagrams, since_ns: int) -> bool:
         """Start to speak, at once, for a driver that is silent since then; returns whether that is news."""
         if name in self._speaking:
             return False

@@ -25,7 +25,7 @@ class StopOrder(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class LastWords:
+class FailsafeDatagrams:
     """What supervisor or guardian tell a drone for a driver that died or hangs, in the drone's own protocol.
 
     hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead.
@@ -44,8 +44,8 @@ class ProcessSpec:
 
     entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of
     a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
-    silence_limit_s: heartbeat older than this starts the last words; hang_limit_s: it is killed (both after READY).
-    restart_delay_s: pause before even the first restart. required: the run cannot start without it.
+    silence_limit_s: heartbeat older than this starts its fail-safe datagrams; hang_limit_s: it is killed (both after
+    READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it.
     on_terminal: it writes to the operator's terminal.
     """
 
@@ -63,7 +63,7 @@ class ProcessSpec:
     start_limit_s: float = 60.0
     stop_order: StopOrder = StopOrder.DRIVES
     stop_limit_s: float = 3.0
-    last_words: LastWords | None = None
+    failsafe_datagrams: FailsafeDatagrams | None = None
     on_bus: bool = True
     on_terminal: bool = False
     keep_open: tuple[int, ...] = ()

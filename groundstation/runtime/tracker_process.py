@@ -1,4 +1,4 @@
-"""The tracker process. Started as `groundstation.runtime.node:run`.
+"""The tracker process. Started as `groundstation.runtime.tracker_process:run`.
 
 Bus callbacks only enqueue; one loop ticks at the estimator's rate; one worker thread plans. Numba and everything that
 needs it is imported only after the kernel cache is chosen.
@@ -22,7 +22,7 @@ from groundstation.runtime.health import Deadlines
 from groundstation.time_units import NS_PER_S
 
 if TYPE_CHECKING:
-    from groundstation.runtime.tracking import Tracking
+    from groundstation.runtime.tracker_loop import Tracking
 
 _SWITCH_INTERVAL_S = 0.001  # how long the planner's thread may keep the interpreter from a tick that is due
 
@@ -35,7 +35,7 @@ def run(child: Child) -> int:
     else:
         child.starting("compiling kernels (once per version, some 30 s)")
         compile_kernels(cache)
-    from groundstation.runtime.tracking import TrackerSection, Tracking
+    from groundstation.runtime.tracker_loop import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up
 
     try:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from drivers.watchdog_types import AuthorityLimits
+from drivers.watchdog_types import WatchdogLimits
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -41,9 +41,9 @@ class SilenceLimits(DriverSection):
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
 
-    def authority(self, limits: VehicleLimits) -> AuthorityLimits:
+    def authority(self, limits: VehicleLimits) -> WatchdogLimits:
         """Return the limits of the shared watchdog for a vehicle with these limits."""
-        return AuthorityLimits(
+        return WatchdogLimits(
             hover_after_s=self.setpoint_lifetime_ms / 1000,
             land_after_s=self.land_after_s,
             unseen_land_after_s=self.unseen_land_after_s,

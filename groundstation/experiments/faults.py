@@ -8,7 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from groundstation.errors import OperatorMistake
+
 BATCH = 20
+# Exit code of the simulator's study for an order that it does not understand.
+_WRONG_ORDER = 2
 HEALTHY = "none"
 _SHOWN_SEEDS = 6
 _WORST = (
@@ -42,10 +46,12 @@ def batches(order: str, first_seed: int, flights: int, size: int = BATCH) -> lis
 
 
 def fly(batch: FlightBatch) -> dict[str, Any]:
-    """Fly a batch in a process of its own; raises CampaignError with what that process said."""
+    """Fly a batch in a process of its own; raises CampaignError, or OperatorMistake, with what it said."""
     order = json.loads(batch.order) | {"seeds": list(batch.seeds)}
     command = [sys.executable, "-m", "sim_bridge.study", "faults"]
     result = subprocess.run(command, input=json.dumps(order), capture_output=True, text=True, check=False)
+    if result.returncode == _WRONG_ORDER:
+        raise OperatorMistake(result.stderr.strip())
     if result.returncode != 0:
         raise CampaignError(result.stderr.strip()[-2000:])
     flights = [json.loads(line) for line in result.stdout.splitlines()]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from recorded_flight import Dark, Recording, figures, fly, read_recording
+from ardrone_flight import Dark, Recording, figures, fly, read_recording
 
 from groundstation.field.resolved import ResolvedField
 

@@ -14,6 +14,7 @@ from sim_bridge.study.faults.draw import KINDS, draw
 
 # Faults begin when the team has found the target, and early enough for what must follow to be seen.
 _SETTLED_S, _LEFT_S = 3.0, 6.0
+WRONG_ORDER = 2
 _WARM_UP_S = {"ardrone": 8.0, "mavlink": 14.0}
 
 
@@ -33,8 +34,12 @@ def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Fly the seeds of the order on standard input."""
+    """Fly the seeds of the order on standard input; WRONG_ORDER where it names an unknown kind of fault."""
     order = json.load(sys.stdin)
+    known = [str(kind) for kind in KINDS]
+    if unknown := [kind for kind in order.get("kinds") or () if kind not in known]:
+        print(f"no kind of fault: {', '.join(unknown)}; there are {', '.join(known)}", file=sys.stderr)
+        return WRONG_ORDER
     numba_cache.activate()
     for seed in order["seeds"]:
         print(json.dumps(fly(order, seed, len(order["seeds"]) == 1)), flush=True)

@@ -8,7 +8,8 @@ import pytest
 
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.experiment import experiment
-from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, table, totals
+from groundstation.errors import OperatorMistake
+from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, fly, table, totals
 
 
 def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
@@ -62,13 +63,13 @@ def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
 ) -> None:
     told = []
 
-    def fly(batch: FlightBatch) -> dict[str, Any]:
+    def flown(batch: FlightBatch) -> dict[str, Any]:
         told.append(json.loads(batch.order))
         flights = [FLIGHTS[seed - 1] for seed in batch.seeds]
         timing = [{"tracker": 1.0, "cpu": 1.0} for _ in flights]
         return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": timing}}
 
-    monkeypatch.setattr("groundstation.experiments.faults.fly", fly)
+    monkeypatch.setattr("groundstation.experiments.faults.fly", flown)
     monkeypatch.setattr("groundstation.experiments.runner._planar_run", lambda: pytest.fail("needs no kernels"))
     options = ["--scheduler", "none", "--kinds", "wind, velocity_stuck", "--set", "safety.min_separation_m=0.7"]
     arguments = ["faults", "--flights", "3", *options, "--out", str(tmp_path)]
@@ -83,3 +84,9 @@ def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
     assert order["field"]["safety"]["min_separation_m"] == 0.7
     assert [kind for kind, _ in order["sections"]] == ["ardrone", "ardrone"]
     assert all(json.loads(section)["raw_datagrams"] is False for _, section in order["sections"])
+
+
+def test_an_unknown_kind_is_the_operators_mistake() -> None:
+    (batch,) = batches(json.dumps({"kinds": ["wind", "gremlins"]}), 1, 1)
+    with pytest.raises(OperatorMistake, match=r"no kind of fault: gremlins; there are .*wind"):
+        fly(batch)

@@ -160,7 +160,7 @@ class Watchdog:
     # -- step ---------------------------------------------------------------------------------------------------------
 
     def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> WatchdogDecision:
-        """Return what to do now; call it at the sender's rate, 30 Hz."""
+        """Return what to do now; call it at the sender's rate."""
         self.see(vehicle, upstream)
         gap_s = 0.0 if self._last_step_ns is None else (now_ns - self._last_step_ns) / NS_PER_S
         self._last_step_ns = now_ns

@@ -47,7 +47,7 @@ class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
     resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
-    of the tracker, whatever broke on the way from it; gap_s: a pause of our own loop after which it does; brake_s:
+    of the tracker, whatever broke on the way from it; gap_s: likewise a pause of our own loop; brake_s:
     hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and
     noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
     it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it is told: from 1 m/s

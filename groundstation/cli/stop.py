@@ -17,7 +17,7 @@ from groundstation.bus.topics import COMMAND, COMMAND_ACK
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.errors import GroundStationError, OperatorMistake
-from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AckBook
+from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AwaitedAnswers
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
@@ -48,7 +48,7 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
     return records[0]
 
 
-def deliver(bus: ZenohBus, book: AckBook, patience_s: float, on_news: Callable[[str], None]) -> None:
+def deliver(bus: ZenohBus, book: AwaitedAnswers, patience_s: float, on_news: Callable[[str], None]) -> None:
     """Send the book's command, again to whoever does not answer, until all answers are final or patience ends."""
     answers = bus.subscribe([COMMAND_ACK])
     bus.publish(COMMAND, book.command)
@@ -94,17 +94,17 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -
     return _report(book, as_json)
 
 
-def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, source: str) -> AckBook:
+def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, source: str) -> AwaitedAnswers:
     header = bus.header("team" if verb in _STOPS else _OPERATOR)
     # A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease.
     scope = drones if verb in _STOPS else (_OPERATOR, *drones)
     expires_ns = 0 if verb in _STOPS else header.stamp_ns + 5_000_000_000
     identity = f"{source}-{header.stamp_ns}"
     command = Command(header=header, id=identity, verb=verb, scope=scope, issuer=source, expires_ns=expires_ns)
-    return AckBook(command, (drones or record.drones) if verb in _STOPS else (_OPERATOR,))
+    return AwaitedAnswers(command, (drones or record.drones) if verb in _STOPS else (_OPERATOR,))
 
 
-def _report(book: AckBook, as_json: bool) -> int:
+def _report(book: AwaitedAnswers, as_json: bool) -> int:
     if as_json:
         answers = {
             name: {"stage": progress.stage or NOT_CONFIRMED, "reason": progress.reason}

@@ -7,7 +7,7 @@ from typing import Any
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import AckStage, Command, CommandAck, Lease, Verb
 from groundstation.bus.topics import COMMAND
-from groundstation.runtime.acknowledgements import AckBook
+from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 OPERATOR = "operator"
@@ -26,7 +26,7 @@ _KEPT = 8
 class Followed:
     """One command on the bus, with its answers; `by`: the viewer who gave it, `ref`: that page's own id of it."""
 
-    book: AckBook
+    book: AwaitedAnswers
     given_ns: int
     repeated_ns: int = 0
     by: str = ""
@@ -108,10 +108,10 @@ class CommandDesk:
         """Return the newest commands first, each with how far it came at each drone."""
         return [_summary(order) for order in reversed(self._orders.values())]
 
-    def _book(self, command: Command) -> AckBook:
+    def _book(self, command: Command) -> AwaitedAnswers:
         # The operator answers for what is asked of it; drones answer for themselves.
         asked: Iterable[str] = (OPERATOR,) if OPERATOR in command.scope else command.scope or self._drones
-        return AckBook(command, tuple(asked))
+        return AwaitedAnswers(command, tuple(asked))
 
     def _keep(self, followed: Followed) -> None:
         new = followed.book.command

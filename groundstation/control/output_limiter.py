@@ -161,7 +161,7 @@ def _fence(
 def _others(
     robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
 ) -> list[_Wall]:
-    """Return two walls towards each other robot, which is not in the same place: at rest, and now.
+    """Return two walls for each other robot: one at its point of rest, one at its place now.
 
     Half of the closing speed is this robot's share.
     """

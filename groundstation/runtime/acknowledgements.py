@@ -32,7 +32,7 @@ class Progress:
 
 
 @dataclass(slots=True)
-class AckBook:
+class AwaitedAnswers:
     """Collects the answers to one command from the drones that were addressed."""
 
     command: Command

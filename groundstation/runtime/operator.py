@@ -7,7 +7,7 @@ from enum import StrEnum
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import AckStage, Command, CommandAck, Event, Lease, Severity, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
-from groundstation.runtime.acknowledgements import AckBook
+from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
@@ -39,7 +39,7 @@ class TeamPhase(StrEnum):
 class _Dialogue:
     """An order that is still followed, and the request from another shell that it answers."""
 
-    book: AckBook
+    book: AwaitedAnswers
     given_ns: int
     repeated_ns: int
     request: Command | None = None
@@ -70,7 +70,7 @@ class Operator:
         self._dialogues: list[_Dialogue] = []
         self._sequence: TakeOff | None = None
         self._sequence_request: Command | None = None
-        self._take_off_book: AckBook | None = None
+        self._take_off_book: AwaitedAnswers | None = None
         self._then_track = False
         self._said: dict[str, str] = {}
         self._next_lease_ns = 0
@@ -106,14 +106,14 @@ class Operator:
         self._sequence, self._sequence_request = None, None
         self._dialogues = [d for d in self._dialogues if d.book.command.verb in _STOPS]
 
-    def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AckBook:
+    def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AwaitedAnswers:
         self._count += 1
         header = self._bus.header(_TEAM)
         expires_ns = 0 if verb in _STOPS else header.stamp_ns + _EXPIRY_NS
         identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
         command = Command(header=header, id=identity, verb=verb, scope=scope, issuer=OPERATOR, expires_ns=expires_ns)
         met = tuple(name for name, member in self.team.members.items() if member.heard_ns)
-        book = AckBook(command, scope or met)
+        book = AwaitedAnswers(command, scope or met)
         self._dialogues.append(_Dialogue(book, now_ns, now_ns, request))
         self._bus.publish(COMMAND, command)
         return book

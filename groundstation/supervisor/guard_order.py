@@ -7,6 +7,8 @@ import msgspec
 from groundstation.supervisor.process_spec import FailsafeDatagrams, ProcessSpec, slot_of
 from groundstation.supervisor.process_table import GUARDIAN
 
+_MARGIN_S = 3.0
+
 
 class Post(msgspec.Struct, frozen=True):
     """One guarded driver: its name, its slot in the heartbeat block, what its drone is told."""
@@ -32,4 +34,8 @@ def guarded(table: tuple[ProcessSpec, ...]) -> tuple[ProcessSpec, ...]:
     )
     if not posts:
         return table
-    return (replace(GUARDIAN, section=msgspec.json.encode(GuardOrder(posts)).decode()), *table)
+    order = GuardOrder(posts)
+    # A drone whose driver died during the stop is told to hover, and then to land, before the guardian ends.
+    stop_limit_s = max(post.words.land_after_s for post in posts) + order.landing_s + _MARGIN_S
+    section = msgspec.json.encode(order).decode()
+    return (replace(GUARDIAN, section=section, stop_limit_s=stop_limit_s), *table)

@@ -12,7 +12,6 @@ GUARDIAN = ProcessSpec(
     role="guardian",
     entry="groundstation.supervisor.guardian:run",
     stop_order=StopOrder.GUARDS,
-    stop_limit_s=16.0,  # a drone whose driver died during the stop is told to hover for 3 s and to land for 10 s
     on_bus=False,  # it needs nobody
 )
 ROUTER = ProcessSpec(

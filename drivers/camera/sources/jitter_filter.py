@@ -24,8 +24,8 @@ class SenderClock:
     def settle(self, sent_ns: Sequence[int], arrival_ns: int) -> list[int]:
         """Return when frames that came together would have come with the usual delay, by their sender's stamps.
 
-        Only the newest of them says how late the link is: it held up the others. It is the arrival while the sender's
-        clock stands still or has just jumped.
+        Only the newest of them says how late the link is: it held up the others. While the sender's clock
+        stands still or has just jumped, the result is the arrival.
         """
         newest = sent_ns[-1]
         offset = arrival_ns - newest

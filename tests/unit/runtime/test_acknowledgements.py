@@ -2,13 +2,13 @@
 
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import AckStage, Command, CommandAck, Verb
-from groundstation.runtime.acknowledgements import AckBook
+from groundstation.runtime.acknowledgements import AwaitedAnswers
 
 
 def test_ack_book_takes_only_news_from_who_was_asked() -> None:
     bus = MemoryBus(MemoryExchange(), "lab", "x")
     command = Command(header=bus.header("team"), id="1", verb=Verb.LAND, scope=(), issuer="x")
-    book = AckBook(command, ("drone_1",))
+    book = AwaitedAnswers(command, ("drone_1",))
 
     def ack(entity: str, stage: AckStage, command_id: str = "1") -> CommandAck:
         return CommandAck(header=bus.header(entity), command_id=command_id, verb=Verb.LAND, stage=stage)

@@ -231,3 +231,9 @@ def test_who_cannot_be_killed_is_left_behind(
     assert not driver.running
     os.kill(driver.pid, signal.SIGKILL)
     os.waitpid(driver.pid, 0)
+
+
+def test_a_stop_waits_for_the_guardian_as_long_as_hover_and_landing_take() -> None:
+    words = FailsafeDatagrams("127.0.0.1", 5556, b"hover", b"land", 20.0)
+    guardian, _ = guarded((spec("drone_1", "dummies:flying", failsafe_datagrams=words),))
+    assert guardian.stop_limit_s >= 20.0 + msgspec.json.decode(guardian.section, type=GuardOrder).landing_s

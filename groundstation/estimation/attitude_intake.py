@@ -39,10 +39,12 @@ class AttitudeIntake:
         attitude_std_rad = yaw_std_rad = 0.0
         inertial = self._inertial.get(name)
         if inertial is not None:
-            inertial.take_velocity(stamp_ns, message.velocity_m_s)
-            inertial.take_heading(stamp_ns, message.yaw_rad, message.reset)
+            source = self._sources[name]
+            if stamp_ns > source.newest_ns:
+                inertial.take_velocity(stamp_ns, message.velocity_m_s)
+                inertial.take_heading(stamp_ns, message.yaw_rad, message.reset)
             attitude = inertial.at(stamp_ns)
-            reset = self._sources[name].resets(attitude is not None, reset if attitude is None else attitude.resets)
+            reset = source.resets(stamp_ns, attitude is not None, reset if attitude is None else attitude.resets)
         if attitude is not None:
             yaw_rad, roll_rad, pitch_rad = attitude.yaw_rad, attitude.roll_rad, attitude.pitch_rad
             attitude_std_rad, yaw_std_rad = attitude.attitude_std_rad, attitude.yaw_std_rad
@@ -72,10 +74,19 @@ class _HeadingSource:
     """Counts the resets of a heading that comes now from one source, now from another."""
 
     def __init__(self) -> None:
-        self._count, self._source = 0, (False, 0)
+        self._count, self._source, self.newest_ns = 0, (False, 0), 0
+        self._counted: dict[tuple[bool, int], int] = {}
 
-    def resets(self, inertial: bool, resets: int) -> int:
-        """Return the resets so far: another source, or a reset of the present one, is one more."""
-        if (inertial, resets) != self._source:
-            self._count, self._source = self._count + 1, (inertial, resets)
+    def resets(self, stamp_ns: int, inertial: bool, resets: int) -> int:
+        """Return the resets until then: another source, or a reset of the present one, is one more.
+
+        What comes late changes nothing: it belongs to the resets that its source last had.
+        """
+        source = inertial, resets
+        if stamp_ns <= self.newest_ns:
+            return self._counted.get(source, self._count)
+        self.newest_ns = stamp_ns
+        if source != self._source:
+            self._count, self._source = self._count + 1, source
+        self._counted[source] = self._count
         return self._count

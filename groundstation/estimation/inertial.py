@@ -49,7 +49,7 @@ class InertialAttitude:
     def __init__(self, velocity_scale: float = 1.0) -> None:
         self._scale = velocity_scale
         self._bias = GyroBias()
-        self._kept: deque[tuple[int, float, float]] = deque(maxlen=_KEPT)
+        self._kept: deque[tuple[int, float, float, float]] = deque(maxlen=_KEPT)
         self._roll = self._pitch = self._yaw = 0.0
         self._resets = 0
         self._variance = _FIRST_RAD**2
@@ -75,7 +75,7 @@ class InertialAttitude:
             self._turn(unbiased[0], unbiased[1], unbiased[2], elapsed_s)
             self._level(force_m_s2, stamp_ns, elapsed_s, _STANDING_S if standing else _LEVEL_S)
         self._stamp_ns, self._rate = stamp_ns, (unbiased[0], unbiased[1], unbiased[2])
-        self._kept.append((stamp_ns, self._roll, self._pitch))
+        self._kept.append((stamp_ns, self._roll, self._pitch, self._yaw))
 
     def take_velocity(self, stamp_ns: int, velocity_m_s: Vector3) -> None:
         """Take a reported velocity [base_stabilized]: how it changes is no tilt."""
@@ -98,23 +98,28 @@ class InertialAttitude:
             self._bias.take_heading(stamp_ns, yaw_rad, self._yaw, reset + self._resets)
 
     def at(self, stamp_ns: int) -> Attitude | None:
-        """Return the attitude at the time of the newest sample, or None where that is too far from `stamp_ns`."""
-        if not self._is_fresh(stamp_ns):
+        """Return the attitude of the nearest sample, with the heading of `stamp_ns`; None where all are too far."""
+        sample = self._nearest(stamp_ns)
+        if sample is None:
             return None
-        assert self._stamp_ns is not None
-        yaw = wrap(self._yaw + self._heading_rate() * (stamp_ns - self._stamp_ns) / NS_PER_S)
+        yaw = wrap(sample[3] + self._heading_rate() * (stamp_ns - sample[0]) / NS_PER_S)
         attitude_std = math.sqrt(self._variance)
-        return Attitude(self._roll, self._pitch, yaw, self._resets, attitude_std, self._bias.yaw_std_rad)
+        return Attitude(sample[1], sample[2], yaw, self._resets, attitude_std, self._bias.yaw_std_rad)
 
     def tilt_at(self, stamp_ns: int) -> tuple[float, float] | None:
         """Return (roll, pitch) at an earlier time, of the nearest sample; None where there is none within 0.1 s."""
+        sample = self._nearest(stamp_ns)
+        return None if sample is None else (sample[1], sample[2])
+
+    def _nearest(self, stamp_ns: int) -> tuple[int, float, float, float] | None:
+        """Return (time, roll, pitch, yaw) of the nearest sample, or None where there is none within 0.1 s."""
         found = None
         for sample in reversed(self._kept):
             if found is None or abs(sample[0] - stamp_ns) < abs(found[0] - stamp_ns):
                 found = sample
             if sample[0] <= stamp_ns:
                 break
-        return None if found is None or abs(found[0] - stamp_ns) > _FRESH_NS else (found[1], found[2])
+        return None if found is None or abs(found[0] - stamp_ns) > _FRESH_NS else found
 
     def _is_fresh(self, stamp_ns: int) -> bool:
         return self._stamp_ns is not None and abs(stamp_ns - self._stamp_ns) <= _FRESH_NS

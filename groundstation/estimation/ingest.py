@@ -64,7 +64,7 @@ class Intake:
         self._newest_status: dict[str, int] = {}
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
         self._attitudes = AttitudeIntake(joint.parameters.inertial)
-        self._standing: set[str] = set()
+        self._standing: dict[str, tuple[int, bool]] = {}
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
         """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are none of ours."""
@@ -80,7 +80,7 @@ class Intake:
         if isinstance(message, ImuSample):
             if stamp_ns > now_ns + FUTURE_NS:
                 return Verdict.IMPLAUSIBLE
-            return self._attitudes.imu(message, stamp_ns, message.header.entity in self._standing)
+            return self._attitudes.imu(message, stamp_ns, self._standing.get(message.header.entity, (0, False))[1])
         if self._is_duplicate(key, message, stamp_ns, now_ns):
             return Verdict.DUPLICATE
         if isinstance(message, Odometry):
@@ -91,14 +91,11 @@ class Intake:
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
         entity, airborne = message.header.entity, _AIRBORNE.get(message.flight_state)
-        if message.flight_state is FlightState.LANDED:
-            self._standing.add(entity)
-        else:
-            self._standing.discard(entity)
-        if airborne is None:
-            return Verdict.ACCEPTED
         if stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
+        self._note_standing(entity, message.flight_state is FlightState.LANDED, stamp_ns)
+        if airborne is None:
+            return Verdict.ACCEPTED
         # The newest word counts however late it comes; an older one must not undo it.
         if stamp_ns < self._newest_status.get(entity, stamp_ns) and stamp_ns < now_ns - self._lag_ns:
             return Verdict.LATE
@@ -107,9 +104,17 @@ class Intake:
             self._newest_status[entity] = max(stamp_ns, self._newest_status.get(entity, stamp_ns))
         return verdict
 
+    def _note_standing(self, entity: str, stands: bool, stamp_ns: int) -> None:
+        """Remember whether a vehicle said last that it is on the ground."""
+        if stamp_ns < self._standing.get(entity, (0, False))[0]:
+            return
+        self._standing[entity] = stamp_ns, stands
+
     def _odometry(self, message: Odometry, stamp_ns: int, now_ns: int) -> Verdict:
         attitude = (message.yaw_rad, message.roll_rad, message.pitch_rad)
         if len(message.velocity_m_s) != 3 or not _plausible(*message.velocity_m_s, *attitude, message.height_m or 0.0):
+            return Verdict.IMPLAUSIBLE
+        if stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
         values = (message.velocity_m_s, *attitude, message.height_m)
         if self._odometry_watch.is_frozen(message.header.entity, values, stamp_ns):

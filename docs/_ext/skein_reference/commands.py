@@ -68,4 +68,4 @@ def _default(option: click.Option) -> str:
     if option.required:
         return "required"
     plain = isinstance(option.default, str | int | float) and not isinstance(option.default, bool)
-    return code(option.default) if plain else ""
+    return code(option.default) if plain and option.default != "" else ""

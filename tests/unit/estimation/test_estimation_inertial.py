@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import Vector3
+from groundstation.bus.messages import Header, Odometry, Vector3
+from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.gyro_bias import GyroBias
 from groundstation.estimation.inertial import GRAVITY_M_S2, InertialAttitude
 from groundstation.geometry.angles import difference
@@ -178,3 +179,21 @@ def test_a_blow_is_no_gravity(flying: Vehicle) -> None:
         flying.now += STEP_NS
         flying.attitude.take_imu(flying.now, BIAS, (30.0, 0.0, 5.0), False)
     assert flying.tilt_error_deg < 0.5
+
+
+def test_odometry_that_comes_late_counts_no_reset() -> None:
+    """One of before the last reset, heard again, would void the heading's increments before and after it."""
+    intake = AttitudeIntake({"drone_1": 1.0})
+
+    def resets(at_s: float, reset: int) -> int:
+        header = Header(round(at_s * 1e9), "boot", "drone_1", "drone_1", 1)
+        odometry = Odometry(
+            header=header, velocity_m_s=(0.0, 0.0, 0.0), velocity_covariance=(0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01),
+            yaw_rad=0.0, roll_rad=0.0, pitch_rad=0.0, reset=reset,
+        )  # fmt: skip
+        return intake.motion(odometry, header.stamp_ns).reset
+
+    assert resets(1.0, 0) == resets(2.0, 0)
+    after = resets(3.0, 1)
+    assert after != resets(2.5, 0) == resets(1.0, 0)
+    assert resets(4.0, 1) == after

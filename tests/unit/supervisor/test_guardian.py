@@ -10,6 +10,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -131,6 +132,9 @@ class SupervisedRun:
             time.sleep(0.02)
 
     def close(self) -> None:
+        tasks = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+        with suppress(OSError):  # those that were started again
+            self.pids |= {f"child {pid}": int(pid) for pid in tasks.read_text().split()}
         self.process.kill()
         self.process.communicate()
         for name, pid in self.pids.items():

@@ -5,7 +5,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import MutableSequence
+from collections.abc import MutableSequence, Sequence
 from multiprocessing.connection import Connection
 from types import FrameType
 
@@ -29,7 +29,7 @@ def run(spec: RenderSpec, modes: Connection | None = None, tally: MutableSequenc
 
     modes: what an AR.Drone's configuration says of its video, as it changes; tally: see _Exposures.
     """
-    stop = threading.Event()
+    stop: list[int] = []
     _obey_signals(stop)
     cv2.setNumThreads(1)
     truth = TruthBoard.attach(spec.truth_name, spec.bodies)
@@ -42,9 +42,11 @@ def run(spec: RenderSpec, modes: Connection | None = None, tally: MutableSequenc
     return 0
 
 
-def _obey_signals(stop: threading.Event) -> None:
-    def request_stop(_number: int, _frame: FrameType | None) -> None:
-        stop.set()
+def _obey_signals(stop: list[int]) -> None:
+    """Note SIGTERM in a list: an Event waits for a lock that the interrupted loop may hold."""
+
+    def request_stop(number: int, _frame: FrameType | None) -> None:
+        stop.append(number)
 
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, request_stop)
@@ -92,14 +94,14 @@ class _Exposures:
         self._first_ns = 0
         self._last_ns = 0
 
-    def run(self, stop: threading.Event) -> None:
-        """Expose until told to stop."""
+    def run(self, stop: Sequence[int]) -> None:
+        """Expose until something stands in `stop`."""
         period_ns = round(NS_PER_S / self._spec.scenario.fps)
         next_ns = time.monotonic_ns()
-        while not stop.is_set() and self._parent_lives():
+        while not stop and self._parent_lives():
             wait_s = (next_ns - time.monotonic_ns()) / NS_PER_S
             if wait_s > 0.0:
-                stop.wait(min(wait_s, _IDLE_S))
+                time.sleep(min(wait_s, _IDLE_S))
                 continue
             self._expose()
             next_ns += period_ns

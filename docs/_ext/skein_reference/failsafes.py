@@ -43,7 +43,7 @@ EVIDENCE: dict[Condition, str] = {
 def failsafe_page() -> str:
     """Return the page."""
     rows = [_row(number, one) for number, one in enumerate(failsafes(WatchdogLimits()), start=1)]
-    headings = ("priority", "condition", "evidence", "lasting", "forgotten", "in mode", "reaction", "until", "text")
+    headings = ("priority", "condition", "reaction", "lasting", "evidence", "in mode", "until", "forgotten", "text")
     return page("Failsafes", _INTRODUCTION, table(headings, rows))
 
 
@@ -53,11 +53,11 @@ def _row(number: int, one: Failsafe) -> tuple[str, ...]:
     return (
         str(number),
         code(one.condition),
-        prose(EVIDENCE[one.condition]),
-        lasting + setting,
-        "at once" if one.forgets is None else f"{one.forgets:g} s per s",
-        ", ".join(sorted(one.modes)),
         f"{one.reaction}{', braking first' if one.brake else ''}",
+        lasting + setting,
+        prose(EVIDENCE[one.condition]),
+        ", ".join(sorted(one.modes)),
         str(one.latch),
+        "at once" if one.forgets is None else f"{one.forgets:g} s per s",
         prose(one.text.replace("{why}", "...")),
     )

@@ -1,0 +1,79 @@
+"""Which statements of a source have run: a probe at the start of each straight stretch of a function.
+
+A probe is one store into an array of bytes. Kernels have none: they run compiled. Why not a library:
+docs/decisions/0079-coverage-by-probes.md.
+"""
+
+import ast
+
+HITS = "__hits__"
+# Functions that numba compiles or calls while it compiles.
+COMPILED = frozenset({"kernel", "njit", "jit", "overload", "intrinsic", "lower_cast"})
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+_COMPOUND = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.Try, ast.TryStar, ast.With, ast.AsyncWith, ast.Match)
+
+
+class Probes:
+    """The number of statements behind each probe."""
+
+    def __init__(self) -> None:
+        self.statements: list[int] = []
+
+    def add(self, before: ast.stmt) -> ast.stmt:
+        """Return a new probe, at the place of the statement that it stands before."""
+        target = ast.Subscript(ast.Name(HITS, ast.Load()), ast.Constant(len(self.statements)), ast.Store())
+        self.statements.append(0)
+        return ast.fix_missing_locations(ast.copy_location(ast.Assign([target], ast.Constant(1)), before))
+
+
+def put_probes(tree: ast.Module) -> Probes:
+    """Put probes into the functions of a module's tree; return what stands behind each."""
+    probes = Probes()
+    _enter(tree.body, probes)
+    return probes
+
+
+def _enter(body: list[ast.stmt], probes: Probes) -> None:
+    """Look for functions where nothing is counted: in modules and classes, and in functions that are compiled."""
+    for statement in body:
+        if isinstance(statement, Function):
+            if not _is_compiled(statement):
+                statement.body = _probed(statement.body, probes)
+        elif isinstance(statement, ast.ClassDef | ast.If | ast.Try):
+            _enter(statement.body, probes)
+
+
+def _is_compiled(function: Function) -> bool:
+    nodes = [node for each in function.decorator_list for node in ast.walk(each)]
+    names = {node.id for node in nodes if isinstance(node, ast.Name)}
+    return bool(COMPILED & (names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}))
+
+
+def _probed(body: list[ast.stmt], probes: Probes) -> list[ast.stmt]:
+    """Return a body with probes at its start and behind each compound statement, which may return or raise."""
+    result: list[ast.stmt] = []
+    current = -1
+    for statement in body:
+        if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+            result.append(statement)  # a docstring or `...`
+            continue
+        if current < 0:
+            current = len(probes.statements)
+            result.append(probes.add(statement))
+        probes.statements[current] += 1
+        result.append(statement)
+        if isinstance(statement, Function | ast.ClassDef):
+            _enter([statement], probes)
+        elif isinstance(statement, _COMPOUND):
+            _enter_branches(statement, probes)
+            current = -1
+    return result
+
+
+def _enter_branches(statement: ast.stmt, probes: Probes) -> None:
+    for name in ("body", "orelse", "finalbody"):
+        if getattr(statement, name, None):
+            setattr(statement, name, _probed(getattr(statement, name), probes))
+    for branch in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
+        branch.body = _probed(branch.body, probes)

@@ -1,0 +1,60 @@
+"""Measures what one run of pytest executes, where `COVERAGE_DATA` names the file for it (make test)."""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from probing_importer import ProbingFinder
+
+VARIABLE = "COVERAGE_DATA"
+
+
+class Measured(NamedTuple):
+    """The probes hit, by file, and how many tests were skipped."""
+
+    hits: dict[str, bytes]
+    skipped: int = 0
+
+    def write(self, path: Path) -> None:
+        """Write it as JSON."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        data = {"hits": {name: each.hex() for name, each in self.hits.items()}, "skipped": self.skipped}
+        path.write_text(json.dumps(data), encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read what `write` wrote."""
+        data = json.loads(path.read_text(encoding="utf-8"))
+        return cls({name: bytes.fromhex(each) for name, each in data["hits"].items()}, data["skipped"])
+
+    def with_repeated(self, again: "Measured") -> "Measured":
+        """Add a run that repeated some of the tests; a file that has changed since counts as the later run saw it."""
+        hits = dict(self.hits)
+        for name, each in again.hits.items():
+            before = hits.get(name, b"")
+            same = len(before) == len(each)
+            hits[name] = bytes(a | b for a, b in zip(before, each, strict=True)) if same else each
+        return Measured(hits, self.skipped)
+
+
+class Measurement:
+    """One run's measurement; it has to start before the first import of what is measured."""
+
+    def __init__(self) -> None:
+        # Taken out of the environment: a pytest that a test starts must not write the same file.
+        self._path = os.environ.pop(VARIABLE, "")
+        self._finder = ProbingFinder()
+        if self._path:
+            sys.meta_path.insert(0, self._finder)
+
+    def finish(self, skipped: int, repeated: bool) -> None:
+        """Write the run's hits, or add them to the file if the run repeated a part of an earlier one."""
+        if not self._path:
+            return
+        path = Path(self._path)
+        measured = Measured({name: bytes(each) for name, each in self._finder.hits.items()}, skipped)
+        if repeated and path.exists():
+            measured = Measured.read(path).with_repeated(measured)
+        measured.write(path)

@@ -1,0 +1,6 @@
+"""What lies here and is no test belongs to these tests."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

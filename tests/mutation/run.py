@@ -1,0 +1,195 @@
+"""Mutation testing of the safety path: `make mutants`, or `python tests/mutation/run.py MODULE... --seconds N`.
+
+Each mutant is written into a copy of the sources and judged by the tests that targets.toml maps to its module, in a
+process forked from one which has the libraries loaded already. Exit code 1: a mutant survived that explained.toml does
+not name.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import tomllib
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from operators import Mutant, mutants_of
+
+ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+COPIED = ("groundstation", "drivers", "sim_bridge", "tests", "config", "docs", "pyproject.toml", ".importlinter")
+# Ours must be imported anew, and pytest's plugins by pytest itself.
+NOT_BEFOREHAND = ("groundstation", "drivers", "sim_bridge", "tests", "conftest", "hypothesis", "pytest_timeout")
+QUIET = (
+    "-x",
+    "-q",
+    "--no-header",
+    "-p",
+    "no:cacheprovider",
+    "-p",
+    "no:faulthandler",
+    "-W",
+    "ignore::pytest.PytestAssertRewriteWarning",
+    "-m",
+    "not slow",
+    "--timeout",
+    "60",
+)
+KILLED, SURVIVED, LATE, BROKEN = "killed", "survived", "late", "no tests"
+
+
+class Bench:
+    """A copy of the sources, in which one module after the other is changed."""
+
+    def __init__(self, folder: Path, module: str, tests: list[str]) -> None:
+        self._path, self._tests = folder / module, tests
+        self._original = self._path.read_text(encoding="utf-8")
+        for stale in self._path.parent.glob(f"__pycache__/{self._path.stem}.*.pyc"):
+            stale.unlink()
+        self.mutants = mutants_of(self._original)
+        self.baseline_s = 0.0
+
+    def prepare(self) -> str:
+        """Run the tests of the unchanged module, then again with libraries loaded; returns what is wrong with them."""
+        for _ in range(2):
+            began = time.monotonic()
+            code, modules = self._judge(self._original, 600.0)
+            self.baseline_s = time.monotonic() - began
+            if code != 0:
+                return f"its tests end with {code} before anything is changed"
+            for name in modules:
+                if not name.lstrip("_").startswith(NOT_BEFOREHAND):
+                    try:
+                        __import__(name)
+                    except ImportError:
+                        continue
+        return ""
+
+    def verdict(self, mutant: Mutant) -> str:
+        """Return what became of a mutant."""
+        code, _ = self._judge(mutant.source, 3.0 * self.baseline_s + 10.0)
+        return {0: SURVIVED, -1: LATE, 5: BROKEN}.get(code, KILLED)
+
+    def close(self) -> None:
+        """Leave the copy as it was."""
+        self._path.write_text(self._original, encoding="utf-8")
+
+    def _judge(self, source: str, limit_s: float) -> tuple[int, list[str]]:
+        self._path.write_text(source, encoding="utf-8")
+        read, write = os.pipe()
+        pid = os.fork()
+        if pid == 0:
+            os.close(read)
+            _run_tests(self._tests, write)
+        os.close(write)
+        return _await(pid, read, limit_s)
+
+
+def _run_tests(tests: list[str], write: int) -> None:
+    """Run in the child; never returns."""
+    os.setsid()
+    sink = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(sink, descriptor)
+    code = 99
+    try:
+        import pytest
+
+        code = int(pytest.main([*QUIET, *tests]))
+        os.write(write, json.dumps([name for name in sys.modules if name != "__main__"]).encode()[:60_000] or b"[]")
+    finally:
+        os._exit(code)
+
+
+def _await(pid: int, read: int, limit_s: float) -> tuple[int, list[str]]:
+    """Return the exit code (-1: it took too long and was ended, with what it had started) and the modules it loaded."""
+    deadline = time.monotonic() + limit_s
+    while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+        if time.monotonic() > deadline:
+            break
+        time.sleep(0.01)
+    late = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+    with suppress(ProcessLookupError):  # it leads a session of its own: whatever its tests started ends with it
+        os.killpg(pid, signal.SIGKILL)
+    _, status = os.waitpid(pid, 0)
+    text = os.read(read, 65_536) if not late else b""
+    os.close(read)
+    try:
+        modules = json.loads(text or b"[]")
+    except json.JSONDecodeError:
+        modules = []
+    return (-1 if late else os.waitstatus_to_exitcode(status)), modules
+
+
+def explained(module: str) -> dict[str, str]:
+    """Return the reasons of known survivors of a module, by the mutants' names without numbers."""
+    rows = tomllib.loads((HERE / "explained.toml").read_text(encoding="utf-8")).get(module, {})
+    return {str(name): str(why) for name, why in rows.items()}
+
+
+def main() -> int:
+    """Judge the mutants of the named modules, or of all."""
+    targets: dict[str, list[str]] = tomllib.loads((HERE / "targets.toml").read_text(encoding="utf-8"))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("modules", nargs="*", help="parts of module paths; default: all of targets.toml")
+    parser.add_argument("--seconds", type=float, default=1200.0, help="stop after so long, and say what is left")
+    parser.add_argument("--sample", type=int, default=0, help="so many mutants of each module, drawn by --seed")
+    parser.add_argument("--seed", type=int, default=1)
+    told = parser.parse_args()
+    chosen = [name for name in targets if not told.modules or any(part in name for part in told.modules)]
+    deadline, unexplained = time.monotonic() + told.seconds, 0
+    sys.dont_write_bytecode = True
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    with tempfile.TemporaryDirectory(prefix="skein-mutants-") as name:
+        folder = Path(name)
+        for part in COPIED:
+            (shutil.copytree if (ROOT / part).is_dir() else shutil.copy2)(ROOT / part, folder / part)
+        os.chdir(folder)
+        sys.path.insert(0, str(folder))
+        os.environ["PYTHONPATH"] = str(folder)
+        for module in chosen:
+            unexplained += _module(Bench(folder, module, targets[module]), module, told, deadline)
+    return 1 if unexplained else 0
+
+
+def _module(bench: Bench, module: str, told: argparse.Namespace, deadline: float) -> int:
+    fault = bench.prepare()
+    if fault:
+        print(f"{module}: {fault}", flush=True)
+        return 1
+    mutants, known, counts, survivors = bench.mutants, explained(module), Counter[str](), list[Mutant]()
+    if told.sample:
+        mutants = random.Random(told.seed).sample(mutants, min(told.sample, len(mutants)))
+    for mutant in mutants:
+        if time.monotonic() > deadline:
+            break
+        verdict = bench.verdict(mutant)
+        counts[verdict] += 1
+        if verdict in (SURVIVED, BROKEN):
+            survivors.append(mutant)
+    bench.close()
+    judged, killed = counts.total(), counts[KILLED] + counts[LATE]
+    print(
+        f"{module}: {killed} of {judged} killed ({len(bench.mutants)} in all; {bench.baseline_s:.1f} s each)",
+        flush=True,
+    )
+    open_ends = 0
+    for mutant in survivors:
+        why = known.get(mutant.name.partition(" #")[0], "")
+        open_ends += not why
+        print(
+            f"  {'explained' if why else 'SURVIVED'} {module}:{mutant.line} {mutant.name}{f' ({why})' * bool(why)}",
+            flush=True,
+        )
+    return open_ends
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,4 +1,7 @@
-"""The last step before a setpoint is sent: it may only shrink a velocity or hover, never add to it."""
+"""The last step before a setpoint is sent: it shrinks a velocity, or hovers; it adds only what holds a drift off.
+
+Why its half-spaces keep fence and separation whatever is asked: docs/explanation/safety.md#why-it-holds.
+"""
 
 import math
 from collections.abc import Mapping
@@ -8,12 +11,13 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import Vector3
+from groundstation.control.half_spaces import project
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
+from groundstation.planning.parameters import MotionLimits
 
-PASSES = 4
 # No two bodies are this near: a belief that has them there does not say on which side the other one is.
 _NO_SIDE_M = 0.1
 
@@ -43,11 +47,14 @@ def limit_setpoint(
     now_ns: int,
     parameters: SafetyParameters,
     velocities: Mapping[str, Array] | None = None,
+    drifts: Mapping[str, Array] | None = None,
 ) -> Limited:
     """Return what of a setpoint is safe to send.
 
-    velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. Each of two
-    robots may use half of the closing speed between them, so that every robot is limited on its own.
+    velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. drifts: motion
+    besides what is told [m/s; world], by robot: one that has any is allowed `drift_m_s` more of it in any direction,
+    and may be moved away from a wall to hold it off; None: nothing is added. Each of two robots may use half of the
+    closing speed between them, so that every robot is limited on its own.
     """
     reason = _unfit(robot, setpoint, belief, now_ns, parameters)
     if reason:
@@ -57,28 +64,35 @@ def limit_setpoint(
     velocity = world_from_stabilized(clipped, yaw)
     known = velocities or {}
     walls = _fence(robot, belief, parameters, known) + _others(robot, belief, parameters, known)
+    drift = None if drifts is None else drifts.get(robot)
+    walls = walls if drift is None else [_held_off(wall, drift, parameters) for wall in walls]
     walls += [_turning(wall, rate, parameters.reaction_s) for wall in walls]
-    for _ in range(PASSES):
-        exceeded = [wall for wall in walls if float(velocity @ wall.normal) > wall.most + 1e-9]
-        if not exceeded:
-            break
-        for wall in exceeded:
-            velocity = velocity - max(0.0, float(velocity @ wall.normal) - wall.most) * wall.normal
-            names.append(wall.name)
-    else:
-        velocity = np.zeros(3)
-    body = stabilized_from_world(velocity, yaw)
+    velocity, met = project(velocity, np.array([wall.normal for wall in walls]), np.array([w.most for w in walls]))
+    names += [walls[i].name for i in met]
+    body = _within(stabilized_from_world(velocity, yaw), parameters.limits_of(robot))
     limited = replace(
         setpoint, velocity_m_s=(float(body[0]), float(body[1]), float(body[2])), yaw_rate_rad_s=float(rate)
     )
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
 
 
+def _held_off(wall: _Wall, drift: Array, parameters: SafetyParameters) -> _Wall:
+    """Return the wall for a robot that drifts: nearer by what it may drift into it, never asking for more than that."""
+    allowed = min(parameters.drift_m_s + max(0.0, float(drift @ wall.normal)), parameters.most_drift_m_s)
+    return _Wall(wall.name, wall.normal, wall.most - allowed)
+
+
+def _within(velocity: Array, limits: MotionLimits) -> Array:
+    """Return a velocity [base_stabilized] in its direction, no faster than the limits."""
+    fast = max(math.hypot(velocity[0], velocity[1]) / limits.max_speed_m_s, abs(velocity[2]) / limits.max_climb_m_s)
+    return velocity if fast <= 1.0 else velocity / fast
+
+
 def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:
     """Return the wall as a turning vehicle meets it.
 
     A vehicle that holds its velocity v in its own frame carries it along when it turns: it flies v + T rate (z x v),
-    for as long as its reaction T lags behind. What is projected on a half-space that contains zero only shrinks.
+    for as long as its reaction T lags behind.
     """
     tilted = wall.normal + reaction_s * rate * np.array([wall.normal[1], -wall.normal[0], 0.0])
     size = float(np.linalg.norm(tilted))

@@ -15,11 +15,11 @@ class ControlParameters:
 
     search_height_m: slot while searching or returning; column_m: horizontal distance within which nobody changes
     height, and which stands of two robots keep; return_std_m: a robot outside the world-fixed views that is known
-    worse than this flies back; return_unseen_s: one that no camera has seen for so long flies back too, or earlier
-    where the way back takes longer than what is left until unseen_land_after_s, less return_margin_s (to turn round,
-    and to be found by a camera), but never before return_soonest_s: so long a gap between sightings is usual;
-    hint_std_m: up to this uncertainty the predicted target is where the search looks; max_plan_age_s: held controls
-    of an older plan are not flown any more.
+    worse than this flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
+    that would then have been unseen for return_within_s (odometry may be worse than it says), each with return_margin_s
+    to turn round and be found, but never before return_soonest_s: so long a gap between sightings is usual; drift_m_s:
+    how fast a place becomes uncertain out of sight at least, seen_std_m: from where; hint_std_m: no plan goes by a
+    target that is known worse; max_plan_age_s: held controls of an older plan are not flown any more.
     """
 
     search_height_m: float
@@ -30,14 +30,15 @@ class ControlParameters:
     column_m: float = 1.0
     side_step_m_s: float = 0.25
     return_std_m: float = 0.35
-    return_unseen_s: float = 7.0
+    return_limit_m: float = 0.5
+    return_within_s: float = 15.0
     return_soonest_s: float = 1.5
-    return_margin_s: float = 2.0
+    return_margin_s: float = 1.5
     return_speed_m_s: float = 0.5
-    unseen_land_after_s: float = 10.0
-    search_speed_m_s: float = 0.35
-    search_yaw_rate_rad_s: float = 0.5
-    search_stand_off_m: float = 0.9
+    drift_m_s: float = 0.03
+    seen_std_m: float = 0.05
+    search_speed_m_s: float = 0.5
+    search_yaw_rate_rad_s: float = 0.8
     hint_std_m: float = 1.5
     max_plan_age_s: float = 1.0
 
@@ -51,7 +52,8 @@ class SafetyParameters:
     """Settings of the output limiter.
 
     fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity;
-    margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief.
+    margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief. drift_m_s: motion
+    besides the commanded one that nobody has noticed yet; most_drift_m_s: largest one that is held off.
     """
 
     fence: tuple[Interval, Interval, Interval]
@@ -61,6 +63,8 @@ class SafetyParameters:
     reaction_s: float = 0.5
     margin_m: float = 0.15
     sigmas: float = 2.0
+    drift_m_s: float = 0.05
+    most_drift_m_s: float = 0.2
     limits: Mapping[str, MotionLimits] = field(default_factory=dict)
 
     def limits_of(self, robot: str) -> MotionLimits:
@@ -76,8 +80,8 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         limits=limits_from_field(field),
         lost_after_s=field.estimator.lost_after_s,
         return_std_m=0.6 * safety.max_position_std_m,
-        return_unseen_s=0.7 * safety.unseen_land_after_s,
-        unseen_land_after_s=safety.unseen_land_after_s,
+        return_limit_m=0.8 * safety.max_position_std_m,
+        return_within_s=1.5 * safety.unseen_land_after_s,
         max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from itertools import combinations
 
-from groundstation.control.search import Stand
+from groundstation.control.stand import Stand
 from groundstation.sensing.models import Rectangle
 
 Point = tuple[float, float]

@@ -1,8 +1,8 @@
 """Setpoints of all robots from a plan: held velocities, height slots, and the way back or around when needed."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,13 +10,16 @@ from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.returning import is_lost, return_stand
-from groundstation.control.search import Stand, search_stands, view_of
 from groundstation.control.search_spacing import apart
+from groundstation.control.stand import Stand
+from groundstation.control.view import view_of
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
+
+_STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +33,27 @@ class Setpoint:
     blocked: str = ""
 
 
-NEVER_UNSEEN: Mapping[str, float] = {}
+Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
+"""Where robots search for targets; who has nowhere to search is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """Who is not seen, and where those look that search.
+
+    target_age_s: since any target was last observed where it is believed, None if never; unseen_s: since a camera last
+    saw each robot; missed_s: since when a camera should see a robot and does not; missing: targets that are to be
+    searched for: while others are tracked, one robot does.
+    """
+
+    target_age_s: float | None = None
+    unseen_s: Mapping[str, float] = field(default_factory=dict)
+    missed_s: Mapping[str, float] = field(default_factory=dict)
+    missing: Collection[str] = ()
+    search: Stands = lambda _robots, _targets: {}
+
+
+NOTHING_SEEN = Sight()
 HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, FlightMode.UNKNOWN)
 
 
@@ -38,26 +61,20 @@ def setpoints_from_plan(
     plan: PlanResult | None,
     belief: JointBelief,
     airborne: Collection[str],
-    target_age_s: float | None,
     parameters: ControlParameters,
     sensors: SensorSuite,
-    unseen_s: Mapping[str, float] = NEVER_UNSEEN,
-    missing: Collection[str] = (),
+    sight: Sight = NOTHING_SEEN,
 ) -> dict[str, Setpoint]:
-    """Return a setpoint for every airborne robot.
-
-    plan: the last valid one, or None; target_age_s: since any target was last observed, None if never;
-    unseen_s: since a camera last saw each robot; missing: targets not seen for too long, or never: while others are
-    tracked, one robot searches for them.
-    """
-    fresh = target_age_s is not None and target_age_s <= parameters.lost_after_s and bool(belief.layout.targets)
+    """Return a setpoint for every airborne robot; plan: the last valid one, or None."""
+    age_s, missing = sight.target_age_s, sight.missing
+    fresh = age_s is not None and age_s <= parameters.lost_after_s and bool(belief.layout.targets)
     robots = [name for name in belief.layout.robots if name in airborne]
     phases = {
         name: flight_mode_of(
             Situation(
                 airborne=True,
                 in_belief=name in robots,
-                lost=name in robots and is_lost(name, belief, parameters, sensors, unseen_s.get(name, 0.0)),
+                lost=name in robots and _is_lost(name, belief, parameters, sensors, sight),
                 target_fresh=fresh,
                 planned=plan is not None and name in plan.controls,
             )
@@ -68,8 +85,8 @@ def setpoints_from_plan(
     scout = _scout(belief, tracking, missing) if fresh and missing else None
     if scout is not None:
         phases[scout] = FlightMode.SEARCH
-    wanted_targets = tuple(missing) if scout is not None else belief.layout.targets
-    stands = _stands(phases, belief, robots, parameters, sensors, wanted_targets)
+    searching = sight.search([name for name in robots if phases[name] is FlightMode.SEARCH], missing)
+    stands = _stands(phases, belief, robots, parameters, sensors, searching, sight.missed_s)
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
         if phase is FlightMode.UNKNOWN:
@@ -80,6 +97,10 @@ def setpoints_from_plan(
         else:
             wanted[name] = _towards(name, stands[name], phase, belief, robots, parameters)
     return wanted
+
+
+def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight) -> bool:
+    return name in sight.missed_s or is_lost(name, belief, parameters, sensors, sight.unseen_s.get(name, 0.0))
 
 
 def _scout(belief: JointBelief, tracking: Sequence[str], missing: Collection[str]) -> str | None:
@@ -96,16 +117,29 @@ def _stands(
     robots: Sequence[str],
     parameters: ControlParameters,
     sensors: SensorSuite,
-    targets: Collection[str],
+    searching: Mapping[str, Stand],
+    missed_s: Mapping[str, float],
 ) -> dict[str, Stand]:
-    """Return where each robot stands that returns or searches, apart from each other; who returns comes first."""
+    """Return where each robot stands that returns or searches, apart from each other; who returns comes first.
+
+    Who searches and has nowhere to go waits in view.
+    """
     means = {name: belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
     views = {name: view_of(*places[name], name, parameters, sensors) for name in robots}
-    searching = search_stands(belief, robots, parameters, sensors, targets)
-    wanted = {name: return_stand(means[name], views[name]) for name in robots if phases[name] is FlightMode.RETURN}
-    wanted |= {name: searching[name] for name in robots if phases[name] is FlightMode.SEARCH}
-    return apart(wanted, places, views, parameters.column_m)
+    back = {
+        name: return_stand(means[name], views[name], missed_s.get(name, 0.0))
+        for name in robots
+        if phases[name] is FlightMode.RETURN
+    }
+    out = {name: searching[name] for name in robots if phases[name] is FlightMode.SEARCH and name in searching}
+    idle = {
+        name: return_stand(means[name], views[name])
+        for name in robots
+        if phases[name] is FlightMode.SEARCH and name not in searching
+    }
+    within = {name: None if name in out else view for name, view in views.items()}
+    return apart(back | out | idle, places, within, parameters.column_m)
 
 
 def _towards(
@@ -118,7 +152,7 @@ def _towards(
 ) -> Setpoint:
     """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots."""
     mean = belief.mean_of(name)
-    velocity = 0.6 * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
+    velocity = _STAND_GAIN * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
     velocity *= min(1.0, most / max(speed, 1e-9))
@@ -128,7 +162,7 @@ def _towards(
         if other != name and distance < parameters.column_m:
             nearness = 1.0 - distance / parameters.column_m
             velocity[:2] += parameters.search_speed_m_s * 2 * nearness * away / max(distance, 0.05)
-    rate = 1.0 * difference(stand.yaw, float(mean[3])) + stand.yaw_rate
+    rate = _TURN_GAIN * difference(stand.yaw, float(mean[3])) + stand.yaw_rate
     limit = parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)

@@ -1,5 +1,6 @@
-"""Which attitude counts for each robot: by its IMU where that is to be used and there is one, else as it reports."""
+"""Which attitude counts for each robot: by its IMU where it has one in use, else as it reports."""
 
+import math
 from collections.abc import Mapping
 
 from groundstation.bus.messages import ImuSample, Odometry, Verdict
@@ -36,9 +37,11 @@ class AttitudeIntake:
         """Return an odometry message as a sample, with the attitude that counts."""
         name, attitude, reset = message.header.entity, None, message.reset
         yaw_rad, roll_rad, pitch_rad = message.yaw_rad, message.roll_rad, message.pitch_rad
-        attitude_std_rad = yaw_std_rad = 0.0
+        attitude_std_rad, velocity_std_m_s, yaw_std_rad = message.attitude_std_rad, 0.0, 0.0
         inertial = self._inertial.get(name)
-        if inertial is not None:
+        if inertial is None:
+            velocity_std_m_s = math.sqrt(max(message.velocity_covariance[0], message.velocity_covariance[4], 0.0))
+        else:
             source = self._sources[name]
             if stamp_ns > source.newest_ns:
                 inertial.take_velocity(stamp_ns, message.velocity_m_s)
@@ -58,10 +61,11 @@ class AttitudeIntake:
             pitch_rad=pitch_rad,
             attitude_std_rad=attitude_std_rad,
             yaw_std_rad=yaw_std_rad,
+            velocity_std_m_s=velocity_std_m_s,
         )
 
     def tilt(self, robot: str, stamp_ns: int, reported: tuple[float, float]) -> tuple[float, float]:
-        """Return (roll, pitch) of a robot at an exposure; reported: what the camera's driver was told.
+        """Return (roll, pitch) of a robot at an exposure; reported: by the camera's driver.
 
         The heading in a sighting was derived with the latter: of a level marker that is an error of second order.
         """

@@ -1,4 +1,4 @@
-"""How much older a camera's pictures are than their stamps say, told in flight by the headings of the robots in them.
+"""How much older a camera's pictures are than their stamps say, found in flight by the headings of the robots in them.
 
 Gyroscopes tell at once how far a robot turned within a second; a picture that is older than its stamp tells it of
 another second. Only headings: what is wrong with velocities lasts, and controls react to it. Nothing here acts on the
@@ -86,7 +86,7 @@ class _Sensor:
         self.overlapping = kept * self.overlapping + overlapping
 
     def told(self) -> tuple[float, float] | None:
-        """Return lateness and one sigma [s]; None where it is not told."""
+        """Return lateness and one sigma [s]; None where it is unknown."""
         found = least(_TRIED_S, self.chi, _NEAR) if self.pairs >= _LEAST_PAIRS else None
         if found is None or found.curvature <= 0.0:
             return None

@@ -11,6 +11,8 @@ from groundstation.bus.messages import PoseHypothesis, Verdict
 from groundstation.estimation import records as r
 from groundstation.estimation.measurement import Correction, Measurement, SensorReading
 
+# Reason of a sighting for which a belief would have been given up, had not others been for the same observer.
+HASTY = "far beyond the gate, but its observer lately had others given up"
 _VERDICTS = {
     r.ACCEPTED: (Verdict.ACCEPTED, ""),
     r.INFLATED: (Verdict.INFLATED, "beyond the gate"),
@@ -22,9 +24,10 @@ _VERDICTS = {
     r.SUBJECT_GROUNDED: (Verdict.UNKNOWN_ENTITY, "the subject does not fly"),
     r.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
     r.MISTAKEN: (Verdict.IMPLAUSIBLE, "far beyond the gate, but fits another entity: is its marker's id right?"),
+    r.OBSERVER_HASTY: (Verdict.IMPLAUSIBLE, HASTY),
     r.OBSERVER_DOUBTED: (Verdict.IMPLAUSIBLE, "far beyond the gate, as is its observer itself"),
     r.CONTRADICTED: (Verdict.IMPLAUSIBLE, "it would join, but contradicts where its observer is: once is not enough"),
-    r.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot tell where its subject is"),
+    r.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot place its subject"),
 }
 _EVENT, _OUTCOME = r.EventRow.packing(), r.OutcomeRow.packing()
 _REST, _NOTHING = (0,) * (_EVENT.size // 8), bytes(_OUTCOME.size)

@@ -78,7 +78,7 @@ class FixedLagFilter:
         return verdict
 
     def add_observation(self, m: Measurement | SensorReading, tie: str, now_ns: int) -> Verdict | None:
-        """Take one observation; None: `take_corrections` tells what it did after `advance`, else why it was refused.
+        """Take one observation; None: `take_corrections` has its effect after `advance`, else why it was refused.
 
         tie: orders observations of the same instant, so that their arrival cannot.
         """

@@ -13,7 +13,7 @@ class _Spell:
 
 
 class FreezeWatch:
-    """Tells for each source whether it has repeated itself at least `count` times over at least `span_s`."""
+    """Decides for each source whether it has repeated itself at least `count` times over at least `span_s`."""
 
     def __init__(self, count: int, span_s: float) -> None:
         self._count, self._span_ns = count, round(span_s * 1e9)

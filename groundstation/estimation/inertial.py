@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from groundstation.bus.messages import Vector3
 from groundstation.estimation.gyro_bias import GyroBias
 from groundstation.geometry.angles import wrap
+from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 from groundstation.time_units import NS_PER_S
 
-GRAVITY_M_S2 = 9.80665
 _LEVEL_S, _STANDING_S = 4.0, 0.5  # accelerometers draw the tilt back over this: in flight, on the ground
 _SMOOTH_S = 0.3  # velocities are smoothed over this before they are differentiated
 _SILENT_S = 0.3  # after so much silence the acceleration counts as none
@@ -24,7 +24,7 @@ _KEPT = 256  # samples: more than a second
 # Of roll and pitch after a while; at the start, when one sample of a vehicle that may accelerate is all there is.
 _SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
 # A specific force beyond these is a blow, no gravity [m/s^2]; a gain of 8 % is usual.
-_LEAST_FORCE, _MOST_FORCE = 0.6 * GRAVITY_M_S2, 1.4 * GRAVITY_M_S2
+_LEAST_FORCE, _MOST_FORCE = 0.6 * STANDARD_GRAVITY_M_S2, 1.4 * STANDARD_GRAVITY_M_S2
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +148,8 @@ class InertialAttitude:
             return
         roll, pitch = _tilt_of(force)
         if self._velocity_ns is not None and abs(stamp_ns - self._velocity_ns) < _SILENT_S * NS_PER_S:
-            roll -= self._acceleration[1] / GRAVITY_M_S2
-            pitch += self._acceleration[0] / GRAVITY_M_S2
+            roll -= self._acceleration[1] / STANDARD_GRAVITY_M_S2
+            pitch += self._acceleration[0] / STANDARD_GRAVITY_M_S2
         share = elapsed_s / (within_s + elapsed_s)
         self._roll += share * (roll - self._roll)
         self._pitch += share * (pitch - self._pitch)

@@ -42,8 +42,8 @@ class OdometrySample:
     """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground.
 
     yaw_rate_rad_s: for vehicles that are commanded, or measure, a turn rate and no heading. roll, pitch: how it leans.
-    attitude_std [rad], yaw_std [rad per root second]: errors of roll and pitch and of the heading's increments; 0: as
-    the robot's model has them.
+    attitude_std [rad], yaw_std [rad per root second], velocity_std [m/s]: errors of roll and pitch, of the heading's
+    increments and of the velocity; 0: as the robot's model has them, which is also the least of the last.
     """
 
     stamp_ns: int
@@ -56,6 +56,7 @@ class OdometrySample:
     pitch_rad: float = 0.0
     attitude_std_rad: float = 0.0
     yaw_std_rad: float = 0.0
+    velocity_std_m_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ def prepare(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Ma
 
 
 def locate(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
-    """Write where z puts its subject (x, y, z, yaw) [world]; False where z alone cannot tell."""
+    """Write where z puts its subject (x, y, z, yaw) [world]; False where z alone is not enough."""
     raise NotImplementedError
 
 
@@ -51,7 +51,7 @@ def as_measured(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R
 
 @kernel()
 def places_nothing(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
-    """A reading does not tell where its subject is."""
+    """A reading alone cannot place its subject."""
     return False
 
 

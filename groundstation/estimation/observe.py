@@ -13,7 +13,7 @@ from groundstation.estimation.filter_state import Belief, Hypothesis, State, Tab
 from groundstation.estimation.joining import admit
 from groundstation.estimation.model_kernels import handle
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.outliers import blame, doubt_velocity
+from groundstation.estimation.outliers import blame, doubt_velocity, forget_lie, note_given_up
 from groundstation.estimation.records import (
     ACCEPTED,
     ADMITTED,
@@ -94,7 +94,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         return
     set_noise(used.innovations, used.R)
     gate, fresh, excess = settings.gates[rows], subject.active == 0, 1.0
-    joins = fresh
+    joins, confirmed = fresh, subject.unconfirmed == 0
     if not fresh:
         if choose(state, tables, event, rows, unused_s, used, other):
             used, out.alternative_chosen = other, 1
@@ -120,11 +120,14 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             write_outcome(out, used.innovations[likeliest(state.weights, used.innovations)])
         if out.verdict != ACCEPTED and out.verdict != INFLATED:
             return
+        if not fresh and confirmed and first.entities[event.subject].kind == KIND_ROBOT:
+            note_given_up(state.memory[event.observer], event.subject, event.at)
         excess, out.joined = 1.0, 1
     for m in range(modes):
         if used.innovations[m].nis >= 0.0:
             correct(belief_of(state, tables, m), used.innovations[m], used.HP[m], excess)
     weigh(state.weights, used.innovations, rows, excess)
+    forget_lie(subject, event.at)
     subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
 
 

@@ -10,11 +10,11 @@ _WORDS = len(_FIELDS)
 _SUM_VX, _SUM_VY, _SUM_VZ, _SUM_RATE, _VELOCITY_COUNT = map(
     _FIELDS.index, ("sum_vx", "sum_vy", "sum_vz", "sum_rate", "velocity_count")
 )
-_NEWEST_AT, _NEWEST_YAW, _NEWEST_RESET, _NEWEST_ROLL, _NEWEST_PITCH, _ATTITUDE_STD, _YAW_STD = map(
+_NEWEST_AT, _NEWEST_YAW, _NEWEST_RESET, _NEWEST_ROLL, _NEWEST_PITCH, _ATTITUDE_STD, _YAW_STD, _VELOCITY_STD = map(
     _FIELDS.index,
     (
         "newest_at", "newest_yaw", "newest_reset", "newest_roll", "newest_pitch",
-        "newest_attitude_std", "newest_yaw_std",
+        "newest_attitude_std", "newest_yaw_std", "newest_velocity_std",
     ),
 )  # fmt: skip
 _HEIGHT_SUM, _HEIGHT_COUNT = map(_FIELDS.index, ("height_sum", "height_count"))
@@ -59,6 +59,7 @@ class OdometryRing:
             words[first + _NEWEST_RESET] = float(motion.reset)
             words[first + _NEWEST_ROLL], words[first + _NEWEST_PITCH] = motion.roll_rad, motion.pitch_rad
             words[first + _ATTITUDE_STD], words[first + _YAW_STD] = motion.attitude_std_rad, motion.yaw_std_rad
+            words[first + _VELOCITY_STD] = motion.velocity_std_m_s
 
     def add_height(self, step: int, robot: int, height_m: float) -> None:
         """Take a height."""

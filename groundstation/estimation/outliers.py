@@ -1,5 +1,7 @@
 """Whom to blame for an observation far beyond the gate: marker, observer, outlier, or the belief of the subject."""
 
+import math
+
 import numpy as np
 
 from groundstation.estimation.filter_state import Belief, Hypothesis, Settings
@@ -10,6 +12,7 @@ from groundstation.estimation.records import (
     KIND_TARGET,
     MISTAKEN,
     OBSERVER_DOUBTED,
+    OBSERVER_HASTY,
     PENDING,
     EntityMemory,
     EventRow,
@@ -21,6 +24,10 @@ from groundstation.estimation.update import linearise
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
+# For one observer: between two robots whose beliefs are given up, and how many at most, one more every so often.
+_BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
+# A sighting stands for so much time at most.
+_SEEN_S, _LIE_FORGOTTEN_S = 0.2, 1.0
 _FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
 
 
@@ -76,6 +83,32 @@ def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
 
 
 @kernel()
+def given_up_lately(observer: EntityMemory, at: float) -> float:
+    """Return how many beliefs were given up for one observer, each forgotten after a while."""
+    return max(0.0, observer.gave_up - (at - observer.gave_up_at) / _FORGOTTEN_S)
+
+
+@kernel()
+def is_hasty(observer: EntityMemory, subject: int, at: float) -> bool:
+    """Return whether a robot's belief may not be given up yet: another one just was, or it were too many.
+
+    Several robots that one camera contradicts at once speak against the camera; one that is re-initialised again and
+    again is not mended by it. Whoever is refused so counts as unseen, and the robot flies back or lands.
+    """
+    lately = given_up_lately(observer, at)
+    if lately > 0.0 and observer.gave_up_whom != subject and at - observer.gave_up_at < _BETWEEN_S:
+        return True
+    return lately > _AT_MOST - 1.0
+
+
+@kernel()
+def note_given_up(observer: EntityMemory, subject: int, at: float) -> None:
+    """Note that a robot's belief was given up for what one observer saw."""
+    observer.gave_up = given_up_lately(observer, at) + 1.0
+    observer.gave_up_at, observer.gave_up_whom = at, subject
+
+
+@kernel()
 def doubt_velocity(memory: EntityMemory) -> None:
     """Doubt what a vehicle says of its velocity: a fixed camera saw it beyond the gate.
 
@@ -85,10 +118,17 @@ def doubt_velocity(memory: EntityMemory) -> None:
 
 
 @kernel()
+def forget_lie(memory: EntityMemory, at: float) -> None:
+    """Forget that a velocity was wrong, while the vehicle is seen: what is wrong still, is noted again."""
+    memory.velocity_lie *= math.exp(-min(at - memory.corrected_at, _SEEN_S) / _LIE_FORGOTTEN_S)
+    memory.unseen_s = 0.0
+
+
+@kernel()
 def blame(
     belief: Belief, sensor: SensorRow, settings: Settings, event: EventRow, rows: int, hypothesis: Hypothesis
 ) -> int:
-    """Return why a wild observation is refused, or PENDING when the subject's belief is to be given up for it.
+    """Return why a wild observation is refused, or PENDING when the subject's belief has to be given up for it.
 
     belief: of the first mode, as is the noise of the hypothesis that counts.
     """
@@ -96,4 +136,10 @@ def blame(
         return OBSERVER_DOUBTED
     if fits_another(belief, sensor, settings, event, rows, hypothesis):
         return MISTAKEN
-    return PENDING if has_diverged(belief.memory[event.subject], settings, event.at) else IMPLAUSIBLE
+    subject, robot = belief.memory[event.subject], belief.entities[event.subject].kind == KIND_ROBOT
+    confirmed = subject.unconfirmed == 0
+    if not has_diverged(subject, settings, event.at):
+        return IMPLAUSIBLE
+    if robot and confirmed and is_hasty(belief.memory[event.observer], event.subject, event.at):
+        return OBSERVER_HASTY
+    return PENDING

@@ -1,4 +1,4 @@
-"""Everything the estimator is told before it starts, and how it follows from a resolved field."""
+"""Settings of the estimator, and how they follow from a resolved field."""
 
 import math
 from collections.abc import Mapping
@@ -36,6 +36,9 @@ _VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
 _LASTING_SHARE, _QUICK_SHARE = 0.6, 0.1
 # A target does the most that it may do for this share of the time.
 _MANOEUVRING_SHARE = 0.07
+# Deviation of a target's turn rate over its highest, and of each component of its velocity, before it is seen, over its
+# highest speed.
+_TURN_SHARE, _SPEED_SHARE = 0.5 / math.pi, 0.4 / 0.7
 # Of the acceleration of a target that turns, what is left to one that goes straight on.
 _STRAIGHT_SHARE = 0.5
 
@@ -135,13 +138,15 @@ def usual_acceleration_m_s2(target: Target) -> float:
 
 def _target(target: Target) -> MotionModel:
     height_m, acceleration_std = target.marker.height_m, usual_acceleration_m_s2(target)
+    speed_std = _SPEED_SHARE * target.max_speed_m_s
     if target.model == "constant_velocity":
-        return ConstantVelocityTarget(height_m, acceleration_std, heading=target.heading)
+        return ConstantVelocityTarget(height_m, acceleration_std, speed_std_m_s=speed_std, heading=target.heading)
     usual, rate_deg_s = CoordinatedTurnTarget(), target.turn_rate_std_deg_s
     turning = CoordinatedTurnTarget(
         height_m,
         acceleration_std,
-        turn_rate_std_rad_s=usual.turn_rate_std_rad_s if rate_deg_s is None else math.radians(rate_deg_s),
+        speed_std_m_s=speed_std,
+        turn_rate_std_rad_s=math.radians(rate_deg_s or target.max_turn_rate_deg_s * _TURN_SHARE),
         turn_rate_correlation_s=target.turn_rate_correlation_s or usual.turn_rate_correlation_s,
         heading=target.heading,
     )

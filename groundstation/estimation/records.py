@@ -32,7 +32,7 @@ EVENT_KINDS = 4
 (PENDING, ACCEPTED, INFLATED, IMPLAUSIBLE, OUT_OF_VIEW, SINGULAR, OBSERVER_UNKNOWN, SUBJECT_GROUNDED, YAW_MISSING) = (
     range(9)
 )
-NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED = 9, 10, 11, 12, 13
+NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED, OBSERVER_HASTY = 9, 10, 11, 12, 13, 14
 
 # Entries of a block that the models of other entities may ask for: EntityRow has their places.
 SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
@@ -110,9 +110,11 @@ class EntityMemory(Record):
     last velocity; attitude_std [rad], yaw_std [rad per root second]: errors as the odometry states them (0: the model's
     own count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before.
     velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed
-    camera's surprises add to the error of the reported velocity.
+    camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was lately
+    seen to be larger than that of a sound sensor; unseen_s: time predicted since the last sighting.
     wild: observations far beyond the gate, the last of them at wild_at; refused: observations by which it would have
-    joined, had they not contradicted their observer; corrected_at: last use of an observation.
+    joined, had they not contradicted their observer; corrected_at: last use of an observation. gave_up, gave_up_at,
+    gave_up_whom: how many robots were lately re-initialised by what this one saw, when, and whom last.
     """
 
     active: int
@@ -138,10 +140,15 @@ class EntityMemory(Record):
     velocity_y: float
     velocity_z: float
     velocity_doubt: float
+    velocity_lie: float
+    unseen_s: float
     wild: Streak
     wild_at: float
     refused: Streak
     corrected_at: float
+    gave_up_at: float
+    gave_up_whom: int
+    gave_up: float
 
 
 class CondensedOdometry(Record):
@@ -163,6 +170,7 @@ class CondensedOdometry(Record):
     newest_pitch: float
     newest_attitude_std: float
     newest_yaw_std: float
+    newest_velocity_std: float
     height_sum: float
     height_count: float
 

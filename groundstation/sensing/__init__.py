@@ -1,1 +1,1 @@
-"""Who may observe whom (topologies) and what the planner believes each sensor delivers."""
+"""Who may observe whom (topologies) and the information that the planner expects of each sensor."""

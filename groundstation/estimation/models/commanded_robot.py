@@ -1,4 +1,4 @@
-"""A ground robot of which only the commanded speeds are known: it follows them late and never quite as told.
+"""A ground robot of which only the commanded speeds are known: it follows them late and never exactly.
 
 f: forward = (1 + forward_scale) v - turn_drag |w|, rate = (1 + turn_scale) w + turn_offset, on an arc during a step. It
 answers a command `response_s` late (its odometry delay is minus that) and approaches it within `lag_s`. What its range

@@ -31,8 +31,10 @@ SLOW_STATES = (
 )
 AERIAL = SLOW_STATES[:6]
 _TURN_SHARE = 0.02  # of each turn is in error
-# Beyond so many deviations a velocity's error is not a sound sensor's: it may be as large as it looks, and last.
-_BELIEVABLE, _LIE_S = 3.0, 2.0
+# Beyond so many deviations an error is not a sound sensor's: it may be as large as it looks, and last; longer unseen.
+_BELIEVABLE, _WRONG, _LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 3.0, 5.0, 2.0, 8.0, 0.5
+# The field file's figure is what a vehicle states while it does not doubt itself; the lasting part of it is 0.6.
+_STATED_ROOM = 2.0
 _DOUBT_S = 1.0  # the doubt that surprises raise is forgotten over this
 
 
@@ -41,7 +43,8 @@ class RobotParameters(Record):
 
     velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
     scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
-    the vehicle reports one; height_variance [m^2]: of one step's height; hold_s: how long a velocity holds in silence;
+    the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: what the
+    vehicle states beyond it is doubt; hold_s: how long a velocity holds in silence;
     at_*: entries (-1: the block has none).
     """
 
@@ -59,6 +62,7 @@ class RobotParameters(Record):
     height_tau_s: float
     bias_std: float
     bias_tau_s: float
+    velocity_std: float
     has_climb_rate: float
     height_variance: float
     hold_s: float
@@ -121,6 +125,13 @@ def fade_velocity_bias(
     if square > believable:
         variance += square - believable
         lasts_s = max(lasts_s, lasts_s + (_LIE_S - lasts_s) * (1.0 - believable / square))
+    if square > _WRONG * _WRONG * p.bias_std * p.bias_std:
+        memory.velocity_lie = max(memory.velocity_lie, math.sqrt(square - believable))
+    memory.unseen_s += dt
+    if memory.velocity_lie > 0.0:
+        lie = memory.velocity_lie * memory.velocity_lie * min(1.0, memory.unseen_s / _UNSEEN_S)
+        variance = max(variance, p.bias_std * p.bias_std + lie)
+        lasts_s = max(lasts_s, lasts_s + (_UNSEEN_LIE_S - lasts_s) * lie / (lie + p.bias_std * p.bias_std))
     deviation = math.sqrt(variance)
     fade(mean, P, start, size, p.at_velocity_bias_x, deviation, dt / lasts_s)
     fade(mean, P, start, size, p.at_velocity_bias_y, deviation, dt / lasts_s)
@@ -197,6 +208,9 @@ def begin_odometry_robot(belief: Belief, odometry: CondensedOdometry, e: int, st
     hold_velocity(odometry, memory, p.hold_s, step_s)
     take_heading(odometry, memory, step_s)
     memory.velocity_doubt *= math.exp(-step_s / _DOUBT_S)
+    if odometry.newest_velocity_std > p.velocity_std:
+        # What the vehicle itself doubts is doubted for as long as it does.
+        memory.velocity_doubt = max(memory.velocity_doubt, odometry.newest_velocity_std)
     if memory.active == 0 or memory.unconfirmed != 0 or odometry.height_count == 0.0:
         return
     error = start + p.at_height_error if p.at_height_error >= 0 else -1
@@ -271,6 +285,7 @@ class OdometryRobot:
             height_tau_s=self.height_correlation_s,
             bias_std=self.velocity_bias_std_m_s,
             bias_tau_s=self.velocity_bias_correlation_s,
+            velocity_std=_STATED_ROOM * max(self.velocity_std_m_s, self.velocity_bias_std_m_s * self.velocity_scale),
             has_climb_rate=float(self.reports_climb),
             # The slow part of the error is a state; what is left is quick, and alike in neighbouring samples.
             height_variance=(0.5 * self.height_std_m) ** 2,

@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.control.excursion import Excursions, time_left_s
 from groundstation.control.flight_mode import FlightMode
-from groundstation.control.parameters import ControlParameters, control_from_field
-from groundstation.control.returning import is_lost, return_after_s, way_back_m
-from groundstation.control.setpoints import setpoints_from_plan
+from groundstation.control.parameters import control_from_field
+from groundstation.control.returning import is_lost
+from groundstation.control.setpoints import Sight, setpoints_from_plan
+from groundstation.control.view import way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.sensing.from_field import sensors_from_field
@@ -49,40 +51,53 @@ def test_the_way_back_into_a_view_without_width_is_that_to_its_middle() -> None:
     assert way_back_m(3.0, 4.0, Rectangle((0.0, 0.0), (0.0, 0.0))) == pytest.approx(5.0, abs=1e-5)
 
 
-def test_the_farther_the_way_back_the_earlier_it_starts() -> None:
-    p = ControlParameters(1.6)
-    starts = [return_after_s(0.25 * k, p) for k in range(30)]
-    assert starts[0] == p.return_unseen_s
-    assert starts == sorted(starts, reverse=True)
-    assert starts[-1] == p.return_soonest_s
-    for k, start_s in enumerate(starts):
-        if start_s > p.return_soonest_s:
-            assert start_s + 0.25 * k / p.return_speed_m_s + p.return_margin_s <= p.unseen_land_after_s + 1e-9
+def test_who_is_known_worse_or_drifts_faster_has_less_time_out_of_sight() -> None:
+    fresh, known_worse = time_left_s(0.05, 0.0, CONTROL), time_left_s(0.3, 0.0, CONTROL)
+    drifting = time_left_s(0.3, 4.0, CONTROL)  # 0.25 m in 4 s
+    assert fresh == pytest.approx(min((CONTROL.return_limit_m - 0.05) / CONTROL.drift_m_s, CONTROL.return_within_s))
+    assert fresh > known_worse > drifting
+    assert drifting == pytest.approx((CONTROL.return_limit_m - 0.3) / 0.0625)
+    assert time_left_s(0.1, 14.0, CONTROL) == pytest.approx(1.0)  # odometry may be worse than it says
 
 
-def test_a_well_localised_drone_far_out_flies_back_before_it_is_too_late() -> None:
+def test_a_drone_far_out_flies_back_by_its_uncertainty_and_its_way() -> None:
     far, near = np.array([3.4, 0.0, 1.6, 0.0]), np.array([0.0, 0.0, 1.6, 0.0])
-    assert is_lost("drone_1", belief(far), CONTROL, SENSORS, unseen_s=4.0)
-    assert not is_lost("drone_1", belief(far), CONTROL, SENSORS, unseen_s=1.0)
-    assert not is_lost("drone_1", belief(near), CONTROL, SENSORS, unseen_s=4.0)
+    assert is_lost("drone_1", belief(far, 0.3), CONTROL, SENSORS, unseen_s=4.0)
+    assert not is_lost("drone_1", belief(far, 0.1), CONTROL, SENSORS, unseen_s=4.0)
+    assert is_lost("drone_1", belief(far, 0.1), CONTROL, SENSORS, unseen_s=10.0)
+    assert not is_lost("drone_1", belief(near, 0.1), CONTROL, SENSORS, unseen_s=10.0)
+
+
+def test_places_from_which_it_could_not_be_back_in_time_are_not_gone_to() -> None:
+    excursions = Excursions(CONTROL, SENSORS)
+    places = np.array([(0.0, 0.0), (2.0, 0.0), (3.4, 2.4)])
+    here = belief(np.array([0.0, 0.0, 1.6, 0.0]), 0.05)
+    inside, near, far = excursions.allowed_s("drone_1", here, places)
+    assert inside == math.inf
+    assert near > far > 5.0
+    excursions.unseen_s = {"drone_1": 11.0}
+    inside, near, far = excursions.allowed_s("drone_1", here, places)
+    assert inside == math.inf
+    assert near < 2.0
+    assert far < 0.0
 
 
 @pytest.mark.parametrize("start", [(1.2, 0.0), (0.9, 0.9), (1.5, -1.0), (-1.8, 0.6), (0.0, 2.0)])
-def test_a_drone_that_flies_outwards_unseen_is_back_in_view_before_it_would_land(start: tuple[float, float]) -> None:
+def test_a_drone_that_flies_outwards_unseen_is_back_in_view_before_it_is_lost(start: tuple[float, float]) -> None:
     """It flies away at 0.5 m/s until RETURN, and follows velocities with a lag."""
     pose, velocity = np.array([*start, 1.6, 0.0]), np.zeros(3)
     away = 0.5 * np.array([*start, 0.0]) / math.hypot(*start)
     velocity[:] = away
     unseen_s, seen = 0.0, False
-    while not seen and unseen_s < 12.0:
+    while not seen and unseen_s < 20.0:
         unseen_s += TICK_S
-        out = setpoints_from_plan(
-            None, belief(pose), ("drone_1",), None, CONTROL, SENSORS, unseen_s={"drone_1": unseen_s}
-        )["drone_1"]
+        sight, std_m = Sight(None, {"drone_1": unseen_s}), 0.05 + 0.03 * unseen_s
+        out = setpoints_from_plan(None, belief(pose, std_m), ("drone_1",), CONTROL, SENSORS, sight)["drone_1"]
         wanted = np.array(out.velocity_m_s) if out.phase is FlightMode.RETURN else away
         velocity += TICK_S / LAG_S * (wanted - velocity)
         pose[:3] += TICK_S * velocity
         marker = SENSORS.marker("drone_1", pose, is_robot=True)
         seen = out.phase is FlightMode.RETURN and SENSORS.world_in_view("ceiling", marker)
     assert seen
-    assert unseen_s < CONTROL.unseen_land_after_s - 0.5
+    assert unseen_s < CONTROL.return_within_s + 0.5
+    assert std_m < LAB.safety.max_position_std_m

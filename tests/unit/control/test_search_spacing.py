@@ -6,8 +6,8 @@ from itertools import combinations
 
 import pytest
 
-from groundstation.control.search import Stand
 from groundstation.control.search_spacing import apart
+from groundstation.control.stand import Stand
 from groundstation.sensing.models import Rectangle
 
 VIEW = Rectangle((-1.0, 1.0), (-0.5, 0.5))

@@ -1,6 +1,7 @@
 """Setpoints from plans: slots, columns, the search, the way back, and the flight-mode table."""
 
 import math
+from collections.abc import Collection, Sequence
 from itertools import product
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import pytest
 from groundstation.bus.messages import SolverReport
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import control_from_field
-from groundstation.control.setpoints import Setpoint, setpoints_from_plan
+from groundstation.control.setpoints import Setpoint, Sight, setpoints_from_plan
+from groundstation.control.stand import Stand
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.planning.planner import PlanResult
@@ -22,6 +24,11 @@ from groundstation.settings.resolved import resolved_field
 LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
 SENSORS, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
 NAMES = ("drone_1", "drone_2")
+STANDS = {"drone_1": Stand(1.5, 1.5, 1.0), "drone_2": Stand(-1.5, -0.5, -2.0)}
+
+
+def searching(robots: Sequence[str], _targets: Collection[str]) -> dict[str, Stand]:
+    return {name: STANDS[name] for name in robots}
 
 
 def belief(
@@ -60,7 +67,7 @@ def plan(heights: tuple[float, float], topology: str = "drone_1/drone_2") -> Pla
 def setpoints(
     at: JointBelief, plan: PlanResult | None, age: float | None = 0.1, airborne: tuple[str, ...] = NAMES
 ) -> dict[str, Setpoint]:
-    return setpoints_from_plan(plan, at, airborne, age, CONTROL, SENSORS)
+    return setpoints_from_plan(plan, at, airborne, CONTROL, SENSORS, Sight(age, search=searching))
 
 
 def test_a_plan_is_flown_as_it_is_and_heights_are_held() -> None:
@@ -94,52 +101,37 @@ def test_small_corrections_of_height_go_on_within_a_column() -> None:
 
 
 @pytest.mark.parametrize("age", [None, 5.0])
-def test_without_a_fresh_target_they_search_and_look_different_ways(age: float | None) -> None:
-    target = None if age is None else (0.5, 0.0, 0.0, 0.0)
+def test_without_a_fresh_target_they_go_to_the_stands_of_the_search(age: float | None) -> None:
     at = [np.array([-0.5, 0.5, 1.3, 0.0]), np.array([-0.5, -0.5, 1.3, 0.0])]
-    headings, gaps = [], []
-    for tick in range(1500):
-        now = belief(tuple(at[0]), tuple(at[1]), target, target_std=9.0, stamp_s=0.05 * tick)
-        out = setpoints(now, plan((1.5, 1.5)), age)
+    for tick in range(400):
+        out = setpoints(belief(tuple(at[0]), tuple(at[1]), stamp_s=0.05 * tick), plan((1.5, 1.5)), age)
         for pose, name in zip(at, NAMES, strict=True):
             assert out[name].phase is FlightMode.SEARCH
             vx, vy, vz = out[name].velocity_m_s
             c, s = math.cos(pose[3]), math.sin(pose[3])
             pose += 0.05 * np.array([c * vx - s * vy, s * vx + c * vy, vz, out[name].yaw_rate_rad_s])
-        headings.append([at[0][3], at[1][3]])
-        gaps.append(math.dist(at[0][:2], at[1][:2]))
-        if tick > 200:
-            assert all(SENSORS.world_in_view("ceiling", np.add(pose[:3], (0, 0, 0.08))) for pose in at)
-    late = np.array(headings[600:])
-    apart = np.abs(np.mod(late[:, 0] - late[:, 1] + math.pi, math.tau) - math.pi)
-    assert apart.mean() > 2.5
-    assert np.ptp(late[:, 0]) > math.tau  # a full turn
-    assert min(gaps) > 0.8
-    assert min(gaps[200:]) > CONTROL.column_m
-    assert at[0][2] == pytest.approx(CONTROL.search_height_m, abs=0.05)
+    for pose, name in zip(at, NAMES, strict=True):
+        stand = STANDS[name]
+        assert pose == pytest.approx([stand.x, stand.y, CONTROL.search_height_m, stand.yaw], abs=0.05)
 
 
-def test_a_fair_prediction_of_the_target_is_searched_around() -> None:
-    at = belief((-1.0, 0.4, 1.5, 0.0), (-1.0, -0.4, 1.5, 0.0), (2.5, 0.0, 0.0, 0.0), target_std=0.5)
-    out = setpoints(at, plan((1.5, 1.5)), age=4.0)
-    assert set(out) == set(NAMES)
-    assert all(one.phase is FlightMode.SEARCH and one.velocity_m_s[0] > 0.1 for one in out.values())
+def test_who_has_nowhere_to_search_waits_in_view() -> None:
+    at = belief((2.0, 0.5, 1.6, 0.0), (-0.5, -0.5, 1.6, 0.0))
+    out = setpoints_from_plan(None, at, NAMES, CONTROL, SENSORS)
+    assert out["drone_1"].phase is FlightMode.SEARCH
+    assert out["drone_1"].velocity_m_s[0] < -0.2
 
 
-@pytest.mark.parametrize("hint", [(3.5, 2.4), (3.5, 0.0), (0.0, 2.6), (-3.0, -2.5)])
-def test_two_that_search_for_a_target_far_outside_of_the_view_stay_in_it(hint: tuple[float, float]) -> None:
-    """The view's corner is nearest to both: with one stand for two they pushed each other out of the view."""
-    at = [np.array([0.2, 0.5, 1.6, 0.0]), np.array([0.2, -0.5, 1.6, 0.0])]
-    for tick in range(1000):
-        now = belief(tuple(at[0]), tuple(at[1]), (*hint, 0.0, 0.0), target_std=0.5, stamp_s=0.05 * tick)
-        out = setpoints(now, None, 5.0)
-        for pose, name in zip(at, NAMES, strict=True):
-            vx, vy, vz = out[name].velocity_m_s
-            c, s = math.cos(pose[3]), math.sin(pose[3])
-            pose += 0.05 * np.array([c * vx - s * vy, s * vx + c * vy, vz, out[name].yaw_rate_rad_s])
-        assert all(SENSORS.world_in_view("ceiling", np.add(pose[:3], (0, 0, 0.08))) for pose in at)
-        if tick > 300:
-            assert math.dist(at[0][:2], at[1][:2]) > CONTROL.column_m - 0.05
+def test_one_that_a_fixed_camera_misses_turns_and_looks_for_the_view() -> None:
+    at = belief((0.1, 0.3, 1.6, 0.0), (-1.5, -0.5, 1.6, 0.0))
+    turned = []
+    for missed_s in (0.5, 3.0, 10.0):
+        sight = Sight(0.1, {"drone_1": 4.0}, {"drone_1": missed_s})
+        out = setpoints_from_plan(plan((1.6, 1.6)), at, NAMES, CONTROL, SENSORS, sight)["drone_1"]
+        assert out.phase is FlightMode.RETURN
+        turned.append((out.yaw_rate_rad_s, math.hypot(*out.velocity_m_s[:2])))
+    assert all(rate > 0.5 for rate, _ in turned)
+    assert turned[-1][1] > 0.2
 
 
 def test_two_that_fly_back_are_given_a_stand_each() -> None:
@@ -147,7 +139,7 @@ def test_two_that_fly_back_are_given_a_stand_each() -> None:
     places = [np.array([2.5, 0.3, 1.6, 0.0]), np.array([2.5, -0.9, 1.6, 0.0])]
     for _ in range(800):
         at = belief(tuple(places[0]), tuple(places[1]), robot_std=0.4)
-        out = setpoints_from_plan(None, at, NAMES, 5.0, CONTROL, SENSORS, unseen_s=dict.fromkeys(NAMES, 8.0))
+        out = setpoints_from_plan(None, at, NAMES, CONTROL, SENSORS, Sight(5.0, dict.fromkeys(NAMES, 20.0)))
         assert {one.phase for one in out.values()} == {FlightMode.RETURN}
         for pose, name in zip(places, NAMES, strict=True):
             pose[:3] += 0.05 * np.array(out[name].velocity_m_s)
@@ -188,9 +180,10 @@ def test_the_flight_mode_table() -> None:
 
 def test_while_one_target_is_tracked_the_robot_farthest_from_it_searches_for_a_missing_one() -> None:
     at = belief((-0.5, 0.5, 1.3, 0.0), (-1.5, -0.5, 1.3, 0.0))
-    common = (plan((1.3, 1.3), "drone_1,drone_2"), at, NAMES, 0.1, CONTROL, SENSORS)
-    assert {s.phase for s in setpoints_from_plan(*common).values()} == {FlightMode.TRACK}
-    out = setpoints_from_plan(*common, missing=("other",))
+    common, looked_for = plan((1.3, 1.3), "drone_1,drone_2"), Sight(0.1, missing=("other",))
+    out = setpoints_from_plan(common, at, NAMES, CONTROL, SENSORS, Sight(0.1))
+    assert {s.phase for s in out.values()} == {FlightMode.TRACK}
+    out = setpoints_from_plan(common, at, NAMES, CONTROL, SENSORS, looked_for)
     assert (out["drone_1"].phase, out["drone_2"].phase) == (FlightMode.TRACK, FlightMode.SEARCH)
-    alone = setpoints_from_plan(common[0], at, ("drone_1",), 0.1, CONTROL, SENSORS, missing=("other",))
+    alone = setpoints_from_plan(common, at, ("drone_1",), CONTROL, SENSORS, looked_for)
     assert alone["drone_1"].phase is FlightMode.TRACK

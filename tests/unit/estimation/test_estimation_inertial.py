@@ -8,9 +8,10 @@ import pytest
 from groundstation.bus.messages import Header, Odometry, Vector3
 from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.gyro_bias import GyroBias
-from groundstation.estimation.inertial import GRAVITY_M_S2, InertialAttitude
+from groundstation.estimation.inertial import InertialAttitude
 from groundstation.geometry.angles import difference
 from groundstation.geometry.rotations import rotation_from_euler
+from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
 STEP_NS, START = 10_000_000, 10**12
 GAIN, BIAS = 0.92, (0.004, -0.003, 0.01)
@@ -46,7 +47,7 @@ class Vehicle:
             self.attitude.take_heading(self.now, math.remainder(own, math.tau), 0)
 
     def _publish(self, rates: np.ndarray, acceleration: tuple[float, float], standing: bool) -> None:
-        force = rotation_from_euler(self.roll, self.pitch, 0.0).T @ np.array([*acceleration, GRAVITY_M_S2])
+        force = rotation_from_euler(self.roll, self.pitch, 0.0).T @ np.array([*acceleration, STANDARD_GRAVITY_M_S2])
         noisy = GAIN * force + 0.05 * self._rng.standard_normal(3)
         rates = rates + np.array(BIAS) + 0.003 * self._rng.standard_normal(3)
         self.attitude.take_velocity(self.now, (*(self.velocity / 1.25).tolist(), 0.0))

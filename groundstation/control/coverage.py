@@ -1,0 +1,117 @@
+"""Stands from which a team sees most of where a lost target may be, soonest."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array, IntVector
+from groundstation.control.search_parameters import SearchParameters
+from groundstation.control.stand import Stand
+from groundstation.estimation.room_map import RoomGrid
+from groundstation.geometry.angles import difference
+from groundstation.sensing.footprint import HEADINGS, Footprint, seen_from
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """The stands that are considered: their cells, and their places (n, 2) [m; world]."""
+
+    rows: IntVector
+    columns: IntVector
+    places: Array
+
+
+def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
+    """Return every other cell of a grid that lies well inside the fence."""
+    (x0, x1), (y0, y1), inset = parameters.fence_x_m, parameters.fence_y_m, parameters.fence_inset_m
+    cells = [
+        (row, column, x, y)
+        for row, y in enumerate(grid.ys.tolist())
+        for column, x in enumerate(grid.xs.tolist())
+        if row % 2 == column % 2 == 0 and x0 + inset <= x <= x1 - inset and y0 + inset <= y <= y1 - inset
+    ]
+    rows, columns, xs, ys = zip(*cells, strict=True) if cells else ((), (), (), ())
+    places = np.array([xs, ys], dtype=np.float64).T
+    return Lattice(np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), places)
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """The stands that were chosen, and what they promise: the chance to see the target there, and when [s]."""
+
+    stands: Mapping[str, Stand]
+    chance: float
+    after_s: float
+
+
+def choose_stands(
+    chances: Array,
+    lattice: Lattice,
+    footprints: Mapping[str, Footprint],
+    poses: Mapping[str, Array],
+    allowed_s: Mapping[str, Array],
+    held: Mapping[str, Stand],
+    parameters: SearchParameters,
+) -> Outlook:
+    """Return a stand for each robot that has a footprint: one after the other takes what promises most, soonest.
+
+    poses: x, y, z, yaw; allowed_s: by stand, within how long a robot may be there (negative: not at all); held: the
+    stands so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
+    """
+    left = np.array(chances)
+    stands: dict[str, Stand] = {}
+    missed, soonest = 1.0, math.inf
+    for name, footprint in footprints.items():
+        cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
+        seen = seen_from(left, lattice.rows, lattice.columns, *cells)
+        way_s = _way_s(poses[name], lattice.places, parameters)
+        value = seen * np.exp(-way_s / parameters.patience_s)
+        free = way_s.min(axis=1) <= allowed_s[name]
+        for other in stands.values():
+            free &= np.hypot(*(lattice.places - (other.x, other.y)).T) >= parameters.apart_m
+        if not free.any():
+            continue
+        value = np.where(free[:, None], value, -1.0)
+        best = divmod(int(np.argmax(value)), HEADINGS)
+        if name in held:
+            kept = _nearest(held[name], lattice)
+            if value[kept] * parameters.keep_gain >= value[best]:
+                best = kept
+        stand, heading = best
+        x, y = lattice.places[stand].tolist()
+        stands[name] = Stand(x, y, math.tau * heading / HEADINGS)
+        missed *= 1.0 - float(seen[stand, heading])
+        soonest = min(soonest, float(way_s[stand, heading]))
+        _take(left, lattice, footprint, stand, heading)
+    return Outlook(stands, 1.0 - missed, soonest if stands else math.inf)
+
+
+def _way_s(pose: Array, places: Array, parameters: SearchParameters) -> Array:
+    """Return how long a robot needs to each stand and heading (n, HEADINGS) [s]."""
+    flight = np.hypot(*(places - pose[:2]).T) / parameters.speed_m_s
+    turn = [abs(difference(math.tau * k / HEADINGS, float(pose[3]))) for k in range(HEADINGS)]
+    slower: Array = np.maximum(flight[:, None], np.array(turn)[None, :] / parameters.yaw_rate_rad_s)
+    return slower + parameters.look_s
+
+
+def _nearest(stand: Stand, lattice: Lattice) -> tuple[int, int]:
+    row = int(np.argmin(np.hypot(*(lattice.places - (stand.x, stand.y)).T)))
+    return row, round(stand.yaw / math.tau * HEADINGS) % HEADINGS
+
+
+def _take(left: Array, lattice: Lattice, footprint: Footprint, stand: int, heading: int) -> None:
+    """Count what a robot will see from its stand as seen, for those that choose after it."""
+    part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
+    rows = lattice.rows[stand] + footprint.rows[part]
+    columns = lattice.columns[stand] + footprint.columns[part]
+    inside = (rows >= 0) & (rows < left.shape[0]) & (columns >= 0) & (columns < left.shape[1])
+    # A stand is looked from more than once: three pictures.
+    left[rows[inside], columns[inside]] *= (1.0 - footprint.chances[part][inside]) ** 3
+
+
+def robots_in_order(robots: Sequence[str], chances: Array, poses: Mapping[str, Array], grid: RoomGrid) -> list[str]:
+    """Return robots, the one first that is nearest to where the target is expected."""
+    centre = (float(chances.sum(axis=0) @ grid.xs), float(chances.sum(axis=1) @ grid.ys))
+    return sorted(robots, key=lambda name: (math.dist(poses[name][:2], centre), name))

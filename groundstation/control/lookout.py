@@ -1,0 +1,110 @@
+"""What pictures do not show: targets that are searched for, robots that are missed, and what a person should know."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+from groundstation.bus.messages import SearchedPicture, Severity, TargetSearch
+from groundstation.bus.notice import Notice
+from groundstation.control.excursion import Excursions
+from groundstation.control.missing_robots import MissingRobots
+from groundstation.control.parameters import ControlParameters
+from groundstation.control.search_parameters import SearchParameters
+from groundstation.control.stand import Stand
+from groundstation.control.target_search import Search, SearchMode, SearchState
+from groundstation.estimation.belief import JointBelief
+from groundstation.sensing.models import SensorSuite
+from groundstation.time_units import NS_PER_S
+
+_CALL_REMEDY = "check its marker and the light; drive it into the middle of the room; or land the team"
+_ROBOT_REMEDY = "check its marker and that camera; land it if it strays"
+
+
+class Lookout:
+    """Use: `take` pictures, `advance` with each belief; read `targets`, `missing`, `missed_s`, `take_notices`."""
+
+    def __init__(
+        self, search: SearchParameters, control: ControlParameters, sensors: SensorSuite,
+        robots: Sequence[str], targets: Sequence[str],
+    ) -> None:  # fmt: skip
+        self._excursions = Excursions(control, sensors)
+        self._search = Search(search, control.lost_after_s, sensors, targets, self._excursions)
+        self._robots = MissingRobots(sensors, robots)
+        self._names = tuple(robots)
+        self._notices: list[Notice] = []
+
+    @property
+    def targets(self) -> Mapping[str, SearchState]:
+        """Return how the search for each target stands."""
+        return self._search.targets
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Return the targets that are searched for."""
+        return tuple(name for name in self.targets if self._search.is_missing(name))
+
+    @property
+    def missed_s(self) -> Mapping[str, float]:
+        """Return since when cameras should see which robots and do not [s]."""
+        return self._robots.missed_s
+
+    def take(self, picture: SearchedPicture) -> None:
+        """Take a picture that was searched all over."""
+        self._search.take(picture)
+        self._robots.take(picture)
+
+    def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
+        """Count all pictures; returns the targets that are not where the belief has them any more.
+
+        ages_s: since each airborne robot and each target was last seen; infinite: not in the belief.
+        """
+        self._excursions.unseen_s = {name: age_s for name, age_s in ages_s.items() if name in self._names}
+        for name in self._robots.advance(belief, self._excursions.unseen_s):
+            text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
+            self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))
+        before = {name: state.mode for name, state in self.targets.items()}
+        gone = self._search.advance(belief, {name: age_s for name, age_s in ages_s.items() if name in before})
+        self._tell(before)
+        return gone
+
+    def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
+        """Return where robots look for targets."""
+        before = {name: state.mode for name, state in self.targets.items()}
+        found = self._search.stands(robots, targets, belief)
+        self._tell(before)
+        return found
+
+    def searches(self, now_ns: int) -> tuple[TargetSearch, ...]:
+        """Return how the search for each target that is searched for stands, for people."""
+        return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
+
+    def take_notices(self) -> list[Notice]:
+        """Return and forget what the operator should know."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def _tell(self, before: Mapping[str, SearchMode]) -> None:
+        """Say of each target that a search for it began, ended, or became hopeless."""
+        for name, state in self.targets.items():
+            if state.mode is before[name]:
+                continue
+            if state.mode is SearchMode.LOST:
+                text = f"{name} is not found: {state.excluded:.0%} of the room was searched"
+                self._notices.append(Notice(Severity.ERROR, text, _CALL_REMEDY, name))
+            elif state.mode is SearchMode.SEARCH:
+                place = state.room.likeliest() if state.room is not None else (0.0, 0.0)
+                text = f"{name} is not where it was expected: the team searches around ({place[0]:.1f}, {place[1]:.1f})"
+                self._notices.append(Notice(Severity.WARNING, text, "", name))
+            else:
+                self._notices.append(Notice(Severity.INFO, f"{name} is found", "", name))
+
+
+def _message(name: str, state: SearchState, now_ns: int) -> TargetSearch:
+    since_s = (now_ns - state.since_ns) / NS_PER_S
+    x, y = state.place or (0.0, 0.0)
+    how_long = "nobody can search now" if state.expected_s is None else f"about {state.expected_s:.0f} s more"
+    done = f"{state.excluded:.0%} of the room done"
+    text = f"searched for {since_s:.0f} s, now around ({x:.1f}, {y:.1f}); {done}, {how_long}"
+    if state.mode is SearchMode.LOST:
+        text = f"not found in {since_s:.0f} s, {done}: {_CALL_REMEDY}"
+    expected_s = None if state.expected_s is None else round(state.expected_s, 1)
+    place = (round(x, 2), round(y, 2))
+    return TargetSearch(name, str(state.mode), round(since_s, 1), place, round(state.excluded, 3), expected_s, text)

@@ -1,0 +1,58 @@
+"""Settings of the search for targets that are not seen."""
+
+from dataclasses import dataclass
+
+from groundstation.field.resolved import ResolvedField
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SearchParameters:
+    """How a target that is not seen is searched for.
+
+    room_m: size along x and y; observers: robots and world-fixed cameras that may see targets; height_m: of the search;
+    begin_after_s: unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is
+    where it was predicted below which the search begins, though `lost_after_s` is not over; speed_m_s, yaw_rate_rad_s:
+    as fast as pictures stay sharp and follow each other densely enough; patience_s: what is seen so much later counts
+    1/e; keep_gain: another stand must promise so much more; drift_m_s: how fast a robot's place becomes uncertain out
+    of sight; starts_ahead_m: how far before the team a target is expected that was never seen; target_speed_m_s,
+    target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so
+    long a search that excluded so much of the room a person is asked.
+    """
+
+    room_m: tuple[float, float]
+    fence_x_m: Interval
+    fence_y_m: Interval
+    height_m: float
+    observers: tuple[str, ...]
+    apart_m: float = 1.0
+    fence_inset_m: float = 0.3
+    begin_after_s: float = 0.6
+    given_up_below: float = 0.3
+    speed_m_s: float = 0.5
+    yaw_rate_rad_s: float = 0.8
+    look_s: float = 0.4
+    patience_s: float = 10.0
+    keep_gain: float = 1.3
+    plan_period_s: float = 0.3
+    drift_m_s: float = 0.04
+    starts_ahead_m: float = 1.2
+    target_speed_m_s: float = 0.3
+    target_straight_s: float = 2.0
+    lost_after_s: float = 45.0
+    lost_excluded: float = 0.85
+
+
+def search_from_field(field: ResolvedField) -> SearchParameters:
+    """Return the settings of a resolved field."""
+    room, planner = field.room, field.planner
+    cameras = tuple(name for name, camera in field.cameras.items() if "targets" in camera.observes)
+    return SearchParameters(
+        room_m=(room.size_m[0], room.size_m[1]),
+        fence_x_m=room.fence.x_m,
+        fence_y_m=room.fence.y_m,
+        height_m=planner.level_heights_m[0][0],
+        observers=(*field.drones, *cameras),
+        apart_m=max(1.0, planner.separation_m),
+    )

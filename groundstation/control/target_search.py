@@ -1,0 +1,227 @@
+"""What is known of targets that are not seen, and where the team looks for them: maps in place of Gaussians."""
+
+from collections import deque
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.bus.messages import SearchedPicture
+from groundstation.control.coverage import Outlook, choose_stands, lattice_of, robots_in_order
+from groundstation.control.excursion import Excursions
+from groundstation.control.search_parameters import SearchParameters
+from groundstation.control.stand import Stand
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
+from groundstation.sensing.detection import detection_map
+from groundstation.sensing.footprint import footprint_of
+from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.visibility import camera_rows
+from groundstation.time_units import NS_PER_S
+
+_HISTORY = 50  # beliefs that pictures may be as old as: a second at 50 Hz
+_SHOWN_NS = 1_500_000_000  # pictures are searched all over twice a second
+_STEP_NS = 100_000_000  # of the maps' motion
+_SLOW_SEARCH_S = 999.0
+
+
+class SearchMode(StrEnum):
+    """What the team does about one target."""
+
+    TRACK = "TRACK"  # it is seen, or was just now
+    SEARCH = "SEARCH"  # it is looked for where it may be
+    LOST = "LOST"  # it was looked for nearly everywhere: a person is asked
+
+
+@dataclass(frozen=True, slots=True)
+class SearchState:
+    """How the search for one target stands.
+
+    since_ns: since when the mode holds; place: where it most likely is [m; world]; excluded: share of the floor where
+    it is not; expected_s: about how long finding it takes.
+    """
+
+    mode: SearchMode
+    since_ns: int
+    room: RoomMap | None = None
+    place: tuple[float, float] | None = None
+    excluded: float = 0.0
+    expected_s: float | None = None
+    given_up: bool = False
+
+
+class Search:
+    """Maps of the targets that are not seen, updated by pictures without them, and the stands of those that search.
+
+    Use: `take` the pictures, `advance` with each belief, read `targets`, ask for `stands`.
+    """
+
+    def __init__(
+        self, parameters: SearchParameters, lost_after_s: float, sensors: SensorSuite, targets: Sequence[str],
+        excursions: Excursions,
+    ) -> None:  # fmt: skip
+        self.parameters = parameters
+        self.grid = RoomGrid.over(*parameters.room_m)
+        self.targets: dict[str, SearchState] = {name: SearchState(SearchMode.SEARCH, 0) for name in targets}
+        self._lost_after_s, self._sensors, self._excursions = lost_after_s, sensors, excursions
+        observers = [name for name in parameters.observers if name in sensors.onboard or name in sensors.world]
+        self._cameras = {
+            name: camera_rows([sensors.onboard.get(name) or sensors.world[name]], sensors.softness)
+            for name in observers
+        }
+        marker_m = max((sensors.marker_height_m[name] for name in targets), default=0.0)
+        self._footprints = {
+            name: footprint_of(camera, self.grid.cell_m, parameters.height_m, marker_m, sensors.softness)
+            for name, camera in sensors.onboard.items()
+            if name in parameters.observers
+        }
+        self._lattice = lattice_of(self.grid, parameters)
+        self._pictures: list[SearchedPicture] = []
+        self._history: deque[JointBelief] = deque(maxlen=_HISTORY)
+        self._moved_ns = 0
+        self._shown_ns: dict[str, int] = {}
+        self._outlook = Outlook({}, 0.0, np.inf)
+        self._planned: tuple[int, tuple[str, ...], tuple[str, ...]] = (0, (), ())
+
+    def take(self, picture: SearchedPicture) -> None:
+        """Take a picture that was searched; it counts with the next `advance`."""
+        if picture.observer in self._cameras:
+            self._pictures.append(picture)
+            self._shown_ns.update(dict.fromkeys(picture.found, picture.header.stamp_ns))
+
+    def is_missing(self, name: str) -> bool:
+        """Return whether a target is searched for."""
+        return self.targets[name].mode is not SearchMode.TRACK
+
+    def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
+        """Bring the maps to a belief; returns the targets that are not where the belief has them any more.
+
+        ages_s: since each target was last seen (infinite: not in the belief).
+        """
+        self._history.append(belief)
+        now_ns = belief.stamp_ns
+        dropped = []
+        for name, age_s in ages_s.items():
+            before = self.targets[name]
+            after = self._begun(name, before, belief, age_s)
+            if after.given_up and not before.given_up and name in belief.layout:
+                dropped.append(name)
+            self.targets[name] = after
+        self._move(now_ns)
+        pictures, self._pictures = self._pictures, []
+        for picture in pictures:
+            self._look(picture, now_ns)
+        return tuple(dropped)
+
+    def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
+        """Return where robots look for targets now, none within a column of another; some may have nowhere to go."""
+        wanted = tuple(name for name in sorted(targets) if name in self.targets and self.targets[name].room is not None)
+        able = tuple(name for name in robots if name in self._footprints)
+        planned_ns, of_robots, of_targets = self._planned
+        recent = belief.stamp_ns - planned_ns < self.parameters.plan_period_s * NS_PER_S
+        if not (recent and (able, wanted) == (of_robots, of_targets)):
+            self._planned = belief.stamp_ns, able, wanted
+            self._outlook = self._choose(able, wanted, belief)
+            self._judge(belief.stamp_ns)
+        return self._outlook.stands
+
+    def _choose(self, robots: Sequence[str], targets: Sequence[str], belief: JointBelief) -> Outlook:
+        rooms = [room for name in targets if (room := self.targets[name].room) is not None]
+        if not rooms or not robots:
+            return Outlook({}, 0.0, np.inf)
+        chances: Array = np.sum([room.chances for room in rooms], axis=0) / len(rooms)
+        poses = {name: belief.mean_of(name)[:4] for name in robots}
+        order = robots_in_order(robots, chances, poses, self.grid)
+        footprints = {name: self._footprints[name] for name in order}
+        allowed_s = {name: self._excursions.allowed_s(name, belief, self._lattice.places) for name in robots}
+        held = self._outlook.stands
+        return choose_stands(chances, self._lattice, footprints, poses, allowed_s, held, self.parameters)
+
+    def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
+        p, now_ns = self.parameters, belief.stamp_ns
+        # A picture that shows it elsewhere than it was predicted is the filter's business, not a reason to search.
+        shown = now_ns - self._shown_ns.get(name, -_SHOWN_NS) < _SHOWN_NS and name in belief.layout
+        if age_s <= p.begin_after_s or shown:
+            return (
+                state
+                if state.mode is SearchMode.TRACK and state.room is None
+                else SearchState(SearchMode.TRACK, now_ns)
+            )
+        if name not in belief.layout:
+            if not belief.layout.robots or (state.room is not None and state.given_up):
+                return state
+            return SearchState(SearchMode.SEARCH, now_ns, self._anywhere(belief), given_up=True)
+        mean, covariance = belief.mean_of(name)[:2], belief.covariance_of(name)[:2, :2]
+        room = state.room or lost_at(self.grid, mean, covariance)
+        state = replace(state, room=room)
+        if state.given_up:
+            return state
+        if room.mass_near(mean, covariance, 2.0, 0.5) < p.given_up_below:
+            since_ns = state.since_ns if state.mode is SearchMode.SEARCH else now_ns
+            return replace(state, mode=SearchMode.SEARCH, since_ns=since_ns, given_up=True)
+        if age_s > self._lost_after_s and state.mode is SearchMode.TRACK:
+            return replace(state, mode=SearchMode.SEARCH, since_ns=now_ns)
+        return state
+
+    def _anywhere(self, belief: JointBelief) -> RoomMap:
+        """Return the map of a target that was never seen: rather before the team, which starts towards it."""
+        ahead_m = self.parameters.starts_ahead_m
+        poses = (belief.mean_of(name) for name in belief.layout.robots)
+        places = [(float(p[0] + ahead_m * np.cos(p[3])), float(p[1] + ahead_m * np.sin(p[3]))) for p in poses]
+        return unknown_place(self.grid, places)
+
+    def _move(self, now_ns: int) -> None:
+        """Let the targets of the maps drive on, in steps."""
+        if now_ns - self._moved_ns < _STEP_NS:
+            return
+        self._moved_ns = now_ns
+        p = self.parameters
+        variance = p.target_speed_m_s**2 * p.target_straight_s * _STEP_NS / NS_PER_S
+        for name, state in self.targets.items():
+            if state.room is not None:
+                self.targets[name] = replace(state, room=state.room.moved(variance))
+
+    def _look(self, picture: SearchedPicture, now_ns: int) -> None:
+        """Count a picture for all targets that it does not show."""
+        pose, slack_m = self._pose_at(picture.observer, picture.header.stamp_ns)
+        missing = [name for name, state in self.targets.items() if state.room is not None and name not in picture.found]
+        if pose is None or not missing:
+            return
+        for name in missing:
+            state = self.targets[name]
+            assert state.room is not None
+            camera, height_m = self._cameras[picture.observer][0], self._sensors.marker_height_m[name]
+            chance = detection_map(camera, pose, slack_m, self.grid.xs, self.grid.ys, height_m)
+            self.targets[name] = replace(state, room=state.room.emptied(chance))
+
+    def _pose_at(self, observer: str, stamp_ns: int) -> tuple[Array | None, float]:
+        """Return where a camera's carrier was, and its standard deviation; None if that is not known."""
+        if observer in self._sensors.world:
+            return np.zeros(4), 0.0
+        if not self._history or not self._history[0].stamp_ns <= stamp_ns <= self._history[-1].stamp_ns:
+            return None, 0.0
+        belief = min(self._history, key=lambda one: abs(one.stamp_ns - stamp_ns))
+        if observer not in belief.layout:
+            return None, 0.0
+        variance = float(np.diag(belief.covariance_of(observer))[:2].max())
+        return np.array(belief.mean_of(observer)[:4]), variance**0.5
+
+    def _judge(self, now_ns: int) -> None:
+        """Say how each search stands, and which has become hopeless."""
+        p, outlook = self.parameters, self._outlook
+        expected_s = min(_SLOW_SEARCH_S, (outlook.after_s + p.look_s) / outlook.chance) if outlook.chance > 0 else None
+        for name, state in self.targets.items():
+            if state.room is None or state.mode is SearchMode.TRACK:
+                continue
+            excluded = state.room.excluded()
+            lasted_s = (now_ns - state.since_ns) / NS_PER_S
+            lost = state.mode is SearchMode.LOST or (lasted_s > p.lost_after_s and excluded > p.lost_excluded)
+            self.targets[name] = replace(
+                state,
+                mode=SearchMode.LOST if lost else SearchMode.SEARCH,
+                place=state.room.likeliest(),
+                excluded=excluded,
+                expected_s=expected_s,
+            )

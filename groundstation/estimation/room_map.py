@@ -1,0 +1,143 @@
+"""Where in the room a target is that is not seen: probabilities on a grid, that it stands there, that it drives there.
+
+Two hypotheses are kept, since what was searched stays empty of a target that stands, and does not of one that drives.
+Every operation returns a new value.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.arrays import Array
+
+MOST_CELLS = 2400
+STANDS_SHARE = 0.6
+"""Prior of a target that is not seen: it stands."""
+
+# Of a target that was seen just now and is not where it was predicted: it is there all the same, near, anywhere.
+_THERE, _NEAR, _ANYWHERE = 0.75, 0.2, 0.05
+_NEAR_M = 1.2
+_HINTED = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class RoomGrid:
+    """Square cells over the floor of a room whose origin is in the middle: their size and centres [m; world]."""
+
+    cell_m: float
+    xs: Array
+    ys: Array
+
+    @classmethod
+    def over(cls, size_x_m: float, size_y_m: float, cell_m: float = 0.2) -> "RoomGrid":
+        """Return the grid of a room, with larger cells where there would be too many."""
+        cell_m = max(cell_m, math.sqrt(size_x_m * size_y_m / MOST_CELLS))
+        return cls(cell_m, _centres(size_x_m, cell_m), _centres(size_y_m, cell_m))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Return (rows along y, columns along x)."""
+        return len(self.ys), len(self.xs)
+
+
+@dataclass(frozen=True, slots=True)
+class RoomMap:
+    """Probabilities by cell (rows along y, columns along x): that it is there and stands, and is there and drives.
+
+    overlooked: chance that all pictures since the beginning would have missed a target standing there.
+    """
+
+    grid: RoomGrid
+    stands: Array
+    drives: Array
+    overlooked: Array
+
+    @property
+    def chances(self) -> Array:
+        """Return the probability of each cell; their sum is 1."""
+        return self.stands + self.drives
+
+    def moved(self, variance_m2: float) -> "RoomMap":
+        """Return the map after the target, if it drives, went about: the variance that this adds to each axis.
+
+        Walls keep it in. variance_m2: at most half the square of a cell.
+        """
+        share = min(0.5 * variance_m2 / self.grid.cell_m**2, 0.25)
+        drives = self.drives
+        for axis in (0, 1):
+            drives = _smoothed(drives, axis, share)
+        return replace(self, drives=drives)
+
+    def emptied(self, chance: Array) -> "RoomMap":
+        """Return the map after a picture without the target; chance: with which it shows a target in each cell."""
+        missed = 1.0 - chance
+        stands, drives = self.stands * missed, self.drives * missed
+        total = float(stands.sum() + drives.sum())
+        if total <= 1e-9:
+            return replace(unknown_place(self.grid), overlooked=self.overlooked * missed)
+        return RoomMap(self.grid, stands / total, drives / total, self.overlooked * missed)
+
+    def mass_near(self, mean: Sequence[float] | Array, covariance: Array, sigmas: float, least_m: float) -> float:
+        """Return the probability that the target is within some standard deviations of a place, or a least distance."""
+        dx, dy = self.grid.xs[None, :] - mean[0], self.grid.ys[:, None] - mean[1]
+        square = _squared_distance(dx, dy, covariance)
+        near = (square <= sigmas**2) | (dx * dx + dy * dy <= least_m**2)
+        return float(self.chances[near].sum())
+
+    def excluded(self) -> float:
+        """Return the share of the room that was searched: the chance that a standing target would have been found."""
+        return 1.0 - float(np.mean(self.overlooked))
+
+    def likeliest(self) -> tuple[float, float]:
+        """Return the centre of the likeliest cell [m; world]."""
+        row, column = np.unravel_index(int(np.argmax(self.chances)), self.grid.shape)
+        return float(self.grid.xs[column]), float(self.grid.ys[row])
+
+
+def unknown_place(grid: RoomGrid, hints: Sequence[tuple[float, float]] = ()) -> RoomMap:
+    """Return the map of a target that was never seen: anywhere, and rather near the middle of some places."""
+    even = np.full(grid.shape, 1.0 / (grid.shape[0] * grid.shape[1]))
+    if not hints:
+        return _shared(grid, even)
+    x, y = np.mean(hints, axis=0)
+    near = np.exp(-np.hypot(grid.xs[None, :] - x, grid.ys[:, None] - y) / _NEAR_M)
+    return _shared(grid, _HINTED * near / near.sum() + (1.0 - _HINTED) * even)
+
+
+def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) -> RoomMap:
+    """Return the map of a target that was predicted at a Gaussian place (2), (2, 2) and is not seen any more.
+
+    It may also have been carried away, so places near to it and the whole room have their share.
+    """
+    dx, dy = grid.xs[None, :] - mean[0], grid.ys[:, None] - mean[1]
+    wide = np.asarray(covariance) + (0.5 * grid.cell_m) ** 2 * np.eye(2)
+    square = _squared_distance(dx, dy, wide)
+    there = np.exp(-0.5 * (square - square.min()))
+    near = np.exp(-np.hypot(dx, dy) / _NEAR_M)
+    chances = _THERE * there / there.sum() + _NEAR * near / near.sum() + _ANYWHERE / there.size
+    return _shared(grid, chances)
+
+
+def _squared_distance(dx: Array, dy: Array, covariance: Array) -> Array:
+    """Return the squared Mahalanobis distance of places (dx, dy) from a mean with this covariance (2, 2)."""
+    xx, xy, yy = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+
+
+def _shared(grid: RoomGrid, chances: Array) -> RoomMap:
+    return RoomMap(grid, STANDS_SHARE * chances, (1.0 - STANDS_SHARE) * chances, np.ones(grid.shape))
+
+
+def _centres(size_m: float, cell_m: float) -> Array:
+    count = max(1, round(size_m / cell_m))
+    return (np.arange(count, dtype=np.float64) - (count - 1) / 2) * cell_m
+
+
+def _smoothed(values: Array, axis: int, share: float) -> Array:
+    """Return values of which each cell gave a share to either neighbour along an axis; walls give it back."""
+    padded = np.concatenate((values.take([0], axis), values, values.take([-1], axis)), axis)
+    count = padded.shape[axis]
+    before, after = padded.take(range(count - 2), axis), padded.take(range(2, count), axis)
+    return (1.0 - 2.0 * share) * values + share * (before + after)

@@ -1,0 +1,70 @@
+"""What a robot's camera sees of the floor from where it stands, in cells of a grid."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import IntVector, Matrix, Vector
+from groundstation.kernel import kernel
+from groundstation.sensing.detection import detection_map
+from groundstation.sensing.models import OnboardCameraModel, Softness
+from groundstation.sensing.visibility import camera_rows
+
+HEADINGS = 12
+_LEAST = 0.05  # a chance below it is not counted
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """The cells that a robot's camera sees from the centre of a cell, for each heading: row, column, chance.
+
+    first (HEADINGS + 1): where the cells of a heading begin.
+    """
+
+    rows: IntVector
+    columns: IntVector
+    chances: Vector
+    first: IntVector
+
+
+def footprint_of(
+    camera_model: OnboardCameraModel, cell_m: float, height_m: float, marker_m: float, soft: Softness
+) -> Footprint:
+    """Return what a robot at a height sees with its camera of markers at another."""
+    camera = camera_rows([camera_model], soft)[0]
+    half = math.ceil((camera_model.view.range_m + 0.5) / cell_m)
+    around = np.arange(-half, half + 1, dtype=np.float64) * cell_m
+    rows, columns, chances, first = [], [], [], [0]
+    for heading in range(HEADINGS):
+        pose = np.array([0.0, 0.0, height_m, math.tau * heading / HEADINGS])
+        seen = detection_map(camera, pose, 0.0, around, around, marker_m)
+        at = np.nonzero(seen > _LEAST)
+        rows.append(at[0] - half)
+        columns.append(at[1] - half)
+        chances.append(seen[at])
+        first.append(first[-1] + len(at[0]))
+    return Footprint(
+        np.concatenate(rows).astype(np.int64),
+        np.concatenate(columns).astype(np.int64),
+        np.concatenate(chances),
+        np.array(first, dtype=np.int64),
+    )
+
+
+@kernel()
+def seen_from(
+    chances: Matrix, at_row: IntVector, at_column: IntVector,
+    rows: IntVector, columns: IntVector, seen: Vector, first: IntVector,
+) -> Matrix:  # fmt: skip
+    """Return the probability that a picture shows the target, by stand (its cell) and heading."""
+    found = np.zeros((at_row.shape[0], first.shape[0] - 1))
+    for stand in range(at_row.shape[0]):
+        for heading in range(first.shape[0] - 1):
+            total = 0.0
+            for k in range(first[heading], first[heading + 1]):
+                row, column = at_row[stand] + rows[k], at_column[stand] + columns[k]
+                if 0 <= row < chances.shape[0] and 0 <= column < chances.shape[1]:
+                    total += chances[row, column] * seen[k]
+            found[stand, heading] = total
+    return found

@@ -1,0 +1,55 @@
+"""What the operator is told of searches and of robots that are missed."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from groundstation.bus.messages import Header, SearchedPicture, Severity
+from groundstation.control.lookout import Lookout
+from groundstation.control.parameters import control_from_field
+from groundstation.control.search_parameters import search_from_field
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+
+LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
+
+
+def belief(stamp_s: float) -> JointBelief:
+    layout = StateLayout().with_entity("drone_1", EntityKind.ROBOT, ROBOT_CORE)
+    layout = layout.with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+    mean, variances = np.array([0.0, 0.0, 1.6, 0.0, 1.0, 0.0, 0.0, 0.0]), [0.03**2] * 4 + [0.1**2] * 4
+    return JointBelief(mean, np.diag(variances), layout, round(stamp_s * 1e9))
+
+
+def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() -> None:
+    lookout = Lookout(
+        search_from_field(LAB), control_from_field(LAB), sensors_from_field(LAB), ("drone_1",), ("turtlebot",)
+    )
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1})
+    lookout.take_notices()
+    assert lookout.searches(0) == ()
+    for tick in range(1, 80):
+        now_s = 0.02 * (tick + 1)
+        header = Header(round(now_s * 1e9), "c", "drone_1", "drone_1_camera", tick)
+        if tick % 5 == 0:
+            lookout.take(SearchedPicture(header=header, observer="drone_1", camera="drone_1_camera"))
+        lookout.advance(belief(now_s), {"drone_1": 0.1, "turtlebot": now_s})
+        lookout.stands(("drone_1",), lookout.missing, belief(now_s))
+    (notice,) = lookout.take_notices()
+    assert notice.severity is Severity.WARNING
+    assert notice.entity == "turtlebot"
+    assert "searches around" in notice.text
+    (search,) = lookout.searches(round(1.6e9))
+    assert (search.target, search.mode) == ("turtlebot", "SEARCH")
+    assert 0.0 < search.since_s < 1.6
+    assert 0.0 < search.searched < 0.5
+    assert search.expected_s is not None
+    assert math.hypot(search.place_m[0] - 1.0, search.place_m[1]) > 0.2
+    assert "of the room done" in search.text
+    lookout.advance(belief(1.7), {"drone_1": 0.1, "turtlebot": 0.1})
+    assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
+    assert lookout.searches(round(1.7e9)) == ()

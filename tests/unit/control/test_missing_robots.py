@@ -1,0 +1,63 @@
+"""A robot that a fixed camera should see and does not is missed; one that may be hidden is not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import Header, SearchedPicture
+from groundstation.control.missing_robots import MissingRobots
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+
+SENSORS = sensors_from_field(resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml")))
+NAMES = ("drone_1", "drone_2")
+
+
+def belief(first: tuple[float, ...], second: tuple[float, ...], stamp_ns: int, std_m: float = 0.05) -> JointBelief:
+    layout = StateLayout()
+    for name in NAMES:
+        layout = layout.with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
+    return JointBelief(np.array([*first, *second]), std_m**2 * np.eye(8), layout, stamp_ns)
+
+
+def missed(
+    first: tuple[float, ...], second: tuple[float, ...], age_s: float = 2.0, std_m: float = 0.05
+) -> tuple[list[str], MissingRobots]:
+    """Return whom ten pictures without drone_1 let miss."""
+    said: list[str] = []
+    watch = MissingRobots(SENSORS, NAMES)
+    for tick in range(1, 11):
+        stamp_ns = tick * 100_000_000
+        header = Header(stamp_ns, "c", "ceiling", "ceiling", tick)
+        watch.take(SearchedPicture(header=header, observer="ceiling", camera="ceiling", found=("drone_2",)))
+        said += watch.advance(belief(first, second, stamp_ns, std_m), {"drone_1": age_s, "drone_2": 0.1})
+    return said, watch
+
+
+def test_one_that_should_be_seen_is_missed_once_and_until_it_is_seen() -> None:
+    said, watch = missed((0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0))
+    assert said == ["drone_1"]
+    assert watch.missed_s["drone_1"] == pytest.approx(0.6, abs=0.11)
+    watch.advance(belief((0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 2_000_000_000), {"drone_1": 0.1, "drone_2": 0.1})
+    assert watch.missed_s == {}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "age_s", "std_m"),
+    [
+        ((2.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 2.0, 0.05),  # out of view
+        ((0.5, 0.2, 1.1, 0.0), (0.4, 0.2, 1.9, 0.0), 2.0, 0.05),  # below another
+        ((0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 0.3, 0.05),  # seen just now, by whomever
+        ((0.9, 0.4, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 2.0, 0.4),  # not known well enough to be sure
+    ],
+)
+def test_one_that_may_well_not_be_seen_is_not_missed(
+    first: tuple[float, ...], second: tuple[float, ...], age_s: float, std_m: float
+) -> None:
+    said, watch = missed(first, second, age_s, std_m)
+    assert said == []
+    assert watch.missed_s == {}

@@ -1,0 +1,134 @@
+"""A team without its target covers the whole room, each from its own stand, and the maps follow the pictures."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import Header, SearchedPicture
+from groundstation.control.excursion import Excursions
+from groundstation.control.parameters import control_from_field
+from groundstation.control.search_parameters import SearchParameters, search_from_field
+from groundstation.control.target_search import Search, SearchMode
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.sensing.detection import detection
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.visibility import camera_rows
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+
+LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
+SENSORS, CONTROL, SEARCH = sensors_from_field(LAB), control_from_field(LAB), search_from_field(LAB)
+NAMES = ("drone_1", "drone_2")
+TICK_S = 0.1
+
+
+def belief(poses: dict[str, np.ndarray], stamp_s: float, target: tuple[float, float] | None = None) -> JointBelief:
+    layout, mean, variances = StateLayout(), [], []
+    for name, pose in poses.items():
+        layout = layout.with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
+        mean += pose.tolist()
+        variances += [0.03**2] * 4
+    if target is not None:
+        layout = layout.with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+        mean += [*target, 0.0, 0.0]
+        variances += [0.1**2] * 4
+    return JointBelief(np.array(mean), np.diag(variances), layout, round(stamp_s * 1e9))
+
+
+def picture(observer: str, stamp_s: float, *found: str) -> SearchedPicture:
+    header = Header(round(stamp_s * 1e9), "c", observer, observer, round(stamp_s * 100))
+    return SearchedPicture(header=header, observer=observer, camera=f"{observer}_camera", found=found)
+
+
+def new_search(parameters: SearchParameters = SEARCH) -> Search:
+    return Search(parameters, CONTROL.lost_after_s, SENSORS, ("turtlebot",), Excursions(CONTROL, SENSORS))
+
+
+def fly(
+    place: tuple[float, float], limit_s: float = 60.0, parameters: SearchParameters = SEARCH
+) -> tuple[float, float, Search]:
+    """Return when two drones that fly from stand to stand see a target at rest, and how near their stands came."""
+    search, rng = new_search(parameters), np.random.default_rng(1)
+    poses = {"drone_1": np.array([-0.5, 0.5, 1.6, 0.0]), "drone_2": np.array([-0.5, -0.5, 1.6, 0.0])}
+    cameras = {name: camera_rows([SENSORS.onboard[name]], SENSORS.softness)[0] for name in NAMES}
+    nearest = math.inf
+    for tick in range(round(limit_s / TICK_S)):
+        now_s = TICK_S * (tick + 1)
+        now = belief(poses, now_s)
+        for name in NAMES:
+            if tick % 5 == 0:
+                seen = detection(cameras[name], poses[name], 0.0, *place, 0.4) > rng.random()
+                if seen:
+                    return now_s, nearest, search
+                search.take(picture(name, now_s))
+        search.advance(now, {"turtlebot": math.inf})
+        stands = search.stands(NAMES, ("turtlebot",), now)
+        if len(stands) == 2:
+            a, b = stands.values()
+            nearest = min(nearest, math.hypot(a.x - b.x, a.y - b.y))
+        for name, stand in stands.items():
+            way = np.array([stand.x, stand.y]) - poses[name][:2]
+            poses[name][:2] += way * min(1.0, SEARCH.speed_m_s * TICK_S / max(float(np.hypot(*way)), 1e-9))
+            turn = math.remainder(stand.yaw - poses[name][3], math.tau)
+            poses[name][3] += max(-0.08, min(0.08, turn))
+    return limit_s, nearest, search
+
+
+@pytest.mark.parametrize("place", [(2.8, 1.8), (-3.5, -2.5)])
+def test_a_target_at_rest_is_found_wherever_it_stands_and_stands_are_apart(place: tuple[float, float]) -> None:
+    found_s, nearest, _ = fly(place)
+    assert found_s < 45.0
+    assert nearest >= SEARCH.apart_m - 1e-9
+
+
+def test_a_target_that_is_nowhere_is_said_to_be_lost_when_the_room_was_searched() -> None:
+    soon = replace(SEARCH, lost_after_s=5.0, lost_excluded=0.2)
+    before = fly((30.0, 0.0), 4.0, soon)[2].targets["turtlebot"]
+    after = fly((30.0, 0.0), 14.0, soon)[2].targets["turtlebot"]
+    assert (before.mode, after.mode) == (SearchMode.SEARCH, SearchMode.LOST)
+    assert after.excluded > 0.2 > before.excluded > 0.01
+    assert before.expected_s is not None
+    assert before.expected_s > 5.0
+
+
+def test_a_target_that_a_few_pictures_do_not_show_is_no_longer_where_it_was() -> None:
+    search, poses = new_search(), {"drone_1": np.array([0.0, 0.0, 1.6, 0.0])}
+    for tick in range(60):
+        now_s, age_s = 0.02 * (tick + 1), 0.02 * tick
+        if tick in (50, 53, 56):
+            search.take(picture("drone_1", now_s))
+        gone = search.advance(belief(poses, now_s, (1.0, 0.0)), {"turtlebot": age_s})
+        if tick < 50:
+            assert search.targets["turtlebot"].mode is SearchMode.TRACK
+        if gone:
+            break
+    assert gone == ("turtlebot",)
+    assert tick > 53
+    assert search.is_missing("turtlebot")
+    search.advance(belief(poses, now_s + 0.02, (2.0, 1.0)), {"turtlebot": 0.1})
+    assert search.targets["turtlebot"].mode is SearchMode.TRACK
+    assert search.targets["turtlebot"].room is None
+
+
+def test_pictures_that_show_it_or_look_elsewhere_change_nothing() -> None:
+    search, poses = new_search(), {"drone_1": np.array([0.0, 0.0, 1.6, math.pi])}
+    search.advance(belief(poses, 0.01, (1.0, 0.0)), {"turtlebot": 0.1})
+    for tick in range(60):
+        now_s = 0.02 * (tick + 1)
+        search.take(picture("drone_1", now_s))
+        search.take(picture("ceiling", now_s))
+        search.take(picture("nobody", now_s))
+        assert search.advance(belief(poses, now_s, (1.0, 0.0)), {"turtlebot": 1.0}) == ()
+    assert search.targets["turtlebot"].mode is SearchMode.TRACK
+
+
+def test_the_same_pictures_give_the_same_maps_to_the_bit() -> None:
+    first, second = fly((3.5, -2.5), 6.0)[2], fly((3.5, -2.5), 6.0)[2]
+    a, b = first.targets["turtlebot"].room, second.targets["turtlebot"].room
+    assert a is not None
+    assert b is not None
+    assert np.array_equal(a.chances, b.chances)

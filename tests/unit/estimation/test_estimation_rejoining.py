@@ -1,0 +1,96 @@
+"""How often beliefs may be given up for one observer: several at once, or one again and again, speak against it."""
+
+import math
+
+import numpy as np
+
+from groundstation.bus.messages import Verdict
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.measurement import Correction, Measurement, OdometrySample
+from groundstation.estimation.models import FixedMount, MountedCamera, OdometryRobot
+from groundstation.estimation.models.protocol import MotionModel
+from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
+
+MS = 1_000_000
+START = 10_000_000_000_000
+COVARIANCE = tuple(np.diag([1e-4, 1e-4, 1e-4, 1e-3]).ravel().tolist())
+FLIGHT_M = 1.3
+PLACES = {"a": (-1.0, 0.0), "b": (1.0, 0.3)}
+
+
+class Team:
+    """Two drones that hover below a ceiling camera, which sees both at 10 Hz, each displaced as it is said."""
+
+    def __init__(self) -> None:
+        entities: dict[str, MotionModel] = {n: OdometryRobot(marker_position_m=(0.0, 0.0, 0.0)) for n in PLACES}
+        entities["ceiling"] = FixedMount((0.0, 0.0, 4.2), 0.004, 0.01)
+        self.filter = FixedLagFilter(
+            EstimatorParameters(entities, {"ceiling": MountedCamera("ceiling", WORLD_FROM_DOWN)})
+        )
+        self.now = START
+        self.given_up: list[tuple[float, str]] = []
+        self.refused: list[Correction] = []
+        for name in PLACES:
+            self.filter.set_airborne(name, True, self.now, self.now)
+        self.watch(2.0)
+        assert self.given_up == []
+
+    def watch(self, seconds: float, **displaced: tuple[float, float]) -> "Team":
+        for tick in range(round(seconds * 100)):
+            self.now += 10 * MS
+            for name, (x, y) in PLACES.items():
+                self.filter.add_motion(name, OdometrySample(self.now, (0.0, 0.0, 0.0), 0.0, FLIGHT_M), self.now)
+                if tick % 10 == 0:
+                    dx, dy = displaced.get(name, (0.0, 0.0))
+                    seen = (x + dx, -y - dy, 4.2 - FLIGHT_M)
+                    assert (
+                        self.filter.add_observation(
+                            Measurement(self.now, "ceiling", name, seen, 0.0, COVARIANCE), name, self.now
+                        )
+                        is None
+                    )
+            self.filter.advance(self.now)
+            for c in self.filter.take_corrections():
+                if c.joined and c.nis is not None:
+                    self.given_up.append(((self.now - START) / 1e9, c.subject))
+                elif c.verdict is Verdict.IMPLAUSIBLE:
+                    self.refused.append(c)
+        return self
+
+    def place(self, name: str) -> tuple[float, float]:
+        x, y = self.filter.belief().mean_of(name)[:2]
+        return float(x), float(y)
+
+
+def test_a_robot_that_was_carried_off_is_found_at_once() -> None:
+    team = Team().watch(1.5, a=(0.8, 0.0))
+    assert [name for _, name in team.given_up] == ["a"]
+    assert math.dist(team.place("a"), (-0.2, 0.0)) < 0.05
+    assert math.dist(team.place("b"), PLACES["b"]) < 0.05
+
+
+def test_a_camera_that_displaces_all_at_once_has_them_given_up_one_by_one() -> None:
+    team = Team().watch(2.5, a=(0.8, 0.0), b=(0.8, 0.0))
+    assert len(team.given_up) == 1, "the others stay where they were believed"
+    kept = ({*PLACES} - {team.given_up[0][1]}).pop()
+    assert math.dist(team.place(kept), PLACES[kept]) < 0.1
+    assert any("lately had others given up" in c.reason for c in team.refused if c.subject == kept)
+    team.watch(2.5, a=(0.8, 0.0), b=(0.8, 0.0))
+    (first_s, one), (second_s, other) = team.given_up
+    assert one != other and second_s - first_s >= 3.0, "if it insists for longer it is believed"
+
+
+def test_a_camera_that_puts_one_robot_here_and_there_is_soon_heeded_no_more() -> None:
+    team = Team()
+    for turn in range(10):
+        team.watch(1.0, a=(0.9, 0.0) if turn % 2 else (-0.9, 0.0))
+    assert 2 <= len(team.given_up) <= 4, "three in a row, then one in ten seconds"
+    assert math.dist(team.place("b"), PLACES["b"]) < 0.05, "who is seen right stays"
+
+
+def test_years_of_rare_losses_are_never_held_against_anybody() -> None:
+    team, place = Team(), 0.0
+    for _ in range(5):
+        place = 0.8 - place
+        team.watch(11.0, a=(place, 0.0))
+    assert len(team.given_up) == 5

@@ -1,0 +1,75 @@
+"""The map of a target that is not seen: bounded by walls, moved, and emptied by pictures without the target."""
+
+import numpy as np
+import pytest
+
+from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
+
+GRID = RoomGrid.over(8.0, 6.0)
+
+
+def seen_within(x: float, y: float, radius: float, chance: float = 0.7) -> np.ndarray:
+    return chance * (np.hypot(GRID.xs[None, :] - x, GRID.ys[:, None] - y) < radius)
+
+
+def test_cells_cover_the_room_and_never_become_too_many() -> None:
+    assert GRID.shape == (30, 40)
+    assert GRID.xs[[0, -1]] == pytest.approx([-3.9, 3.9])
+    assert GRID.ys[[0, -1]] == pytest.approx([-2.9, 2.9])
+    hall = RoomGrid.over(60.0, 40.0)
+    assert hall.shape[0] * hall.shape[1] <= 2500
+
+
+def test_a_lost_target_is_mostly_where_it_was_predicted_and_a_little_anywhere() -> None:
+    room = lost_at(GRID, (1.0, -0.5), 0.04 * np.eye(2))
+    assert room.chances.sum() == pytest.approx(1.0)
+    assert room.likeliest() == pytest.approx((0.9, -0.5), abs=0.11)
+    near = room.mass_near((1.0, -0.5), 0.04 * np.eye(2), 2.0, 0.5)
+    assert 0.7 < near < 0.9
+    assert room.chances.min() > 0.0
+
+
+def test_a_target_that_was_never_seen_is_rather_where_a_hint_says() -> None:
+    room = unknown_place(GRID, [(-0.5, 0.5), (-0.5, -0.5)])
+    assert room.chances.sum() == pytest.approx(1.0)
+    assert room.likeliest() == pytest.approx((-0.5, 0.0), abs=0.11)
+    assert room.chances.min() > 0.4 / room.chances.size
+
+
+def test_walls_keep_in_what_drives_and_what_stands_stays() -> None:
+    room = lost_at(GRID, (3.9, 2.9), 0.01 * np.eye(2))
+    moved = room
+    for _ in range(100):
+        moved = moved.moved(0.018)
+    assert moved.drives.sum() == pytest.approx(room.drives.sum())
+    assert np.array_equal(moved.stands, room.stands)
+    xs = GRID.xs[None, :] * np.ones(GRID.shape)
+    before, after = (float((r.drives * xs).sum() / r.drives.sum()) for r in (room, moved))
+    assert after < before - 0.3  # it can only have gone inwards
+
+
+def test_the_spread_of_one_that_drives_grows_by_the_variance_given() -> None:
+    room = lost_at(GRID, (0.0, 0.0), 1e-4 * np.eye(2))
+    start = RoomMap(GRID, np.zeros(GRID.shape), np.where(room.drives == room.drives.max(), 0.25, 0.0), room.overlooked)
+    moved = start
+    for _ in range(10):
+        moved = moved.moved(0.018)
+    ys = GRID.ys[:, None]
+    grown = ((moved.drives * ys**2).sum() - (start.drives * ys**2).sum()) / start.drives.sum()
+    assert grown == pytest.approx(0.18, rel=1e-6)
+
+
+def test_empty_pictures_move_the_probability_elsewhere_and_count_as_searched() -> None:
+    room = unknown_place(GRID)
+    assert room.excluded() == 0.0
+    for _ in range(6):
+        room = room.emptied(seen_within(0.0, 0.0, 2.0))
+    share = np.mean(seen_within(0.0, 0.0, 2.0) > 0)
+    assert room.excluded() == pytest.approx(share, rel=1e-3)
+    assert room.chances.sum() == pytest.approx(1.0)
+    assert np.hypot(*room.likeliest()) > 2.0
+
+
+def test_when_every_place_is_excluded_it_may_be_anywhere_again() -> None:
+    room = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2))
+    assert np.array_equal(room.emptied(np.ones(GRID.shape)).chances, unknown_place(GRID).chances)

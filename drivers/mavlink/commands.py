@@ -1,14 +1,16 @@
 """What a decision of the watchdog means to PX4 and ArduPilot: modes, arming, take-off, set-points, landing. Pure.
 
-Each setpoint of the tracker goes out once, at most setpoint_hz times a second, and zero velocity while hovering. What
-sends is our own loop: when it stands still, nothing is sent and the vehicle's own time-out acts.
+Each setpoint of the tracker goes out once, at most setpoint_hz times a second. While hovering it is told to stand
+still: at the place where the hover began, as far as the tracker knows where it is, else by zero velocity. What sends is
+our own loop: when it stands still, nothing is sent and the vehicle's own time-out acts.
 """
 
 from collections import deque
 
 from drivers.mavlink.convert import setpoint_from_velocity
+from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.requests import Requests
-from drivers.mavlink.settings import VehicleSettings, VisionFeedback
+from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import ARMED, FORCE, Flavour, Landed, MavCmd, guided_mode, land_mode, mode_name
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
@@ -18,61 +20,67 @@ _STREAM_FIRST_NS = 1_200_000_000
 _CLIMB_LIMIT_NS = 8_000_000_000
 _TAKEN_OVER_NS = 1_500_000_000
 _REGAIN_NS = 1_400_000_000
+# A text older than this explains nothing that happens now.
+_EXPLAINS_NS = 4_000_000_000
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 _WARNING = 4
-_CLIMBED = 0.9
+# The last of a climb is slower, so that it ends at the height asked for.
+_CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
 
 
 class Orders:
-    """Keeps what was asked of one vehicle. events: (severity, text) for the operator; said: its own STATUSTEXT."""
+    """Keeps what was asked of one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
 
-    def __init__(self, vehicle: VehicleSettings, flavour: Flavour, vision: VisionFeedback, requests: Requests) -> None:
+    def __init__(self, vehicle: VehicleSettings, flavour: Flavour, requests: Requests) -> None:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
         self.said: deque[tuple[int, str]] = deque(maxlen=8)
-        self.detail = ""
         self.starting = False
-        self._vehicle, self._flavour, self._vision, self._requests = vehicle, flavour, vision, requests
+        self.drift = DriftFeedback()
+        self._vehicle, self._flavour, self._requests = vehicle, flavour, requests
         self._guided, self._landing = guided_mode(flavour), land_mode(flavour)
         self._period_ns = round(1e9 / vehicle.setpoint_hz)
         self._action = Action.WAIT
         self._since_ns = 0
         self._climb_until_ns = 0
+        self._floor_m: float | None = None
+        self._fresh_start = False
         self._due_ns = 0
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
         self._taken_over = False
-        self._blind_landing = False
 
     def are_heeded(self, custom_mode: int) -> bool:
         """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
         return custom_mode == self._guided and not self._taken_over
 
-    def failsafe_datagrams(self) -> str:
-        """Return what the vehicle said of late, to go with a refusal."""
-        return f" ({self.said[-1][1]})" if self.said else ""
+    def last_said(self, now_ns: int) -> str:
+        """Return what the vehicle said last, if that was just now: it explains a change of its mode."""
+        if not self.said or now_ns - self.said[-1][0] > _EXPLAINS_NS:
+            return ""
+        return f" ({self.said[-1][1]})"
 
     def step(
-        self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float,
-        lost_s: float,
+        self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float
     ) -> SetPositionTargetLocalNed | None:  # fmt: skip
         """Return the set-point to send now, if any; commands are asked through the requests."""
         armed, guided = bool(base_mode & ARMED), custom_mode == self._guided
-        action = self._without_position(decision.action, lost_s)
+        climbed_m = self._climbed(now_ns, landed, height_m)
+        action = decision.action
         if action is not self._action:
             self._enter(now_ns, action)
         self._watch_mode(now_ns, action, armed, guided, custom_mode)
         match action:
             case Action.TAKE_OFF:
-                return self._take_off(now_ns, armed, guided, landed)
+                return self._take_off(now_ns, armed, guided, landed, climbed_m)
             case Action.FLY:
                 return self._fly(now_ns, decision, guided)
             case Action.HOVER:
-                return self._hover(now_ns, decision.mode, guided, height_m)
+                return self._hover(now_ns, decision.mode, guided, climbed_m)
             case Action.LAND:
                 if armed and custom_mode != self._landing:
                     self._ask(now_ns, "landing", MavCmd.NAV_LAND)
                     # Until it obeys it must not fly on with the last velocity.
-                    return self._send(now_ns, _STILL, 0.0) if guided else None
+                    return self._stand(now_ns) if guided else None
             case Action.CUT:
                 if armed:
                     self._ask(now_ns, "motor cut", MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE)
@@ -83,21 +91,17 @@ class Orders:
                 pass
         return None
 
-    def _without_position(self, action: Action, lost_s: float) -> Action:
-        flying = action in (Action.FLY, Action.HOVER)
-        if not flying or lost_s < self._vision.hover_after_s:
-            self.detail = ""
-            self._blind_landing = self._blind_landing and flying
-        elif lost_s >= self._vision.land_after_s:
-            if not self._blind_landing:
-                self.events.append((3, f"no position from the cameras for {lost_s:.1f} s: landing"))
-            self._blind_landing = True
-        else:
-            self.detail = f"no position from the cameras for {lost_s:.1f} s"
-            action = Action.HOVER
-        return Action.LAND if self._blind_landing else action
+    def _climbed(self, now_ns: int, landed: int, reported_m: float) -> float:
+        """Return the height above the floor [m]: as the tracker knows it, else since lift-off as it says itself."""
+        if landed == Landed.ON_GROUND or self._floor_m is None:
+            self._floor_m = reported_m
+            self.drift.reset()
+        believed = self.drift.place(now_ns)
+        return reported_m - self._floor_m if believed is None else believed[2]
 
     def _enter(self, now_ns: int, action: Action) -> None:
+        self.drift.let_go()
+        self._fresh_start = action is Action.TAKE_OFF or (self._fresh_start and action is Action.HOVER)
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
             self._requests.accepted.discard("take-off")  # once per start: a second one would begin its spool-up anew
@@ -120,9 +124,11 @@ class Orders:
         elif not self._taken_over and now_ns - self._guided_ns > _TAKEN_OVER_NS:
             self._taken_over = True
             text = f"{self._vehicle.name} is in {mode_name(self._flavour, custom_mode)}: not ours to fly until RESUME"
-            self.events.append((_WARNING, text + self.failsafe_datagrams()))
+            self.events.append((_WARNING, text + self.last_said(now_ns)))
 
-    def _take_off(self, now_ns: int, armed: bool, guided: bool, landed: int) -> SetPositionTargetLocalNed | None:
+    def _take_off(
+        self, now_ns: int, armed: bool, guided: bool, landed: int, climbed_m: float
+    ) -> SetPositionTargetLocalNed | None:
         px4 = self._flavour is Flavour.PX4
         # WIRE (docs/reference/mavlink.md 5.2): PX4 needs a second of set-points before OFFBOARD, and arms in it.
         if px4 and now_ns - self._since_ns < _STREAM_FIRST_NS:
@@ -136,17 +142,28 @@ class Orders:
             self._ask(now_ns, "take-off", MavCmd.NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height)
         if not px4:
             return None
-        return self._send(now_ns, (0.0, 0.0, self._vehicle.limits.max_climb_m_s) if armed and guided else _STILL, 0.0)
+        return self._climb(now_ns, climbed_m) if armed and guided else self._send(now_ns, _STILL, 0.0)
 
-    def _hover(self, now_ns: int, mode: DriverMode, guided: bool, height_m: float) -> SetPositionTargetLocalNed | None:
-        if mode is not DriverMode.HOVER or height_m >= _CLIMBED * self._vehicle.take_off_m:
+    def _climb(self, now_ns: int, climbed_m: float) -> SetPositionTargetLocalNed | None:
+        left_m = self._vehicle.take_off_m - climbed_m
+        up = min(self._vehicle.limits.max_climb_m_s, max(_LEAST_CLIMB_M_S, _CLIMB_GAIN * left_m))
+        forward, left, _ = self.drift.hold(now_ns)
+        return self._send(now_ns, (forward, left, up), 0.0)
+
+    def _stand(self, now_ns: int, height_m: float | None = None) -> SetPositionTargetLocalNed | None:
+        return self._send(now_ns, self.drift.hold(now_ns, height_m), 0.0)
+
+    def _hover(self, now_ns: int, mode: DriverMode, guided: bool, climbed_m: float) -> SetPositionTargetLocalNed | None:
+        if mode is not DriverMode.HOVER or climbed_m >= _CLIMBED * self._vehicle.take_off_m:
             self._climb_until_ns = 0
         if now_ns < self._climb_until_ns:
             # It has left the ground; it goes on to its take-off height (ArduPilot does so by itself).
             if self._flavour is Flavour.ARDUPILOT:
                 return None
-            return self._send(now_ns, (0.0, 0.0, self._vehicle.limits.max_climb_m_s), 0.0)
-        return self._send(now_ns, _STILL, 0.0) if guided else None
+            return self._climb(now_ns, climbed_m)
+        if not guided:
+            return None
+        return self._stand(now_ns, self._vehicle.take_off_m if self._fresh_start else None)
 
     def _fly(self, now_ns: int, decision: WatchdogDecision, guided: bool) -> SetPositionTargetLocalNed | None:
         if not guided and now_ns < self._regain_until_ns:
@@ -171,4 +188,7 @@ class Orders:
             return None
         self._due_ns = max(self._due_ns + self._period_ns, now_ns)
         vehicle = self._vehicle
-        return setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits)
+        drift = self.drift.drift(now_ns)
+        message = setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits, drift)
+        self.drift.tell(now_ns, (message.vx, -message.vy, -message.vz))
+        return message

@@ -23,8 +23,9 @@ from drivers.plausibility.motion import MotionSample
 from drivers.vehicle_settings import VehicleLimits
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
 from groundstation.geometry.angles import quaternion_from_euler, wrap
+from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
-_M_S2_FROM_MG = 9.80665 / 1000
+_M_S2_FROM_MG = STANDARD_GRAVITY_M_S2 / 1000
 _RAD_S_FROM_MRAD_S = 0.001
 # Beyond these nothing is a measurement of an indoor vehicle.
 _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
@@ -137,9 +138,13 @@ def is_still(velocity_m_s: Vector3) -> bool:
 
 
 def setpoint_from_velocity(
-    system: int, now_ns: int, velocity_m_s: Vector3, yaw_rate_rad_s: float, limits: VehicleLimits
-) -> SetPositionTargetLocalNed:
-    """Return the set-point of a velocity [base_stabilized, FLU], clamped to the limits."""
+    system: int, now_ns: int, velocity_m_s: Vector3, yaw_rate_rad_s: float, limits: VehicleLimits,
+    drift_m_s: Vector3 = (0.0, 0.0, 0.0),
+) -> SetPositionTargetLocalNed:  # fmt: skip
+    """Return the set-point of a velocity [base_stabilized, FLU], clamped to the limits.
+
+    drift_m_s: what the vehicle's own velocity is off by, added beyond the limits: they are of the true velocity.
+    """
     forward, left, up = velocity_m_s
     size = math.hypot(forward, left)
     shrink = min(1.0, limits.max_speed_m_s / size) if size > 0.0 else 1.0
@@ -152,7 +157,7 @@ def setpoint_from_velocity(
         coordinate_frame=MavFrame.BODY_NED,
         type_mask=VELOCITY_AND_YAW_RATE,
         x=0.0, y=0.0, z=0.0,
-        vx=forward * shrink, vy=-left * shrink, vz=-up,
+        vx=forward * shrink + drift_m_s[0], vy=-(left * shrink + drift_m_s[1]), vz=-(up + drift_m_s[2]),
         afx=0.0, afy=0.0, afz=0.0,
         yaw=0.0, yaw_rate=-turn,
     )  # fmt: skip

@@ -81,6 +81,7 @@ class Fleet:
             if isinstance(received.message, Estimate):
                 for vehicle in self.vehicles.values():
                     vehicle.see(now_ns, received.message)
+        self._child.note_addresses(self.link.called_from)
         while self._news:
             self._child.event(Severity.WARNING, self._news.pop(0), "see system_id in the field file")
         for vehicle in self.vehicles.values():

@@ -1,14 +1,21 @@
-"""What supervisor or guardian tell a vehicle for a driver that died or hangs."""
+"""What supervisor or guardian tell vehicles for a driver that died or hangs."""
+
+from collections.abc import Sequence
 
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
+from drivers.mavlink.wire.verification import Signing
 from drivers.vehicle_settings import VehicleLimits
 
 
-def hover_and_land(system: int, our_system: int = 255) -> tuple[bytes, bytes]:
-    """Return the datagrams that stop and that land a vehicle; both are obeyed as often as they are repeated."""
-    encoder = FrameEncoder(our_system, 190)
-    hover = setpoint_from_velocity(system, 0, (0.0, 0.0, 0.0), 0.0, VehicleLimits())
-    return encoder.encode(hover), encoder.encode(CommandLong(system, 1, MavCmd.NAV_LAND, 0))
+def hover_and_land(systems: Sequence[int], our_system: int = 255, *, signed: bool = False) -> tuple[bytes, bytes]:
+    """Return the datagrams that stop and that land the vehicles of a link; both are obeyed as often as repeated.
+
+    signed: with room for signatures, which whoever sends them makes (`wire/signature.py`).
+    """
+    encoder = FrameEncoder(our_system, 190, Signing(bytes(32), 0) if signed else None)
+    stop = [setpoint_from_velocity(system, 0, (0.0, 0.0, 0.0), 0.0, VehicleLimits()) for system in systems]
+    land = [CommandLong(system, 1, MavCmd.NAV_LAND, 0) for system in systems]
+    return b"".join(map(encoder.encode, stop)), b"".join(map(encoder.encode, land))

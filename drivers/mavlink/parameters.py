@@ -1,23 +1,55 @@
 """Parameters that indoor flight on our position needs, and what is wrong with those a vehicle has.
 
-Sources: docs/reference/mavlink.md 1.1, 2 (flown), docs/reference/mavlink.md 5.2, 5.3 (failsafes).
+Reasons and sources, one by one: docs/reference/mavlink.md 5.4.1. Checked with PX4 1.16 and ArduCopter 4.6.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import INT32, REAL32
 
+Version = tuple[int, int]
+# Releases whose parameters were compared with the tables below: the first and the last of each flavour.
+_CHECKED: dict[Flavour, tuple[Version, Version]] = {
+    Flavour.PX4: ((1, 16), (1, 16)),
+    Flavour.ARDUPILOT: ((4, 6), (4, 6)),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Needed:
-    """One parameter: its value, how it travels, and what it is for."""
+    """One parameter: the value that `setup` writes, how it travels, and what it is for.
+
+    accepted: lowest and highest value that will do as well; others: single values that will do; aliases: its names in
+    other releases.
+    """
 
     name: str
     value: float
     reason: str
     kind: int = INT32
+    accepted: tuple[float, float] | None = None
+    others: tuple[float, ...] = ()
+    aliases: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return its name and its aliases."""
+        return (self.name, *self.aliases)
+
+    def takes(self, value: float) -> bool:
+        """Return whether a value will do."""
+        low, high = self.accepted or (self.value, self.value)
+        tolerance = 1e-4 * max(1.0, abs(value))
+        return low - tolerance <= value <= high + tolerance or any(abs(value - o) <= tolerance for o in self.others)
+
+    @property
+    def wish(self) -> str:
+        """Return what it may be, in words."""
+        if self.accepted is not None:
+            return f"{self.accepted[0]:g} to {self.accepted[1]:g}"
+        return " or ".join(f"{value:g}" for value in (self.value, *self.others))
 
 
 _PX4 = (
@@ -25,17 +57,20 @@ _PX4 = (
     Needed("EKF2_EV_CTRL", 11, "position, height and heading come from outside; velocity does not"),
     Needed("EKF2_HGT_REF", 3, "height comes from outside"),
     Needed("EKF2_MAG_TYPE", 5, "no compass near steel"),
-    Needed("EKF2_EV_DELAY", 0, "poses are sent as predicted to now", REAL32),
+    Needed("EKF2_EV_DELAY", 0, "poses are sent as predicted to now", REAL32, accepted=(0, 50)),
+    Needed("EKF2_EVP_NOISE", 0.03, "lower bound of the error of our positions, 1 to 3 cm", REAL32, (0.01, 0.06)),
     Needed("SYS_HAS_GPS", 0, "arm without GPS"),
-    Needed("COM_OF_LOSS_T", 1.0, "time without set-points before the failsafe", REAL32),
+    Needed("COM_OF_LOSS_T", 1.0, "time without set-points before the failsafe", REAL32, accepted=(0.3, 1.0)),
     Needed("COM_OBL_RC_ACT", 4, "that failsafe: land"),
-    Needed("COM_RC_IN_MODE", 4, "no stick"),
-    Needed("COM_RCL_EXCEPT", 4, "offboard flight needs no stick"),
-    Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32),
+    Needed(
+        "COM_RC_IN_MODE", 0, "a transmitter's kill and mode switches stay alive: 1 and 4 ignore them", others=(2, 3)
+    ),
+    Needed("COM_RCL_EXCEPT", 4, "offboard flight needs no stick", others=(5, 6, 7)),
+    Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),
 )
 _ARDUPILOT = (
     Needed("VISO_TYPE", 1, "position from outside, by MAVLink"),
-    Needed("GPS1_TYPE", 0, "no GPS indoors"),
+    Needed("GPS1_TYPE", 0, "no GPS indoors", aliases=("GPS_TYPE",)),
     Needed("EK3_SRC1_POSXY", 6, "position comes from outside"),
     Needed("EK3_SRC1_VELXY", 6, "as flown; no velocity is fed"),
     Needed("EK3_SRC1_POSZ", 6, "height comes from outside"),
@@ -44,28 +79,64 @@ _ARDUPILOT = (
     Needed("COMPASS_USE", 0, "no compass near steel"),
     Needed("COMPASS_USE2", 0, "no compass near steel"),
     Needed("COMPASS_USE3", 0, "no compass near steel"),
-    Needed("ARMING_CHECK", 1048574, "all checks but the GPS's"),
-    Needed("GUID_TIMEOUT", 0.5, "time without set-points before it stops", REAL32),
+    Needed("ARMING_CHECK", 1048574, "every check by its own bit; without a GPS those of the GPS check nothing"),
+    Needed("GUID_TIMEOUT", 0.5, "time without set-points before it stops", REAL32, accepted=(0.1, 0.5)),
     Needed("FS_GCS_ENABLE", 5, "ground station lost: land"),
-    Needed("FS_GCS_TIMEOUT", 5.0, "time without our heartbeat before that", REAL32),
+    Needed("FS_GCS_TIMEOUT", 5.0, "time without our heartbeat before that", REAL32, accepted=(2.0, 5.0)),
     Needed("FS_EKF_ACTION", 1, "position lost: land"),
-    Needed("FS_THR_ENABLE", 0, "no stick"),
+    Needed("FS_THR_ENABLE", 0, "a throttle failsafe of a transmitter that is off would forbid arming", others=(1, 3)),
 )
 
 
-def needed(flavour: Flavour, our_system: int) -> tuple[Needed, ...]:
-    """Return what a vehicle of a flavour must be set to, when this ground station has a system id."""
-    if flavour is Flavour.PX4:
-        return _PX4
-    # WIRE (docs/reference/mavlink.md 1): only heartbeats from SYSID_MYGCS keep the ground-station failsafe quiet.
-    return (*_ARDUPILOT, Needed("SYSID_MYGCS", our_system, "the ground station whose heartbeat counts"))
+def needed(flavour: Flavour, our_system: int, overrides: Mapping[str, float] | None = None) -> tuple[Needed, ...]:
+    """Return what a vehicle of a flavour must be set to, when this ground station has a system id.
+
+    overrides: values of the field file, by name or alias; a name of its own is checked as well.
+    """
+    wanted: tuple[Needed, ...] = _PX4
+    if flavour is Flavour.ARDUPILOT:
+        # WIRE (docs/reference/mavlink.md 1): only heartbeats from it keep the ground-station failsafe quiet.
+        reason = "the ground station whose heartbeat counts"
+        wanted = (*_ARDUPILOT, Needed("SYSID_MYGCS", our_system, reason, aliases=("MAV_GCS_SYSID",)))
+    return _overridden(wanted, overrides or {})
+
+
+def _overridden(wanted: Iterable[Needed], overrides: Mapping[str, float]) -> tuple[Needed, ...]:
+    left, found = dict(overrides), []
+    for need in wanted:
+        name = next((n for n in need.names if n in left), None)
+        if name is not None:
+            need = replace(need, value=left.pop(name), reason="as the field file says", accepted=None, others=())
+        found.append(need)
+    for name, value in left.items():
+        kind = INT32 if value == round(value) else REAL32
+        found.append(Needed(name, value, "as the field file says", kind))
+    return tuple(found)
+
+
+def overridden(flavour: Flavour, overrides: Mapping[str, float]) -> str:
+    """Return the warning for parameters that the field file has otherwise than indoor flight needs them, or ""."""
+    usual = {name: need for need in needed(flavour, 0) for name in need.names}
+    bold = [
+        f"{n} {v:g} instead of {usual[n].wish}" for n, v in overrides.items() if n in usual and not usual[n].takes(v)
+    ]
+    return f"parameters as the field file says: {', '.join(bold)}" if bold else ""
+
+
+def version_of(flight_sw_version: int) -> Version:
+    """Return major and minor of the version in AUTOPILOT_VERSION."""
+    return flight_sw_version >> 24 & 255, flight_sw_version >> 16 & 255
+
+
+def is_checked(flavour: Flavour, version: Version | None) -> bool:
+    """Return whether the tables here were compared with a release."""
+    first, last = _CHECKED[flavour]
+    return version is not None and first <= version <= last
 
 
 def difference(wanted: Needed, found: Mapping[str, float]) -> str:
-    """Return what is wrong with one parameter, or ""."""
-    if wanted.name not in found:
-        return f"{wanted.name} is missing, needs {wanted.value:g} ({wanted.reason})"
-    have = found[wanted.name]
-    if abs(have - wanted.value) <= 1e-4 * max(1.0, abs(wanted.value)):
-        return ""
-    return f"{wanted.name} is {have:g}, needs {wanted.value:g} ({wanted.reason})"
+    """Return what is wrong with one parameter, or ""; found: by name or alias."""
+    name = next((n for n in wanted.names if n in found), None)
+    if name is None:
+        return f"{wanted.name} is missing, needs {wanted.wish} ({wanted.reason})"
+    return "" if wanted.takes(found[name]) else f"{name} is {found[name]:g}, needs {wanted.wish} ({wanted.reason})"

@@ -1,14 +1,15 @@
 """Odometry and IMU samples of one vehicle on the bus.
 
 The autopilot's position, height and heading are our own estimate come back, and are never published. Its velocity is
-partly ours: it goes out with an inflated covariance. Its heading is replaced by what its gyros say, whose increments
-are the vehicle's own measurement (docs/explanation/estimation.md 8).
+partly ours: it goes out with an inflated covariance, more so where the autopilot or the cameras doubt it. Its heading
+is replaced by what its gyros say, whose increments are its own measurement (docs/explanation/estimation.md 8).
 """
 
 import math
 
 from drivers.mavlink.convert import BaseAttitude, attitude_quaternion
 from drivers.mavlink.settings import VehicleSettings
+from drivers.mavlink.uncertainty import StatedUncertainty
 from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
@@ -51,8 +52,8 @@ class TelemetryPublisher:
     def __init__(self, settings: VehicleSettings, bus: Bus) -> None:
         self._name, self._bus = settings.name, bus
         self._heading = GyroHeading()
-        self._covariance = _covariance(settings.velocity_std_m_s)
-        self._suspect_covariance = _covariance(max(settings.velocity_std_m_s, _SUSPECT_STD_M_S))
+        self.stated = StatedUncertainty()
+        self._velocity_std_m_s, self._attitude_std_rad = settings.velocity_std_m_s, settings.attitude_std_rad
 
     def attitude(self, stamp_ns: int, attitude: BaseAttitude) -> None:
         """Take an attitude: its turn rate moves the heading."""
@@ -65,13 +66,17 @@ class TelemetryPublisher:
         believed = health.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY)
         if believed is Health.BAD:
             return
+        std_m_s = max(self._velocity_std_m_s, self.stated.velocity_std_m_s(stamp_ns))
+        if believed is Health.SUSPECT:
+            std_m_s = max(std_m_s, _SUSPECT_STD_M_S)
         message = Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=velocity_m_s,
-            velocity_covariance=self._suspect_covariance if believed is Health.SUSPECT else self._covariance,
+            velocity_covariance=_covariance(std_m_s),
             yaw_rad=self._heading.yaw_rad,
             roll_rad=attitude.roll_rad,
             pitch_rad=attitude.pitch_rad,
+            attitude_std_rad=max(self._attitude_std_rad, self.stated.attitude_std_rad(stamp_ns)),
             reset=self._heading.resets,
         )
         self._bus.publish(ODOMETRY, message)

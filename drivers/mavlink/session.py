@@ -5,7 +5,8 @@ origin is ignored until its estimator runs, so it is repeated until GPS_GLOBAL_O
 neither changed nor told: it is asked for as well. PX4 flies indoors without: nothing waits for its answer.
 """
 
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Mapping
 
 from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
@@ -24,6 +25,10 @@ _PARAM_BURST = 4
 _PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
 _STOPPED = 0.0
+_CHECKED_WITH = "PX4 1.16 or ArduCopter 4.6"
+_VERSION_PERIOD_NS, _VERSION_TRIES = 1_000_000_000, 5
+# After so many questions without an answer a parameter is asked for by its other names as well.
+_ALIAS_AFTER = 3
 
 
 def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
@@ -41,22 +46,32 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
     if flavour is Flavour.ARDUPILOT:
         wanted[telemetry.EkfStatusReport] = 5.0
     else:
-        # WIRE (docs/reference/mavlink.md 2): unasked, PX4 sends 100 and 30 of these a second.
-        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: _STOPPED}
+        # WIRE (docs/reference/mavlink.md 2): unasked, PX4 sends 100 and 30 of these a second; of the latter only its
+        # covariances are of use. Its ESTIMATOR_STATUS comes unasked.
+        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: 5.0}
     return wanted
 
 
 class MavlinkSession:
     """What one vehicle still has to be asked; starts over when it was silent for 2 s.
 
-    problems: parameters that forbid a take-off. detail: what is waited for, or "".
+    problems: parameters that forbid a take-off. detail: what is waited for, or "". notes: for the operator; drained by
+    the driver. overrides: parameters as the field file has them.
     """
 
     def __init__(
-        self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: GlobalOrigin
-    ) -> None:
+        self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: GlobalOrigin,
+        overrides: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
         self._system, self._flavour, self._rates, self._origin = system, flavour, rates, origin
-        self._needed = parameters.needed(flavour, our_system)
+        self._needed = parameters.needed(flavour, our_system, overrides)
+        self._by_name = {name: n for n in self._needed for name in n.names}
+        self.notes: deque[str] = deque(maxlen=8)
+        if warning := parameters.overridden(flavour, overrides or {}):
+            self.notes.append(warning)
+        self._version: parameters.Version | None = None
+        self._version_tries = 0
+        self._next_version_ns = 0
         self._connected = False
         self._found: dict[str, float] = {}
         self._asked: set[str] = set()
@@ -69,12 +84,21 @@ class MavlinkSession:
     def problems(self) -> list[str]:
         """Return what is wrong with the parameters that were read."""
         found = self._found
-        return [text for n in self._needed if n.name in found and (text := parameters.difference(n, found))]
+        read = [n for n in self._needed if not found.keys().isdisjoint(n.names)]
+        return [text for n in read if (text := parameters.difference(n, found))]
 
     @property
     def unread(self) -> list[str]:
         """Return the parameters that were not read yet."""
-        return [n.name for n in self._needed if n.name not in self._found]
+        return [n.name for n in self._needed if self._found.keys().isdisjoint(n.names)]
+
+    @property
+    def unchecked(self) -> list[str]:
+        """Return the parameters that a firmware of another version does not have: nothing waits for those."""
+        known = self._version is not None or self._version_tries >= _VERSION_TRIES
+        if not known or parameters.is_checked(self._flavour, self._version):
+            return []
+        return [name for name in self.unread if self._param_tries[name] >= _PARAM_TRIES]
 
     def detail(self, requests: Requests) -> str:
         """Return what is still missing, or ""."""
@@ -83,8 +107,9 @@ class MavlinkSession:
         missing = [kind for kind in self._rates if self._key(kind) not in requests.accepted]
         if missing:
             return f"asking for {missing[0].__name__.removesuffix('Message')}"
-        if self.unread:
-            return self._unread_detail(self.unread[0])
+        waited_for = [name for name in self.unread if name not in self.unchecked]
+        if waited_for:
+            return self._unread_detail(waited_for[0])
         if self.problems:
             return f"parameter {self.problems[0]}: groundstation mavlink setup --apply"
         ready = self._has_origin or self._flavour is Flavour.PX4
@@ -93,14 +118,21 @@ class MavlinkSession:
     def _unread_detail(self, name: str) -> str:
         if self._param_tries[name] < _PARAM_TRIES:
             return f"reading parameter {name}"
-        return f"it does not know parameter {name}: is its firmware PX4 1.16 or ArduCopter 4.6?"
+        return f"it does not know parameter {name}: is its firmware {_CHECKED_WITH}?"
 
     def hear_parameter(self, message: service.ParamValue) -> None:
         """Take a parameter's value; raises WireError."""
-        names = {n.name for n in self._needed}
-        if message.param_id in names:
+        if message.param_id in self._by_name:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
             self._found[message.param_id] = value
+
+    def hear_version(self, flight_sw_version: int) -> None:
+        """Take the version of its firmware; a new one of which nothing is known is noted."""
+        version = parameters.version_of(flight_sw_version)
+        if version != self._version and not parameters.is_checked(self._flavour, version):
+            text = f"its firmware is {version[0]}.{version[1]}: parameters were compared with {_CHECKED_WITH}"
+            self.notes.append(f"{text}; those that it does not have are not checked")
+        self._version = version
 
     def hear_origin(self) -> None:
         """Note that the origin is set."""
@@ -117,6 +149,7 @@ class MavlinkSession:
                 self._connected, self._has_origin, self._origin_tries = False, False, 0
                 self._found.clear()
                 self._param_tries.clear()
+                self._version, self._version_tries = None, 0
                 requests.forget()
             return messages
         self._connected = True
@@ -135,15 +168,31 @@ class MavlinkSession:
             self._next_origin_ns = now_ns + _ORIGIN_PERIOD_NS
             self._origin_tries += 1
             messages += self._origin_requests()
-        unread = self.unread
+        messages += self._version_request(now_ns)
+        unread = [name for name in self.unread if name not in self.unchecked]
         if unread and (now_ns >= self._next_param_ns or self._asked.isdisjoint(unread)):
             self._next_param_ns = now_ns + _PARAM_PERIOD_NS
             # A burst at a time, so that a slow radio is not flooded; answers bring the next one forward.
             burst = sorted(unread, key=self._param_tries.__getitem__)[:_PARAM_BURST]
-            messages += [service.ParamRequestRead(self._system, 1, name, -1) for name in burst]
+            messages += [service.ParamRequestRead(self._system, 1, self._asked_as(name), -1) for name in burst]
             self._param_tries.update(burst)
+            if left_out := [name for name in burst if name in self.unchecked]:
+                self.notes.append(f"not checked, because its firmware does not know them: {', '.join(left_out)}")
             self._asked = set(burst)
         return messages
+
+    def _asked_as(self, name: str) -> str:
+        names, tries = self._by_name[name].names, self._param_tries[name]
+        return names[tries % len(names)] if tries >= _ALIAS_AFTER else name
+
+    def _version_request(self, now_ns: int) -> list[Message]:
+        tried = self._version_tries >= _VERSION_TRIES
+        if self._version is not None or tried or now_ns < self._next_version_ns:
+            return []
+        self._version_tries += 1
+        self._next_version_ns = now_ns + _VERSION_PERIOD_NS
+        asked = float(id_of(telemetry.AutopilotVersion))
+        return [CommandLong(self._system, 1, MavCmd.REQUEST_MESSAGE, 0, asked)]
 
     def _origin_requests(self) -> list[Message]:
         o = self._origin

@@ -1,5 +1,6 @@
 """What the MAVLink driver is told; the composition root fills it from the field file."""
 
+from dataclasses import replace
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -31,11 +32,14 @@ class VisionFeedback(DriverSection):
 
 
 class GlobalOrigin(DriverSection):
-    """Where on Earth the estimator is told to be; any place will do indoors."""
+    """Where on Earth the estimator is told to be; any place will do indoors.
+
+    altitude_m: of the floor. Another than 0 shifts the local height of a PX4 by as much.
+    """
 
     latitude_deg: Annotated[float, Field(ge=-85, le=85)] = 47.397742
     longitude_deg: Annotated[float, Field(ge=-180, le=180)] = 8.545594
-    altitude_m: Annotated[float, Field(ge=-500, le=9000)] = 488.0
+    altitude_m: Annotated[float, Field(ge=-500, le=9000)] = 0.0
 
 
 class LinkSettings(DriverSection):
@@ -74,6 +78,8 @@ class VehicleSettings(DriverSection):
     imu_hz: Annotated[float, Field(ge=0, le=200)] = 100.0
     setpoint_hz: Annotated[float, Field(ge=5, le=50)] = 20.0
     velocity_std_m_s: Positive = 0.15
+    attitude_std_rad: Positive = 0.0053
+    parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
 
 
 class MavlinkDriverSettings(DriverSection):
@@ -96,4 +102,5 @@ class MavlinkDriverSettings(DriverSection):
 
     def authority(self, vehicle: VehicleSettings) -> WatchdogLimits:
         """Return the limits of one vehicle's watchdog."""
-        return self.safety.authority(vehicle.limits)
+        limits, vision = self.safety.authority(vehicle.limits, vehicle.pad_m), self.vision
+        return replace(limits, lost_hover_s=vision.hover_after_s, lost_land_s=vision.land_after_s)

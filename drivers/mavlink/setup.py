@@ -1,7 +1,7 @@
 """Reads the parameters that indoor flight needs, tells each difference, and writes them if asked to."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from drivers.mavlink.links.seam import MavlinkLink
@@ -31,9 +31,14 @@ class ParameterDifference:
 class ParameterSetup:
     """The parameters of one vehicle on an open link that nobody else reads."""
 
-    def __init__(self, link: MavlinkLink, system: int, flavour: Flavour, our_system: int) -> None:
+    def __init__(
+        self, link: MavlinkLink, system: int, flavour: Flavour, our_system: int,
+        overrides: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
         self._link, self._system, self._flavour = link, system, flavour
-        self._needed = needed(flavour, our_system)
+        self._needed = needed(flavour, our_system, overrides)
+        # As it answered: by which name, and how it travels.
+        self._answers: dict[str, ParamValue] = {}
 
     def connect(self) -> None:
         """Wait for the vehicle; raises DriverError if it does not answer, is another kind, or has its motors on."""
@@ -60,19 +65,29 @@ class ParameterSetup:
     def differences(self) -> Iterator[ParameterDifference]:
         """Yield what is not as needed."""
         for wanted in self._needed:
-            value = self._exchange(wanted, ParamRequestRead(self._system, 1, wanted.name, -1))
+            value = self._read(wanted)
             text = difference(wanted, {} if value is None else {wanted.name: value})
             if text:
                 yield ParameterDifference(wanted, value, text)
 
     def apply(self, wanted: Needed) -> bool:
         """Write one parameter; returns whether the vehicle confirmed it."""
-        carried = carried_from_value(self._flavour, wanted.value, wanted.kind)
-        value = self._exchange(wanted, ParamSet(self._system, 1, wanted.name, carried, wanted.kind))
+        known = self._answers.get(wanted.name)
+        name, kind = (wanted.name, wanted.kind) if known is None else (known.param_id, known.param_type)
+        carried = carried_from_value(self._flavour, wanted.value, kind)
+        value = self._exchange(wanted, ParamSet(self._system, 1, name, carried, kind), _TRIES)
         return value is not None and not difference(wanted, {wanted.name: value})
 
-    def _exchange(self, wanted: Needed, message: ParamRequestRead | ParamSet) -> float | None:
-        for _ in range(_TRIES):
+    def _read(self, wanted: Needed) -> float | None:
+        for tries in (1, _TRIES - 1):
+            for name in wanted.names:
+                value = self._exchange(wanted, ParamRequestRead(self._system, 1, name, -1), tries)
+                if value is not None:
+                    return value
+        return None
+
+    def _exchange(self, wanted: Needed, message: ParamRequestRead | ParamSet, tries: int) -> float | None:
+        for _ in range(tries):
             self._link.send(self._system, message)
             deadline = time.monotonic() + _ANSWER_S
             while time.monotonic() < deadline:
@@ -80,7 +95,8 @@ class ParameterSetup:
                     answer = frame.message
                     if frame.system != self._system or not isinstance(answer, ParamValue):
                         continue
-                    if answer.param_id == wanted.name:
+                    if answer.param_id == message.param_id:
+                        self._answers[wanted.name] = answer
                         try:
                             return value_from_carried(self._flavour, answer.param_value, answer.param_type)
                         except WireError:

@@ -3,11 +3,13 @@
 from collections import deque
 
 from drivers.mavlink.wire.telemetry import Statustext
+from groundstation.time_units import NS_PER_S
 
 _PIECE = 50
 _WARNING = 4
 _JUMP_MS = 1000
 _PIECES = 8
+_RECENT_S = 2
 Said = tuple[int, str]  # severity 0 emergency .. 7 debug, text
 
 
@@ -35,10 +37,18 @@ class Texts:
         self._heard.append((now_ns, (message.severity, text)))
         return message.severity, text
 
-    def reasons(self, since_ns: int, word: str = "") -> list[str]:
-        """Return the distinct warnings that it gave since a time, oldest first; word: only those that hold it."""
-        said = [text for at, (severity, text) in self._heard if at >= since_ns and severity <= _WARNING]
-        return list(dict.fromkeys(text for text in said if word in text.lower()))
+    def reasons(self, since_ns: int, word: str = "", now_ns: int | None = None) -> list[str]:
+        """Return the distinct warnings that it gave since a time, oldest first; word: only those that hold it.
+
+        now_ns: name the age of those that are older than 2 s.
+        """
+        newest = {text: at for at, (level, text) in self._heard if at >= since_ns and level <= _WARNING}
+        return [text + _age(at, now_ns) for text, at in newest.items() if word in text.lower()]
+
+
+def _age(at_ns: int, now_ns: int | None) -> str:
+    age_s = 0 if now_ns is None else (now_ns - at_ns) // NS_PER_S
+    return f" ({age_s} s ago)" if age_s > _RECENT_S else ""
 
 
 class BootClock:

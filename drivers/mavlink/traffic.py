@@ -4,24 +4,29 @@ import threading
 from collections import deque
 
 _WINDOW_NS = 1_000_000_000
+# Half a turn of the counter is no loss that can be told from a restart; a datagram is not overtaken by more than this.
+_HALF_TURN, _OVERTAKEN = 128, 32
 
 
 class Traffic:
     """Frames of the last second; counted by the reader, read by the sender loop."""
 
     def __init__(self) -> None:
-        self._last: dict[int, int] = {}
+        self._newest: dict[int, int] = {}
         self._window: deque[tuple[int, int]] = deque()
         self._lock = threading.Lock()
 
     def count(self, now_ns: int, component: int, sequence: int) -> None:
         """Take the number of a frame; each component of a vehicle counts for itself, modulo 256."""
-        before = self._last.get(component)
-        self._last[component] = sequence
-        step = 1 if before is None else (sequence - before) % 256 or 1
+        newest = self._newest.get(component)
+        step = 1 if newest is None else (sequence - newest) % 256
+        if step >= _HALF_TURN:
+            # One that was overtaken, which has been counted as missing, or what sends was restarted.
+            step = 0 if 256 - step <= _OVERTAKEN else 1
+        if step:
+            self._newest[component] = sequence
         with self._lock:
-            # Half a turn of the counter is no loss that can be told from a restart.
-            self._window.append((now_ns, step if step < 128 else 1))
+            self._window.append((now_ns, step))
             self._trim(now_ns)
 
     def rates(self, now_ns: int) -> tuple[float, float | None]:
@@ -29,7 +34,8 @@ class Traffic:
         with self._lock:
             self._trim(now_ns)
             expected = sum(step for _, step in self._window)
-            return len(self._window) * 1e9 / _WINDOW_NS, len(self._window) / expected if expected else None
+            share = min(1.0, len(self._window) / expected) if expected else None
+            return len(self._window) * 1e9 / _WINDOW_NS, share
 
     def _trim(self, now_ns: int) -> None:
         while self._window and self._window[0][0] < now_ns - _WINDOW_NS:

@@ -18,7 +18,7 @@ from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, SensorBits
+from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, Landed, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.limits import MAVLINK
 from drivers.plausibility.motion import MotionMonitor
@@ -35,6 +35,7 @@ _BATTERY_NS = 10_000_000_000
 _EXPLAIN_NS = 700_000_000
 # ArduPilot repeats what keeps it from arming every 30 s.
 _COMPLAINTS_NS = 35_000_000_000
+_WARNING = 4
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
 
@@ -74,12 +75,15 @@ class MavlinkVehicle:
         self._publisher = TelemetryPublisher(vehicle, bus)
         self._requests = Requests(self.system)
         self._acks: deque[flight.CommandAckMessage] = deque(maxlen=64)
-        self._values: deque[service.ParamValue | telemetry.GpsGlobalOrigin] = deque(maxlen=256)
+        self._values: deque[service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion] = deque(
+            maxlen=256
+        )
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
-        self._session = MavlinkSession(self.system, self.flavour, rates, settings.link.system_id, settings.origin)
+        ours, known = settings.link.system_id, dict(vehicle.parameters)
+        self._session = MavlinkSession(self.system, self.flavour, rates, ours, settings.origin, known)
         pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
-        self.orders = Orders(vehicle, self.flavour, settings.vision, self._requests)
+        self.orders = Orders(vehicle, self.flavour, self._requests)
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
         self._traffic = Traffic()
@@ -156,12 +160,15 @@ class MavlinkVehicle:
             case telemetry.BatteryStatus():
                 return _charged(now_ns, message.battery_remaining, known)
             case telemetry.EkfStatusReport():
+                self._publisher.stated.hear(now_ns, message)
                 return replace(known, ekf=message.flags)
+            case telemetry.EstimatorStatus() | flight.OdometryMessage():
+                self._publisher.stated.hear(now_ns, message)
             case telemetry.Statustext():
                 self.texts.append((now_ns, message))
             case flight.CommandAckMessage():
                 self._acks.append(message)
-            case service.ParamValue() | telemetry.GpsGlobalOrigin():
+            case service.ParamValue() | telemetry.GpsGlobalOrigin() | telemetry.AutopilotVersion():
                 self._values.append(message)
             case service.Timesync() if message.tc1 == 0:
                 # WIRE (docs/reference/mavlink.md 5.6): without answers PX4 does not accept the times of our poses.
@@ -172,7 +179,10 @@ class MavlinkVehicle:
 
     def see(self, now_ns: int, estimate: Estimate) -> None:
         """Take the tracker's estimate."""
-        self.vision.hear(now_ns, estimate)
+        good, known = self.vision.hear(now_ns, estimate), self.telemetry
+        if good is not None and known.landed != Landed.ON_GROUND and now_ns - known.moved_ns < _FRESH_NS:
+            self.orders.drift.hear(now_ns, good, known.velocity_m_s)
+            self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
 
     def view(self, now_ns: int) -> VehicleView:
         """Return what the vehicle last said."""
@@ -186,10 +196,16 @@ class MavlinkVehicle:
             state = FlightState.HOVERING
         elif state is FlightState.LANDED and self.orders.starting:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
-        velocity = known.velocity_m_s if self.orders.are_heeded(known.custom_mode) else None
+        velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(known.custom_mode) else None
         not_ready = self._not_ready(now_ns, known)
         battery = known.battery if now_ns - known.battery_ns < _BATTERY_NS else None
-        return VehicleView(state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity)
+        lost_s = self.vision.lost_s(now_ns)
+        return VehicleView(state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s)
+
+    def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
+        # What it is told holds its drift as well: that is no error of control.
+        (x, y, z), (drift_x, drift_y, _) = known.velocity_m_s, self.orders.drift.drift(now_ns)
+        return x - drift_x, y - drift_y, z
 
     def _state(self, known: LatestTelemetry) -> FlightState:
         return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
@@ -216,7 +232,8 @@ class MavlinkVehicle:
         return "" if known.healthy & SensorBits.PREARM_CHECK else self._arming_reason()
 
     def _arming_reason(self) -> str:
-        said = self._said.reasons(clock.now_ns() - _COMPLAINTS_NS, "arm")
+        now_ns = clock.now_ns()
+        said = self._said.reasons(now_ns - _COMPLAINTS_NS, "arm", now_ns)
         return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
@@ -227,8 +244,7 @@ class MavlinkVehicle:
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         height = known.position_m[2] if known.position_m else 0.0
-        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, known.landed, height,
-                                    self.vision.lost_s(now_ns))  # fmt: skip
+        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, known.landed, height)
         messages += self._requests.due(now_ns)
         if setpoint is not None:
             messages.append(setpoint)
@@ -243,6 +259,8 @@ class MavlinkVehicle:
             try:
                 if isinstance(value, service.ParamValue):
                     self._session.hear_parameter(value)
+                elif isinstance(value, telemetry.AutopilotVersion):
+                    self._session.hear_version(value.flight_sw_version)
                 else:
                     self._session.hear_origin()
             except WireError as error:
@@ -251,10 +269,12 @@ class MavlinkVehicle:
 
     def _take_texts(self, now_ns: int) -> None:
         events = self.orders.events
+        while self._session.notes:
+            events.append((_WARNING, self._session.notes.popleft()))
         while self.texts:
             said = self._said.hear(*self.texts.popleft())
             if said is not None:
-                self.orders.said.append(said)
+                self.orders.said.append((now_ns, said[1]))
                 events.append(said)
         while self._jumps:
             jump_s = self._jumps.popleft() / 1000
@@ -281,7 +301,10 @@ class MavlinkVehicle:
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals; those of the link are shared by all vehicles on it."""
         rate_hz, quality = self._traffic.rates(now_ns)
-        detail = self.orders.detail or self._session.detail(self._requests)
+        lost_s = self.vision.lost_s(now_ns)
+        lost = f"no position from the cameras for {lost_s:.1f} s"
+        without = lost_s >= self._settings.vision.hover_after_s
+        detail = lost if without else self._session.detail(self._requests)
         return LinkHealth(quality, rate_hz, dict(self._link.rejected + self._refused), detail)
 
     def flush(self) -> None:

@@ -36,26 +36,28 @@ class VisionFeed:
         self._good_ns: int | None = None
         self._aloft_ns: int | None = None
 
-    def hear(self, now_ns: int, estimate: Estimate) -> None:
-        """Take the tracker's estimate."""
+    def hear(self, now_ns: int, estimate: Estimate) -> EntityEstimate | None:
+        """Take the tracker's estimate; return what it says of this vehicle if that is good enough to fly on."""
         for entity in estimate.entities:
             if entity.name == self._name:
                 break
         else:
-            return
+            return None
         if estimate.epoch != self._epoch:
             self._epoch, self._last = estimate.epoch, None
             self.resets += 1
         if len(entity.mean) < 4 or len(entity.velocity_m_s) < 3 or len(entity.covariance) != 16:
-            return
+            return None
         header = estimate.header
         stamp_ns = header.stamp_ns if header.clock == self._clock and header.stamp_ns <= now_ns else now_ns
-        if self._is_good(entity):
-            x, y, z, yaw = entity.mean[:4]
-            variances = (entity.covariance[0], entity.covariance[5], entity.covariance[10], entity.covariance[15])
-            vx, vy, vz = entity.velocity_m_s[:3]
-            self._newest = VisionPose(stamp_ns, (x, y, z), yaw, variances, (vx, vy, vz))
-            self._good_ns = stamp_ns
+        if not self._is_good(entity):
+            return None
+        x, y, z, yaw = entity.mean[:4]
+        variances = (entity.covariance[0], entity.covariance[5], entity.covariance[10], entity.covariance[15])
+        vx, vy, vz = entity.velocity_m_s[:3]
+        self._newest = VisionPose(stamp_ns, (x, y, z), yaw, variances, (vx, vy, vz))
+        self._good_ns = stamp_ns
+        return entity
 
     def _is_good(self, entity: EntityEstimate) -> bool:
         worst = max(entity.covariance[0], entity.covariance[5], entity.covariance[10])

@@ -24,7 +24,7 @@ from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkDirect
 from mavsdk.plugins.mavlink_direct.mavlink_direct import MavlinkMessage
 
-from drivers.mavlink.links.seam import Heard, Transport
+from drivers.mavlink.links.seam import Address, Heard, Transport
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, fields_of, name_of
@@ -173,6 +173,11 @@ class MavsdkLink:
             return None
         system = self._systems[number] = _System(number, self._settings, self._transport, self._heard)
         return system
+
+    @property
+    def called_from(self) -> tuple[Address, ...]:
+        """Where the vehicles were heard last, where the link waits for them."""
+        return self._transport.called_from
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return what came."""

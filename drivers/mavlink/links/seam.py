@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol
 
 from drivers.mavlink.wire.frames import Message, ReceivedFrame
 
+Address = tuple[str, int]
 Sniffer = Callable[[int, int, bytes, bool], None]  # system, stamp_ns, bytes, received
 
 
@@ -20,6 +21,10 @@ class MavlinkLink(Protocol):
     """One port with any number of vehicles behind it. Nothing that arrives raises; refusals are counted by reason."""
 
     rejected: Counter[str]
+
+    @property
+    def called_from(self) -> tuple[Address, ...]:
+        """Where the vehicles were heard last, on a link that they call themselves; empty on others."""
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return what came."""

@@ -6,11 +6,13 @@ import termios
 import threading
 from collections import Counter
 
-from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.seam import Address, Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.tty import make_raw
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message
-from drivers.mavlink.wire.verification import Signing, frame_size
+from drivers.mavlink.wire.signature import frame_size
+from drivers.mavlink.wire.verification import Signing
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 
@@ -58,10 +60,15 @@ class SerialLink:
         except OSError as error:
             raise DriverError(f"cannot open {device}: {error.strerror}") from error
         try:
-            _make_raw(self._fd, int(baud))
+            make_raw(self._fd, int(baud))
         except (termios.error, DriverError) as error:
             os.close(self._fd)
             raise DriverError(f"cannot use {device} at {baud} baud: {error}") from error
+
+    @property
+    def called_from(self) -> tuple[Address, ...]:
+        """Nobody calls over a line."""
+        return ()
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s for bytes; return the frames that are whole by now."""
@@ -115,12 +122,3 @@ def raise_if_closed(error: Exception) -> None:
     """Raise again what means that we closed the line ourselves (ValueError); other errors may pass."""
     if isinstance(error, ValueError):
         raise error
-
-
-def _make_raw(fd: int, baud: int) -> None:
-    speed = getattr(termios, f"B{baud}", None)
-    if speed is None:
-        raise DriverError("no such speed")
-    attributes = termios.tcgetattr(fd)
-    control = termios.CS8 | termios.CREAD | termios.CLOCAL
-    termios.tcsetattr(fd, termios.TCSANOW, [0, 0, control, 0, speed, speed, attributes[6]])

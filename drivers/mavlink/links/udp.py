@@ -3,12 +3,15 @@
 import logging
 import socket
 import threading
+import zlib
 from collections import Counter
+from contextlib import suppress
 
-from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.seam import Address, Heard, Sniffer, ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
+from drivers.mavlink.wire.telemetry import Heartbeat
 from drivers.mavlink.wire.verification import Signing
 from groundstation.bus import clock
 from groundstation.errors import DriverError
@@ -16,7 +19,17 @@ from groundstation.process.ports import why_refused
 
 _POLL_S = 0.1
 _ADDRESS_HELD_NS = 3_000_000_000
+_FIRST_OWN_PORT, _OWN_PORTS = 14_300, 200
+_GREETED_NS, _MOST_GREETED = 1_000_000_000, 250
 _log = logging.getLogger(__name__)
+
+
+def _bind_as_ever(sock: socket.socket, target: str) -> None:
+    """Speak from the same port each time: PX4 answers the first one that spoke to it, until it restarts."""
+    try:
+        sock.bind(("", _FIRST_OWN_PORT + zlib.crc32(target.encode()) % _OWN_PORTS))
+    except OSError:  # somebody else speaks to that vehicle already
+        sock.bind(("", 0))
 
 
 class UdpLink:
@@ -34,15 +47,24 @@ class UdpLink:
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._lock = threading.Lock()
         self._sniffer = sniffer
+        self._greeted: dict[tuple[str, int], int] = {}
         self._own = (settings.system_id, settings.component_id)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind(("", 0) if self._peer else (address, int(port)))
+            if self._peer is None:
+                self._socket.bind((address, int(port)))
+            else:
+                _bind_as_ever(self._socket, settings.target)
         except OSError as error:
             self._socket.close()
             why = why_refused(error, address, int(port), socket.SOCK_DGRAM)
             raise DriverError(f"cannot listen on {settings.target}: {why}") from error
         self._socket.settimeout(_POLL_S)
+
+    @property
+    def called_from(self) -> tuple[Address, ...]:
+        """Where the vehicles were heard last, where the link waits for them."""
+        return () if self._peer else tuple(dict.fromkeys(address for address, _ in self._addresses.copy().values()))
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s for a datagram; return its frames."""
@@ -75,7 +97,22 @@ class UdpLink:
                     heard.append((Heard(now_ns, frame), raw))
         except WireError as error:
             self._reject(error.reason, str(error))
+            if error.reason == "mavlink_1":
+                self._greet(now_ns, source)
         return heard
+
+    def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
+        """Show a vehicle that speaks MAVLink 1 a frame of version 2, which is when it changes to that.
+
+        WIRE (docs/reference/mavlink.md 5.10): PX4 with MAV_PROTO_VER 0. Nothing is learnt from it: no address is bound.
+        """
+        if now_ns - self._greeted.get(source, -_GREETED_NS) < _GREETED_NS or len(self._greeted) >= _MOST_GREETED:
+            return
+        self._greeted[source] = now_ns
+        with self._lock:
+            greeting = self._encoder.encode(Heartbeat(6, 8, 0, 0, 4))
+        with suppress(OSError):
+            self._socket.sendto(greeting, source)
 
     def _decode(self, raw: bytes) -> ReceivedFrame | None:
         try:

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from drivers.mavlink.wire import flight, service, telemetry
+from drivers.mavlink.wire import flight, positioning, service, simulator, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.verification import Signing, Verifier, frame_size, number_of
+from drivers.mavlink.wire.signature import frame_size
+from drivers.mavlink.wire.verification import Signing, Verifier, number_of
 
 Message = tuple[Any, ...]
 MAX_DATAGRAM = 2048
@@ -29,7 +30,7 @@ class ReceivedFrame(NamedTuple):
 
 def _classes() -> dict[str, type[Message]]:
     found = {}
-    for module in (flight, service, telemetry):
+    for module in (flight, positioning, service, simulator, telemetry):
         for name, value in vars(module).items():
             if (
                 isinstance(value, type)
@@ -120,12 +121,12 @@ class FrameEncoder:
             self._mav.signing.link_id = signing.link_id
             self._mav.signing.timestamp = signing.timestamp
 
-    def encode(self, message: Message) -> bytes:
-        """Return the frame of a message; raises WireError when a value does not fit its field."""
+    def encode(self, message: Message, old: bool = False) -> bytes:
+        """Return the frame of a message; raises WireError when a value does not fit its field. old: of MAVLink 1."""
         try:
             fields = [v.encode("ascii", "replace") if isinstance(v, str) else v for v in message]
             packet = dialect.mavlink_map[id_of(type(message))](*fields)
-            frame: bytes = packet.pack(self._mav)
+            frame: bytes = packet.pack(self._mav, force_mavlink1=old)
             self._mav.seq = (self._mav.seq + 1) % 256
             return bytes(frame)
         except (struct.error, TypeError, OverflowError) as error:

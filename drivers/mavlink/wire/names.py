@@ -75,6 +75,7 @@ class SensorBits(IntFlag):
     GYRO = 0x1
     ACCELEROMETER = 0x2
     MAGNETOMETER = 0x4
+    GPS = 0x20
     VISION_POSITION = 0x80
     PREARM_CHECK = 0x10000000
 

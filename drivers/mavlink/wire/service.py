@@ -102,6 +102,32 @@ class MissionCount(NamedTuple):
     mission_type: int = 0
 
 
+class MissionRequestInt(NamedTuple):
+    """Ask for one mission item."""
+
+    target_system: int
+    target_component: int
+    seq: int
+    mission_type: int = 0
+
+
+class MissionClearAll(NamedTuple):
+    """Forget all mission items."""
+
+    target_system: int
+    target_component: int
+    mission_type: int = 0
+
+
+class MissionAck(NamedTuple):
+    """How a transfer of mission items ended: 0 accepted, 3 unsupported, 13 no such item."""
+
+    target_system: int
+    target_component: int
+    type: int
+    mission_type: int = 0
+
+
 class FileTransferProtocol(NamedTuple):
     """A step of MAVLink FTP."""
 

@@ -151,6 +151,21 @@ class EkfStatusReport(NamedTuple):
     airspeed_variance: float = 0.0
 
 
+class EstimatorStatus(NamedTuple):
+    """PX4: flags, test ratios of innovations (beyond 1 they are refused), accuracies [m]."""
+
+    time_usec: int
+    flags: int
+    vel_ratio: float
+    pos_horiz_ratio: float
+    pos_vert_ratio: float
+    mag_ratio: float
+    hagl_ratio: float
+    tas_ratio: float
+    pos_horiz_accuracy: float
+    pos_vert_accuracy: float
+
+
 class HomePosition(NamedTuple):
     """Where it took off: degrees x 1e7, mm, and NED [m]."""
 

@@ -4,17 +4,14 @@ A frame of any kind that pymavlink's widest dialect knows can be verified, wheth
 another kind cannot, because its checksum needs a seed that only its definition has.
 """
 
-import hashlib
 import hmac
 from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import all as widest
 
 from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.signature import CHECKSUM, HEADER, SIGNATURE, SIGNED, digest, frame_size
 
-MAGIC, MAGIC_1 = 0xFD, 0xFE
-HEADER, CHECKSUM, SIGNATURE = 10, 2, 13
-SIGNED = 1
 # WIRE (pymavlink): a sender that was not heard before may sign with a time up to a minute old [10 us].
 _NEW_SENDER_LAG = 6_000_000
 # WIRE (docs/reference/mavlink.md 5.10): the seed comes from a message's definition: other dialects fail.
@@ -28,19 +25,6 @@ class Signing:
     key: bytes
     timestamp: int
     link_id: int = 1
-
-
-def frame_size(data: bytes | bytearray, offset: int = 0) -> int:
-    """Return the length of the frame that begins at an offset; raises WireError (mavlink_1, no_frame, ...)."""
-    if data[offset] != MAGIC:
-        raise WireError("mavlink_1" if data[offset] == MAGIC_1 else "no_frame", f"byte {data[offset]:#x}")
-    if len(data) - offset < 3:
-        raise WireError("truncated", "header")
-    flags = data[offset + 2]
-    # WIRE (docs/reference/mavlink.md 5.10): a frame with an unknown incompatibility flag must be dropped.
-    if flags & ~SIGNED:
-        raise WireError("incompatible", f"flags {flags:#x}")
-    return HEADER + int(data[offset + 1]) + CHECKSUM + (SIGNATURE if flags & SIGNED else 0)
 
 
 def number_of(frame: bytes) -> int:
@@ -80,10 +64,9 @@ class Verifier:
 
 
 def _check_signature(frame: bytes, key: bytes) -> None:
-    # WIRE (docs/reference/mavlink.md 5.9): the last 6 bytes are of SHA256(key, all before them).
     if not frame[2] & SIGNED:
         raise WireError("unsigned", f"from system {frame[5]}")
-    if not hmac.compare_digest(hashlib.sha256(key + frame[:-6]).digest()[:6], frame[-6:]):
+    if not hmac.compare_digest(digest(key, frame[:-6]), frame[-6:]):
         raise WireError("signature", f"from system {frame[5]}")
 
 

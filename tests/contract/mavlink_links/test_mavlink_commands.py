@@ -84,7 +84,7 @@ def test_setup_tells_and_sets_what_differs(hangar, flavour, drone, system):
     place = ("--address", f"{address}:{port}")
     result = run("setup", "--check", FIELD, drone, *place)
     assert result.return_value == 1, result.output
-    name = "EKF2_GPS_CTRL is 7, needs 0" if flavour == "px4" else "GUID_TIMEOUT is 3, needs 0.5"
+    name = "EKF2_GPS_CTRL is 7, needs 0" if flavour == "px4" else "GUID_TIMEOUT is 3, needs 0.1 to 0.5"
     assert name in result.output
     assert not emulator.firmware.parameters.indoor
     result = run("setup", "--apply", FIELD, drone, *place)
@@ -106,6 +106,7 @@ def test_setup_refuses_another_autopilot_and_an_armed_one(hangar):
 def test_signed_link_hears_only_who_has_the_key(hangar, tmp_path):
     key = tmp_path / "key"
     key.write_text(bytes(range(32)).hex())
+    key.chmod(0o600)
     signing = signing_of(LinkSettings(target="udpout:127.0.0.1:1", key_file=str(key)))
     emulator, _, (address, port) = hangar.add("ardupilot", 9, signing=signing)
     target = f"udpout:{address}:{port}"
@@ -113,6 +114,7 @@ def test_signed_link_hears_only_who_has_the_key(hangar, tmp_path):
     plain = open_link(LinkSettings(target=target))
     other = tmp_path / "other"
     other.write_bytes(os.urandom(32))
+    other.chmod(0o600)
     wrong = open_link(LinkSettings(target=target, key_file=str(other)))
     try:
         deadline, heard = time.monotonic() + 4, list[Heard]()
@@ -132,9 +134,19 @@ def test_signed_link_hears_only_who_has_the_key(hangar, tmp_path):
 def test_a_bad_key_is_named_but_not_shown(tmp_path, content):
     key = tmp_path / "key"
     key.write_bytes(content)
+    key.chmod(0o600)
     with pytest.raises(DriverError, match="32 bytes") as refused:
         signing_of(LinkSettings(target="udpout:127.0.0.1:1", key_file=str(key)))
     assert content.decode() not in str(refused.value) or not content
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o644])
+def test_a_key_that_others_can_read_is_none(tmp_path, mode):
+    key = tmp_path / "key"
+    key.write_bytes(bytes(range(32)))
+    key.chmod(mode)
+    with pytest.raises(DriverError, match="others can read it"):
+        signing_of(LinkSettings(target="udpout:127.0.0.1:1", key_file=str(key)))
 
 
 def test_duplicates_strangers_and_rubbish_are_refused_by_name():
@@ -159,6 +171,7 @@ def test_duplicates_strangers_and_rubbish_are_refused_by_name():
 def test_a_signed_link_refuses_what_is_unsigned_forged_or_played_again(tmp_path):
     key = tmp_path / "key"
     key.write_bytes(bytes(range(32)))
+    key.chmod(0o600)
     ours = signing_of(LinkSettings(target="udpin:127.0.0.1:0", key_file=str(key)))
     assert ours is not None
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"), ours)

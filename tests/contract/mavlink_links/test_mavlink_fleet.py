@@ -176,7 +176,7 @@ def test_parameters_and_health_forbid_a_take_off_on_every_link(hangar, kind):
     flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)
     reason = lambda: flying.hosts[0].watchdog.vehicle.not_ready  # noqa: E731
     try:
-        assert flying.turn(10.0, lambda: "GUID_TIMEOUT is 3, needs 0.5" in reason()), reason()
+        assert flying.turn(10.0, lambda: "GUID_TIMEOUT is 3, needs 0.1 to 0.5" in reason()), reason()
         emulator.firmware.parameters.values["GUID_TIMEOUT"] = 0.5
         emulator.silent = True  # it is restarted: everything is read anew
         flying.turn(2.5)

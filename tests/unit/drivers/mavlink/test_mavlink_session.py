@@ -17,7 +17,7 @@ def read_all(strange: set[str], seconds: float) -> MavlinkSession:
     values = {n.name: n.value for n in needed(Flavour.ARDUPILOT, 255)}
     for turn in range(round(seconds * 100)):
         for message in session.step(10_000 * MS + turn * 10 * MS, 0, requests):
-            if isinstance(message, ParamRequestRead) and message.param_id not in strange:
+            if isinstance(message, ParamRequestRead) and message.param_id in values.keys() - strange:
                 session.hear_parameter(ParamValue(message.param_id, values[message.param_id], REAL32, 1, 0))
     return session
 
@@ -32,4 +32,37 @@ def test_a_parameter_that_is_never_answered_is_named_with_the_firmware() -> None
     session = read_all({"GPS1_TYPE"}, 3.0)
     assert session.detail(Requests(1)) == "reading parameter GPS1_TYPE"
     session = read_all({"GPS1_TYPE"}, 15.0)
+    session.hear_version(0x04060200)
     assert "does not know parameter GPS1_TYPE" in session.detail(Requests(1))
+
+
+def test_an_older_or_newer_name_counts_as_well() -> None:
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
+    values = {n.aliases[0] if n.aliases else n.name: n.value for n in needed(Flavour.ARDUPILOT, 255)}
+    for turn in range(1500):
+        for message in session.step(10_000 * MS + turn * 10 * MS, 0, requests):
+            if isinstance(message, ParamRequestRead) and message.param_id in values:
+                session.hear_parameter(ParamValue(message.param_id, values[message.param_id], REAL32, 1, 0))
+    assert "GPS_TYPE" in values and "MAV_GCS_SYSID" in values
+    assert not session.unread and not session.problems
+
+
+def test_another_version_is_flown_and_what_was_not_checked_is_said() -> None:
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
+    session.hear_origin()
+    session.hear_version(0x04080000)
+    values = {n.name: n.value for n in needed(Flavour.ARDUPILOT, 255) if n.name != "FS_EKF_ACTION"}
+    for turn in range(1500):
+        for message in session.step(10_000 * MS + turn * 10 * MS, 0, requests):
+            if isinstance(message, ParamRequestRead) and message.param_id in values:
+                session.hear_parameter(ParamValue(message.param_id, values[message.param_id], REAL32, 1, 0))
+    assert session.detail(requests) == ""
+    assert "4.8" in session.notes[0]
+    assert session.notes[1] == "not checked, because its firmware does not know them: FS_EKF_ACTION"
+    assert len(session.notes) == 2
+
+
+def test_no_version_told_at_all_is_another_version() -> None:
+    session = read_all({"FS_EKF_ACTION"}, 20.0)
+    session.hear_origin()
+    assert session.detail(Requests(1)) == ""

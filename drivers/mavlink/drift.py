@@ -1,0 +1,149 @@
+"""What an autopilot's word of its own velocity is off by, as the cameras see it; and a place held by the belief. Pure.
+
+An autopilot obeys a velocity by its own estimate: one that is wrong by 0.3 m/s flies off at that speed while it is told
+to stand still (docs/reference/mavlink.md 2.1). The tracker knows both, so what it is told is corrected. Nothing here
+moves a vehicle by itself: without the tracker's word the correction fades, and hovering is zero velocity again.
+"""
+
+import math
+
+from groundstation.bus.messages import EntityEstimate, Vector3
+from groundstation.time_units import NS_PER_S
+
+# Velocities of the belief are noisy by 0.05 m/s.
+_SMOOTHING_S = 0.25
+# Without the tracker an estimator's error of the velocity lasts for about that long.
+_FORGETS_S = 2.0
+_FRESH_NS = 300_000_000
+# Larger ones are no error of an estimator that still works, nor are sudden ones (its tilt would be wrong by 5 degrees
+# and more): what is told is not corrected then, and the limits of the control error act.
+_MOST_M_S = 0.8
+_SUDDEN_M_S, _SUDDEN_M_S2 = 0.45, 0.8
+_TRUSTED_AGAIN_NS = NS_PER_S
+# Up to here it does not matter whose word is wrong.
+_SMALL_M_S = 0.2
+_RESPONSE_S, _JUDGED_S, _EVEN_M_S = 0.6, 0.5, 0.1
+_HOLD_GAIN = 0.8
+# Below what the control error tolerates of a vehicle that is told to stand still.
+_HOLD_M_S = 0.2
+_SEEN_S = 0.5
+_STILL: Vector3 = (0.0, 0.0, 0.0)
+Vector2 = tuple[float, float]
+
+
+class Obedience:
+    """Whether a vehicle moves as it was told by its own word, rather than by that of the cameras.
+
+    An estimator that errs obeys by its own word. Where cameras see what was told, it is the report that is wrong, not
+    what the vehicle flies by.
+    """
+
+    def __init__(self) -> None:
+        self._expected: Vector2 = (0.0, 0.0)
+        self._told_ns = self._heard_ns = 0
+        self._reported_off = self._seen_off = 0.0
+
+    def tell(self, now_ns: int, velocity: Vector2) -> None:
+        """Note what goes out [m/s; base_stabilized]."""
+        share = _share(now_ns - self._told_ns, _RESPONSE_S)
+        self._expected, self._told_ns = _towards(self._expected, velocity, share), now_ns
+
+    def hear(self, now_ns: int, reported: Vector2, seen: Vector2) -> bool:
+        """Take both words of its velocity; return whether its own is the one that it flies by."""
+        share, self._heard_ns = _share(now_ns - self._heard_ns, _JUDGED_S), now_ns
+        self._reported_off += share * (math.dist(reported, self._expected) - self._reported_off)
+        self._seen_off += share * (math.dist(seen, self._expected) - self._seen_off)
+        return self._reported_off <= self._seen_off + _EVEN_M_S
+
+
+class DriftFeedback:
+    """Belief of one flying vehicle [world, FLU] beside the velocity that its autopilot reports."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the vehicle is on the floor."""
+        self._drift: Vector2 = (0.0, 0.0)
+        self._at_ns: int | None = None
+        self._believed_ns: int | None = None
+        self._doubted_until_ns = 0
+        self._obedience, self._obeys = Obedience(), True
+        self._place: Vector3 = _STILL
+        self._yaw_rad = 0.0
+        self._held: Vector3 | None = None
+
+    def tell(self, now_ns: int, velocity_m_s: Vector3) -> None:
+        """Note the velocity [base_stabilized] that goes out, correction included."""
+        self._obedience.tell(now_ns, velocity_m_s[:2])
+
+    def hear(self, now_ns: int, estimate: EntityEstimate, reported_m_s: Vector3) -> None:
+        """Take a good estimate and the velocity [base_stabilized] that was reported last."""
+        x, y, z, yaw = estimate.mean[:4]
+        self._place, self._yaw_rad, self._believed_ns = (x, y, z), yaw, now_ns
+        if estimate.age_s > _SEEN_S:
+            return  # dead reckoning by the very velocity that is asked about
+        c, s = math.cos(yaw), math.sin(yaw)
+        forward, left = reported_m_s[:2]
+        vx, vy = estimate.velocity_m_s[:2]
+        self._obeys = self._obedience.hear(now_ns, (forward, left), (c * vx + s * vy, c * vy - s * vx))
+        self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
+
+    def _correct(self, now_ns: int, error: Vector2) -> None:
+        first, since_ns = self._at_ns is None, now_ns - (self._at_ns or now_ns)
+        if not first and math.dist(error, self._drift) > _SUDDEN_M_S + _SUDDEN_M_S2 * since_ns / NS_PER_S:
+            self._doubted_until_ns = now_ns + _TRUSTED_AGAIN_NS
+        self._drift = _towards(self._drift, error, 1.0 if first else _share(since_ns, _SMOOTHING_S))
+        self._at_ns = now_ns
+
+    def drift(self, now_ns: int) -> Vector3:
+        """Return reported less true velocity [m/s; base_stabilized]: what to add to what it is to fly."""
+        size = math.hypot(*self._drift)
+        doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
+        if self._at_ns is None or doubted or size > _MOST_M_S:
+            return _STILL
+        left_over = math.exp(-max(0.0, (now_ns - self._at_ns) / NS_PER_S - _SEEN_S) / _FORGETS_S)
+        return self._in_heading(left_over * self._drift[0], left_over * self._drift[1], 0.0)
+
+    @property
+    def size_m_s(self) -> float:
+        """Return how far both words of its velocity were apart last [m/s], whether that is corrected or not."""
+        return math.hypot(*self._drift)
+
+    def place(self, now_ns: int) -> Vector3 | None:
+        """Return where it is [world], or None without a fresh belief."""
+        if self._believed_ns is None or now_ns - self._believed_ns > _FRESH_NS:
+            return None
+        return self._place
+
+    def let_go(self) -> None:
+        """Hold no place any more: the next hover holds the one where it begins."""
+        self._held = None
+
+    def hold(self, now_ns: int, height_m: float | None = None) -> Vector3:
+        """Return the velocity [base_stabilized] back to the place held, zero without a fresh belief.
+
+        height_m: the height to hold, None for that where the hover began.
+        """
+        place = self.place(now_ns)
+        if place is None:
+            self._held = None
+            return _STILL
+        x, y, z = self._held = self._held or place
+        wanted = (x - place[0], y - place[1], (z if height_m is None else height_m) - place[2])
+        size = math.hypot(*wanted[:2])
+        gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
+        up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_GAIN * wanted[2]))
+        return self._in_heading(gain * wanted[0], gain * wanted[1], up)
+
+    def _in_heading(self, x: float, y: float, up: float) -> Vector3:
+        c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        return c * x + s * y, c * y - s * x, up
+
+
+def _share(elapsed_ns: int, time_s: float) -> float:
+    return 1.0 - math.exp(-max(0, elapsed_ns) / NS_PER_S / time_s)
+
+
+def _towards(old: Vector2, new: Vector2, share: float) -> Vector2:
+    return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])

@@ -1,0 +1,72 @@
+"""How far an autopilot's own velocity and attitude are to be trusted: by its own word, and by what cameras see. Pure.
+
+Its covariances say too little (docs/reference/mavlink.md 2.1), so they can only add to what the field file says; where
+its filter refuses what it is fed (test ratios near 1), its velocity is its accelerometers' alone.
+"""
+
+import math
+
+from drivers.mavlink.wire.flight import OdometryMessage
+from drivers.mavlink.wire.telemetry import EkfStatusReport, EstimatorStatus
+from groundstation.time_units import NS_PER_S
+
+# WIRE (ESTIMATOR_STATUS): below 0.5 under normal operation, above 1 a measurement is refused.
+_NORMAL_RATIO = 0.5
+_REFUSED_STD_M_S = 0.5
+# An estimator that is levelled by positions alone errs by g times its tilt against a bandwidth of some 1.6 rad/s.
+_TILT_PER_VELOCITY = 0.08
+_NOISE_M_S = 0.05
+_FADES_S = 10.0
+_KEPT_NS = 3 * NS_PER_S
+_MOST_M_S, _MOST_RAD = 2.0, math.radians(10.0)
+_ROLL_VARIANCE, _PITCH_VARIANCE = 15, 18
+_X_VARIANCE, _Y_VARIANCE = 0, 6
+
+
+class StatedUncertainty:
+    """Deviations of one vehicle's velocity [m/s] and of its roll and pitch [rad]; 0.0: nothing was stated."""
+
+    def __init__(self) -> None:
+        self._velocity = self._attitude = self._ratio = 0.0
+        self._stated_ns = self._ratio_ns = self._drift_ns = 0
+        self._drift_m_s = 0.0
+
+    def hear(self, now_ns: int, message: OdometryMessage | EstimatorStatus | EkfStatusReport) -> None:
+        """Take what the autopilot states."""
+        match message:
+            case OdometryMessage():
+                velocity, pose = message.velocity_covariance, message.pose_covariance
+                self._velocity = _std(velocity[_X_VARIANCE], velocity[_Y_VARIANCE])
+                self._attitude = _std(pose[_ROLL_VARIANCE], pose[_PITCH_VARIANCE])
+                self._stated_ns = now_ns
+            case EstimatorStatus():
+                self._doubt(now_ns, message.vel_ratio, message.pos_horiz_ratio)
+            case EkfStatusReport():
+                self._doubt(now_ns, message.velocity_variance, message.pos_horiz_variance)
+
+    def _doubt(self, now_ns: int, *ratios: float) -> None:
+        self._ratio = max((r for r in ratios if math.isfinite(r)), default=0.0)
+        self._ratio_ns = now_ns
+
+    def see_drift(self, now_ns: int, drift_m_s: float) -> None:
+        """Take what its velocity is off by, as cameras see it [m/s]."""
+        faded = self._drift_m_s * math.exp(-max(0, now_ns - self._drift_ns) / NS_PER_S / _FADES_S)
+        self._drift_m_s, self._drift_ns = max(faded, drift_m_s - _NOISE_M_S), now_ns
+
+    def velocity_std_m_s(self, now_ns: int) -> float:
+        """Return the deviation of a component of its velocity."""
+        stated = self._velocity if now_ns - self._stated_ns <= _KEPT_NS else 0.0
+        ratio = self._ratio if now_ns - self._ratio_ns <= _KEPT_NS else 0.0
+        beyond = max(0.0, ratio - _NORMAL_RATIO) / _NORMAL_RATIO
+        return min(_MOST_M_S, max(stated, _REFUSED_STD_M_S * min(1.0, beyond)))
+
+    def attitude_std_rad(self, now_ns: int) -> float:
+        """Return the deviation of roll and of pitch."""
+        stated = self._attitude if now_ns - self._stated_ns <= _KEPT_NS else 0.0
+        return min(_MOST_RAD, max(stated, _TILT_PER_VELOCITY * self._drift_m_s))
+
+
+def _std(*variances: float) -> float:
+    # A covariance that is not known is NaN by the standard, and 0 or huge where one fills it in.
+    known = [v for v in variances if 0.0 < v < _MOST_M_S**2]
+    return math.sqrt(max(known)) if len(known) == len(variances) else 0.0

@@ -1,0 +1,69 @@
+"""How supervisor and guardian reach the vehicles of a link whose driver is silent: signed, called back, or by a line.
+
+No pymavlink here: the guardian is small. Reason for all of it: docs/decisions/0084-a-voice-for-every-link.md.
+"""
+
+import json
+import os
+import socket
+import termios
+import time
+from collections.abc import Sequence
+
+from drivers.mavlink.links.tty import make_raw
+from drivers.mavlink.signing_key import read_key
+from drivers.mavlink.wire.signature import signed_anew, stamp_at
+from groundstation.errors import DriverError
+
+Address = tuple[str, int]
+
+
+class MavlinkVoice:
+    """Says prepared frames; made before anything flies, since the key must be at hand when it is needed.
+
+    way: JSON with `serial` (DEVICE:BAUD, or "" for UDP) and `key_file` ("" for unsigned frames). speaker: a number of
+    its own for each process that may speak, used as the signature's link.
+    """
+
+    def __init__(self, way: str, speaker: int) -> None:
+        told = json.loads(way)
+        self._serial, key_file = str(told["serial"]), str(told["key_file"])
+        self._key = read_key(key_file) if key_file else b""
+        self._speaker, self._stamp, self._fd = speaker, 0, -1
+        self._socket = None if self._serial else socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        if self._socket is not None:
+            self._socket.setblocking(False)
+
+    def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
+        """Send frames to every address, or into the line; raises OSError where that fails."""
+        if self._key:
+            # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin
+            # at most a minute before the newest time that the vehicle knows.
+            self._stamp = max(self._stamp, stamp_at(time.time()))
+            datagram, self._stamp = signed_anew(datagram, self._key, self._speaker, self._stamp)
+        if self._socket is None:
+            os.write(self._line(), datagram)
+            return
+        for address in addresses:
+            self._socket.sendto(datagram, address)
+
+    def _line(self) -> int:
+        """Open the device beside the driver that hangs, or after it; a device may be opened twice."""
+        if self._fd < 0:
+            device, _, baud = self._serial.partition(":")
+            fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            try:
+                make_raw(fd, int(baud))
+            except (termios.error, DriverError) as error:
+                os.close(fd)
+                raise OSError(f"cannot use {device}: {error}") from error
+            self._fd = fd
+        return self._fd
+
+    def close(self) -> None:
+        """Release the socket or device; idempotent."""
+        if self._socket is not None:
+            self._socket.close()
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1

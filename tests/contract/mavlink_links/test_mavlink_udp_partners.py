@@ -1,0 +1,62 @@
+"""One partner for good, and autopilots that speak MAVLink 1 until they hear version 2."""
+
+import socket
+import time
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from drivers.mavlink.links.udp import UdpLink
+from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.wire.telemetry import Heartbeat
+
+
+@pytest.fixture
+def vehicle():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind(("127.0.0.1", 0))
+        sock.settimeout(1.0)
+        yield sock
+
+
+def test_a_link_that_is_opened_again_speaks_from_the_same_port(vehicle):
+    sources = []
+    for _ in range(2):
+        link = UdpLink(LinkSettings(target=f"udpout:127.0.0.1:{vehicle.getsockname()[1]}"))
+        link.send(1, Heartbeat(6, 8, 0, 0, 4))
+        sources.append(vehicle.recvfrom(300)[1])
+        link.close()
+    assert sources[0] == sources[1]
+
+
+def test_a_second_link_to_the_same_vehicle_is_opened_all_the_same(vehicle):
+    settings = LinkSettings(target=f"udpout:127.0.0.1:{vehicle.getsockname()[1]}")
+    first, second = UdpLink(settings), UdpLink(settings)
+    for link in (first, second):
+        link.send(1, Heartbeat(6, 8, 0, 0, 4))
+    assert vehicle.recvfrom(300)[1] != vehicle.recvfrom(300)[1]
+    first.close()
+    second.close()
+
+
+def test_who_speaks_mavlink_1_is_greeted_once_a_second_and_not_believed(vehicle):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+    old = dialect.MAVLink(None, 1, 1)
+    frame = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3).pack(old, force_mavlink1=True)
+    for _ in range(3):
+        vehicle.sendto(frame, ("127.0.0.1", port))
+    deadline, heard = time.monotonic() + 1.0, []
+    while link.rejected["mavlink_1"] < 3 and time.monotonic() < deadline:
+        heard += link.receive()
+    assert heard == [] and link.rejected["mavlink_1"] == 3
+    assert vehicle.recvfrom(300)[0][0] == 0xFD
+    vehicle.settimeout(0.1)
+    with pytest.raises(TimeoutError):
+        vehicle.recvfrom(300)
+    link.send(1, Heartbeat(6, 8, 0, 0, 4))  # its address is not known yet
+    with pytest.raises(TimeoutError):
+        vehicle.recvfrom(300)
+    link.close()

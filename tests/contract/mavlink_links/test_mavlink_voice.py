@@ -1,0 +1,192 @@
+"""Who speaks for a dead driver is heard on every kind of link: signed, called by the vehicle, by a serial line."""
+
+import dataclasses
+import os
+import pty
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.mavlink.links.opening import open_link
+from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
+from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.verification import Signing, Verifier
+from groundstation.flight.composition import process_table
+from groundstation.process.heartbeat import MOST_ADDRESSES, HeartbeatBlock
+from groundstation.settings.load import load_field
+from groundstation.supervisor.failsafe_sender import FailsafeSender, Speaker
+
+FIELD = Path(__file__).parents[3] / "config" / "mixed-team.yaml"
+KEY = bytes(range(32))
+HEARTBEAT = Heartbeat(2, 3, 1, 4, 3)
+S = 1_000_000_000
+
+
+def words_of(tmp_path, **mavlink):
+    """Return what the MAVLink drivers of the mixed team leave behind, reached in another way."""
+    field = load_field(FIELD)
+    for name, drone in field.drones.items():
+        if drone.kind == "mavlink":
+            other = drone.require_mavlink().model_copy(update=mavlink)
+            field.drones[name] = drone.model_copy(update={"mavlink": other})
+    table = process_table(field, "tcp/127.0.0.1:1", tmp_path, simulation=None, monitor=False)
+    spoken = [s.failsafe_datagrams for s in table if s.failsafe_datagrams and s.failsafe_datagrams.hover[0] == 0xFD]
+    return spoken, [d.require_mavlink().system_id for d in field.drones.values() if d.kind == "mavlink"]
+
+
+@pytest.fixture
+def vehicle():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind(("127.0.0.1", 0))
+        udp.settimeout(2.0)
+        yield udp
+
+
+@pytest.fixture
+def key_file(tmp_path):
+    path = tmp_path / "key"
+    path.write_bytes(KEY)
+    path.chmod(0o600)
+    return str(path)
+
+
+def target_of(frame):
+    message: Any = FrameDecoder().decode(frame).message
+    return message.target_system
+
+
+def at(words, udp, **changes):
+    return dataclasses.replace(words, address="127.0.0.1", port=udp.getsockname()[1], **changes)
+
+
+def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehicle, key_file, tmp_path):
+    (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
+    words = at(words, vehicle, land_after_s=0.2)
+    link = open_link(LinkSettings(target=f"udpout:127.0.0.1:{words.port}", key_file=key_file))
+    speakers = [FailsafeSender(speaker) for speaker in Speaker]
+    decoder, kinds = FrameDecoder(Signing(KEY, 0)), []
+    for round_ in range(4):
+        link.send(11, HEARTBEAT)
+        for speaker in speakers:
+            speaker.begin("px4", words, 0)
+            speaker.send_due(round_ * S // 10)
+        for _ in range(3):
+            kinds += [type(decoder.decode(frame).message) for frame in split(vehicle.recv(2048))]
+    link.close()
+    for speaker in speakers:
+        speaker.close()
+    expected = [SetPositionTargetLocalNed] * 2, [CommandLong] * 2
+    assert kinds == [kind for words in (expected[0], expected[0], expected[1], expected[1])
+                     for kind in (Heartbeat, *words)]  # fmt: skip
+
+
+def test_a_driver_that_comes_back_is_heard_after_the_guardian(vehicle, key_file, tmp_path):
+    (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
+    verifier = Verifier(Signing(KEY, 0))
+    words = at(words, vehicle)
+    guardian = FailsafeSender(Speaker.GUARDIAN)
+    guardian.begin("px4", words, 0)
+    for turn in range(20):
+        guardian.send_due(turn * S // 10)
+        verifier.verify(vehicle.recv(2048))
+    guardian.close()
+    link = open_link(LinkSettings(target=f"udpout:127.0.0.1:{words.port}", key_file=key_file))
+    link.send(11, HEARTBEAT)
+    verifier.verify(vehicle.recv(2048))
+    link.close()
+
+
+def test_a_key_that_cannot_be_read_is_named_and_never_sent_unsigned(vehicle, key_file, tmp_path):
+    (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
+    Path(key_file).write_bytes(b"short")
+    sender = FailsafeSender()
+    assert "32 bytes" in sender.prepare("px4", at(words, vehicle))
+    assert sender.begin("px4", at(words, vehicle), 0)
+    sender.send_due(S)
+    vehicle.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        vehicle.recv(2048)
+
+
+def test_vehicles_that_call_one_port_are_all_spoken_to_where_they_were_heard(vehicle, tmp_path):
+    spoken, systems = words_of(tmp_path, listen=True, port=14_777, local_address="127.0.0.1")
+    (words,) = spoken
+    assert words.called and len(systems) > 1
+    targets = [target_of(frame) for frame in split(words.land)]
+    assert targets == systems
+    sender = FailsafeSender()
+    sender.begin("px4", words, 0, lambda: (vehicle.getsockname(),))
+    sender.send_due(S)
+    assert [target_of(frame) for frame in split(vehicle.recv(2048))] == systems
+    sender.close()
+
+
+def test_where_vehicles_called_from_outlives_their_driver(vehicle, port):
+    link = open_link(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+    vehicle.sendto(FrameEncoder(11, 1).encode(HEARTBEAT), ("127.0.0.1", port))
+    assert not link.called_from
+    link.receive()
+    assert list(link.called_from) == [vehicle.getsockname()]
+    link.close()
+    block = HeartbeatBlock.create(f"test-voice-{os.getpid()}", 3)
+    block.set_addresses(1, link.called_from)
+    block.beat(1)
+    block.clear(1)
+    assert block.addresses(1) == (vehicle.getsockname(),)
+    assert block.addresses(0) == block.addresses(2) == ()
+    many = [("255.255.255.254", 65_535 - index) for index in range(MOST_ADDRESSES + 1)]
+    block.set_addresses(2, many)
+    assert block.addresses(2) == tuple(many[:-1])
+    block.close(remove=True)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_line_is_spoken_on_beside_a_driver_that_hangs(key_file, tmp_path, signed):
+    vehicle, line = pty.openpty()
+    device = os.ttyname(line)
+    (words, *_), _ = words_of(tmp_path, serial=f"{device}:57600", key_file=key_file * signed, link="pymavlink")
+    hangs = open_link(LinkSettings(target=f"serial:{device}:57600", key_file=key_file * signed))
+    sender = FailsafeSender(Speaker.GUARDIAN)
+    sender.begin("px4", dataclasses.replace(words, land_after_s=0.5), 0)
+    decoder = FrameDecoder(Signing(KEY, 0) if signed else None)
+    for now_s, kind in ((0.0, SetPositionTargetLocalNed), (1.0, CommandLong)):
+        sender.send_due(int(now_s * S))
+        time.sleep(0.02)
+        assert isinstance(decoder.decode(os.read(vehicle, 4096)).message, kind)
+    sender.close()
+    hangs.close()
+    for fd in (vehicle, line):
+        os.close(fd)
+
+
+def test_an_emulated_signed_vehicle_lands_at_the_guardians_word(hangar, key_file, tmp_path):
+    (words, *_), systems = words_of(tmp_path, key_file=key_file, link="pymavlink")
+    emulator, _, (address, port) = hangar.add("px4", systems[0], signing=Signing(KEY, 0))
+    heard = []
+    obey = emulator.firmware.land
+
+    def land():
+        heard.append("land")
+        return obey()
+
+    emulator.firmware.land = land
+    sender = FailsafeSender(Speaker.GUARDIAN)
+    sender.begin("px4", dataclasses.replace(words, address=address, port=port, land_after_s=0.0), 0)
+    deadline = time.monotonic() + 3
+    while not heard and time.monotonic() < deadline:
+        sender.send_due(time.monotonic_ns())
+        time.sleep(0.02)
+    sender.close()
+    assert heard and not emulator.rejected
+
+
+def test_the_guardians_voice_needs_no_dialect():
+    code = "import sys, drivers.mavlink.voice; sys.exit(any(name.startswith('pymavlink') for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=20).returncode == 0

@@ -1,0 +1,113 @@
+"""Velocity errors of autopilots: estimated from the belief, corrected, and not where it is the report that is wrong."""
+
+import math
+
+import pytest
+
+from drivers.mavlink.drift import DriftFeedback
+from groundstation.bus.messages import EntityEstimate
+
+S = 1_000_000_000
+STEP_NS = 20_000_000
+YAW = 0.7
+
+
+class Vehicle:
+    """Flies what it is told with a lag of 0.4 s, by a velocity of its own [world]."""
+
+    def __init__(self):
+        self.now_ns = S
+        self.place = [0.0, 0.0, 0.8]
+        self.velocity = [0.0, 0.0]
+        self.error = (0.0, 0.0)
+        self.lie = (0.0, 0.0)
+        self.feedback = DriftFeedback()
+        self.seen = True
+
+    def _world(self, velocity, sign=1.0):
+        c, s = math.cos(YAW), sign * math.sin(YAW)
+        return c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1]
+
+    def step(self, wanted=None):
+        self.now_ns += STEP_NS
+        feedback, drift = self.feedback, self.feedback.drift(self.now_ns)
+        if wanted is None:
+            wanted = feedback.hold(self.now_ns)
+        else:
+            feedback.let_go()
+        told = (wanted[0] + drift[0], wanted[1] + drift[1])
+        feedback.tell(self.now_ns, (*told, 0.0))
+        goal = self._world(told)
+        for axis in (0, 1):
+            self.velocity[axis] += 0.05 * (goal[axis] - self.error[axis] - self.velocity[axis])
+            self.place[axis] += self.velocity[axis] * 0.02
+        if self.seen:
+            entity = EntityEstimate(
+                "v", "robot", (*self.place, YAW), (1e-4,) * 16, (*self.velocity, 0.0), True, 0.1
+            )  # fmt: skip
+            reported = [v + e + lie for v, e, lie in zip(self.velocity, self.error, self.lie, strict=True)]
+            feedback.hear(self.now_ns, entity, (*self._world(reported, -1.0), 0.0))
+
+    def fly(self, seconds, wanted=None):
+        for _ in range(round(seconds * 50)):
+            self.step(wanted)
+
+
+def test_a_place_is_held_although_its_velocity_grows_wrong():
+    vehicle = Vehicle()
+    vehicle.fly(1.0)
+    for _ in range(50):  # 0.5 m/s within a second
+        vehicle.error = (vehicle.error[0] + 0.01, 0.0)
+        vehicle.step()
+    vehicle.fly(2.0)
+    assert math.hypot(*vehicle.place[:2]) < 0.3
+    vehicle.fly(8.0)
+    assert math.hypot(*vehicle.place[:2]) < 0.05
+    assert math.hypot(*vehicle.feedback.drift(vehicle.now_ns)[:2]) == pytest.approx(0.5, abs=0.05)
+
+
+def test_what_it_is_to_fly_is_its_true_velocity():
+    vehicle = Vehicle()
+    vehicle.fly(0.5)
+    vehicle.error = (-0.3, 0.3)
+    vehicle.fly(3.0, (0.4, 0.0, 0.0))
+    assert vehicle._world(vehicle.velocity, -1.0) == pytest.approx((0.4, 0.0), abs=0.03)
+
+
+def test_a_report_that_is_wrong_while_it_obeys_is_not_corrected():
+    vehicle = Vehicle()
+    vehicle.fly(1.0)
+    vehicle.lie = (0.4, 0.0)
+    vehicle.fly(2.0)
+    assert math.hypot(*vehicle.velocity) < 0.05
+    assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0)
+
+
+def test_a_sudden_error_is_no_drift():
+    vehicle = Vehicle()
+    vehicle.fly(1.0)
+    vehicle.error = (0.7, 0.0)
+    vehicle.step()
+    assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0)
+
+
+def test_without_the_tracker_the_correction_fades_and_no_place_is_held():
+    vehicle = Vehicle()
+    vehicle.error = (0.3, 0.0)
+    vehicle.fly(3.0)
+    vehicle.seen = False
+    vehicle.fly(0.5)
+    assert vehicle.feedback.hold(vehicle.now_ns) == (0.0, 0.0, 0.0)
+    kept = math.hypot(*vehicle.feedback.drift(vehicle.now_ns))
+    vehicle.fly(8.0)
+    assert kept == pytest.approx(0.3, abs=0.05)
+    assert math.hypot(*vehicle.feedback.drift(vehicle.now_ns)) < 0.02
+
+
+def test_on_the_floor_nothing_is_known():
+    vehicle = Vehicle()
+    vehicle.error = (0.3, 0.0)
+    vehicle.fly(2.0)
+    vehicle.feedback.reset()
+    assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0)
+    assert vehicle.feedback.place(vehicle.now_ns) is None

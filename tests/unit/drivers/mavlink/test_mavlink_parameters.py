@@ -1,0 +1,51 @@
+"""What a parameter may be: by value, range and other values; and what the field file has otherwise."""
+
+import pytest
+
+from drivers.mavlink.parameters import difference, is_checked, needed, overridden, version_of
+from drivers.mavlink.wire.names import Flavour
+
+
+def of(name, flavour=Flavour.PX4, **overrides):
+    return next(n for n in needed(flavour, 255, overrides) if name in n.names)
+
+
+@pytest.mark.parametrize(("value", "alive"), [(0, True), (1, False), (2, True), (3, True), (4, False)])
+def test_a_transmitters_kill_switch_stays_alive(value, alive):
+    text = difference(of("COM_RC_IN_MODE"), {"COM_RC_IN_MODE": value})
+    assert (text == "") is alive
+    assert alive or "kill and mode switches" in text
+
+
+@pytest.mark.parametrize(("value", "good"), [(0.29, False), (0.3, True), (1.0, True), (1.01, False)])
+def test_a_range_is_accepted_as_a_whole(value, good):
+    assert (difference(of("COM_OF_LOSS_T"), {"COM_OF_LOSS_T": value}) == "") is good
+
+
+def test_what_is_missing_is_named_with_what_it_needs():
+    assert difference(of("EKF2_HGT_REF"), {}) == "EKF2_HGT_REF is missing, needs 3 (height comes from outside)"
+
+
+def test_an_alias_is_named_as_it_was_read():
+    text = difference(of("GPS1_TYPE", Flavour.ARDUPILOT), {"GPS_TYPE": 1})
+    assert text == "GPS_TYPE is 1, needs 0 (no GPS indoors)"
+
+
+def test_the_field_file_has_the_last_word_and_a_warning():
+    wanted = of("EKF2_MAG_TYPE", EKF2_MAG_TYPE=0)
+    assert difference(wanted, {"EKF2_MAG_TYPE": 0}) == ""
+    assert difference(wanted, {"EKF2_MAG_TYPE": 5}) == "EKF2_MAG_TYPE is 5, needs 0 (as the field file says)"
+    assert "EKF2_MAG_TYPE 0 instead of 5" in overridden(Flavour.PX4, {"EKF2_MAG_TYPE": 0})
+
+
+def test_what_it_has_besides_is_checked_without_a_warning():
+    assert difference(of("MPC_XY_VEL_MAX", MPC_XY_VEL_MAX=1.5), {"MPC_XY_VEL_MAX": 12}).startswith(
+        "MPC_XY_VEL_MAX is 12"
+    )
+    assert overridden(Flavour.PX4, {"MPC_XY_VEL_MAX": 1.5, "COM_OF_LOSS_T": 0.5}) == ""
+
+
+def test_only_releases_that_were_compared_count_as_checked():
+    assert is_checked(Flavour.PX4, version_of(0x011001FF))
+    assert not is_checked(Flavour.PX4, version_of(0x01110000))
+    assert not is_checked(Flavour.ARDUPILOT, None)

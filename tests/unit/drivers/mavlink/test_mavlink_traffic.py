@@ -1,0 +1,46 @@
+"""Link quality by sequence numbers: losses count, reordering does not; the age of what a vehicle said."""
+
+import numpy as np
+import pytest
+
+from drivers.mavlink.texts import Texts
+from drivers.mavlink.traffic import Traffic
+from drivers.mavlink.wire.telemetry import Statustext
+
+S = 1_000_000_000
+MS = 1_000_000
+
+
+def quality(sequences):
+    traffic = Traffic()
+    for rank, sequence in enumerate(sequences):
+        traffic.count(S + rank * MS, 1, int(sequence) % 256)
+    return traffic.rates(S + len(sequences) * MS)[1]
+
+
+def test_what_is_lost_is_missing():
+    kept = [n for n in range(900) if n % 5]
+    assert quality(kept) == pytest.approx(0.8, abs=0.01)
+
+
+def test_what_is_overtaken_is_not_lost():
+    rng = np.random.default_rng(1)
+    order = np.argsort(np.arange(900) + rng.uniform(0.0, 6.0, 900))
+    assert quality(order) == pytest.approx(1.0, abs=0.01)
+
+
+def test_of_reordered_frames_the_lost_ones_are_missing():
+    rng = np.random.default_rng(2)
+    order = np.argsort(np.arange(900) + rng.uniform(0.0, 6.0, 900))
+    assert quality([n for n in order if rng.random() < 0.8]) == pytest.approx(0.8, abs=0.04)
+
+
+def test_a_restart_is_no_loss():
+    assert quality([*range(100), *range(200)]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_reason_that_is_old_says_so():
+    texts = Texts()
+    texts.hear(S, Statustext(4, "Arm: gyros inconsistent"))
+    texts.hear(18 * S, Statustext(4, "Arm: not level"))
+    assert texts.reasons(0, "arm", 20 * S) == ["Arm: gyros inconsistent (19 s ago)", "Arm: not level"]

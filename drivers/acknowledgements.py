@@ -34,7 +34,7 @@ class AckBook:
             self._pending = None
 
     def effective(self, mode: DriverMode, vehicle: VehicleView, flies: bool) -> tuple[Ack, ...]:
-        """Return what is to be told now; flies: a setpoint is obeyed."""
+        """Return the answers that are due; flies: a setpoint is obeyed."""
         if self._pending is None or not _is_effective(self._pending.verb, mode, vehicle, flies):
             return ()
         ack = Ack(self._pending.id, self._pending.verb, AckStage.EFFECTIVE)

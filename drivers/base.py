@@ -1,5 +1,6 @@
 """What a vehicle driver implements; the host does the rest."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -31,7 +32,7 @@ class Vehicle(Protocol):
         """Return what the vehicle last said, and whether that is fresh."""
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
-        """Tell the vehicle what to do; called at the sender's rate, also while it is silent."""
+        """Send the vehicle its command; called at the sender's rate, also while it is silent."""
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return the state of the link for the status message."""
@@ -79,6 +80,9 @@ class HostProcess(Protocol):
 
     def wake(self) -> None:
         """End a sleep early, the one under way or the next; from any thread."""
+
+    def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
+        """Record where vehicles that call us were heard last, for whoever speaks to them after this process."""
 
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
         """Publish something that happened."""

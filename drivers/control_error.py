@@ -1,4 +1,4 @@
-"""Whether a vehicle does what it is told: commanded against reported velocity, and against what cameras see. Pure.
+"""Whether a vehicle follows its commands: commanded against reported velocity, and against what cameras see. Pure.
 
 Half of it holds for every kind of vehicle: whatever lags without overshoot stays between the command and where it was.
 """
@@ -92,7 +92,7 @@ class ControlErrorMonitor:
     def judge(
         self, now_ns: int, view: VehicleView, told: WatchdogDecision | None, seen_m_s: tuple[float, float] | None
     ) -> VehicleView:
-        """Return the view with its speed, and whether it strays from what it was told last.
+        """Return the view with its speed, and whether it strays from its last command.
 
         seen_m_s: velocity forward and left as cameras see it, None if they do not.
         """

@@ -41,7 +41,7 @@ class Situation:
 
 
 def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
-    """Return the conditions that hold at this moment, with what is to be said of them."""
+    """Return the conditions that hold at this moment, each with its explanation."""
     vehicle, up = at.vehicle, at.upstream
     holding: dict[Condition, str] = {}
     if up.stop_requested:
@@ -58,6 +58,8 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
         holding[Condition.BATTERY_LOW] = f"{vehicle.battery:.0%}, at least {limits.battery_min:.0%}"
     if vehicle.not_ready:
         holding[Condition.NOT_READY] = vehicle.not_ready
+    if vehicle.near:
+        holding[Condition.SOMEBODY_NEAR] = vehicle.near
     _observe_state(at, holding)
     _observe_setpoints(at, holding)
     _observe_motion(vehicle, limits, holding)
@@ -114,6 +116,12 @@ def timed(at: Situation) -> dict[Condition, float]:
         # Whoever orders TRACK before the tracker speaks again means it: the pause counts from that order.
         pause_s = at.since_s(max(heard_ns, at.entered_ns))
         lasted = {Condition.TRACKER_SILENT: at.since_s(heard_ns), Condition.TRACKER_PAUSED: pause_s}
+    for condition, lasted_s in (
+        (Condition.NOT_SEEN, at.vehicle.unseen_s),
+        (Condition.UNLOCATED, at.vehicle.lost_s),
+    ):
+        if lasted_s > 0.0:
+            lasted[condition] = lasted_s
     if at.paused_ns is not None:
         # Setpoints that come back after a pause do not stop the land timer: only an order does.
         lasted[Condition.NOT_RESUMED] = at.since_s(at.paused_ns)

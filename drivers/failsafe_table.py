@@ -45,6 +45,8 @@ class Condition(StrEnum):
     TAKE_OFF_OVERDUE = auto()
     TRACKER_SILENT = auto()
     UNSEEN = auto()
+    NOT_SEEN = auto()
+    UNLOCATED = auto()
     TRACKER_PAUSED = auto()
     NOT_RESUMED = auto()
     NO_SETPOINT = auto()
@@ -54,6 +56,7 @@ class Condition(StrEnum):
     TOO_FAST = auto()
     DRIVER_STOOD = auto()
     NOT_READY = auto()
+    SOMEBODY_NEAR = auto()
 
 
 # Seconds of a condition that a second without it makes forgotten: what fails one sixth of the time adds up.
@@ -113,7 +116,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     noticed_s = limits.land_after_s - limits.hover_after_s
     land, patience = Reaction.LAND, "safety.land_after_s"
     return (
-        Failsafe(Condition.STOP_REQUESTED, land, "the driver was told to stop"),
+        Failsafe(Condition.STOP_REQUESTED, land, "the driver was ordered to stop"),
         Failsafe(Condition.SUPERVISOR_DEAD, land, "the supervisor is dead", limits.brake_s),
         Failsafe(Condition.SUPERVISOR_SILENT, land, "the supervisor does not answer", noticed_s, patience, SLOWLY),
         Failsafe(Condition.TELEMETRY_SILENT, land, "{why}", noticed_s, patience, SLOWLY),
@@ -130,6 +133,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  patience),
         Failsafe(Condition.UNCONVERGED, land, "the tracker does not know where it is", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", EVENLY, modes=FREE),
+        Failsafe(Condition.NOT_SEEN, land, "no camera has seen it for too long", limits.unseen_land_after_s,
+                 "safety.unseen_land_after_s", modes=FREE),
+        Failsafe(Condition.UNLOCATED, land, "no position from the cameras", limits.lost_land_s, modes=FREE),
         Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),
         Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
     )  # fmt: skip
@@ -159,6 +165,7 @@ def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.TELEMETRY_SILENT, "{why}", 0.0),
         (Condition.NO_SETPOINT, "no setpoint from the tracker", 0.0),
         (Condition.UNCONVERGED, "the tracker does not know where it is", 0.0),
+        (Condition.UNLOCATED, "no position from the cameras", limits.lost_hover_s),
         (Condition.TOO_FAST, "{why}", limits.fast_brake_s),
     )
     return tuple(
@@ -177,6 +184,7 @@ def _refusals() -> tuple[Failsafe, ...]:
         (Condition.SUPERVISOR_DEAD, "the ground station is stopping", ""),
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", ""),
         (Condition.NOT_READY, "{why}", ""),
+        (Condition.SOMEBODY_NEAR, "{why}", "safety.min_separation_m"),
     )
     return tuple(
         Failsafe(condition, Reaction.REFUSE, text, 0.0, limit, latch=Latch.NONE, modes=_STANDS)

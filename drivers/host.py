@@ -1,11 +1,14 @@
 """What every vehicle driver shares: orders in, acknowledgements, status and events out, and the sender loop."""
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from drivers.base import HostProcess, Vehicle
 from drivers.control_error import ControlErrorMonitor, SeenVelocity
+from drivers.neighbours import Neighbours
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.bus import clock
@@ -20,24 +23,25 @@ from groundstation.bus.messages import (
     VelocitySetpoint,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
+from groundstation.time_units import NS_PER_S
 
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS = 200_000_000
 _FLUSH_PERIOD_NS = 100_000_000
 _UNANSWERED_NS = 5_000_000_000
 _UNCONFIGURED_NS = 15_000_000_000
-_SILENCE_EVENT_NS = 1_000_000_000
+_SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
 _LOUD = {DriverMode.CUT: Severity.ERROR, DriverMode.LANDING: Severity.WARNING}
 
 
 class VehicleHost:
-    """One vehicle on the bus: feeds its watchdog, applies the decisions, tells everybody."""
+    """One vehicle on the bus: feeds its watchdog, applies and publishes the decisions."""
 
     def __init__(self, child: HostProcess, vehicle: Vehicle, limits: WatchdogLimits) -> None:
         self.vehicle = vehicle
-        self.watchdog = Watchdog(limits, clock.clock_id())
+        self.watchdog = Watchdog(limits, clock.clock_id(), child.bus.run)
         self._child = child
         self._bus = child.bus
         self._setpoints = self._bus.subscribe([SETPOINT], entity=vehicle.name, newest=True)
@@ -52,6 +56,10 @@ class VehicleHost:
         self._estimates = self._bus.subscribe([ESTIMATE], newest=True)
         self._seen, self._control_error = SeenVelocity(), ControlErrorMonitor()
         self._told: WatchdogDecision | None = None
+        self._refused_id, self._next_refusal_ns = "", 0
+        self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
+        self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m)
+        self._localised_ns: int | None = None
 
     def call_on_orders(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a setpoint or command arrives."""
@@ -82,13 +90,30 @@ class VehicleHost:
         return decision
 
     def _judge(self, now_ns: int, view: VehicleView) -> VehicleView:
-        """Add to a view how the vehicle does what it was told."""
+        """Add to a view how the vehicle does what it was told, and what the tracker knows of it and of the others."""
         for received in self._estimates.drain():
             if isinstance(received.message, Estimate):
-                for entity in received.message.entities:
-                    if entity.name == self.vehicle.name:
-                        self._seen.hear(now_ns, received.message.epoch, entity)
-        return self._control_error.judge(now_ns, view, self._told, self._seen.velocity(now_ns))
+                self._hear_estimate(now_ns, received.message)
+        view = self._control_error.judge(now_ns, view, self._told, self._seen.velocity(now_ns))
+        if view.flight_state not in AIRBORNE:
+            self._localised_ns = None
+        unlocalised_s = 0.0 if self._localised_ns is None else (now_ns - self._localised_ns) / NS_PER_S
+        return replace(view, unseen_s=unlocalised_s, near=self._near(now_ns, view))
+
+    def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
+        self._neighbours.see(now_ns, estimate.entities)
+        for entity in estimate.entities:
+            if entity.name == self.vehicle.name:
+                self._seen.hear(now_ns, estimate.epoch, entity)
+                if math.isfinite(entity.unlocalised_s):
+                    self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
+
+    def _near(self, now_ns: int, view: VehicleView) -> str:
+        """Return who in the air is too near to the pad of a vehicle that stands."""
+        for received in self._statuses.drain():
+            if isinstance(received.message, VehicleStatus):
+                self._neighbours.hear(received.message)
+        return "" if view.flight_state in AIRBORNE else self._neighbours.obstacle(now_ns)
 
     def is_finished(self, now_ns: int) -> bool:
         """Whether a driver that is to exit may: no motor turns any more, or the vehicle was silent too long."""
@@ -110,6 +135,7 @@ class VehicleHost:
             header=self._bus.header(self.vehicle.name),
             flight_state=FlightState.LOST if lost else view.flight_state,
             mode=self.watchdog.mode,
+            failsafe=self.watchdog.failsafe,
             battery=view.battery,
             link_quality=health.link_quality,
             rate_hz=health.rate_hz,
@@ -135,8 +161,19 @@ class VehicleHost:
     def _command(self, now_ns: int, command: Command) -> None:
         if command.scope and self.vehicle.name not in command.scope:
             return
+        self._announce_refusal(now_ns, command)
         for ack in self.watchdog.accept_command(now_ns, command):
             self._answer(ack)
+
+    def _announce_refusal(self, now_ns: int, command: Command) -> None:
+        """Say which order nobody had the right to give; once a second, and once for each."""
+        reason = self.watchdog.lease.refusal(now_ns, command)
+        if not reason or command.id == self._refused_id:
+            return
+        self._count("command", "unauthorised")
+        if now_ns >= self._next_refusal_ns:
+            self._refused_id, self._next_refusal_ns = command.id, now_ns + _REFUSAL_PERIOD_NS
+            self._event(Severity.WARNING, f"{command.verb} of {command.header.source} refused: {reason}")
 
     def _answer(self, ack: Ack) -> None:
         header = self._bus.header(self.vehicle.name)

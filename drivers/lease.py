@@ -1,23 +1,31 @@
-"""Who may give starting orders: the holder of an operator lease that has not run out."""
+"""Which orders count: those for this run that are not too old; to start, those of the holder of a live lease."""
 
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Command, Lease, Verb
+from groundstation.time_units import NS_PER_S
 
 # Orders that begin or go on with a motion; all others stop, and anyone may stop.
 STARTING_VERBS = frozenset({Verb.TAKEOFF, Verb.TRACK, Verb.RESUME})
 # A lease may not claim to live longer than this after it was heard.
 _LONGEST_NS = 5_000_000_000
+# Whoever repeats a stop gives up before that: an older one is the ghost of a queue that stood still.
+_STOP_LIVES_NS = 30_000_000_000
 # Both ends read the same clock; only the order of reading may differ.
 _FUTURE_NS = 1_000_000_000
 
 
 @dataclass(slots=True)
 class LeaseBook:
-    """Remembers the live lease; another holder gets it only after the former ran out or was given back."""
+    """Remembers the live lease; another holder gets it only after the former ran out or was given back.
+
+    run: whose orders count, "" for those of any. source: who sent the lease, as the bus vouches for it.
+    """
 
     clock: str
+    run: str = ""
     holder: str = ""
+    source: str = ""
     expires_ns: int = 0
     stamp_ns: int = -1
 
@@ -29,22 +37,30 @@ class LeaseBook:
             return "future"  # it would make every true lease look old
         if lease.header.stamp_ns <= self.stamp_ns:
             return "old"
-        if now_ns < self.expires_ns and lease.holder != self.holder:
+        if now_ns < self.expires_ns and (lease.holder, lease.header.source) != (self.holder, self.source):
             return "held"
-        self.holder, self.stamp_ns = lease.holder, lease.header.stamp_ns
+        self.holder, self.source, self.stamp_ns = lease.holder, lease.header.source, lease.header.stamp_ns
         self.expires_ns = min(lease.expires_ns, now_ns + _LONGEST_NS)
         return ""
 
     def refusal(self, now_ns: int, command: Command) -> str:
-        """Return "" if the command is permitted to its issuer now, else why not; stops always are."""
+        """Return "" if the command is permitted to its issuer now, else why not; anybody of the run may stop."""
+        if self.run and command.run != self.run:
+            return f"given for another run ({command.run})" if command.run else "given for no run"
         if command.verb not in STARTING_VERBS:
-            return ""
+            return self._staleness(now_ns, command)
         if command.header.clock != self.clock:
             return "sent from a host whose clock is not known here"
         if now_ns >= command.expires_ns:
             return "expired"
         if now_ns >= self.expires_ns:
             return "no live operator lease"
-        if command.issuer != self.holder:
+        if (command.issuer, command.header.source) != (self.holder, self.source):
             return f"the operator lease is held by {self.holder}"
+        return ""
+
+    def _staleness(self, now_ns: int, stop: Command) -> str:
+        age_ns = now_ns - stop.header.stamp_ns
+        if stop.header.clock == self.clock and age_ns > _STOP_LIVES_NS:
+            return f"given {age_ns / NS_PER_S:.0f} s ago"
         return ""

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from groundstation.bus.messages import VelocitySetpoint
 from groundstation.time_units import NS_PER_MS
 
+# A thousand lives of the tracker, each of which may begin a thousand epochs.
+_LONGEST_LEAP = 1_000_000
+
 
 @dataclass(slots=True)
 class SetpointGate:
-    """Remembers the newest setpoint and when the authorised epoch was last heard.
+    """Remembers the newest setpoint and when the authorised epoch was last heard. The first sender is the only one.
 
     max_lifetime_ns caps the lifetime that a setpoint claims. epoch: the one that may move the vehicle (None: the first
     that comes is authorised). last_heard_ns: receipt of the last live setpoint of that epoch.
@@ -25,13 +28,18 @@ class SetpointGate:
     expires_ns: int = 0
 
     def accept(self, now_ns: int, setpoint: VelocitySetpoint) -> str:
-        """Take a setpoint; returns "" or why it is ignored (old_epoch, other_source, old_sequence, expired)."""
+        """Take a setpoint; returns "" or why it is ignored.
+
+        Reasons: other_source, old_epoch, epoch_leap, old_sequence, expired.
+        """
         if self.newest is not None:
+            # The tracker's later lives have its name: whoever has another is none, and his numbers mean nothing.
+            if setpoint.header.source != self.newest.header.source:
+                return "other_source"
             if setpoint.epoch < self.newest.epoch:
                 return "old_epoch"
-            # An epoch is one life of one tracker: whoever else claims it is none, and its numbers mean nothing.
-            if setpoint.epoch == self.newest.epoch and setpoint.header.source != self.newest.header.source:
-                return "other_source"
+            if setpoint.epoch > self.newest.epoch + _LONGEST_LEAP:
+                return "epoch_leap"  # it would make every true setpoint look old
             if setpoint.epoch == self.newest.epoch and setpoint.header.seq <= self.newest.header.seq:
                 return "old_sequence"
         expires_ns = self._expiry(now_ns, setpoint)

@@ -1,4 +1,4 @@
-"""What every vehicle driver is told of limits and patience; the kinds add their own to it."""
+"""Limits and time-outs that every vehicle driver has; the kinds add their own."""
 
 import math
 from typing import Annotated
@@ -6,6 +6,9 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from drivers.watchdog_types import WatchdogLimits
+from groundstation.field.behaviour import SafetyValues
+
+_SAFETY = SafetyValues()
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -35,14 +38,18 @@ class VehicleLimits(DriverSection):
 
 
 class SilenceLimits(DriverSection):
-    """How long silence is borne; setpoint_lifetime_ms caps the lifetime that a setpoint may claim."""
+    """How long silence is borne, and how far drones keep apart.
 
-    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
-    land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
-    unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
+    setpoint_lifetime_ms caps the lifetime that a setpoint may claim.
+    """
 
-    def authority(self, limits: VehicleLimits) -> WatchdogLimits:
-        """Return the limits of the shared watchdog for a vehicle with these limits."""
+    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = _SAFETY.setpoint_lifetime_ms
+    land_after_s: Annotated[float, Field(ge=0.5, le=30)] = _SAFETY.land_after_s
+    unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = _SAFETY.unseen_land_after_s
+    min_separation_m: Positive = 0.6
+
+    def authority(self, limits: VehicleLimits, pad_m: tuple[float, float] | None = None) -> WatchdogLimits:
+        """Return the limits of the shared watchdog for a vehicle with these limits; pad_m: where it takes off."""
         return WatchdogLimits(
             hover_after_s=self.setpoint_lifetime_ms / 1000,
             land_after_s=self.land_after_s,
@@ -50,4 +57,6 @@ class SilenceLimits(DriverSection):
             battery_min=limits.battery_min,
             battery_hold_s=limits.battery_hold_s,
             max_speed_m_s=limits.max_speed_m_s,
+            pad_m=pad_m,
+            min_separation_m=self.min_separation_m,
         )

@@ -33,17 +33,19 @@ _PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
 class Watchdog:
     """Authority over one vehicle. Feed it with `accept_*`, then call `step` at the sender's rate.
 
-    mode, reason: see `WatchdogDecision`. The vehicle's and upstream's last words are remembered between steps.
+    mode, reason: see `WatchdogDecision`; failsafe: condition of the row by which it is in that mode, "" without. The
+    vehicle's and upstream's last words are remembered between steps.
     """
 
-    def __init__(self, limits: WatchdogLimits, clock: str) -> None:
+    def __init__(self, limits: WatchdogLimits, clock: str, run: str = "") -> None:
         self.limits = limits
         self.table = failsafes(limits)
         self._acting = tuple(row for row in self.table if row.reaction is not Reaction.REFUSE)
         self.mode = DriverMode.CONNECTING
         self.reason = "waiting for the vehicle's first word"
+        self.failsafe = ""
         self.gate = SetpointGate(int(limits.hover_after_s * NS_PER_S), clock)
-        self.lease = LeaseBook(clock)
+        self.lease = LeaseBook(clock, run)
         self.vehicle = VehicleView()
         self.upstream = Upstream()
         self.evidence = Evidence(self.table)
@@ -147,11 +149,11 @@ class Watchdog:
         self.evidence.forget(*(row.condition for row in self.table if row.latch is Latch.RESUME))
         return self._enter(now_ns, DriverMode.TRACK, f"tracking for {command.issuer}")
 
-    def _enter(self, now_ns: int, mode: DriverMode, reason: str, brake: bool = False) -> str:
+    def _enter(self, now_ns: int, mode: DriverMode, reason: str, brake: bool = False, failsafe: str = "") -> str:
         if self.mode is DriverMode.TAKING_OFF:
             self._take_off_ended_ns = now_ns
         self._entered_ns = now_ns
-        self.mode, self.reason = mode, reason
+        self.mode, self.reason, self.failsafe = mode, reason, failsafe
         self._paused_ns = None
         self._brake_until_ns = now_ns + int(self.limits.brake_s * NS_PER_S) if brake else 0
         self._acks.enter(mode)
@@ -217,12 +219,12 @@ class Watchdog:
 
     def _react(self, now_ns: int, row: Failsafe, reason: str) -> None:
         if row.reaction is Reaction.CUT:
-            self._enter(now_ns, DriverMode.CUT, reason)
+            self._enter(now_ns, DriverMode.CUT, reason, failsafe=row.condition)
         elif row.reaction is Reaction.LAND:
-            self._enter(now_ns, DriverMode.LANDING, reason, row.brake)
+            self._enter(now_ns, DriverMode.LANDING, reason, row.brake, row.condition)
         else:
             paused_s = self.evidence.lasted_s(Condition.TRACKER_PAUSED)
-            self._enter(now_ns, DriverMode.HOVER, f"{reason}; RESUME is needed")
+            self._enter(now_ns, DriverMode.HOVER, f"{reason}; RESUME is needed", failsafe=row.condition)
             if paused_s is not None and paused_s >= self.limits.tracker_resume_within_s:
                 self._paused_ns = self.gate.last_heard_ns
             elif row.condition in _PAUSES:

@@ -1,9 +1,12 @@
-"""Vocabulary of the watchdog: modes, actions, what it is told, what it answers."""
+"""Vocabulary of the watchdog: modes, actions, inputs and answers."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from groundstation.bus.messages import AckStage, FlightState, Vector3, Verb
+from groundstation.field.behaviour import SafetyValues
+
+_SAFETY = SafetyValues()
 
 
 class DriverMode(StrEnum):
@@ -20,7 +23,7 @@ class DriverMode(StrEnum):
 
 
 class Action(StrEnum):
-    """What the vehicle is told now.
+    """The command for the vehicle.
 
     WAIT: say nothing that could start or end a flight; IDLE: stay on the ground with motors off; HOVER: stand still
     if it flies, never take off.
@@ -51,12 +54,14 @@ class WatchdogLimits:
     hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and
     noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
     it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it is told: from 1 m/s
-    it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled.
+    it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. lost_hover_s, lost_land_s: without a position from
+    the cameras, for vehicles that need one. pad_m: where it takes off [x, y; world], if known; min_separation_m: how
+    far from there everybody in the air must be.
     """
 
-    hover_after_s: float = 0.3
-    land_after_s: float = 3.0
-    unseen_land_after_s: float = 10.0
+    hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
+    land_after_s: float = _SAFETY.land_after_s
+    unseen_land_after_s: float = _SAFETY.unseen_land_after_s
     battery_min: float = 0.15
     battery_hold_s: float = 3.0
     resume_within_s: float = 1.0
@@ -70,6 +75,10 @@ class WatchdogLimits:
     fast_resume_s: float = 0.5
     fast_land_s: float = 1.6
     stray_land_s: float = 1.6
+    lost_hover_s: float = 0.5
+    lost_land_s: float = 2.0
+    pad_m: tuple[float, float] | None = None
+    min_separation_m: float = 0.6
 
     @property
     def tolerated_speed_m_s(self) -> float:
@@ -84,7 +93,9 @@ class VehicleView:
     configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before. unsound: why
     what it says of its motion cannot be true, or ""; its telemetry then counts as silent. velocity_m_s: true (scaled)
     one that it reports, None if it reports none. speed_m_s, stray: what the host makes of that: horizontal speed, and
-    how the vehicle strays from what it is told, or "".
+    how the vehicle strays from what it is told, or ""; unseen_s: for how long it may not have been where it is
+    believed, as the tracker says; near: who in the air is too near to its pad, or "". lost_s: for how long it had no
+    position that it needs.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -96,6 +107,9 @@ class VehicleView:
     velocity_m_s: Vector3 | None = None
     speed_m_s: float = 0.0
     stray: str = ""
+    unseen_s: float = 0.0
+    near: str = ""
+    lost_s: float = 0.0
 
     @property
     def believed(self) -> "VehicleView":
@@ -119,7 +133,7 @@ class Upstream:
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """What is to be answered to a command."""
+    """An answer to a command."""
 
     command_id: str
     verb: Verb

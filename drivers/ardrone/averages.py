@@ -1,8 +1,11 @@
-"""Means of what came between two turns of the sender: the reader adds, the sender drains."""
+"""Means of the samples between two turns of the sender: the reader adds, the sender drains."""
 
 import threading
 
 from drivers.ardrone.convert import NavdataMotion
+
+# In flight no measured velocity comes twice: one that has come so often is none.
+_REPEATED = 4
 
 
 class MotionMean:
@@ -12,13 +15,22 @@ class MotionMean:
         self._lock = threading.Lock()
         self._waiting: list[NavdataMotion] = []
         self._velocity = (0.0, 0.0, 0.0)
+        self._newest, self._standing = (0.0, 0.0), [1, 1]
         self._force: tuple[float, float] | None = None
 
     def add(self, motion: NavdataMotion) -> None:
         """Take the motion of one packet."""
         with self._lock:
             self._waiting.append(motion)
+            for i, before in enumerate(self._newest):
+                self._standing[i] = self._standing[i] + 1 if motion.velocity_m_s[i] == before else 1
+            self._newest = motion.velocity_m_s[:2]
             del self._waiting[:-50]  # nobody drains while the sender stands still
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a horizontal velocity stands still to the last bit: the drone does not see its own motion."""
+        return max(self._standing) >= _REPEATED
 
     def drain(self) -> tuple[tuple[float, float, float], tuple[float, float] | None]:
         """Return (velocity, force forward and left or None) since the last call, or once more the last ones."""

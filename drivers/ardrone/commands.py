@@ -17,8 +17,12 @@ from groundstation.bus.messages import FlightState
 def orders_from_decision(
     action: Action, attitude: AttitudeRequest, state: int, flight_state: FlightState, scale: Scale
 ) -> list[AtCommand]:
-    """Return REF and PCMD for an action, and COMWDG where the drone missed us; no REF while waiting."""
-    motion = motion_from_attitude(attitude, scale) if action is Action.FLY else at.ProgressiveMotion()
+    """Return REF and PCMD for an action, and COMWDG where the drone missed us; no REF while waiting.
+
+    attitude: of a drone that flies a setpoint, or that must be braked to hover.
+    """
+    steered = action in (Action.FLY, Action.HOVER)
+    motion = motion_from_attitude(attitude, scale) if steered else at.ProgressiveMotion()
     orders = [at.pcmd(motion)]
     if action is not Action.WAIT:
         orders.insert(0, _reference(action, bool(state & StateBit.EMERGENCY), flight_state))

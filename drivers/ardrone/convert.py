@@ -15,11 +15,11 @@ from drivers.ardrone.wire.state import ControlState, StateBit, split_control_sta
 from drivers.plausibility.motion import MotionSample
 from groundstation.bus.messages import FlightState, Vector3
 from groundstation.geometry.angles import difference, wrap
+from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
 _RAD_FROM_MDEG = math.pi / 180_000
 _RAD_FROM_DEG = math.pi / 180
-_STANDARD_GRAVITY_M_S2 = 9.80665
-_M_S2_FROM_MG = _STANDARD_GRAVITY_M_S2 / 1000
+_M_S2_FROM_MG = STANDARD_GRAVITY_M_S2 / 1000
 # Figures beyond these are no measurement of an AR.Drone.
 _MOST_MDEG = 360_000.0
 _MOST_MM_S = 30_000.0

@@ -27,10 +27,10 @@ from drivers.ardrone.wire.state import StateBit, bit_names
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
-from drivers.plausibility.health import Health
+from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import ARDRONE
 from drivers.plausibility.motion import MotionMonitor
-from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from drivers.watchdog_types import UP, Action, VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
@@ -54,7 +54,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LatestNavdata:
-    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last told its motion; velocity as reported."""
+    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last reported motion; velocity as reported."""
 
     heard_ns: int = 0
     moved_ns: int = 0
@@ -156,6 +156,9 @@ class ArDrone:
     def _not_ready(self, heard: LatestNavdata) -> str:
         if self._session.phase is not SessionPhase.READY:
             return self._session.detail
+        pinned, serial = self._settings.serial_number, self._session.identity.serial
+        if pinned and serial != pinned:
+            return f"it is another drone: its serial number is {serial or 'not known'}, the field says {pinned}"
         faults = bit_names(heard.state & _FAULTS)
         return f"the drone reports {', '.join(faults)}" if faults else ""
 
@@ -199,14 +202,24 @@ class ArDrone:
         fresh = now_ns - heard.moved_ns <= _FRESH_NS
         if decision.action is Action.IDLE and fresh and force is not None:
             self._loop.stand(force, dt_s)
+        if fresh and decision.action is Action.HOVER and self._is_blind():
+            return self._loop.brake(dt_s, force)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER
-        asked = self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, self._true(velocity), dt_s, force)
+        measured = None if self._motion.repeats else self._true(velocity)
+        asked = self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force)
         if self._loop.contradicted:
             self._doubted_ns = now_ns
             return velocity_loop.HOVER
         return asked
+
+    def _is_blind(self) -> bool:
+        """Return whether the drone sees nothing of its motion; one that wind pushes holds its place better itself."""
+        report = self._plausibility.report
+        wrong = report.of(Sensor.VELOCITY) is Health.BAD and self._motion.repeats
+        others = report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.ATTITUDE, Sensor.IMU)
+        return wrong and others is not Health.BAD and self.telemetry.flight_state in UP
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals of the link."""
@@ -228,7 +241,7 @@ class ArDrone:
 
 
 def run(child: HostProcess) -> int:
-    """Fly one AR.Drone until told to stop; the process entry."""
+    """Fly one AR.Drone until a stop is requested; the process entry."""
     try:
         settings = ArDroneDriverSettings.model_validate_json(child.section)
     except ValidationError as error:

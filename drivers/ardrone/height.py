@@ -23,7 +23,7 @@ class HeightWatch:
         self._other_since_ns = 0
 
     def accept(self, stamp_ns: int, height_m: float) -> bool:
-        """Return whether a height [m; above ground] is to be believed."""
+        """Return whether a height [m; above ground] is plausible."""
         if self._good is None or stamp_ns - self._good[0] > _FORGET_NS or _reachable(self._good, stamp_ns, height_m):
             self._good, self._other = (stamp_ns, height_m), None
             return True

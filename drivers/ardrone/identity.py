@@ -1,4 +1,4 @@
-"""Which AR.Drone this is: generation and firmware, told by version.txt, by the configuration or by navdata. Pure."""
+"""Which AR.Drone this is: generation and firmware, from version.txt, the configuration or navdata. Pure."""
 
 import re
 from collections.abc import Mapping

@@ -36,7 +36,7 @@ class SequenceFilter:
         self._window: deque[tuple[int, int]] = deque()
 
     def accept(self, now_ns: int, sequence: int) -> bool:
-        """Return whether a packet with this number is to be used."""
+        """Return whether a packet with this number is new enough to use."""
         restarted = self._last < 0 or now_ns - self._accepted_ns > _RESTART_NS
         if sequence <= self._last and not restarted:
             return False

@@ -131,7 +131,7 @@ class _Line:
         return self.packet is not None and bool(self.packet.state & bit)
 
     def stream(self, seconds: float) -> NavdataStretch:
-        """Listen for some seconds and say what came."""
+        """Listen for some seconds and report what the drone sent."""
         self.listen(seconds)
         mode = "demo" if self.is_set(StateBit.NAVDATA_DEMO) else "full"
         numbers = self._numbers

@@ -18,7 +18,7 @@ _REMEDY = (
 
 
 class RateWatch:
-    """Tells when the rate falls far below the best of this connection, and when it is back."""
+    """Detects when the rate falls far below the best of this connection, and when it is back."""
 
     def __init__(self) -> None:
         self._best_hz = 0.0

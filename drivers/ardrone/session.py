@@ -206,7 +206,7 @@ class ArdroneSession:
         return [*ids, at.config(wish.key, wish.value)]
 
     def _find_out(self, now_ns: int, seen: Model) -> bool:
-        """Decide what is to be written once the firmware is known, or will not be; returns whether that is so."""
+        """Choose the settings to write once the firmware is known, or will not be; returns whether that is so."""
         version = self._inquirer.version
         if version is None:
             return False

@@ -1,4 +1,4 @@
-"""What the AR.Drone driver is told; the composition root fills it from the field file."""
+"""Settings of the AR.Drone driver; the composition root fills them from the field file."""
 
 import math
 from typing import Annotated, Literal
@@ -51,11 +51,13 @@ class ArDroneDriverSettings(DriverSection):
     """One AR.Drone: where it is, what it may do, what is published of it.
 
     local_address: address to bind (empty: any); local_navdata_port, local_at_port: ports to bind there, 0: any free
-    one, so that many drones fit on one host. video None: the drone's own setting is left alone.
+    one, so that many drones fit on one host. video None: the drone's own setting is left alone. pad_m: where it takes
+    off [x, y; world], None: unknown. serial_number: the only drone that may take off ("": any).
     """
 
     name: Name
     address: str
+    serial_number: str = ""
     navdata_port: Port = 5554
     at_port: Port = 5556
     control_port: Port = 5559
@@ -66,6 +68,7 @@ class ArDroneDriverSettings(DriverSection):
     limits: ArDroneLimits = ArDroneLimits()
     odometry: VelocityScale = VelocityScale()
     safety: SilenceLimits = SilenceLimits()
+    pad_m: tuple[float, float] | None = None
     flight: FlightConfiguration = FlightConfiguration()
     video: Video | None = None
     odometry_hz: Annotated[float, Field(gt=0, le=200)] = 100.0
@@ -76,4 +79,4 @@ class ArDroneDriverSettings(DriverSection):
     @property
     def authority(self) -> WatchdogLimits:
         """Return the limits of the shared watchdog."""
-        return self.safety.authority(self.limits)
+        return self.safety.authority(self.limits, self.pad_m)

@@ -14,7 +14,7 @@ _WORDS: dict[StateBit, str] = {
     StateBit.TRAVELLING: "travelling mode",
     StateBit.USB: "USB stick found",
     StateBit.NAVDATA_DEMO: "demo navdata",
-    StateBit.NAVDATA_BOOTSTRAP: "waits to be told which navdata to send",
+    StateBit.NAVDATA_BOOTSTRAP: "waits for the choice of navdata",
     StateBit.MOTORS: "MOTOR PROBLEM",
     StateBit.COM_LOST: "COMMUNICATION LOST",
     StateBit.SOFTWARE_FAULT: "SOFTWARE FAULT",

@@ -57,7 +57,7 @@ class Axis:
 
     def __init__(self, gains: Gains) -> None:
         self._gains = gains
-        self.bias_m_s2 = 0.0
+        self.bias_m_s2 = self._rest_m_s2 = 0.0
         self.start(0.0)
 
     def start(self, speed_m_s: float) -> None:
@@ -80,11 +80,17 @@ class Axis:
         share = min(1.0, dt_s / self._gains.standing_s)
         rest = -_clamp(force_m_s2 / self._gains.accelerometer_gain, self._gains.bias_m_s2)
         self.bias_m_s2 += (rest - self.bias_m_s2) * share
+        self._rest_m_s2 = self.bias_m_s2
 
-    def observe(self, measured_m_s: float, force_m_s2: float | None, turn_m_s2: float, dt_s: float) -> float:
+    def distrust(self) -> None:
+        """Forget what was concluded from measured speeds that contradict what was asked for."""
+        self.speed_m_s, self.bias_m_s2, self._unexplained_m = self.flown_m_s, self._rest_m_s2, 0.0
+
+    def observe(self, measured_m_s: float | None, force_m_s2: float | None, turn_m_s2: float, dt_s: float) -> float:
         """Take a measurement; returns how air and bias accelerate the vehicle [m/s^2].
 
-        force_m_s2: specific force, None unless measured. turn_m_s2: change of the speed by turning of its frame.
+        measured_m_s: None where there is none, so that the speed is integrated. force_m_s2: specific force, None unless
+        measured. turn_m_s2: change of the speed by turning of its frame.
         """
         gains = self._gains
         blind = force_m_s2 is None
@@ -92,6 +98,8 @@ class Axis:
         outside = air + self.bias_m_s2
         acceleration = self._answer(dt_s) + outside + turn_m_s2
         self.speed_m_s += acceleration * dt_s
+        if measured_m_s is None:
+            return outside
         error = measured_m_s - (self.speed_m_s - gains.odometry_delay_s * acceleration)
         self._expected_m_s += (self.flown_m_s - self._expected_m_s) * min(1.0, dt_s / gains.answer_s)
         doubt = math.fabs(measured_m_s - self._expected_m_s) - gains.doubt_m_s

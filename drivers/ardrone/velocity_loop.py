@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from drivers.ardrone.settings import ArDroneLimits
 from drivers.ardrone.velocity_axis import Axis, Gains
 from groundstation.bus.messages import Vector3
+from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
-_GRAVITY_M_S2 = 9.81
 _LONGEST_STEP_S = 0.1
 
 
@@ -39,7 +39,7 @@ class VelocityLoop:
 
     def __init__(self, limits: ArDroneLimits, gains: Gains | None = None) -> None:
         self._limits = limits
-        self._max_acceleration = _GRAVITY_M_S2 * math.tan(limits.max_tilt_rad)
+        self._max_acceleration = STANDARD_GRAVITY_M_S2 * math.tan(limits.max_tilt_rad)
         self._gains = gains or Gains()
         self._axes = (Axis(self._gains), Axis(self._gains))
         self.reset()
@@ -63,13 +63,14 @@ class VelocityLoop:
         self,
         wanted_m_s: Vector3,
         yaw_rate_rad_s: float,
-        measured_m_s: Vector3,
+        measured_m_s: Vector3 | None,
         dt_s: float,
         force_m_s2: tuple[float, float] | None = None,
     ) -> AttitudeRequest:
         """Return the attitude for a wanted velocity, given the true (scaled) one [base_stabilized, FLU].
 
-        force_m_s2: specific force forward and left [base], None when the drone does not tell.
+        measured_m_s: None while the drone does not see its motion: it is then integrated from what was asked and the
+        forces. force_m_s2: specific force forward and left [base], None when the drone does not tell.
         """
         gains = self._gains
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
@@ -79,10 +80,31 @@ class VelocityLoop:
         if self._still_s >= gains.settle_s:
             self._flying = False
             return HOVER
+        return self._request(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
+
+    def brake(self, dt_s: float, force_m_s2: tuple[float, float] | None = None) -> AttitudeRequest:
+        """Return the attitude that stops a drone whose velocity is wrong, by the speed that was right before it was.
+
+        Its own hover is no brake then: the firmware stops by the same optical flow.
+        """
+        if self.contradicted:
+            for axis in self._axes:
+                axis.distrust()
+        dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
+        return self._request((0.0, 0.0, 0.0), 0.0, None, dt_s, force_m_s2)
+
+    def _request(
+        self,
+        wanted_m_s: Vector3,
+        turn_rad_s: float,
+        measured_m_s: Vector3 | None,
+        dt_s: float,
+        force_m_s2: tuple[float, float] | None,
+    ) -> AttitudeRequest:
         x, y = self._accelerations(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
         return AttitudeRequest(
-            roll_rad=-math.atan(y / _GRAVITY_M_S2),
-            pitch_rad=math.atan(x / _GRAVITY_M_S2),
+            roll_rad=-math.atan(y / STANDARD_GRAVITY_M_S2),
+            pitch_rad=math.atan(x / STANDARD_GRAVITY_M_S2),
             climb_m_s=_clamp(wanted_m_s[2], self._limits.max_climb_m_s),
             yaw_rate_rad_s=turn_rad_s,
         )
@@ -91,14 +113,14 @@ class VelocityLoop:
         self,
         wanted_m_s: Vector3,
         turn_rad_s: float,
-        measured_m_s: Vector3,
+        measured_m_s: Vector3 | None,
         dt_s: float,
         force_m_s2: tuple[float, float] | None,
     ) -> tuple[float, float]:
         axes = self._axes
         if not self._flying:
             self._flying = True
-            for axis, speed in zip(axes, measured_m_s, strict=False):
+            for axis, speed in zip(axes, measured_m_s or (0.0, 0.0), strict=False):
                 axis.start(speed)
         wanted = _shortened(wanted_m_s[0], wanted_m_s[1], self._limits.max_speed_m_s)
         # Seen from a frame that turns left a steady velocity turns right, and holding one takes a pull to the left.
@@ -107,7 +129,8 @@ class VelocityLoop:
         forces = (None, None) if force_m_s2 is None else force_m_s2
         asked = [0.0, 0.0]
         for i, axis in enumerate(axes):
-            outside = axis.observe(measured_m_s[i], forces[i], turning[i], dt_s)
+            seen_m_s = None if measured_m_s is None else measured_m_s[i]
+            outside = axis.observe(seen_m_s, forces[i], turning[i], dt_s)
             wish = axis.wish(wanted[i], outside, dt_s)
             asked[i] = axis.bounded(wish, wanted[i], outside, dt_s) + centripetal[i]
         x, y = _shortened(asked[0], asked[1], self._max_acceleration)

@@ -18,8 +18,8 @@ from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
 from groundstation.arrays import Image
 from groundstation.bus import clock
-from groundstation.bus.messages import CameraStatus, Severity
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, VIDEO
+from groundstation.bus.messages import CameraStatus, SearchedPicture, Severity
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, SEARCHED_PICTURE, VIDEO
 from groundstation.errors import SettingsError, without_password
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -30,7 +30,7 @@ _LEVEL = (0.0, 0.0)
 
 
 def run(child: HostProcess) -> int:
-    """Serve one camera until told to stop; returns the exit code."""
+    """Serve one camera until a stop is requested; returns the exit code."""
     try:
         settings = CameraDriverSettings.model_validate_json(child.section)
     except ValidationError as error:
@@ -162,6 +162,11 @@ class CameraDriver:
             observation = convert.observation_from_sighting(sighting, header, settings.name, attitude)
             self._child.bus.publish(OBSERVATION, observation)
             self._detections += 1
+        if self._pipeline.searched:
+            header = self._child.bus.header(settings.observer, exposure_ns)
+            found = tuple(sighting.entity for sighting in sightings)
+            searched = SearchedPicture(header=header, observer=settings.observer, camera=settings.name, found=found)
+            self._child.bus.publish(SEARCHED_PICTURE, searched)
         for notice in self._pipeline.take_notices():
             self._child.event(notice.severity, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
 
@@ -184,7 +189,7 @@ class CameraDriver:
                 self._child.bus.publish_bytes(VIDEO, header, unit.data)
 
     def _announce(self) -> None:
-        """Tell lifecycle and operator what the stream does now."""
+        """Report the state of the stream to lifecycle and operator."""
         name = self._settings.name
         if self._watch.state is StreamState.FLOWING:
             self._child.ready(f"pictures from {without_password(self._settings.source)}")

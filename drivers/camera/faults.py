@@ -24,7 +24,7 @@ class MarkerFaults:
         self._told: set[tuple[str, str]] = set()
 
     def take(self) -> list[Notice]:
-        """Return and forget what has not been told yet."""
+        """Return the faults that are not reported yet, and forget them."""
         notices, self._notices = self._notices, []
         return notices
 

@@ -37,7 +37,8 @@ def _unknown_drop(_entity: str) -> float | None:
 class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
-    `counts` says what was found, missed and refused since the start, by name.
+    `counts` says what was found, missed and refused since the start, by name; `searched`: whether the last picture was
+    searched all over.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class Pipeline:
         self._next_search_ns: int | None = None
         self._searched_ns = 0
         self._tracks: list[Track] = []
+        self.searched = False
         self._blind: Counter[str] = Counter()
         self._faults = MarkerFaults()
         self.counts: Counter[str] = Counter()
@@ -92,7 +94,7 @@ class Pipeline:
         """
         finds = self._follow(picture, stamp_ns, predictions)
         self._look_where_expected(picture, stamp_ns, predictions, finds)
-        searching = self._is_search_due(stamp_ns)
+        searching = self.searched = self._is_search_due(stamp_ns)
         if searching:
             finds += self._search(picture, stamp_ns) if self._expected else []
         sightings = self._tags.look(picture, stamp_ns, gravity_of, predictions, searching)
@@ -151,7 +153,7 @@ class Pipeline:
             finds.append((self._adopted(find, stamp_ns, prediction), find))
 
     def _adopted(self, find: detect.Find, stamp_ns: int, prediction: Prediction) -> Track:
-        """Return the track that had lost this board, else a new one; whose it is, its bar has to say."""
+        """Return the track that had lost this board, else a new one; its bar identifies it later."""
         for track in self._tracks:
             if track.misses and track.accepts(find, stamp_ns):
                 track.follow(find, stamp_ns, prediction)

@@ -119,7 +119,7 @@ class TagSettings(_Section):
 
 
 class MarkerSettings(_Section):
-    """A marker that may come into view: whose it is, its place on its carrier [m; base], and what is printed on it.
+    """A marker that may come into view: its carrier, its place on that [m; base], and its print.
 
     That is a checkerboard (code, square_mm), or a tag.
     """

@@ -16,7 +16,7 @@ _SIGMAS, _LEAST_DEVIATION = 3.0, math.log(1.08)
 
 
 class SizeCheck:
-    """Collects ratios for one marker; `ratio` is told once they contradict the size for three seconds."""
+    """Collects ratios for one marker; `ratio` is set once they contradict the size for three seconds."""
 
     def __init__(self) -> None:
         self._ratios: deque[tuple[int, float, float]] = deque(maxlen=_KEPT)

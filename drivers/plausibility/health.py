@@ -5,7 +5,7 @@ from enum import IntEnum, StrEnum
 
 
 class Health(IntEnum):
-    """How far a sensor is to be believed; a BAD one counts as silent."""
+    """How far a sensor can be trusted; a BAD one counts as silent."""
 
     GOOD = 0
     SUSPECT = 1

@@ -22,7 +22,7 @@ _GAP_S = 0.3
 
 @dataclass(frozen=True, slots=True)
 class MotionSample:
-    """What one packet says. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it tells none.
+    """Motion in one packet. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it has none.
 
     velocity_m_s: horizontal, as told, in axes of the vehicle's own choice; heading_rad: of the vehicle in these axes.
     roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not told.

@@ -6,13 +6,18 @@ attitude for longer than 24 ms.
 
 import math
 
-_GRAVITY_M_S2 = 9.81
+from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
+
 # Two datagrams of one moment are no standstill.
 _LEAST_SAMPLES = 4
 
 
 class RepeatWatch:
-    """Counts how long a value stands. Nothing is known of a value that did not come for `gap_s`."""
+    """Counts how long a value stands. Nothing is known of a value that did not come for `gap_s`.
+
+    `FreezeWatch` of the estimator is its near twin: it has no gap, because sightings come and go, and answers yes or no
+    for many sources. Neither package may import the other, and no package below both is about sensors.
+    """
 
     def __init__(self, gap_s: float = 0.3) -> None:
         self._gap_ns = round(gap_s * 1e9)
@@ -52,6 +57,6 @@ class StandstillWatch:
         if held_s == 0.0:
             self._change_m_s = 0.0
         else:
-            self._change_m_s += _GRAVITY_M_S2 * math.tan(tilt_rad) * (stamp_ns - self._stamp_ns) * 1e-9
+            self._change_m_s += STANDARD_GRAVITY_M_S2 * math.tan(tilt_rad) * (stamp_ns - self._stamp_ns) * 1e-9
         self._stamp_ns = stamp_ns
         return held_s, abs(self._change_m_s)

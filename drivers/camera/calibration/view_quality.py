@@ -19,7 +19,7 @@ _LEAST_SHAPES = 2
 
 
 class Flaw(StrEnum):
-    """Why a picture is not kept; the text tells what to do."""
+    """Why a picture is not kept; the text is the remedy."""
 
     NO_BOARD = "no board"
     CUT = "board cut by the picture's border"

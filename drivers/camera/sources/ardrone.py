@@ -84,7 +84,7 @@ class ArDroneReader:
         self._line.interrupt()
 
     def read(self, drain: Drain) -> None:
-        """Hand over pictures until told to stop."""
+        """Hand over pictures until the drain closes."""
         try:
             with self._line.open() as connection:
                 reader, assembly = FrameReader(), Assembly()

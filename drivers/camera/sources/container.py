@@ -36,7 +36,7 @@ class ContainerReader:
         """Do nothing: every read ends by itself within 2 s."""
 
     def read(self, drain: Drain) -> None:
-        """Hand over packets until told to stop."""
+        """Hand over packets until the drain closes."""
         with self._open() as container:
             stream = next(iter(container.streams.video), None)
             if stream is None:

@@ -34,7 +34,7 @@ class MjpegReader:
         self._line.interrupt()
 
     def read(self, drain: Drain) -> None:
-        """Hand over pictures until told to stop."""
+        """Hand over pictures until the drain closes."""
         with self._line.open() as connection:
             connection.sendall(self._request)
             boundary, data = _read_head(connection)

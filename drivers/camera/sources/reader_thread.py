@@ -1,4 +1,4 @@
-"""The thread behind every source: it reads all there is at once, comes back after a loss, and keeps what came last.
+"""The thread behind every source: it reads everything at once, reconnects after a loss, and keeps the newest unit.
 
 A plain read loop would hand over pictures seconds old after a stall; draining keeps them as young as the link allows.
 What needs the pictures before it (H.264) is decoded when the newest picture is asked for, from the last place at which

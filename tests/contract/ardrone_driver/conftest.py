@@ -54,6 +54,9 @@ class Process:
     def degrade(self, detail: str) -> None:
         self.states.append(f"DEGRADED {detail}")
 
+    def note_addresses(self, addresses: object) -> None:
+        pass
+
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         pass
 

@@ -52,6 +52,16 @@ def test_ids_go_before_every_key_and_everything_is_read_back(new_rig):
     assert "AR.Drone 2.0, firmware 2.4.8, serial PS721000AB2L01234" in text
 
 
+@pytest.mark.parametrize(("pinned", "flies"), [("PS721000AB2L01234", True), ("PS721000AB2L09999", False)])
+def test_another_drone_at_the_address_does_not_take_off(new_rig, pinned, flies):
+    rig = new_rig("2.4.8", serial_number=pinned).connect()
+    rig.order(Verb.TAKEOFF)
+    rig.turn()
+    acks = [ack for ack in rig.messages(COMMAND_ACK) if ack.stage is not AckStage.RECEIVED]
+    assert (acks[-1].stage is AckStage.ACCEPTED) is flies
+    assert flies or "its serial number is PS721000AB2L01234, the field says PS721000AB2L09999" in acks[-1].reason
+
+
 def test_a_limit_that_is_not_stored_grounds_the_drone_and_says_why(new_rig):
     rig = new_rig("2.3.3")
     rig.fake.deaf_to = {"control:altitude_max"}

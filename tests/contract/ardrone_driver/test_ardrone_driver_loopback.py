@@ -271,3 +271,15 @@ def test_values_that_cannot_be_true_stop_it_like_silence_and_the_operator_reads_
     word = "all values repeat" if fault == "frozen" else "its velocity is stuck at"
     assert any(word in text for _, text, _ in rig.process.events), rig.process.events
     rig.until(lambda: not rig.fake.state & FLY)
+
+
+def test_an_order_without_the_right_to_give_it_is_an_event(rig):
+    rig.connect()
+    rig.other.source = "cli_1"
+    rig.order(Verb.TAKEOFF)
+    rig.other.source = "other"
+    rig.turn()
+    assert rig.host.watchdog.mode == "LANDED"
+    assert any(
+        "TAKEOFF of cli_1 refused: the operator lease is held by op" in text for _, text, _ in rig.process.events
+    )

@@ -226,11 +226,12 @@ def test_reference_bits(action, state, flight_state, bits):
     assert orders(action, state=state, flight_state=flight_state)["REF"] == (BASE | bits,)
 
 
-def test_only_fly_moves():
+def test_only_a_flying_or_hovering_drone_is_steered():
     tilted = AttitudeRequest(pitch_rad=0.1)
     for action in Action:
         flag = orders(action, tilted)["PCMD"][0]
-        assert flag == (1 if action is Action.FLY else 0)
+        assert flag == (1 if action in (Action.FLY, Action.HOVER) else 0)
+    assert orders(Action.HOVER, HOVER)["PCMD"][0] == 0, "nor one that holds its place by itself"
 
 
 def test_waiting_says_nothing_about_flying():

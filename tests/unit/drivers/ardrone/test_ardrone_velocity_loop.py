@@ -6,6 +6,8 @@ from collections import deque
 
 import pytest
 
+from drivers.ardrone.averages import MotionMean
+from drivers.ardrone.convert import NavdataMotion
 from drivers.ardrone.settings import ArDroneLimits
 from drivers.ardrone.velocity_loop import VelocityLoop
 
@@ -192,3 +194,50 @@ def test_a_healthy_flight_is_never_contradicted(sensed, monkeypatch):
     for seed in range(3):
         fly(lambda t: 0.5 * math.copysign(1.0, math.sin(0.8 * t)), 20.0, seed=seed, sensed=sensed, bias_deg=1.0)
     assert len(found) > 2000 and not any(found)
+
+
+def stop_blindly(push, seen_s, wrong=0.0):
+    """Fly 0.5 m/s, seen until seen_s, then with a speed that is off by `wrong` for 0.7 s, then brake for 4 s.
+
+    Return the true speeds of the last second; push: of the air from the brake on [m/s^2].
+    """
+    rng, loop, tilt = random.Random(1), VelocityLoop(ArDroneLimits()), Tilt()
+    speed, pitch, speeds, air = 0.0, 0.0, [], []
+    for i in range(round((seen_s + 4.7) / TICK_S)):
+        now_s = i * TICK_S
+        outside = -speed * (0.2 + 0.1 * abs(speed)) + (push if now_s > seen_s else 0.0)
+        speed += (9.81 * math.tan(tilt.step(pitch)) + outside) * TICK_S
+        air.append(0.92 * outside + rng.gauss(0, 0.045))
+        if i % 5 == 0:
+            force = (sum(air) / len(air), 0.0)
+            air.clear()
+            measured = (speed + rng.gauss(0, 0.04), 0.0, 0.0) if now_s < seen_s else None
+            measured = (speed + wrong, 0.0, 0.0) if wrong and now_s >= seen_s else measured
+            asked = (
+                loop.step((0.5, 0.0, 0.0), 0.0, measured, 1 / 40, force)
+                if now_s < seen_s + 0.7
+                else loop.brake(1 / 40, force)
+            )
+            assert not asked.hover
+            pitch = asked.pitch_rad
+        speeds.append(speed)
+    return speeds[-round(1.0 / TICK_S) :]
+
+
+@pytest.mark.parametrize("push", [0.0, 0.15, -0.15])
+@pytest.mark.parametrize("seen_s", [1.0, 4.0])
+def test_a_drone_that_sees_no_floor_is_braked_by_what_it_knows(seen_s, push):
+    """Level, as its firmware hovers then, it would still do 0.3 m/s: air alone hardly brakes."""
+    assert max(abs(speed) for speed in stop_blindly(push, seen_s)) <= 0.12
+
+
+def test_a_speed_that_contradicts_the_requests_is_no_guide_to_braking():
+    assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong=-0.9)) <= 0.25
+
+
+@pytest.mark.parametrize(("values", "repeats"), [((0.1, 0.2, 0.3, 0.4), False), ((0.1, 0.0, 0.0, 0.0, 0.0), True)])
+def test_a_velocity_that_stands_still_is_no_measurement(values, repeats):
+    mean = MotionMean()
+    for left in values:
+        mean.add(NavdataMotion((left + 1.0, left, 0.0), 0.0, 0.0, 0.0, None, None, None))
+    assert mean.repeats is repeats

@@ -224,6 +224,6 @@ def test_the_check_compares_what_two_cameras_have_in_view(tmp_path, capsys):
 def test_the_check_says_what_is_missing(tmp_path, capsys):
     folder, calibration = files_for(tmp_path, LENS, np.full((720, 1280), 120, np.uint8), 1)
     assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 0
-    assert "cannot be told: " in capsys.readouterr().out
+    assert "is unknown: " in capsys.readouterr().out
     assert run(["calibrate", "check", "http://127.0.0.1:9/video.mjpg"]) == 2
     assert "--calibration FILE" in capsys.readouterr().err

@@ -17,7 +17,7 @@ from groundstation.bus import clock
 from groundstation.bus.api import Subscription
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Odometry
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, VIDEO
+from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, SEARCHED_PICTURE, VIDEO
 from groundstation.errors import SettingsError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
@@ -25,18 +25,12 @@ from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 
+LENS: dict[str, Any] = {"width_px": 640, "height_px": 360, "fx_px": 460, "fy_px": 460, "cx_px": 319.5, "cy_px": 179.5}
+LENS |= {"distortion": [-0.30, 0.08, 0, 0, 0]}
 SECTION: dict[str, Any] = {
     "name": "drone_1_camera",
     "source": "http://127.0.0.1:9/video.mjpg",
-    "calibration": {
-        "width_px": 640,
-        "height_px": 360,
-        "fx_px": 460,
-        "fy_px": 460,
-        "cx_px": 319.5,
-        "cy_px": 179.5,
-        "distortion": [-0.30, 0.08, 0, 0, 0],
-    },
+    "calibration": LENS,
     "mount": {"parent": "drone_1", "position_m": [0.09, 0, 0], "tilt_down_deg": 45},
     "video_delay_ms": 120,
     "markers": [
@@ -97,8 +91,8 @@ class FakeChild:
     def beat(self):
         self.beats += 1
 
-    def tick_status(self, ticks=0, overruns=0, overflowed=0):
-        pass
+    def note_addresses(self, addresses): ...
+    def tick_status(self, ticks=0, overruns=0, overflowed=0): ...
 
     def sleep_until(self, deadline_ns):
         return True
@@ -123,7 +117,7 @@ def rig():
     exchange = MemoryExchange()
     child, source = FakeChild(MemoryBus(exchange, "lab", "drone_1_camera")), FakeSource()
     listener = MemoryBus(exchange, "lab", "test")
-    subscription = listener.subscribe([OBSERVATION, CAMERA_STATUS, IMAGE, VIDEO])
+    subscription = listener.subscribe([OBSERVATION, SEARCHED_PICTURE, CAMERA_STATUS, IMAGE, VIDEO])
     return Rig(driver.CameraDriver(child, settings(), source), child, source, listener, subscription)
 
 
@@ -164,12 +158,12 @@ def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
     heard = rig.heard.drain()
     (observation,) = [r.message for r in heard if r.key.topic is OBSERVATION]
     assert observation.header.stamp_ns == now_ns - 120_000_000
-    assert (observation.observer, observation.subject, observation.camera) == ("drone_1", "bot", "drone_1_camera")
-    assert observation.header.entity == "drone_1"
+    named = (observation.header.entity, observation.observer, observation.subject, observation.camera)
+    assert named == ("drone_1", "drone_1", "bot", "drone_1_camera")
     assert observation.roll_rad == pytest.approx(0.1)
     assert observation.yaw_rad == pytest.approx(0.5, abs=0.02)
-    assert len(observation.covariance) == 16
-    assert observation.margin > 1.0
+    assert (len(observation.covariance), observation.margin > 1.0) == (16, True)
+    assert [r.message.found for r in heard if r.key.topic is SEARCHED_PICTURE] == [("bot",)]
     (image,) = [r for r in heard if r.key.topic is IMAGE]
     assert image.payload == jpeg
     assert (image.header.entity, image.header.stamp_ns) == ("drone_1_camera", now_ns - 120_000_000)

@@ -255,6 +255,7 @@ def test_full_searches_are_rationed_and_staggered():
     for k in range(30):
         assert pipeline.process(empty, k * FRAME_NS, lambda _: gravity()) == []
         counts.append(pipeline.counts["searches"])
+        assert pipeline.searched == (counts[-1] > (counts[-2] if k else 0))
     assert counts[3] == 0
     assert counts[4] == 1
     assert counts[-1] <= 4

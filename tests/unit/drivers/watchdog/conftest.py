@@ -24,7 +24,9 @@ class Bench:
         self.fresh = True
         self.battery = 0.9
         self.not_ready = self.unsound = self.stray = ""
-        self.speed = 0.0
+        self.speed = self.unseen_s = self.lost_s = 0.0
+        self.unseen = self.lost = False
+        self.near = ""
         self.upstream = Upstream()
         self.epoch = 1
         self.ids = itertools.count()
@@ -39,6 +41,8 @@ class Bench:
 
     def step(self, dt=STEP):
         self.now += dt
+        self.unseen_s = self.unseen_s + dt / S if self.unseen else 0.0
+        self.lost_s = self.lost_s + dt / S if self.lost else 0.0
         if self.lease_alive:
             self.watchdog.accept_lease(self.now, Lease(header=self.header(), holder="op", expires_ns=self.now + 2 * S))
         if self.tracker_speaks:
@@ -49,7 +53,8 @@ class Bench:
     @property
     def view(self):
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
-        return replace(view, speed_m_s=self.speed, stray=self.stray).believed
+        seen = replace(view, unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near)
+        return replace(seen, speed_m_s=self.speed, stray=self.stray).believed
 
     def see(self):
         """Let the watchdog know what the vehicle says, as its host does before it hands over orders."""

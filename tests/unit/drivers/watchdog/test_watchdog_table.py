@@ -7,7 +7,7 @@ import pytest
 
 from drivers.failsafe_table import Condition
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import AIRBORNE, FREE, Action, DriverMode, Upstream, VehicleView, WatchdogLimits
+from drivers.watchdog_types import AIRBORNE, FREE, Ack, Action, DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
 LASTING = (
@@ -240,3 +240,33 @@ def test_no_sequence_of_inputs_flies_after_land_without_a_take_off():
             if decision.action in (Action.FLY, Action.TAKE_OFF):
                 assert not latched and started
             latched = latched or decision.action in (Action.LAND, Action.CUT)
+
+
+def test_the_row_that_acted_is_named_until_the_mode_ends(new_bench):
+    bench = new_bench().fly()
+    assert bench.watchdog.failsafe == ""
+    bench.fresh = False
+    bench.run(1.2)
+    assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.HOVER, Condition.TELEMETRY_SILENT)
+    bench.run(2.0)
+    assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.LANDING, Condition.TELEMETRY_SILENT)
+    bench.fresh, bench.state = True, FlightState.LANDED
+    bench.step()
+    assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.LANDED, "")
+
+
+def test_an_order_is_no_failsafe(new_bench):
+    bench = new_bench().fly()
+    bench.order(Verb.LAND)
+    bench.step()
+    assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.LANDING, "")
+
+
+def test_nobody_takes_off_under_somebody(new_bench):
+    bench = new_bench()
+    bench.near = "drone_2 flies 0.2 m from its pad, at least 0.6 m needed"
+    bench.see()
+    assert bench.order(Verb.TAKEOFF) == Ack("c0", Verb.TAKEOFF, AckStage.REFUSED, bench.near)
+    bench.near = ""
+    bench.see()
+    assert bench.order(Verb.TAKEOFF).stage is AckStage.ACCEPTED

@@ -1,0 +1,92 @@
+"""Who may be in the air while another drone climbs from its pad."""
+
+import itertools
+import math
+
+import pytest
+
+from drivers.neighbours import Neighbours
+from groundstation.bus.messages import EntityEstimate, FlightState, Header, VehicleStatus
+
+S = 1_000_000_000
+ALOFT = (FlightState.FLYING, FlightState.HOVERING, FlightState.TAKING_OFF, FlightState.LANDING)
+
+
+def status(name, state):
+    return VehicleStatus(header=Header(0, "here", name, name, 0), flight_state=state, mode="TRACK")
+
+
+def believed(name, x_m, y_m=0.0, std_m=0.02):
+    covariance = tuple(std_m**2 if row == column else 0.0 for row in range(4) for column in range(4))
+    return EntityEstimate(name, "robot", (x_m, y_m, 1.0, 0.0), covariance, (0.0,) * 3, True, 0.1)
+
+
+def watch(state=FlightState.FLYING, pad_m=(0.0, 0.0)):
+    neighbours = Neighbours("a", pad_m, 0.6)
+    neighbours.hear(status("b", state))
+    return neighbours
+
+
+@pytest.mark.parametrize("state", ALOFT)
+def test_somebody_in_the_air_over_the_pad_is_named(state):
+    neighbours = watch(state)
+    neighbours.see(S, [believed("b", 0.4)])
+    assert neighbours.obstacle(S) == "b flies 0.4 m from its pad, at least 0.6 m needed"
+
+
+def test_distance_counts_from_the_pad_and_in_the_plane():
+    neighbours = watch(pad_m=(2.0, 1.0))
+    for x_m, y_m in itertools.product((1.5, 3.0), (0.8, 2.0)):
+        neighbours.see(S, [believed("b", x_m, y_m)])
+        near = math.hypot(x_m - 2.0, y_m - 1.0) < 0.64
+        assert bool(neighbours.obstacle(S)) == near
+
+
+def test_a_doubtful_place_counts_as_nearer():
+    neighbours = watch()
+    neighbours.see(S, [believed("b", 0.9, std_m=0.1)])
+    assert neighbours.obstacle(S) == ""
+    neighbours.see(S, [believed("b", 0.9, std_m=0.2)])
+    assert neighbours.obstacle(S)
+
+
+def test_who_flies_and_nobody_knows_where_keeps_others_down():
+    neighbours = watch()
+    assert neighbours.obstacle(S) == "b is in the air, and nobody knows where"
+    neighbours.see(S, [believed("b", 3.0)])
+    assert neighbours.obstacle(S) == "" == neighbours.obstacle(2 * S)
+    assert neighbours.obstacle(2 * S + 1)
+    neighbours.see(3 * S, [believed("b", 3.0)])
+    neighbours.hear(status("b", FlightState.LOST))
+    assert neighbours.obstacle(3 * S) == "" and neighbours.obstacle(5 * S)
+    neighbours.hear(status("b", FlightState.UNKNOWN))  # a driver that was started again
+    assert neighbours.obstacle(5 * S)
+
+
+@pytest.mark.parametrize("state", [FlightState.LANDED, FlightState.EMERGENCY])
+def test_who_stands_is_in_nobodys_way(state):
+    neighbours = watch()
+    neighbours.hear(status("b", state))
+    neighbours.hear(status("a", FlightState.FLYING))
+    assert neighbours.obstacle(S) == ""
+
+
+def test_without_a_pad_nothing_is_near():
+    assert watch(pad_m=None).obstacle(S) == ""
+
+
+@pytest.mark.parametrize(("std_m", "held"), [((0.2, 0.0), True), ((0.0, 0.2), True), ((0.0, 0.0, 0.5, 0.5), False)])
+def test_doubt_counts_by_two_deviations_of_the_worse_axis_of_the_plane(std_m, held):
+    variances = [value**2 for value in (*std_m, 0.0, 0.0)][:4]
+    covariance = tuple(variances[row] if row == column else 0.0 for row in range(4) for column in range(4))
+    neighbours = watch()
+    neighbours.see(S, [EntityEstimate("b", "robot", (0.98, 0.0, 1.0, 0.0), covariance, (0.0,) * 3, True, 0.1)])
+    assert bool(neighbours.obstacle(S)) == held
+    neighbours.see(S, [EntityEstimate("b", "robot", (1.02, 0.0, 1.0, 0.0), covariance, (0.0,) * 3, True, 0.1)])
+    assert neighbours.obstacle(S) == ""
+
+
+def test_the_separation_itself_is_far_enough():
+    neighbours = watch()
+    neighbours.see(S, [believed("b", 0.6, std_m=0.0)])
+    assert neighbours.obstacle(S) == ""

@@ -1,8 +1,9 @@
-"""`python -m sim_bridge.standalone 127.0.0.2 127.0.0.3`: emulated AR.Drones alone, for programs of others.
+"""`python -m sim_bridge.standalone 127.0.0.2 px4@127.0.0.3`: emulated drones alone, for programs of others.
 
-Each address gets a drone of its own with the ports of a real one, 2 m from the next in an empty room; no bus, no
-ground station. With `--truth`, a line of JSON every 0.1 s says where each really is and what it does. Exit codes:
-0 stopped (Ctrl-C, SIGTERM, `--seconds`), 1 cannot run (the port that is taken is named), 2 wrong arguments.
+Each address gets a drone of its own with the ports of a real one (an AR.Drone, or `px4@`, `ardupilot@`: system ids from
+1 on, UDP port 14550), 2 m from the next in an empty room; no bus, no ground station. With `--truth`, a line of JSON
+every 0.1 s says where each really is and what it does. Exit codes: 0 stopped (Ctrl-C, SIGTERM, `--seconds`), 1 cannot
+run (the port that is taken is named), 2 wrong arguments.
 """
 
 import argparse
@@ -13,18 +14,28 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
+from drivers.mavlink.wire.names import Flavour
 from groundstation.errors import GroundStationError
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_video import PORT
-from sim_bridge.scenario import DroneScenario, Scenario, Standstill, TargetScenario
+from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_satellites import Satellites
+from sim_bridge.devices.mavlink_truth import TruthTeller
+from sim_bridge.scenario import DroneScenario, Scenario, TargetScenario
 from sim_bridge.site import Site
 from sim_bridge.stage import Stage
+from sim_bridge.target_paths import Standstill
 from sim_bridge.tick_schedule import Clockwork
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS, World
 
+Address = tuple[str, int]
 _SPACING_M = 2.0
 _TRUTH_TICKS = 20
 _MODE_TICKS = 20
@@ -35,78 +46,118 @@ _FRONT = {
 }  # fmt: skip
 
 
-def site_of(addresses: Sequence[str]) -> Site:
-    """Return a room with a drone for each address, in a row along y, all looking along x at a parked TurtleBot."""
-    middle = (len(addresses) - 1) / 2
-    camera = {"source": "ardrone://", "calibration": _FRONT, "position_m": (0.2, 0.0, 0.0), "tilt_down_deg": 0.0}
-    drones = {
-        address: {
-            "kind": "ardrone",
+def site_of(names: Sequence[str]) -> Site:
+    """Return a room with a drone for each name, in a row along y, all looking along x at a parked TurtleBot."""
+    middle = (len(names) - 1) / 2
+    drones: dict[str, dict[str, object]] = {}
+    for index, name in enumerate(names):
+        kind, at, _ = name.rpartition("@")
+        drones[name] = {
+            "kind": "mavlink" if at else "ardrone",
+            "mavlink": {"flavour": kind, "system_id": index + 1} if at else None,
             "pad_m": (0.0, (index - middle) * _SPACING_M),
             "marker": {"code": index % 16, "square_mm": 44, "position_m": (0.0, 0.0, 0.08)},
-            "camera": camera,
+            "camera": None
+            if at
+            else {"source": "ardrone://", "calibration": _FRONT, "position_m": (0.2, 0.0, 0.0), "tilt_down_deg": 0.0},
         }
-        for index, address in enumerate(addresses)
-    }
     return Site.model_validate(
         {
             "site": "hangar",
-            "room": {"size_m": (40.0, 20.0 + len(addresses) * _SPACING_M, 6.0)},
+            "room": {"size_m": (40.0, 20.0 + len(names) * _SPACING_M, 6.0)},
             "drones": drones,
             "target": {"name": "target", "marker": {"code": 5, "height_m": 0.4, "square_mm": 44}},
         }
     )
 
 
+@dataclass(frozen=True, slots=True)
+class MavlinkChoice:
+    """How MAVLink vehicles are opened.
+
+    indoor: set up for flight on poses from outside, which whoever flies them must send, else with satellites; calls:
+    where each of them speaks to unasked; truth: where the first sends its true state.
+    """
+
+    indoor: bool = False
+    calls: Address | None = None
+    truth: Address | None = None
+
+
 class Hangar:
     """The drones and their ports; `close` releases them."""
 
-    def __init__(self, addresses: Sequence[str], firmware: ArdroneFirmware, seed: int = 1) -> None:
-        self._site, self._seed = site_of(addresses), seed
+    def __init__(
+        self, names: Sequence[str], firmware: ArdroneFirmware, seed: int = 1, mavlink: MavlinkChoice = MavlinkChoice()
+    ) -> None:
+        self._site, self._seed, self._mavlink = site_of(names), seed, mavlink
         parked = TargetScenario(path=Standstill(position_m=(6.0, 0.0)))
         self._scenario = Scenario(drones=DroneScenario(firmware=firmware.name), target=parked)
         self.world = World(self._site, self._scenario, seed)
         self._stage = Stage(self.world)
+        self._tellers: list[TruthTeller] = []
         try:
-            for address, drone in self.world.ardrones.items():
-                onboard = self.world.onboard[address]
-                emulator = ArDroneEmulator(address, address, drone, onboard, firmware=firmware)
-                self._stage.add(address, emulator, emulator.fileno())
+            for name, drone in self.world.ardrones.items():
+                emulator = ArDroneEmulator(name, name, drone, self.world.onboard[name], firmware=firmware)
+                self._stage.add(name, emulator, emulator.fileno())
+            for name, copter in self.world.copters.items():
+                self._open_mavlink(name, copter)
         except GroundStationError:
             self.close()
             raise
+
+    def _open_mavlink(self, name: str, copter: MavlinkCopter) -> None:
+        identity, choice = self._site.drones[name].require_mavlink(), self._mavlink
+        flavour, system = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT, identity.system_id
+        place = name.rpartition("@")[2], identity.port
+        parameters = Parameters(flavour, system, choice.indoor)
+        vehicle = MavlinkEmulator(name, place, parameters, copter, calls=choice.calls)
+        self._stage.add(name, vehicle, vehicle.socket.fileno())
+        if not choice.indoor:
+            vehicle.equip(Satellites(self._seed + system))
+        if choice.truth is not None and not self._tellers:
+            self._tellers.append(TruthTeller(flavour, system, copter.airframe, choice.truth))
 
     def open_video(self, should_stop: Callable[[], bool]) -> None:
         """Serve the pictures of all drones; returns when every port listens. Raises GroundStationError."""
         name = f"{os.getpid()}-hangar"
         self._stage.share_truth(name)
-        streams = {address: (address, PORT) for address in self._stage.emulators}
+        streams = {address: (address, PORT) for address in self.world.ardrones}
         specs = render_specs(self._site, self._scenario, streams, name, self._seed)
         self._stage.open_cameras(specs, should_stop)
 
     def tick(self, stamp_ns: int) -> None:
         """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
         self._stage.tick(stamp_ns)
+        for teller in self._tellers:
+            teller.send()
         if self.world.ticks % _MODE_TICKS == 0:
             self._stage.tell_cameras()
 
     def truth(self) -> str:
         """Return where each drone really is [m, m/s, rad; world] and what it does, as a line of JSON."""
         drones = {}
-        for name, drone in self.world.ardrones.items():
+        for name, drone in self.world.drones.items():
             body = drone.airframe
             drones[name] = {
                 "position": [round(value, 4) for value in (body.x, body.y, body.z)],
                 "velocity": [round(value, 4) for value in (body.vx, body.vy, body.vz)],
                 "yaw": round(body.yaw, 4),
-                "phase": drone.autopilot.phase.name,
+                "phase": self._phase(name, drone),
                 "battery": round(drone.battery, 4),
             }
         return json.dumps({"time": round(self.world.time_s, 3), "drones": drones})
 
+    def _phase(self, name: str, drone: Quadrotor | MavlinkCopter) -> str:
+        if isinstance(drone, Quadrotor):
+            return drone.autopilot.phase.name
+        return ("ARMED " if drone.motors_on else "") + drone.steering.name
+
     def close(self) -> None:
         """Stop the pictures and close all ports; idempotent."""
         self._stage.close()
+        while self._tellers:
+            self._tellers.pop().close()
 
 
 def serve(hangar: Hangar, seconds: float, tell_truth: bool, should_stop: Callable[[], bool]) -> None:
@@ -121,29 +172,54 @@ def serve(hangar: Hangar, seconds: float, tell_truth: bool, should_stop: Callabl
             print(hangar.truth(), flush=True)
 
 
-def _address(text: str) -> str:
+def _drone(text: str) -> str:
+    kind, at, address = text.rpartition("@")
     try:
-        good = ipaddress.IPv4Address(text).is_loopback
+        good = ipaddress.IPv4Address(address).is_loopback
     except ValueError:
         good = False
     if not good:
-        raise argparse.ArgumentTypeError(f"{text!r} is no loopback address: give one such as 127.0.0.2")
-    return text
+        raise argparse.ArgumentTypeError(f"{address!r} is no loopback address: give one such as 127.0.0.2")
+    if at and kind not in ("ardrone", "px4", "ardupilot"):
+        raise argparse.ArgumentTypeError(f"{kind!r} is no kind of drone, only ardrone, px4 and ardupilot")
+    return address if kind == "ardrone" else text
+
+
+def _place(text: str) -> Address:
+    host, _, port = text.rpartition(":")
+    try:
+        if not ipaddress.IPv4Address(host).is_loopback or not 0 < int(port) < 65536:
+            raise ValueError(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no loopback address and port, such as 127.0.0.1:14550") from None
+    return host, int(port)
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m sim_bridge.standalone", description=__doc__)
-    parser.add_argument("addresses", nargs="+", type=_address, metavar="ADDRESS", help="loopback address of a drone")
-    parser.add_argument("--firmware", choices=FIRMWARES, default=DEFAULT, help="of all drones (default: %(default)s)")
+    parser.add_argument(
+        "drones", nargs="+", type=_drone, metavar="[KIND@]ADDRESS", help="ardrone (default), px4 or ardupilot"
+    )
+    parser.add_argument(
+        "--firmware", choices=FIRMWARES, default=DEFAULT, help="of all AR.Drones (default: %(default)s)"
+    )
     parser.add_argument(
         "--omit-option", type=int, action="append", default=[], metavar="TAG", help="navdata option never to send"
     )
     parser.add_argument("--no-video", action="store_true", help="leave TCP port 5555 closed")
+    parser.add_argument(
+        "--indoor", action="store_true", help="MAVLink vehicles without satellites, set up for poses from outside"
+    )
+    parser.add_argument("--call", type=_place, metavar="ADDRESS:PORT", help="whom MAVLink vehicles speak to unasked")
+    parser.add_argument(
+        "--truth-to", type=_place, metavar="ADDRESS:PORT", help="where the first MAVLink vehicle sends its true state"
+    )
     parser.add_argument("--seed", type=int, default=1, help="of noise and unrest (default: %(default)s)")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--truth", action="store_true", help="print the true states")
     arguments = parser.parse_args()
-    if len(set(arguments.addresses)) < len(arguments.addresses):
+    places = [name.rpartition("@")[2] for name in arguments.drones]
+    if len(set(places)) < len(places):
         parser.error("an address stands twice")
     return arguments
 
@@ -157,11 +233,12 @@ def main() -> int:
     firmware = FIRMWARES[arguments.firmware].without(tuple(arguments.omit_option))
     hangar: Hangar | None = None
     try:
-        hangar = Hangar(arguments.addresses, firmware, arguments.seed)
+        mavlink = MavlinkChoice(arguments.indoor, arguments.call, arguments.truth_to)
+        hangar = Hangar(arguments.drones, firmware, arguments.seed, mavlink)
         # WIRE: an AR.Drone 1 sends its pictures over UDP in a coding of its own, which is not emulated.
-        if not arguments.no_video and firmware.generation == 2:
+        if hangar.world.ardrones and not arguments.no_video and firmware.generation == 2:
             hangar.open_video(lambda: bool(stopped))
-        print(f"serving {', '.join(arguments.addresses)}", file=sys.stderr, flush=True)
+        print(f"serving {', '.join(arguments.drones)}", file=sys.stderr, flush=True)
         serve(hangar, arguments.seconds, arguments.truth, lambda: bool(stopped))
     except GroundStationError as error:
         print(f"hangar: {error}", file=sys.stderr)

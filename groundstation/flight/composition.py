@@ -2,24 +2,32 @@
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from drivers.camera.settings import SourceKind, parse_source
 from drivers.registry import entry_point
+from groundstation.bus.access import AccessList
+from groundstation.bus.roles import SHELLS, Member, Role
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
+from groundstation.flight.real_parts import ALL_EMULATED, RealParts
+from groundstation.runtime.router import RouterSection
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, DriverSection, core_section, driver_sections, rerouted
 from groundstation.supervisor import process_table as rows
 from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
 from groundstation.supervisor.process_spec import ProcessSpec
+from groundstation.supervisor.supervisor import SOURCE
 
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """What makes a run a simulated one: its network, scenario and seed.
+    """What makes a run a simulated one: its network, scenario and seed, and what of it is real all the same.
 
     The scenario is as its file has it: only the simulator, which judges it, knows its keys.
     """
@@ -27,26 +35,30 @@ class Simulation:
     network: Network
     scenario: dict[str, Any]
     seed: int | None
+    real: RealParts = ALL_EMULATED
 
 
 def fly_endpoint(field: Field) -> str:
     """Return where the router of a real flight listens."""
-    return f"tcp/127.0.0.1:{field.bus.port}"
+    return f"tls/127.0.0.1:{field.bus.port}"
 
 
-def simulated(field: Field, network: Network) -> Field:
-    """Return the field with the addresses of its emulated devices."""
-    addresses = {name: network.drone_address(index) for index, name in enumerate(field.drones)}
-    return rerouted(field, addresses, _streams(field, network))
+def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) -> Field:
+    """Return the field with the addresses of its emulated devices; what is real keeps those of the file."""
+    addresses = {
+        name: network.drone_address(index) for index, name in enumerate(field.drones) if name not in real.drones
+    }
+    return rerouted(field, addresses, _streams(field, network, real), streams_only=frozenset(real.drones))
 
 
-def _streams(field: Field, network: Network) -> dict[str, tuple[str, int]]:
+def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
     streams = {name: network.stream(index) for index, name in enumerate((*field.cameras, *field.drones))}
     for index, (name, drone) in enumerate(field.drones.items()):
         source = parse_source(drone.camera.source)
-        if source.kind is SourceKind.ARDRONE:  # a drone sends its own video from its own address
+        # A drone sends its own video from its own address; a real one is none of ours, so its emulated camera is apart.
+        if source.kind is SourceKind.ARDRONE and name not in real.drones:
             streams[name] = (network.drone_address(index), source.port)
-    return streams
+    return {name: stream for name, stream in streams.items() if name not in real.cameras}
 
 
 def process_table(
@@ -54,7 +66,7 @@ def process_table(
 ) -> tuple[ProcessSpec, ...]:
     """Return all processes of a run; `field` already has the addresses that it is to use."""
     core = core_section(field, str(run_dir), int(time.time()))
-    table = [replace(rows.ROUTER, section=json.dumps({"endpoint": endpoint}))]
+    table = [rows.ROUTER]
     if simulation is not None:
         table.append(_sim_bridge(field, simulation))
     table.append(replace(rows.TRACKER, section=core))
@@ -66,24 +78,41 @@ def process_table(
         table.append(replace(rows.CONSOLE, section=page))
     if monitor:
         table.append(replace(rows.MONITOR, section=core))
+    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table))
     return guarded(tuple(table))
+
+
+def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec]) -> str:
+    """Return what a router is handed: where it listens, and whom it lets speak as whom."""
+    members = [
+        Member(spec.name, Role(spec.role), (spec.name,), spec.entities or (spec.name,)) for spec in table if spec.on_bus
+    ]
+    members += [Member(SOURCE, Role.SUPERVISOR, (SOURCE,)), *SHELLS]
+    return msgspec.json.encode(RouterSection(endpoint, AccessList(site, tuple(members)))).decode()
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:
     row = rows.CAMERA if section.kind is DriverKind.CAMERA else rows.DRONE
-    spec = replace(row, name=section.name, entry=entry_point(section.kind), section=section.section)
+    spec = replace(
+        row,
+        name=section.name,
+        entry=entry_point(section.kind),
+        section=section.section,
+        entities=section.entities,
+    )
     if section.kind is DriverKind.CAMERA:
         return spec
     return replace(spec, failsafe_datagrams=failsafe_datagrams(field, section))
 
 
 def _sim_bridge(field: Field, simulation: Simulation) -> ProcessSpec:
-    network = simulation.network
+    network, real = simulation.network, simulation.real
     order = {
         "field": field.model_dump(mode="json"),
         "scenario": simulation.scenario,
-        "addresses": {name: drone.address for name, drone in field.drones.items()},
-        "streams": _streams(field, network),
+        "addresses": {name: drone.address for name, drone in field.drones.items() if name not in real.drones},
+        "streams": _streams(field, network, real),
+        "real": {name: {"source": body.source, "address": body.address} for name, body in real.bodies.items()},
         "seed": simulation.seed,
     }
     return replace(rows.SIM_BRIDGE, section=json.dumps(order), keep_open=(network.lock,))

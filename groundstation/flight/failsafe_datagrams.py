@@ -1,22 +1,26 @@
 """The bytes with which supervisor or guardian stop and land a drone whose driver is dead, for each kind of vehicle."""
 
+import json
+
 from drivers.ardrone.wire import at
-from groundstation.settings.drones import Mavlink, unknown_kind
+from drivers.mavlink.settings import MavlinkDriverSettings
+from groundstation.settings.drones import Drone, unknown_kind
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverSection
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 
 _AT_PORT = 5556
+_VOICE = "drivers.mavlink.voice:MavlinkVoice"
 
 
-def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagrams | None:
-    """Return what a drone is sent, or None where nobody but its driver can speak to it."""
+def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagrams:
+    """Return what the vehicles of a driver are sent."""
     drone = field.drones[section.entity]
     match drone.kind:
         case "ardrone":
             return _of_ardrone(drone.address, field.safety.land_after_s)
         case "mavlink":
-            return _of_mavlink(drone.address, drone.require_mavlink(), field.safety.land_after_s)
+            return _of_mavlink(drone, section, field.safety.land_after_s)
         case other:
             raise unknown_kind(other)
 
@@ -29,11 +33,12 @@ def _of_ardrone(address: str, land_after_s: float) -> FailsafeDatagrams:
     return FailsafeDatagrams(address, _AT_PORT, hover, land, land_after_s)
 
 
-def _of_mavlink(address: str, mavlink: Mavlink, land_after_s: float) -> FailsafeDatagrams | None:
-    if mavlink.listen or mavlink.serial or mavlink.key_file:
-        return None  # nobody but the driver can speak to it; its own time-outs act
+def _of_mavlink(drone: Drone, section: DriverSection, land_after_s: float) -> FailsafeDatagrams:
     # Only here: pymavlink's dialect takes its time to load.
     from drivers.mavlink.failsafe import hover_and_land
 
-    hover, land = hover_and_land(mavlink.system_id)
-    return FailsafeDatagrams(address, mavlink.port, hover, land, land_after_s)
+    mavlink = drone.require_mavlink()
+    systems = [vehicle.system_id for vehicle in MavlinkDriverSettings.model_validate_json(section.section).vehicles]
+    hover, land = hover_and_land(systems, signed=bool(mavlink.key_file))
+    way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file})
+    return FailsafeDatagrams(drone.address, mavlink.port, hover, land, land_after_s, _VOICE, way, mavlink.listen)

@@ -109,6 +109,8 @@ class Flight:
                 return self._supervisor.failure
             if self._supervisor.interrupts.stop_requested:
                 return ""
+            if self._plan.asks and operator.phase is TeamPhase.GROUND:
+                began_ns = now_ns
             ended, failure = self._is_over(operator, now_ns, began_ns)
             if ended:
                 return failure
@@ -125,7 +127,7 @@ class Flight:
         self._grounded = grounded
 
     def _is_over(self, operator: Operator, now_ns: int, began_ns: int) -> tuple[bool, str]:
-        if self._plan.asks:
+        if self._plan.asks and (self._plan.duration_s is None or operator.phase is TeamPhase.GROUND):
             return False, ""
         if operator.mistake is not None:
             return True, str(operator.mistake)
@@ -165,8 +167,9 @@ class Flight:
         if not operator.landed(now_ns):
             self._say("landing")
         operator.land(now_ns)
-        # When the simulator is gone there is nobody left to report a landing.
-        limit_s = _FAILED_LANDING_S if supervisor.failure else self._plan.landing_limit_s
+        # When the simulator is gone there is nobody left to report a landing, unless a drone is real.
+        patient = self._plan.asks or not supervisor.failure
+        limit_s = self._plan.landing_limit_s if patient else _FAILED_LANDING_S
         deadline_ns = now_ns + int(limit_s * NS_PER_S)
         while now_ns < deadline_ns and not supervisor.interrupts.hurry:
             now_ns = self._turn(operator)

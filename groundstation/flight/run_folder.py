@@ -26,7 +26,8 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
             if not path.exists():
                 break
             path = parent / f"{stamp}-{field_name}-{number}"
-        path.mkdir(parents=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.mkdir(mode=0o700)  # there are pictures of people in it
         probe = path / ".probe"
         probe.write_bytes(b"x" * 4096)
         probe.unlink()

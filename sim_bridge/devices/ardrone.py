@@ -9,7 +9,7 @@ from sim_bridge.devices.ardrone_control import FlightControl
 from sim_bridge.devices.ardrone_edge import ArDroneEdge
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_navdata import NavdataWriter
-from sim_bridge.devices.ardrone_ports import Ports, open_udp
+from sim_bridge.devices.ardrone_ports import Ports, open_shared_udp
 from sim_bridge.devices.ardrone_state import state_word
 from sim_bridge.devices.ardrone_subscribers import Listener
 from sim_bridge.world.ardrone import Quadrotor
@@ -112,7 +112,7 @@ class ArDroneEmulator:
         return self._ticks * TICK_NS
 
     def _open(self, address: str, port: int, reader: object) -> socket.socket:
-        udp = open_udp(self.name, address, port)
+        udp = open_shared_udp(self.name, address, port)
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         self._sockets.append(udp)
         self._selector.register(udp, selectors.EVENT_READ, reader)

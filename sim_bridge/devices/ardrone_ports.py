@@ -8,7 +8,8 @@ from drivers.ardrone.wire.configuration import format_custom_dump, format_dump
 from groundstation.errors import GroundStationError
 from sim_bridge.devices.ardrone_config import Configuration
 from sim_bridge.devices.ardrone_ftp import FtpServer
-from sim_bridge.devices.ardrone_tcp import Connection, Selector, TcpPort, refused
+from sim_bridge.devices.ardrone_tcp import Connection, Selector, TcpPort
+from sim_bridge.listening import open_udp
 
 CONTROL_PORT = 5559
 VERSION_PORT = 5551
@@ -63,7 +64,7 @@ class Pairing:
 
     def __init__(self, name: str, address: str, selector: Selector) -> None:
         self._selector = selector
-        self._udp = open_udp(name, address, PAIRING_PORT)
+        self._udp = open_shared_udp(name, address, PAIRING_PORT)
         selector.register(self._udp, selectors.EVENT_READ, self._answer)
 
     def close(self) -> None:
@@ -103,15 +104,9 @@ class Ports:
         self._opened.clear()
 
 
-def open_udp(name: str, address: str, port: int) -> socket.socket:
+def open_shared_udp(name: str, address: str, port: int) -> socket.socket:
     """Return a bound datagram socket that never blocks; raises GroundStationError naming a port that is taken."""
-    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    udp.setblocking(False)
-    try:
-        udp.bind((address, port))
-    except OSError as error:
-        udp.close()
-        raise refused(name, address, port, socket.SOCK_DGRAM, error) from error
+    udp = open_udp(f"emulated {name}", address, port)
     # Set after binding: nobody else gets this address, but old clients, which want the same port on all addresses of
     # the host, get theirs if they ask for sharing, too.
     udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
-from groundstation.errors import GroundStationError
-from groundstation.process.ports import why_refused
+from sim_bridge.listening import refused
 
 _MOST_CONNECTIONS = 8
 _LARGEST_BACKLOG = 1 << 18
@@ -96,13 +95,6 @@ class Connection:
         self._selector.modify(self.stream, wanted, self._serve)
 
 
-def refused(name: str, address: str, port: int, kind: socket.SocketKind, error: OSError) -> GroundStationError:
-    """Return the error of a port that an emulated vehicle cannot have."""
-    protocol = "TCP" if kind is socket.SOCK_STREAM else "UDP"
-    why = why_refused(error, address, port, kind)
-    return GroundStationError(f"emulated {name}: cannot listen on {address}:{port} ({protocol}): {why}")
-
-
 class TcpPort:
     """A listening port; each accepted connection is handed to `greet`, which gives it its conversation."""
 
@@ -119,7 +111,7 @@ class TcpPort:
             self._listener.listen(_MOST_CONNECTIONS)
         except OSError as error:
             self._listener.close()
-            raise refused(name, address, port, socket.SOCK_STREAM, error) from error
+            raise refused(f"emulated {name}", address, port, socket.SOCK_STREAM, error) from error
         self.address: tuple[str, int] = self._listener.getsockname()
         selector.register(self._listener, selectors.EVENT_READ, self._accept)
 

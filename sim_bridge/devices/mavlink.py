@@ -1,23 +1,23 @@
 """A MAVLink vehicle at the wire: one UDP port of its own loopback address, PX4 or ArduPilot behind it."""
 
-import socket
 from collections import Counter
 from contextlib import suppress
+from dataclasses import dataclass
 
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, id_of, split
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.verification import Signing
-from groundstation.errors import GroundStationError
-from groundstation.process.ports import why_refused
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
 from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_px4 import Px4
+from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.devices.mavlink_services import Services
+from sim_bridge.listening import open_udp
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS
 from sim_bridge.wrong_values import WrongValues
@@ -30,15 +30,23 @@ _CLIENTS = 8
 _TIMESYNC_TICKS = 20
 _LIST_PER_TICK = 2
 _TEXT_SIZE = 50
+_LAST_OLD = 255
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHabits:
+    """one_partner: answers only the first that spoke to it; old_until_greeted: MAVLink 1 until it hears MAVLink 2."""
+
+    one_partner: bool = False
+    old_until_greeted: bool = False
 
 
 class MavlinkEmulator:
     """Socket and firmware around one body of the world: `receive`, a step of the world, then `send`, once per tick.
 
     calls: an address that it speaks to without being spoken to; video: what it says of its camera. `silent` stops what
-    it sends, `deaf` drops what arrives, `wrong` changes what is reported (faults). signing: only rightly signed frames
-    count, and all of ours are signed.
-    Times are the world's.
+    it sends, `deaf` drops what arrives, `wrong` changes what is reported (faults), `habits` are those of its link.
+    signing: only rightly signed frames count, and all of ours are signed. Times are the world's.
     """
 
     def __init__(
@@ -61,7 +69,14 @@ class MavlinkEmulator:
         self._lists: dict[Address, int] = {}
         self._ticks = self._long_texts = 0
         self._wrong = wrong or None
-        self.socket = _open(name, address)
+        self.habits = LinkHabits()
+        self._greeted = False
+        self.socket = open_udp(f"emulated {name}", *address)
+
+    def equip(self, satellites: Satellites) -> None:
+        """Give it a satellite receiver, before anybody is served."""
+        self.firmware.equip(satellites)
+        self.services.stream_global_position()
 
     @property
     def now_ns(self) -> int:
@@ -92,6 +107,9 @@ class MavlinkEmulator:
             self.rejected[error.reason] += 1
 
     def _take(self, frame: ReceivedFrame, source: Address) -> None:
+        self._greeted = True
+        if self.habits.one_partner and self._clients and source not in self._clients:
+            source = next(iter(self._clients))  # it obeys whoever speaks, and answers its partner
         if source not in self._clients:
             if len(self._clients) >= _CLIENTS:
                 del self._clients[min(self._clients, key=lambda address: self._clients[address])]
@@ -119,7 +137,8 @@ class MavlinkEmulator:
         self.firmware.step(now_ns / 1e9, silence_s)
         if self._wrong is not None:
             self.speaker.report(now_ns / 1e9, self._wrong)
-        for client in [c for c, heard_ns in self._clients.items() if now_ns - heard_ns > _FORGET_NS]:
+        forgotten = () if self.habits.one_partner else self._clients.items()
+        for client in [c for c, heard_ns in forgotten if now_ns - heard_ns > _FORGET_NS]:
             del self._clients[client]
             self._lists.pop(client, None)
         for kind, every in list(self.services.intervals.items()):
@@ -155,28 +174,22 @@ class MavlinkEmulator:
         if self._calls is not None and self._calls not in self._clients:
             clients.append(self._calls)
         if clients and not self.silent:
-            data = self._encoder.encode(message)
-            for client in clients:
+            data = self._encode(message)
+            for client in clients if data else ():
                 with suppress(OSError):  # a full buffer or a vanished client loses packets, as radio does
                     self.socket.sendto(data, client)
 
     def _send_to(self, client: Address, message: Message) -> None:
-        if not self.silent:
+        data = b"" if self.silent else self._encode(message)
+        if data:
             with suppress(OSError):
-                self.socket.sendto(self._encoder.encode(message), client)
+                self.socket.sendto(data, client)
+
+    def _encode(self, message: Message) -> bytes:
+        old = self.habits.old_until_greeted and not self._greeted
+        # WIRE: MAVLink 1 has no numbers beyond 255.
+        return b"" if old and id_of(type(message)) > _LAST_OLD else self._encoder.encode(message, old)
 
     def close(self) -> None:
         """Close the port."""
         self.socket.close()
-
-
-def _open(name: str, address: Address) -> socket.socket:
-    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    udp.setblocking(False)
-    try:
-        udp.bind(address)
-    except OSError as error:
-        udp.close()
-        place, why = f"{address[0]}:{address[1]}", why_refused(error, *address, socket.SOCK_DGRAM)
-        raise GroundStationError(f"emulated {name}: cannot listen on {place} (UDP): {why}") from error
-    return udp

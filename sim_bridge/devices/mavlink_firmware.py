@@ -18,6 +18,7 @@ from drivers.mavlink.wire.names import (
     MavResult,
 )
 from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 Answer = tuple[MavResult, str]
@@ -42,6 +43,7 @@ class AutopilotFirmware:
         self.mode = start_mode
         self.texts: deque[tuple[int, str]] = deque(maxlen=32)
         self.origin: tuple[int, int, int] | None = None
+        self.satellites: Satellites | None = None
         self.now_s = 0.0
         self._setpoint_s = -math.inf
         self._stream_s = 0.0
@@ -140,6 +142,8 @@ class AutopilotFirmware:
     def step(self, now_s: float, ground_silence_s: float) -> None:
         """Watch over time-outs; call it once per tick."""
         self.now_s = now_s
+        if self.global_position and self.satellites is not None:
+            self.satellites.aid(self.copter)
         if not self.armed:
             return
         if self.copter.airborne:
@@ -175,9 +179,20 @@ class AutopilotFirmware:
         """Whether the estimator knows where it is, now."""
         return self.copter.estimate.has_position and self.copter.estimate.aided_s < _AIDED_S
 
+    @property
+    def global_position(self) -> bool:
+        """Whether it finds its own way, by satellites."""
+        return self.satellites is not None and not self.parameters.indoor
+
+    def equip(self, satellites: Satellites) -> None:
+        """Give it a satellite receiver; its parameters say whether the filter uses it."""
+        self.satellites = satellites
+        if self.global_position:
+            self.origin = satellites.origin
+
     def health_fault(self) -> str:
         """Return what forbids arming in any mode, or ""."""
-        if not self.parameters.indoor:
+        if not self.parameters.indoor and self.satellites is None:
             return "no GPS"
         if not self.located:
             return "need position estimate"

@@ -10,15 +10,17 @@ from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.flight import OdometryMessage
 from drivers.mavlink.wire.frames import Message
 from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, SensorBits
+from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
+from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
 from sim_bridge.world.mavlink_estimator import InertialEstimate
 from sim_bridge.world.readings import Readings
 from sim_bridge.world.world import TICK_NS
 from sim_bridge.wrong_values import WrongValues
 
 _MG = 1000.0 / 9.80665
-_NO_CELL = 65535
+_NO_CELL = _UNKNOWN = 65535
 _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
 
 
@@ -43,6 +45,8 @@ class Speaker:
             t.HomePosition: self.home,
             t.GpsGlobalOrigin: self.origin,
             t.AutopilotVersion: self.version,
+            GpsRawInt: self.gps,
+            GlobalPositionInt: self.global_position,
         }
         if firmware.flavour is Flavour.PX4:
             self.builders[OdometryMessage] = self.odometry
@@ -93,7 +97,10 @@ class Speaker:
         healthy = SensorBits.GYRO | SensorBits.ACCELEROMETER | SensorBits.MAGNETOMETER
         if self._firmware.located:
             healthy |= SensorBits.VISION_POSITION
-        if isinstance(self._firmware, ArduCopter) and not self._firmware.prearm_fault():
+        if self._firmware.global_position:
+            healthy |= SensorBits.GPS
+        prearm = isinstance(self._firmware, ArduCopter) or self._firmware.global_position
+        if prearm and not self._firmware.health_fault():
             healthy |= SensorBits.PREARM_CHECK
         present = healthy | SensorBits.VISION_POSITION | SensorBits.PREARM_CHECK
         return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
@@ -159,8 +166,9 @@ class Speaker:
         if not self._honest.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
-        pose = _diagonal(0.01, 0.01, 0.01, 0.001, 0.001, 0.003)
-        velocity = _diagonal(0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
+        # As confident as a real one, whatever it errs by (docs/reference/mavlink.md 2.1): 0.3 degrees, 0.05 m/s.
+        pose = _diagonal(0.01, 0.01, 0.01, 2.7e-5, 2.7e-5, 0.003)
+        velocity = _diagonal(0.0025, 0.0025, 0.0025, 0.0, 0.0, 0.0)
         q = self._quaternion()
         return OdometryMessage(self.boot_us, 1, 1, x, -y, -z, q, vx, -vy, -vz, *self._rates(), pose, velocity, 0, 8, 0)
 
@@ -188,6 +196,28 @@ class Speaker:
         """Return the estimator's origin, once it has one."""
         origin = self._firmware.origin
         return origin and t.GpsGlobalOrigin(*origin, self.boot_us)
+
+    def gps(self) -> Message:
+        """Return what its receiver says: that there is none, or a fix."""
+        satellites = self._firmware.satellites
+        if satellites is None:
+            return GpsRawInt(self.boot_us, 0, 0, 0, 0, _UNKNOWN, _UNKNOWN, _UNKNOWN, _UNKNOWN, 255)
+        x, y, z = self._estimate.position
+        place = (*satellites.degrees(x, y), satellites.altitude_mm(z))
+        speed = math.hypot(*self._estimate.velocity[:2])
+        return GpsRawInt(self.boot_us, 3, *place, 90, 120, round(100 * speed), _UNKNOWN, 12)
+
+    def global_position(self) -> Message | None:
+        """Return where on Earth it believes to be, if it flies by satellites."""
+        satellites = self._firmware.satellites
+        if satellites is None or not self._firmware.global_position:
+            return None
+        (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
+        place = (*satellites.degrees(x, y), satellites.altitude_mm(z), round(1000 * (z - STANDING_HEIGHT_M)))
+        velocity = (_whole(100 * vx), _whole(-100 * vy), _whole(-100 * vz))
+        return GlobalPositionInt(
+            self.boot_ms, *place, *velocity, round(math.degrees(-self._estimate.yaw) * 100) % 36000
+        )
 
     def version(self) -> Message:
         """Return what it is and can: MISSION_INT, COMMAND_INT, SET_POSITION_TARGET, MAVLINK2, parameter encoding."""

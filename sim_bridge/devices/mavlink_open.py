@@ -5,7 +5,7 @@ import math
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import VideoStreamInformation
 from sim_bridge.devices.camera_stream import PATH
-from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.site import Lens, SiteDrone
@@ -38,7 +38,7 @@ def open_vehicle(
         address, port = order.streams[name]
         uri = f"http://{address}:{port}{PATH}"
         video = announced(name, drone.camera.calibration, order.scenario.cameras.fps, uri)
-    return MavlinkEmulator(
+    vehicle = MavlinkEmulator(
         name,
         (order.addresses[name], identity.port),
         Parameters(flavour, identity.system_id, order.scenario.mavlink.configured),
@@ -47,3 +47,6 @@ def open_vehicle(
         video=video,
         wrong=wrong,
     )
+    scenario = order.scenario.mavlink
+    vehicle.habits = LinkHabits(scenario.one_partner, scenario.mavlink_1_until_greeted)
+    return vehicle

@@ -7,6 +7,7 @@ from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 HOLD = px4_mode(Px4Main.AUTO, Px4Auto.HOLD)
+TAKE_OFF = px4_mode(Px4Main.AUTO, Px4Auto.TAKE_OFF)
 LAND = px4_mode(Px4Main.AUTO, Px4Auto.LAND)
 OFFBOARD = px4_mode(Px4Main.OFFBOARD)
 POSITION = px4_mode(Px4Main.POSITION)
@@ -15,6 +16,7 @@ ALTITUDE = px4_mode(Px4Main.ALTITUDE)
 _GRANULARITY_S = 0.42
 _VISION_LOST_S = 5.0
 _SPOOL_S = 1.0
+_CLIMB_M_S, _REACHED_M = 1.0, 0.1
 _LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAND, 5: HOLD}
 _LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL))
 
@@ -30,25 +32,51 @@ class Px4(AutopilotFirmware):
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
         super().__init__(copter, parameters, HOLD)
+        self._climb_to_m: float | None = None
 
     def knows(self, mode: int) -> bool:
         """Return whether a mode exists."""
-        return mode in (HOLD, LAND, OFFBOARD, POSITION, *_LEVEL)
+        return mode in (HOLD, LAND, OFFBOARD, POSITION, TAKE_OFF, *_LEVEL)
 
     def arming_fault(self) -> str:
         """Return why it does not arm now, or ""."""
         fault = self.health_fault()
         if fault:
             return f"Arming denied: {fault}"
+        if self.mode != OFFBOARD and self.global_position:
+            return ""
         if self.mode != OFFBOARD:
             # WIRE (docs/reference/mavlink.md 2): Hold needs a global position, which there is none of indoors.
             return "Arming denied: Resolve system health failures first"
         return "" if self.streams else "Arming denied: no offboard signal"
 
     def take_off(self, height_m: float) -> Answer:
-        """Refuse: without a global position there is no AUTO.TAKEOFF."""
-        self.say(2, "Takeoff denied: no global position")
-        return MavResult.TEMPORARILY_REJECTED, "no global position"
+        """Climb in AUTO.TAKEOFF, then hold; without a global position there is no such mode.
+
+        height_m: above sea level, as the command says; 0: MIS_TAKEOFF_ALT above the floor.
+        """
+        if not self.global_position or self.satellites is None:
+            self.say(2, "Takeoff denied: no global position")
+            return MavResult.TEMPORARILY_REJECTED, "no global position"
+        height = self.satellites.height_of(height_m) if height_m else self.parameters["MIS_TAKEOFF_ALT"]
+        self.enter(TAKE_OFF)
+        self._climb_to_m = height
+        return MavResult.ACCEPTED, ""
+
+    def enter(self, mode: int) -> None:
+        """Change the mode; a take-off belongs to its own, and AUTO.TAKEOFF without a height takes the parameter's."""
+        self._climb_to_m = self.parameters["MIS_TAKEOFF_ALT"] if mode == TAKE_OFF else None
+        super().enter(mode)
+
+    def step(self, now_s: float, ground_silence_s: float) -> None:
+        """Climb when asked to, then watch over time-outs."""
+        super().step(now_s, ground_silence_s)
+        if not self.armed or self._climb_to_m is None or now_s - self._armed_s < _SPOOL_S:
+            return
+        if self.copter.estimate.position[2] < self._climb_to_m - _REACHED_M:
+            self.copter.fly((0.0, 0.0, _CLIMB_M_S), 0.0)
+        else:
+            self.enter(HOLD)
 
     def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
         """Say what is wrong with a set-point."""

@@ -14,6 +14,7 @@ from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, id_of
 from drivers.mavlink.wire.names import Flavour, MavCmd, MavResult, px4_mode
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
+from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_time import SenderClock
@@ -23,9 +24,14 @@ _PX4_RATES: dict[type[Message], float] = {
     t.HighresImu: 50, t.LocalPositionNed: 30, f.OdometryMessage: 30, t.Attitude: 100, t.AttitudeQuaternion: 50,
     t.SysStatus: 5, t.ExtendedSysState: 5, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
 }  # fmt: skip
+_GLOBAL_RATES: dict[type[Message], float] = {GlobalPositionInt: 50, GpsRawInt: 8}
+_OLD_STREAMS: tuple[type[Message], ...] = (
+    t.SysStatus, t.LocalPositionNed, t.Attitude, t.ExtendedSysState, t.BatteryStatus, GpsRawInt, GlobalPositionInt,
+)  # fmt: skip
 _UNSUPPORTED: Answer = (MavResult.UNSUPPORTED, "")
 _OK: Answer = (MavResult.ACCEPTED, "")
 _NAK, _FTP_FAIL = 129, 1
+_MISSION_UNSUPPORTED, _NO_SUCH_ITEM = 3, 13
 _FRESH_S = 0.5
 
 
@@ -39,10 +45,18 @@ class Services:
         px4 = firmware.flavour is Flavour.PX4
         self.intervals: dict[type[Message], int] = {t.Heartbeat: 200}
         if px4:
-            self.intervals |= {kind: max(1, round(TICK_HZ / hz)) for kind, hz in _PX4_RATES.items()}
+            self._send_unasked(_PX4_RATES)
         self.clock = SenderClock(learns=not px4)
         self.listing: dict[tuple[str, int], list[str]] = {}
         self._by_id = {id_of(kind): kind for kind in CLASSES.values()}
+
+    def _send_unasked(self, rates: dict[type[Message], float]) -> None:
+        self.intervals |= {kind: max(1, round(TICK_HZ / hz)) for kind, hz in rates.items()}
+
+    def stream_global_position(self) -> None:
+        """Send what a PX4 that flies by satellites sends unasked."""
+        if self._firmware.flavour is Flavour.PX4 and self._firmware.global_position:
+            self._send_unasked(_GLOBAL_RATES)
 
     def take(self, frame: ReceivedFrame, now_ns: int) -> list[Message]:
         """Obey a frame and return the answers."""
@@ -156,6 +170,8 @@ class Services:
                 yield s.Ping(message.time_usec, message.seq, frame.system, frame.component)
             case s.MissionRequestList():
                 yield s.MissionCount(frame.system, frame.component, 0, message.mission_type)
+            case s.MissionCount() | s.MissionClearAll() | s.MissionRequestInt():
+                yield _mission_answer(frame, message)
             case s.FileTransferProtocol():
                 yield self._ftp_refusal(frame, message)
             case s.RequestDataStream() if message.start_stop:
@@ -179,7 +195,7 @@ class Services:
 
     def _old_rates(self, rate_hz: int) -> None:
         ticks = max(4, round(TICK_HZ / max(1, rate_hz)))
-        for kind in (t.SysStatus, t.LocalPositionNed, t.Attitude, t.ExtendedSysState, t.BatteryStatus):
+        for kind in (*_OLD_STREAMS, *((t.EkfStatusReport,) if self.clock.learns else ())):
             self.intervals.setdefault(kind, ticks)
 
     # -- position from outside ----------------------------------------------------------------------------------------
@@ -225,6 +241,18 @@ class Services:
             return None
         w, x, y, z = message.q
         return -math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def _mission_answer(frame: ReceivedFrame, message: s.MissionCount | s.MissionClearAll | s.MissionRequestInt) -> Message:
+    # WIRE (MAVLink mission protocol): a transfer that is not answered is repeated; there are no missions here.
+    match message:
+        case s.MissionRequestInt():
+            kind = _NO_SUCH_ITEM
+        case s.MissionCount(count=count) if count:
+            kind = _MISSION_UNSUPPORTED
+        case _:
+            kind = 0
+    return s.MissionAck(frame.system, frame.component, kind, message.mission_type)
 
 
 def _number(value: float) -> int:

@@ -12,13 +12,13 @@ class SenderClock:
     """
 
     def __init__(self, learns: bool) -> None:
-        self._learns = learns
+        self.learns = learns
         self._offset_ns: float | None = None
         self._odd = 0
 
     def synchronise(self, now_ns: int, remote_ns: int, asked_ns: int) -> None:
         """Take an answer: the sender's time between our asking and now."""
-        if self._learns or not 0 <= now_ns - asked_ns < 1_000_000_000:
+        if self.learns or not 0 <= now_ns - asked_ns < 1_000_000_000:
             return
         offset = (asked_ns + now_ns) / 2 - remote_ns
         if self._offset_ns is None:
@@ -34,7 +34,7 @@ class SenderClock:
 
     def local_ns(self, remote_ns: int, now_ns: int) -> int:
         """Return a time of the sender on our clock."""
-        if self._learns:
+        if self.learns:
             lag = now_ns - remote_ns
             self._offset_ns = lag if self._offset_ns is None else min(self._offset_ns + 1000.0, lag)
         return now_ns if self._offset_ns is None else round(remote_ns + self._offset_ns)

@@ -22,6 +22,9 @@ class FakeProcess:
     def degrade(self, detail):
         pass
 
+    def note_addresses(self, addresses):
+        self.addresses = tuple(addresses)
+
     def tick_status(self, ticks=0, overruns=0, overflowed=0):
         pass
 

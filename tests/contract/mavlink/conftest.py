@@ -66,6 +66,8 @@ class FakeSocket:
 class DirectLink:
     """A Link whose other end is an emulator in the same thread."""
 
+    called_from = ()
+
     def __init__(self, emulator, system=255):
         self.rejected = Counter[str]()
         self.emulator = emulator
@@ -260,7 +262,7 @@ class Hand:
 def hand(monkeypatch):
     hand = Hand()
     monkeypatch.setattr(clock, "now_ns", lambda: hand.now)
-    monkeypatch.setattr(mavlink, "_open", lambda name, address: FakeSocket())
+    monkeypatch.setattr(mavlink, "open_udp", lambda owner, address, port: FakeSocket())
     return hand
 
 

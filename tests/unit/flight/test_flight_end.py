@@ -1,6 +1,8 @@
 """A run says on the bus that it ends, and how, before its processes are stopped."""
 
+import stat
 import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -12,6 +14,7 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
+from groundstation.flight.run_folder import make_run_dir
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor
@@ -73,3 +76,8 @@ def test_a_run_says_how_it_ended(stage: dict[str, Any], severity: str, words: st
     end = Stage(**stage).fly()
     assert end.severity == severity
     assert end.text.startswith(f"run ended: {words}") and "\n" not in end.text
+
+
+def test_the_folder_of_a_run_is_its_owners(tmp_path: Path) -> None:
+    folder = make_run_dir(tmp_path / "runs", "lab")
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700

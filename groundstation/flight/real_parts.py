@@ -1,0 +1,144 @@
+"""Which parts of a simulated run are real (`--real drone_2=autopilot:19410`, `--real ceiling`), and what that takes."""
+
+import ipaddress
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from dataclasses import field as of_class
+
+from groundstation.errors import OperatorMistake
+from groundstation.field.drones import camera_name
+from groundstation.settings.schema import Field
+
+AUTOPILOT, ESTIMATE, NONE = "autopilot", "estimate", "none"
+_LOOPBACK = "127.0.0.1"
+
+
+@dataclass(frozen=True, slots=True)
+class RealBody:
+    """A real drone or target; source: who says where it is; address: where its firmware's simulator sends that."""
+
+    source: str
+    address: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RealParts:
+    """What of a field is not emulated: drones and targets by name, cameras by the names that their streams have.
+
+    A world-fixed camera has its own name, one that a drone carries the drone's.
+    """
+
+    drones: Mapping[str, RealBody] = of_class(default_factory=dict)
+    cameras: frozenset[str] = frozenset()
+    targets: frozenset[str] = frozenset()
+
+    @property
+    def bodies(self) -> dict[str, RealBody]:
+        """Return the real drones and targets; nobody says where a target is."""
+        return {**self.drones, **{name: RealBody(NONE) for name in sorted(self.targets)}}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return everything that is real, drones first."""
+        return (*self.drones, *sorted(self.targets), *sorted(self.cameras - set(self.drones)))
+
+
+ALL_EMULATED = RealParts()
+
+
+def parse_real(field: Field, options: Iterable[str]) -> RealParts:
+    """Return what `--real` names; raises OperatorMistake for what is unknown, contradictory or not safe."""
+    drones: dict[str, RealBody] = {}
+    cameras: set[str] = set()
+    targets: set[str] = set()
+    carried = {camera_name(name): name for name in field.drones}
+    for option in options:
+        name, equals, source = option.partition("=")
+        if name in field.drones:
+            drones[name] = _body(field, name, source if equals else ESTIMATE)
+        elif equals:
+            raise OperatorMistake(f"--real {option}: only a drone has a source of its pose")
+        elif name in carried:
+            cameras.add(carried[name])
+        elif name in field.cameras:
+            cameras.add(name)
+        elif name in field.tracked:
+            targets.add(name)
+        else:
+            known = ", ".join((*field.drones, *field.cameras, *carried, *field.tracked))
+            raise OperatorMistake(f"--real {name}: the field has no such part, only {known}")
+    parts = RealParts(drones, frozenset(cameras), frozenset(targets))
+    _require_sense(field, parts)
+    return parts
+
+
+def _body(field: Field, name: str, source: str) -> RealBody:
+    kind, _, place = source.partition(":")
+    if kind == ESTIMATE and not place:
+        return RealBody(ESTIMATE)
+    if kind == AUTOPILOT:
+        if field.drones[name].kind != "mavlink":
+            raise OperatorMistake(f"--real {name}={source}: only the simulator of a MAVLink firmware tells a true pose")
+        return RealBody(AUTOPILOT, _address(name, source, place))
+    raise OperatorMistake(
+        f"--real {name}={source}: the source of its pose is autopilot:PORT (the port on which the simulator behind its "
+        "firmware tells the truth) or estimate; motion capture cannot be read"
+    )
+
+
+def _address(name: str, source: str, place: str) -> tuple[str, int]:
+    host, _, port = place.rpartition(":")
+    try:
+        ipaddress.IPv4Address(host or _LOOPBACK)
+        number = int(port)
+        if not 0 < number < 65536:
+            raise ValueError(port)
+    except ValueError:
+        raise OperatorMistake(f"--real {name}={source}: {place or 'nothing'!r} is no PORT or ADDRESS:PORT") from None
+    return host or _LOOPBACK, number
+
+
+def _require_sense(field: Field, parts: RealParts) -> None:
+    fixed = parts.cameras & set(field.cameras)
+    for name, body in parts.drones.items():
+        if body.source == ESTIMATE and not fixed:
+            # A fence judged by emulated cameras alone is no fence: they would show the drone where it is believed.
+            raise OperatorMistake(
+                f"--real {name}: nothing real says where it is, so nothing would hold it inside of the fence: make a "
+                f"camera that sees it real as well (--real {next(iter(field.cameras))}), or, if the simulator of its "
+                f"firmware flies it, name the port of its true pose (--real {name}=autopilot:PORT)"
+            )
+    for name in sorted(parts.cameras - set(field.cameras) - set(parts.drones)):
+        raise OperatorMistake(f"--real {camera_name(name)}: {name}, which carries it, must be real as well")
+    if parts.targets and not parts.cameras:
+        raise OperatorMistake(f"--real {min(parts.targets)}: no camera is real, so nothing can see it")
+    addresses = [body.address for body in parts.drones.values() if body.address is not None]
+    if len(set(addresses)) < len(addresses):
+        raise OperatorMistake("--real: two drones have the same port for their true pose")
+    everything = len(parts.drones) == len(field.drones) and parts.cameras >= {*field.cameras, *field.drones}
+    if everything and len(parts.targets) == len(field.tracked):
+        raise OperatorMistake("--real: nothing is left to emulate; use: groundstation fly")
+
+
+def notes(field: Field, parts: RealParts) -> list[str]:
+    """Return what the operator should know of a mixed run, a sentence each."""
+    lines = []
+    emulated = [name for name in field.drones if name not in parts.drones]
+    for name, body in parts.drones.items():
+        if body.source == ESTIMATE:
+            lines.append(
+                f"{name} is real, and the room takes it to be where the tracker says: emulated cameras do not show it, "
+                "so they cannot correct that; only real ones can"
+            )
+        elif body.address is not None:
+            place = f"{body.address[0]}:{body.address[1]}"
+            lines.append(f"{name} is real; its true pose is taken from {place} and begins on its pad")
+    if emulated and (fixed := sorted(parts.cameras & set(field.cameras))):
+        who = " and ".join(fixed)
+        lines.append(f"{who} is real and does not see what is emulated: {', '.join(emulated)}")
+    if emulated and set(field.cameras) <= parts.cameras:
+        lines.append(
+            "no world-fixed camera is emulated: unless they see each other or markers on the floor, emulated drones "
+            "are not seen by any camera, and land"
+        )
+    return lines

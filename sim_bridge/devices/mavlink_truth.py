@@ -1,0 +1,64 @@
+"""The true state of an emulated vehicle over MAVLink, as the simulators behind real firmwares send it."""
+
+import math
+import socket
+from contextlib import suppress
+
+from drivers.mavlink.wire.frames import FrameEncoder, Message
+from drivers.mavlink.wire.names import Flavour
+from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
+from sim_bridge.devices.mavlink_satellites import Satellites
+from sim_bridge.world.ardrone_airframe import Airframe
+
+Address = tuple[str, int]
+_EVERY_TICKS = {Flavour.ARDUPILOT: 4, Flavour.PX4: 8}  # 50 Hz when asked, 25 Hz
+
+
+class TruthTeller:
+    """Sends SIM_STATE (ArduPilot) or HIL_STATE_QUATERNION (PX4) to one address; `send` once per tick."""
+
+    def __init__(self, flavour: Flavour, system: int, body: Airframe, to: Address) -> None:
+        self._flavour, self._body, self._to = flavour, body, to
+        self._globe = Satellites(system)
+        self._encoder = FrameEncoder(system, 1)
+        self._ticks = 0
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def send(self) -> None:
+        """Send the true state when it is due."""
+        self._ticks += 1
+        if self._ticks % _EVERY_TICKS[self._flavour] == 0:
+            message = self._of_px4() if self._flavour is Flavour.PX4 else self._of_ardupilot()
+            with suppress(OSError):
+                self._socket.sendto(self._encoder.encode(message), self._to)
+
+    def _of_ardupilot(self) -> Message:
+        b, (lat, lon) = self._body, self._globe.degrees(self._body.x, self._body.y)
+        attitude, rates = (b.roll, -b.pitch, -b.yaw), self._rates()
+        altitude = self._globe.altitude_mm(b.z) / 1000.0
+        motion = (*self._quaternion(), *attitude, b.ax, -b.ay, -b.az, *rates)
+        place = (lat / 1e7, lon / 1e7, altitude, 0.0, 0.0, b.vx, -b.vy, -b.vz)
+        return SimState(*motion, *place, lat_int=lat, lon_int=lon)
+
+    def _of_px4(self) -> Message:
+        b, place = self._body, (*self._globe.degrees(self._body.x, self._body.y), self._globe.altitude_mm(self._body.z))
+        velocity = (round(100 * b.vx), round(-100 * b.vy), round(-100 * b.vz))
+        return HilStateQuaternion(self._ticks * 5000, self._quaternion(), *self._rates(), *place, *velocity, *(0,) * 5)
+
+    def _rates(self) -> tuple[float, float, float]:
+        wx, wy, wz = self._body.body_rates()
+        return wx, -wy, -wz
+
+    def _quaternion(self) -> tuple[float, float, float, float]:
+        # Yaw about down, then pitch about right, then roll about forward.
+        halves = (self._body.roll / 2, -self._body.pitch / 2, -self._body.yaw / 2)
+        (cr, cp, cy), (sr, sp, sy) = map(math.cos, halves), map(math.sin, halves)
+        return (
+            cy * cp * cr + sy * sp * sr, cy * cp * sr - sy * sp * cr,
+            cy * sp * cr + sy * cp * sr, sy * cp * cr - cy * sp * sr,
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()

@@ -1,0 +1,121 @@
+"""The true pose of a vehicle from the simulator behind its firmware: a UDP port that it sends MAVLink to.
+
+SIM_STATE (ArduPilot, asked for) and HIL_STATE_QUATERNION (PX4's SIH) are exact; where neither arrives,
+LOCAL_POSITION_NED with ATTITUDE counts, which a vehicle that finds its own way sends as well.
+"""
+
+import math
+from contextlib import suppress
+
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, id_of, split
+from drivers.mavlink.wire.names import MavCmd
+from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
+from drivers.mavlink.wire.telemetry import Attitude, LocalPositionNed
+from sim_bridge.listening import open_udp
+from sim_bridge.real.placed import Placement, TrueState
+from sim_bridge.world.puppet import OutsidePose, Vector3
+
+Address = tuple[str, int]
+# Of a system that is neither a vehicle nor a ground station: no failsafe of a vehicle waits for it.
+_SYSTEM, _COMPONENT = 254, 191
+_ASK_NS, _INTERVAL_US = 2_000_000_000, 20_000.0
+# Each simulator has a globe of its own [m per degree]: 0.1 % apart.
+_ARDUPILOT_DEGREE_M, _PX4_DEGREE_M = 111_318.845, 111_194.927
+_DATAGRAMS = 64
+
+
+class AutopilotTruth:
+    """Listens at an address; `latest` drains it and returns the newest pose in the room, None without a new one."""
+
+    def __init__(self, name: str, address: Address, system: int, placement: Placement) -> None:
+        self._system, self._placement = system, placement
+        self._encoder, self._decoder = FrameEncoder(_SYSTEM, _COMPONENT), FrameDecoder()
+        self._attitude: Attitude | None = None
+        self._exact = False
+        self._origin: tuple[float, float] | None = None
+        self._asked_ns = -_ASK_NS
+        self.rejected = 0
+        self._socket = open_udp(f"the true pose of {name}", *address)
+
+    def latest(self, now_ns: int) -> OutsidePose | None:
+        """Return where the vehicle is now, if something new says so; now_ns: of any steady clock."""
+        newest: TrueState | None = None
+        for _ in range(_DATAGRAMS):
+            try:
+                data, source = self._socket.recvfrom(MAX_DATAGRAM)
+            except OSError:
+                break
+            newest = self.hear(data) or newest
+            self._ask(source, now_ns)
+        return None if newest is None else self._placement.pose(newest)
+
+    def hear(self, data: bytes) -> TrueState | None:
+        """Return the newest true state in a datagram; what is no frame, or another vehicle's, is counted."""
+        newest: TrueState | None = None
+        try:
+            for raw in split(data):
+                frame = self._decoder.decode(raw)
+                if frame.system != self._system:
+                    self.rejected += 1
+                elif frame.message is not None:
+                    newest = self._state(frame.message) or newest
+        except WireError:
+            self.rejected += 1
+        return newest if newest is None or _is_finite(newest) else None
+
+    def _state(self, message: Message) -> TrueState | None:
+        match message:
+            case SimState():
+                self._exact = True
+                return self._of_ardupilot(message)
+            case HilStateQuaternion():
+                self._exact = True
+                return self._of_px4(message)
+            case Attitude():
+                self._attitude = message
+            case LocalPositionNed() if self._attitude is not None and not self._exact:
+                a, m = self._attitude, message
+                rates = (a.rollspeed, a.pitchspeed, a.yawspeed)
+                return TrueState((m.x, m.y, m.z), (m.vx, m.vy, m.vz), (a.roll, a.pitch, a.yaw), rates)
+        return None
+
+    def _ask(self, source: Address, now_ns: int) -> None:
+        if now_ns - self._asked_ns < _ASK_NS:
+            return
+        self._asked_ns = now_ns
+        kinds = (SimState,) if self._exact else (SimState, Attitude, LocalPositionNed)
+        for kind in kinds:
+            number = float(id_of(kind))
+            more = (number, _INTERVAL_US, 0.0, 0.0, 0.0, 0.0, 0.0)
+            command = CommandLong(self._system, 1, MavCmd.SET_MESSAGE_INTERVAL, 0, *more)
+            with suppress(OSError):
+                self._socket.sendto(self._encoder.encode(command), source)
+
+    def _of_ardupilot(self, m: SimState) -> TrueState:
+        degrees = (m.lat_int / 1e7, m.lon_int / 1e7) if m.lat_int or m.lon_int else (m.lat, m.lon)
+        place = self._local(*degrees, m.alt, _ARDUPILOT_DEGREE_M)
+        return TrueState(place, (m.vn, m.ve, m.vd), (m.roll, m.pitch, m.yaw), (m.xgyro, m.ygyro, m.zgyro))
+
+    def _of_px4(self, m: HilStateQuaternion) -> TrueState:
+        w, x, y, z = m.attitude_quaternion
+        roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+        yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        place = self._local(m.lat / 1e7, m.lon / 1e7, m.alt / 1e3, _PX4_DEGREE_M)
+        rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
+        return TrueState(place, (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0), (roll, pitch, yaw), rates)
+
+    def _local(self, latitude: float, longitude: float, altitude: float, degree_m: float) -> Vector3:
+        first = self._origin = self._origin or (latitude, longitude)
+        east = (longitude - first[1]) * degree_m * math.cos(math.radians(first[0]))
+        return (latitude - first[0]) * degree_m, east, -altitude
+
+    def close(self) -> None:
+        """Close the port."""
+        self._socket.close()
+
+
+def _is_finite(state: TrueState) -> bool:
+    return all(math.isfinite(v) for part in (state.position, state.velocity, state.attitude, state.rates) for v in part)

@@ -5,7 +5,7 @@ import multiprocessing
 import os
 import socket
 import time
-from collections.abc import Callable, Iterable, MutableSequence
+from collections.abc import Callable, Collection, Iterable, MutableSequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -15,15 +15,12 @@ import numpy as np
 from groundstation.errors import GroundStationError
 from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.pose import Pose
-from groundstation.geometry.rotations import (
-    WORLD_FROM_DOWNWARD_OPTICAL,
-    base_from_tilted_optical,
-    world_from_downward_optical,
-)
+from groundstation.geometry.rotations import WORLD_FROM_DOWNWARD_OPTICAL, base_from_tilted_optical
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.devices.ardrone_firmware import FIRMWARES
 from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.fault_kinds import FaultKind, exchanged
+from sim_bridge.mounting import generator_of_eye, mounted
 from sim_bridge.render.spec import (
     BoardSpec,
     BodyShape,
@@ -46,16 +43,24 @@ _ARDRONE_SOURCE = "ardrone://"
 
 
 def render_specs(
-    site: Site, scenario: Scenario, streams: dict[str, Stream], truth_name: str, seed: int
+    site: Site,
+    scenario: Scenario,
+    streams: dict[str, Stream],
+    truth_name: str,
+    seed: int,
+    unseen: Collection[str] = (),
 ) -> list[RenderSpec]:
-    """Return the orders of all render processes; raises GroundStationError for a stream of no known camera."""
+    """Return the orders of all render processes; raises GroundStationError for a stream of no known camera.
+
+    unseen: bodies that no camera shows.
+    """
     body_at = exchanged(scenario.faults)
     return [
         RenderSpec(
             camera=name,
-            mount=_mount(site, body_at.get(name, name)),
+            mount=_mount(site, body_at.get(name, name), scenario.cameras.mounting_errors, seed),
             intrinsics=_lens(site, body_at.get(name, name)).intrinsics,
-            boards=_boards(site),
+            boards=tuple(board for board in _boards(site) if board.body not in unseen),
             truth_name=truth_name,
             bodies=site.bodies,
             address=address,
@@ -86,13 +91,13 @@ def _lens(site: Site, name: str) -> Lens:
     return drone.camera.calibration
 
 
-def _mount(site: Site, name: str) -> Mount:
+def _mount(site: Site, name: str, errors: bool, seed: int) -> Mount:
     drone = site.drones.get(name)
     if drone is None or drone.camera is None:
         camera = site.cameras.get(name)
         if camera is None:
             return Mount(Pose(WORLD_FROM_DOWNWARD_OPTICAL, np.zeros(3)))
-        return Mount(Pose(world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m)))
+        return Mount(Pose(*mounted(camera, errors, generator_of_eye(seed, name))))
     eye = drone.camera
     rotation = base_from_tilted_optical(math.radians(eye.tilt_down_deg), math.radians(eye.pan_left_deg))
     return Mount(Pose(rotation, np.array(eye.position_m)), name)
@@ -131,7 +136,7 @@ def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
         for fault in scenario.faults
         if fault.kind is FaultKind.WRONG_BOARD or (fault.kind in own and fault.entity == name)
     )
-    figures = scenario.cameras.model_dump(exclude={"floor"})
+    figures = scenario.cameras.model_dump(exclude={"floor", "mounting_errors"})
     return PictureQuality(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages, faults=faults)
 
 

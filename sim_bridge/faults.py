@@ -38,13 +38,23 @@ class FaultSchedule:
             if fault.end_s is not None:
                 edges.append((fault.end_s, False, fault))
         self._edges = deque(sorted(edges, key=lambda edge: edge[0]))
+        self._standing: list[Fault] = []
+        self._flew = False
 
-    def apply(self, now_s: float) -> list[tuple[str, str]]:
-        """Break and heal what is due at this time of the world [s]; returns (entity, line) for each."""
+    def apply(self, now_s: float, flies: bool = False) -> list[tuple[str, str]]:
+        """Break and heal what is due at this time of the world [s]; returns (entity, line) for each.
+
+        flies: whether a drone is in the air. With the first one all that is broken is named once more, because the
+        recording may have begun after it broke.
+        """
         lines = []
+        if flies and not self._flew:
+            self._flew = True
+            lines += [(fault.entity, f"fault {described(fault)} lasts") for fault in self._standing]
         while self._edges and self._edges[0][0] <= now_s:
             _, begins, fault = self._edges.popleft()
             self._switch(fault, begins)
+            (self._standing.append if begins else self._standing.remove)(fault)
             lines.append((fault.entity, f"fault {described(fault)} {'begins' if begins else 'ends'}"))
         return lines
 

@@ -1,8 +1,10 @@
 """The bridge's one loop: sockets, a step of the world, navdata, truth; 200 times a second in real time."""
 
 import gc
+import math
 import os
 import time
+from dataclasses import replace
 
 from groundstation.bus.messages import Severity, SimCommand, SimStatus, TruthState
 from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
@@ -15,6 +17,8 @@ from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
+from sim_bridge.link_bursts import with_bursts
+from sim_bridge.real.followers import Followers
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.unicycle import Unicycle
@@ -31,15 +35,19 @@ class Harness:
     """World, emulators and truth of one run. `close` releases everything, in any state."""
 
     def __init__(self, child: Child, order: LaunchSpec) -> None:
+        own = [name for name in order.streams if name in order.site.drones]
+        order = replace(order, scenario=with_bursts(order.scenario, order.site.drones, own, order.seed))
         self._child, self._order = child, order
-        self.world = World(order.site, order.scenario, order.seed)
+        self.world = World(order.site, order.scenario, order.seed, order.real, order.unseen)
+        self._followers: Followers | None = None
         self._stage = Stage(self.world)
         self._clock = Clockwork(time.monotonic_ns())
-        self._commands = [child.bus.subscribe([SIM_COMMAND], entity=name) for name in order.site.tracked]
+        self._commands = [child.bus.subscribe([SIM_COMMAND], entity=name) for name in self.world.targets]
 
     def open(self) -> None:
         """Take the ports, share the truth, start the cameras; returns when everything listens."""
         self._open_emulators()
+        self._followers = Followers(self._order.site, self._order.real, self.world.puppets, self._child.bus)
         emulators = self._stage.emulators
         controls = {name: one.control for name, one in emulators.items() if isinstance(one, ArDroneEmulator)}
         self._faults = FaultSchedule(self._order.scenario.faults, self.world, emulators, controls)
@@ -48,8 +56,10 @@ class Harness:
         order = self._order
         if order.streams:
             self._child.starting(f"{len(order.streams)} cameras")
-            specs = render_specs(order.site, order.scenario, order.streams, name, order.seed)
+            specs = render_specs(order.site, order.scenario, order.streams, name, order.seed, order.unseen)
             self._stage.open_cameras(specs, lambda: self._child.stop_requested)
+            if order.scenario.obstacles:
+                self._child.event(Severity.WARNING, "rendered pictures do not show the scenario's obstacles")
 
     def run(self) -> None:
         """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""
@@ -72,6 +82,8 @@ class Harness:
 
     def tick(self, stamp_ns: int) -> None:
         """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
+        if self._followers is not None:
+            self._followers.move(stamp_ns)
         self._stage.tick(stamp_ns)
         ticks = self.world.ticks
         if ticks % _TRUTH_TICKS == 0:
@@ -79,6 +91,7 @@ class Harness:
         if ticks % _COMMAND_TICKS == 0:
             self._obey()
             self._break_things()
+            self._tell_lost()
             self._stage.tell_cameras()
             if self._stage.cameras is not None:
                 self._clock.count_pictures(*self._stage.cameras.pictures, matters=not self._all_landed())
@@ -90,6 +103,9 @@ class Harness:
     def close(self) -> None:
         """Stop the cameras, close the ports, remove the truth; idempotent."""
         self._stage.close()
+        if self._followers is not None:
+            self._followers.close()
+            self._followers = None
 
     def _open_emulators(self) -> None:
         order, world = self._order, self.world
@@ -111,14 +127,18 @@ class Harness:
 
     @property
     def _inventory(self) -> str:
-        return f"{len(self._stage.emulators)} drones, {len(self._order.streams)} cameras"
+        real = f", real: {', '.join(self._order.real)}" if self._order.real else ""
+        return f"{len(self._stage.emulators)} drones, {len(self._order.streams)} cameras{real}"
 
     def _all_landed(self) -> bool:
-        return not any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())
+        emulated = any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())
+        return not emulated and not any(puppet.airborne for puppet in self.world.puppets.values())
 
     def _publish_truth(self, stamp_ns: int) -> None:
-        bus = self._child.bus
+        bus, unseen = self._child.bus, self._order.unseen
         for name, row in zip(self.world.bodies, self.world.states().tolist(), strict=True):
+            if name in unseen or math.isnan(row[0]):
+                continue  # what only the tracker says is no truth
             x, y, z, vx, vy, vz, roll, pitch, yaw, _, _, _, on_ground = row
             bus.publish(
                 TRUTH,
@@ -160,9 +180,14 @@ class Harness:
             if isinstance(command, SimCommand) and not steer(self.world.targets[name], command):
                 self._child.event(Severity.WARNING, f"order {command.action!r} to {name} not understood")
 
+    def _tell_lost(self) -> None:
+        for entity, line in self._followers.news() if self._followers is not None else ():
+            severity = Severity.INFO if line == "is followed" else Severity.WARNING
+            self._child.event(severity, line, "", entity)
+
     def _break_things(self) -> None:
-        for entity, line in self._faults.apply(self.world.time_s):
-            self._child.event(Severity.WARNING, line, "", entity)
+        for entity, line in self._faults.apply(self.world.time_s, bool(self.world.airborne)):
+            self._child.event(Severity.WARNING, line, "", entity, injected=True)
 
 
 def steer(target: Unicycle, command: SimCommand) -> bool:

@@ -1,8 +1,9 @@
 """What the bridge is started with: `python -m sim_bridge --spec FILE`."""
 
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,23 @@ from sim_bridge.scenario import Scenario, describe_problems, parse_scenario
 from sim_bridge.site import Site, parse_site
 
 
+class PoseSource(StrEnum):
+    """From whom the room learns where a real body is: its firmware's simulator, the tracker, nobody."""
+
+    AUTOPILOT = "autopilot"
+    ESTIMATE = "estimate"
+    NONE = "none"
+
+
+class RealBody(BaseModel):
+    """A body that exists; address: where its firmware's simulator sends its true state."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    source: PoseSource
+    address: tuple[str, int] | None = None
+
+
 class _Envelope(BaseModel):
     """The parts of an order; the field's and the scenario's own models judge what is in theirs."""
 
@@ -25,6 +43,7 @@ class _Envelope(BaseModel):
     scenario: dict[str, Any] = {}
     addresses: dict[str, str]
     streams: dict[str, tuple[str, int]] = {}
+    real: dict[str, RealBody] = {}
     seed: int | None = Field(default=None, ge=0)
 
 
@@ -32,8 +51,8 @@ class _Envelope(BaseModel):
 class LaunchSpec:
     """A checked start order.
 
-    addresses: loopback address of each drone; streams: address and port of each
-    camera, by the name of the world-fixed camera or of the drone that carries it.
+    addresses: loopback address of each emulated drone; streams: address and port of each emulated
+    camera, by the name of the world-fixed camera or of the drone that carries it; real: drones and targets that exist.
     """
 
     child: ChildSpec
@@ -42,6 +61,12 @@ class LaunchSpec:
     addresses: dict[str, str]
     streams: dict[str, tuple[str, int]]
     seed: int
+    real: Mapping[str, RealBody] = field(default_factory=dict)
+
+    @property
+    def unseen(self) -> frozenset[str]:
+        """Return the bodies that emulated cameras must not show: their places are the tracker's, or nobody's."""
+        return frozenset(name for name, body in self.real.items() if body.source is not PoseSource.AUTOPILOT)
 
 
 def read_order(path: Path) -> LaunchSpec:
@@ -54,7 +79,9 @@ def read_order(path: Path) -> LaunchSpec:
         raise SettingsError(describe_problems(str(path), error)) from None
     site = parse_site(envelope.field)
     scenario = parse_scenario(json.dumps(envelope.scenario))
-    _check_faults(scenario.faults, site, envelope.streams)
+    if strangers := sorted(set(envelope.real) - set(site.bodies)):
+        raise SettingsError([f"{path}: real: {name!r} is no body of the field" for name in strangers])
+    _check_faults(scenario.faults, site, envelope.streams, envelope.real)
     strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
     if strangers:
         names = ", ".join(site.drones)
@@ -62,18 +89,19 @@ def read_order(path: Path) -> LaunchSpec:
     if strangers := sorted(set(scenario.targets) - set(site.tracked)):
         names = ", ".join(site.tracked)
         raise SettingsError([f"scenario: targets.{name}: there is no such target, only {names}" for name in strangers])
-    missing = sorted(set(site.drones) - set(envelope.addresses))
+    missing = sorted(set(site.drones) - set(envelope.addresses) - set(envelope.real))
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])
     seed = scenario.seed if envelope.seed is None else envelope.seed
-    return LaunchSpec(envelope.child, site, scenario, envelope.addresses, envelope.streams, seed)
+    return LaunchSpec(envelope.child, site, scenario, envelope.addresses, envelope.streams, seed, envelope.real)
 
 
-def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str]) -> None:
-    """Raise SettingsError naming every fault of an entity that does not exist, or cannot have it."""
-    ardrones = sorted(name for name, drone in site.drones.items() if drone.kind == "ardrone")
+def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], real: Collection[str] = ()) -> None:
+    """Raise SettingsError naming every fault of an entity that does not exist, is real, or cannot have it."""
+    vehicles = {name: drone for name, drone in site.drones.items() if name not in real}
+    ardrones = sorted(name for name, drone in vehicles.items() if drone.kind == "ardrone")
     known = {
-        Part.VEHICLE: sorted(site.drones),
+        Part.VEHICLE: sorted(vehicles),
         Part.ARDRONE: ardrones,
         Part.CAMERA: sorted(cameras),
         Part.MARKER: list(site.bodies),

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from sim_bridge.scenario import FigureEight, Scenario, Standstill
+from sim_bridge.scenario import Scenario
+from sim_bridge.target_paths import Path, Standstill
 
 # A weaker value in the default scenario would make a simulated run look better than a flight.
 _REALISTIC: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
@@ -28,10 +29,11 @@ _REALISTIC: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
     ("cameras.fps: <= 15", lambda s: s.cameras.fps <= 15),
     ("cameras.video_delay_ms: >= 120", lambda s: s.cameras.video_delay_ms >= 120),
     ("cameras.video_jitter_ms: >= 20", lambda s: s.cameras.video_jitter_ms >= 20),
+    ("cameras.mounting_errors: true", lambda s: s.cameras.mounting_errors),
     ("cameras.frame_loss: >= 0.05", lambda s: s.cameras.frame_loss >= 0.05),
     ("cameras.corner_noise_px: >= 0.2", lambda s: s.cameras.corner_noise_px >= 0.2),
     (
-        "target.path: a figure eight at >= 0.2 m/s",
+        "target.path: driven at >= 0.2 m/s",
         lambda s: all(_is_realistic_path(target.path) for target in (s.target, *s.targets.values())),
     ),
     ("target.slip: > 0", lambda s: all(target.slip > 0 for target in (s.target, *s.targets.values()))),
@@ -46,8 +48,8 @@ def _at_least(interval: tuple[float, float], low: float, high: float) -> bool:
     return interval[0] >= low and interval[1] >= high
 
 
-def _is_realistic_path(path: FigureEight | Standstill) -> bool:
-    return isinstance(path, FigureEight) and path.speed_m_s >= 0.2
+def _is_realistic_path(path: Path) -> bool:
+    return not isinstance(path, Standstill) and path.speed_m_s >= 0.2
 
 
 def weaker_than_reality(scenario: Scenario) -> list[str]:

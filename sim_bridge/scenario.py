@@ -6,7 +6,7 @@ here. Units are in the key names; a pair of numbers is a range that each drone d
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, Literal, assert_never
 
 from pydantic import AfterValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
@@ -15,13 +15,18 @@ from drivers.ardrone.wire.tags import OPTION_SIZES
 from groundstation.errors import SettingsError
 from sim_bridge.fault_kinds import Fault
 from sim_bridge.section import Section
-
-
-def _rising(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] > interval[1]:
-        raise PydanticCustomError("rising", "the first number of a range must not exceed the second")
-    return interval
-
+from sim_bridge.surroundings import FloorZone, LinkBursts, Obstacle, ScenarioExpectation
+from sim_bridge.target_paths import (
+    AlongWalls,
+    FigureEight,
+    Kidnap,
+    Path,
+    RandomWalk,
+    Sprint,
+    Standstill,
+    Waypoints,
+    rising,
+)
 
 # Between targets of which the scenario says nothing by name.
 _APART_TURNS, _APART_M = 0.15, 1.0
@@ -29,47 +34,23 @@ Gain = Annotated[float, Field(ge=0.3, le=1.5)]
 Delay = Annotated[float, Field(ge=0, le=500)]
 Jump = Annotated[float, Field(ge=0, le=180)]
 Share = Annotated[float, Field(ge=0, le=1)]
-Place = Annotated[float, Field(ge=-100, le=100)]
-
-
-class FigureEight(Section):
-    """A figure of eight (lemniscate) along world x, driven at constant speed."""
-
-    shape: Literal["figure_eight"] = "figure_eight"
-    """Form of the path."""
-    half_length_m: Annotated[float, Field(gt=0, le=50)] = 3.2
-    """Half of its length along world x [m]."""
-    half_width_m: Annotated[float, Field(gt=0, le=50)] = 0.8
-    """Half of its width along world y [m]."""
-    speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.2
-    """Speed along the path [m/s]."""
-    start_phase: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Where the target starts [turns]; 0: at the centre, heading to +x and +y."""
-    centre_m: tuple[Place, Place] = (0.0, 0.0)
-    """Centre of the path [x, y in m; world]."""
-
-
-class Standstill(Section):
-    """A target that stands still until it is steered over `@sim`."""
-
-    shape: Literal["none"] = "none"
-    """Form of the path."""
-    position_m: tuple[Place, Place] = (0.0, 0.0)
-    """Where the target stands [x, y in m; world]."""
-    yaw_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """Its heading [deg; world], counter-clockwise."""
 
 
 class TargetScenario(Section):
-    """A simulated target, a TurtleBot."""
+    """A simulated target, a TurtleBot unless told otherwise."""
 
-    path: Annotated[FigureEight | Standstill, Field(discriminator="shape")] = FigureEight()
+    path: Annotated[Path, Field(discriminator="shape")] = FigureEight()
     """What the target drives along."""
+    base: Literal["turtlebot_2", "person", "rc_car"] = "turtlebot_2"
+    """What it can do at most. turtlebot_2: 0.7 m/s, 0.5 m/s^2, 180 deg/s; person: 1.5 m/s, 2 m/s^2, 360 deg/s;
+    rc_car: 3 m/s, 4 m/s^2, 180 deg/s."""
+    kidnaps: tuple[Kidnap, ...] = ()
+    """When somebody carries it away."""
     departs_after_team_s: Annotated[float, Field(ge=0, le=86_400)] | None = 3.0
     """The target stays parked at the start of its path until this long after all drones took off [s]; none: it drives
     from the beginning."""
-    max_speed_m_s: Annotated[float, Field(gt=0, le=0.7)] = 0.7
-    """Top speed of the target [m/s]."""
+    max_speed_m_s: Annotated[float, Field(gt=0, le=3)] = 0.7
+    """Top speed of the target [m/s]; never more than its base's."""
     slip: Annotated[float, Field(ge=0, le=0.5)] = 0.05
     """Standard deviation of its wheel slip, as a share of the speed."""
 
@@ -78,14 +59,23 @@ def _beside(scenario: TargetScenario, rank: int) -> TargetScenario:
     """Return the scenario of the rank-th target (0: the first) where one is told for all, so that none meet.
 
     On an eight each is some way ahead of the one before (half a turn ahead, they would meet where the path crosses
-    itself); those that wait stand 1 m apart.
+    itself); those that wait or walk at random start 1 m apart; along walls each starts in a corner of its own.
     """
     path = scenario.path
     moved: dict[str, object]
-    if isinstance(path, FigureEight):
-        moved = {"start_phase": math.fmod(path.start_phase + rank * _APART_TURNS, 1.0)}
-    else:
-        moved = {"position_m": (path.position_m[0] + rank * _APART_M, path.position_m[1])}
+    match path:
+        case FigureEight():
+            moved = {"start_phase": math.fmod(path.start_phase + rank * _APART_TURNS, 1.0)}
+        case Standstill():
+            moved = {"position_m": (path.position_m[0] + rank * _APART_M, path.position_m[1])}
+        case RandomWalk() | Sprint():
+            moved = {"start_m": (path.start_m[0] + rank * _APART_M, path.start_m[1])}
+        case AlongWalls():
+            moved = {"start_corner": (path.start_corner + rank) % 4}
+        case Waypoints():
+            moved = {"points_m": tuple((x, y + rank * _APART_M) for x, y in path.points_m)}
+        case other:
+            assert_never(other)
     return scenario.model_copy(update={"path": path.model_copy(update=moved)})
 
 
@@ -109,9 +99,9 @@ class DroneScenario(Section):
     """Numbers of navdata options that are never sent, for clients that expect something else there."""
     navdata_hz: Annotated[float, Field(ge=1, le=200)] = 200.0
     """Rate of full navdata packets [Hz]."""
-    velocity_gain: Annotated[tuple[Gain, Gain], AfterValidator(_rising)] = (0.80, 0.90)
+    velocity_gain: Annotated[tuple[Gain, Gain], AfterValidator(rising)] = (0.80, 0.90)
     """Reported velocity divided by true velocity."""
-    velocity_delay_ms: Annotated[tuple[Delay, Delay], AfterValidator(_rising)] = (20.0, 40.0)
+    velocity_delay_ms: Annotated[tuple[Delay, Delay], AfterValidator(rising)] = (20.0, 40.0)
     """Age of the reported velocity [ms]."""
     velocity_noise_m_s: Annotated[float, Field(ge=0, le=1)] = 0.03
     """Noise of the reported velocity, one sigma [m/s]."""
@@ -129,9 +119,9 @@ class DroneScenario(Section):
     """Slow error of the heading, one sigma [deg]."""
     yaw_wander_correlation_s: Annotated[float, Field(gt=0, le=1000)] = 30.0
     """Correlation time of that error [s]."""
-    yaw_jump_at_lift_off_deg: Annotated[tuple[Jump, Jump], AfterValidator(_rising)] = (60.0, 143.0)
+    yaw_jump_at_lift_off_deg: Annotated[tuple[Jump, Jump], AfterValidator(rising)] = (60.0, 143.0)
     """Size of the heading's jump when the motors start [deg], as the magnetometer causes it; either direction."""
-    battery: Annotated[tuple[Share, Share], AfterValidator(_rising)] = (0.85, 1.0)
+    battery: Annotated[tuple[Share, Share], AfterValidator(rising)] = (0.85, 1.0)
     """Charge at the start, 0 to 1."""
     battery_drain_per_min: Annotated[float, Field(ge=0, le=10)] = 0.06
     """Charge that a minute of flight costs, as a share of the full charge."""
@@ -144,6 +134,8 @@ class DroneScenario(Section):
     """Correlation time of that air's speed and direction [s]."""
     downwash: bool = True
     """Whether drones disturb those below them."""
+    echoes_of_bodies: bool = False
+    """Whether the ultrasound measures to the top of targets and obstacles below the drone, not to the floor."""
     ultrasound_crosstalk: bool = True
     """Whether drones near each other with the same ultrasound rate (pic:ultrasound_freq) hear each other's echoes."""
 
@@ -159,9 +151,20 @@ class CopterScenario(Section):
     """true: the vehicle has the parameters that indoor flight needs; false: those of the factory."""
     attitude_noise_deg: Annotated[float, Field(ge=0, le=5)] = 0.3
     """Noise of roll and pitch, one sigma [deg]."""
+    velocity_gain: Annotated[tuple[Gain, Gain], AfterValidator(rising)] | None = None
+    """Velocity that is reached divided by the one asked for; none: as each firmware on average, PX4 0.85, ArduPilot
+    1."""
+    hover_drift_m_s: Annotated[float, Field(ge=0, le=2)] = 0.0
+    """Steady horizontal drift while a velocity is asked for, zero included, one sigma per axis [m/s]."""
+    lift_off_velocity_m_s: Annotated[float, Field(ge=0, le=2)] = 0.0
+    """Error of the estimated horizontal velocity at lift-off, one sigma per axis [m/s]."""
+    one_partner: bool = False
+    """true: it answers only the first that spoke to it, until it is started again, as PX4's UDP link does."""
+    mavlink_1_until_greeted: bool = False
+    """true: it speaks MAVLink 1 until it hears MAVLink 2, as PX4 with MAV_PROTO_VER 0 does."""
     gyro_bias_deg_s: Annotated[float, Field(ge=0, le=5)] = 0.05
     """Bias of the gyroscopes, one sigma [deg/s]."""
-    battery: Annotated[tuple[Share, Share], AfterValidator(_rising)] = (0.85, 1.0)
+    battery: Annotated[tuple[Share, Share], AfterValidator(rising)] = (0.85, 1.0)
     """Charge at the start, 0 to 1."""
     battery_drain_per_min: Annotated[float, Field(ge=0, le=10)] = 0.05
     """Charge that a minute of flight costs, as a share of the full charge."""
@@ -178,6 +181,9 @@ class CameraScenario(Section):
     """Mean time from exposure to arrival [ms]."""
     video_jitter_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
     """Half width of the uniform spread about that delay [ms]."""
+    mounting_errors: bool = True
+    """Whether cameras fixed in the room are off by what the field says of their mounting (attitude_std_deg,
+    position_std_m), drawn from the seed; false: each is exactly where the field says."""
     frame_loss: Annotated[float, Field(ge=0, le=1)] = 0.05
     """Share of images that are lost; over TCP, that come 200 ms late."""
     corner_noise_px: Annotated[float, Field(ge=0, le=5)] = 0.2
@@ -220,6 +226,14 @@ class Scenario(Section):
     """Every emulated camera."""
     faults: tuple[Fault, ...] = ()
     """What breaks, and when."""
+    obstacles: tuple[Obstacle, ...] = ()
+    """People and things that hide what is behind them."""
+    floor_zones: tuple[FloorZone, ...] = ()
+    """Parts of the floor over which optical flow is off."""
+    link_bursts: LinkBursts = LinkBursts()
+    """Random times without a radio link, for each vehicle."""
+    expected: ScenarioExpectation | None = None
+    """How `groundstation experiment scenarios` flies it, and what must come of it; the simulator does not read it."""
 
     def of_targets(self, names: Iterable[str]) -> dict[str, TargetScenario]:
         """Return what each target of a field does."""

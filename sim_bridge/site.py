@@ -116,6 +116,8 @@ class SiteCamera(_Part):
 
     calibration: Lens
     position_m: tuple[float, float, float]
+    attitude_std_deg: float = 0.0
+    position_std_m: float = 0.0
     looking: Literal["down"] = "down"
     rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

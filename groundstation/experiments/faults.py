@@ -23,32 +23,33 @@ _WORST = (
 
 @dataclass(frozen=True, slots=True)
 class FlightBatch:
-    """Some flights of one campaign. order: what the simulator is told besides the seeds, as JSON."""
+    """Some flights of one campaign. order: the simulator's settings besides the seeds, as JSON; study: which."""
 
     order: str
     seeds: tuple[int, ...]
+    study: str = "faults"
 
     @property
     def key(self) -> str:
         """Return a name that is the same for equal batches only."""
         digest = hashlib.sha256(self.order.encode()).hexdigest()[:12]
-        return f"faults-{digest}-{self.seeds[0]:06d}-{len(self.seeds)}"
+        return f"{self.study}-{digest}-{self.seeds[0]:06d}-{len(self.seeds)}"
 
 
 class CampaignError(RuntimeError):
     """The simulator could not fly a batch."""
 
 
-def batches(order: str, first_seed: int, flights: int, size: int = BATCH) -> list[FlightBatch]:
+def batches(order: str, first_seed: int, flights: int, size: int = BATCH, study: str = "faults") -> list[FlightBatch]:
     """Return all batches of a campaign."""
     ends = range(first_seed, first_seed + flights, size)
-    return [FlightBatch(order, tuple(range(a, min(a + size, first_seed + flights)))) for a in ends]
+    return [FlightBatch(order, tuple(range(a, min(a + size, first_seed + flights))), study) for a in ends]
 
 
 def fly(batch: FlightBatch) -> dict[str, Any]:
     """Fly a batch in a process of its own; raises CampaignError, or OperatorMistake, with what it said."""
     order = json.loads(batch.order) | {"seeds": list(batch.seeds)}
-    command = [sys.executable, "-m", "sim_bridge.study", "faults"]
+    command = [sys.executable, "-m", "sim_bridge.study", batch.study]
     result = subprocess.run(command, input=json.dumps(order), capture_output=True, text=True, check=False)
     if result.returncode == _WRONG_ORDER:
         raise OperatorMistake(result.stderr.strip())

@@ -12,7 +12,7 @@ Tell = Callable[[int, int], None]
 
 
 class Keyed(Protocol):
-    """A value that says what is to be run; equal ones have equal keys and equal results."""
+    """A value that describes a run; equal ones have equal keys and equal results."""
 
     @property
     def key(self) -> str:

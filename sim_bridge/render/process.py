@@ -1,6 +1,7 @@
 """One process per emulated camera: truth in by shared memory, pictures out over the network."""
 
 import logging
+import math
 import os
 import signal
 import threading
@@ -12,6 +13,7 @@ from types import FrameType
 import cv2
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 from sim_bridge.render.outputs import Output, open_output
 from sim_bridge.render.spec import Outage, OutageKind, RenderSpec, StreamKind
@@ -121,8 +123,12 @@ class _Exposures:
         outage = active_outage(self._spec.scenario.outages, now_s)
         self._output.set_accepting(outage is not OutageKind.CUT)
         release_ns = self._link.release_ns(exposure_ns)
-        if release_ns is None or outage is not None or not self._output.clients:
+        if release_ns is None or outage is not None or not self._output.clients or self._is_nowhere(states):
             return
         self._output.show(states, exposure_ns, release_ns, now_s)
         self._tally[1] += time.monotonic_ns() > release_ns
         self._tally[0] += 1
+
+    def _is_nowhere(self, states: Array) -> bool:
+        carrier = self._spec.mount.body
+        return bool(carrier) and math.isnan(states[self._spec.bodies.index(carrier), 0])

@@ -1,5 +1,6 @@
 """From the true states of all bodies to what one camera has before it."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,7 @@ def camera_pose(mount: Mount, bodies: tuple[str, ...], states: Array) -> Pose:
 
 
 def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
-    """Return what the camera has before it; a camera never sees its own carrier."""
+    """Return what the camera has before it; a camera never sees its own carrier, nor what is nowhere (NaN)."""
     half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
     camera = camera_pose(spec.mount, spec.bodies, states)
     optical_from_world = camera.inverse()
@@ -74,6 +75,8 @@ def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
         if board.body == spec.mount.body:
             continue
         state, offset = states[spec.bodies.index(board.body)], np.array(board.position_m)
+        if math.isnan(state[0]):
+            continue
         base = world_from_base(state)
         optical_from_base = optical_from_world.compose(base)
         on_body = Pose(np.eye(3), offset)

@@ -62,6 +62,10 @@ def main() -> int:
         from sim_bridge.study.faults.command import main as faults
 
         return faults()
+    if sys.argv[1:2] == ["scenarios"]:
+        from sim_bridge.study.scenarios.command import main as scenarios
+
+        return scenarios()
     arguments = _parser().parse_args()
     field = resolved_field(arguments.field, arguments.set)
     scenario = parse_scenario(Path(arguments.scenario).read_bytes()) if arguments.scenario else Scenario()

@@ -1,19 +1,20 @@
 """A camera without pictures: geometry in, relative observations out, with the errors a detector would have."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import Header, RelativeObservation
+from groundstation.bus.messages import Header, RelativeObservation, SearchedPicture
 from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
     rotation_from_euler,
-    world_from_downward_optical,
 )
 from groundstation.geometry.tag import SquareTag
+from sim_bridge.mounting import generator_of_eye, mounted
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
 from sim_bridge.turned import turned_about
@@ -59,16 +60,22 @@ def boards_of(site: Site) -> tuple[Carried, ...]:
     return (*drones, *targets)
 
 
+def _hidden(world: World, carried: Carried, state: Array, eye: Array) -> bool:
+    """Return whether an obstacle hides a marker's centre."""
+    centre = state[:3] + carried.position
+    return any(box.hides(eye, centre) for box in world.obstacles)
+
+
 class Eye:
     """One camera, on a drone or in the world: looks at all boards but its carrier's own.
 
-    outliers: share of sightings with a gross error, beside what the scenario says; mounting_std: error of a fixed
-    camera's attitude [rad] and position [m] that the ground station does not know.
+    outliers: share of sightings with a gross error, beside what the scenario says. A fixed camera hangs a little off
+    what the ground station knows, unless the scenario says otherwise.
     """
 
     def __init__(
         self, name: str, lens: Lens, mount: SiteDrone | SiteCamera, site: Site, cameras: CameraScenario,
-        outliers: float, rng: np.random.Generator, mounting_std: tuple[float, float] = (0.0, 0.0),
+        outliers: float, rng: np.random.Generator,
     ) -> None:  # fmt: skip
         self.name = name
         self.period_s = 1.0 / cameras.fps
@@ -79,16 +86,14 @@ class Eye:
             tilt, pan = math.radians(mount.camera.tilt_down_deg), math.radians(mount.camera.pan_left_deg)
             self._rotation, self._position = base_from_tilted_optical(tilt, pan), np.array(mount.camera.position_m)
         else:
-            turn, shift = mounting_std
-            error = rotation_from_euler(*(turn * rng.standard_normal(3)))
-            self._rotation = error @ world_from_downward_optical(mount.rotation_deg)
-            self._position = mount.position_m + shift * rng.standard_normal(3)
+            self._rotation, self._position = mounted(mount, cameras.mounting_errors, rng)
         self._mounted = self._rotation
         self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
         self._robots = frozenset(site.drones)
         self._scenario, self._outliers, self._rng = cameras, outliers, rng
         self._last_seen = {b.body: -math.inf for b in self._boards}
         self._seq = 0
+        self._searching = False
 
     def bump(self, angle_deg: float, axis_deg: float) -> None:
         """Turn the camera away from its mounting, which the ground station does not know; 0: back to it."""
@@ -96,8 +101,10 @@ class Eye:
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
         """Return what one exposure shows; stamps carry the error of a delay that is known as a mean only."""
+        self._searching = False
         if self._rng.random() < self._scenario.frame_loss:
             return []
+        self._searching = bool(self._rng.random() < 3.0 * _SEARCH_SHARE)
         states = dict(zip(world.bodies, world.states(), strict=True))
         rotation, position, reported = self._rotation, self._position, (0.0, 0.0)
         if self._carrier is not None:
@@ -112,6 +119,8 @@ class Eye:
         for carried in self._boards:
             if self._carrier is None and carried.body not in self._robots:
                 continue
+            if _hidden(world, carried, states[carried.body], position):
+                continue
             sighting = self._sight(carried, states[carried.body], rotation, position, world.time_s)
             if sighting is not None:
                 yaw_o = states[self._carrier][8] if self._carrier is not None else 0.0
@@ -119,6 +128,16 @@ class Eye:
                 stamp = stamp_ns + round(jitter * 1e6)
                 seen.append(self._message(carried.body, sighting, yaw, stamp, clock, reported))
         return seen
+
+    def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
+        """Return that the last picture was searched all over, and what it shows; None if only known boards were."""
+        if not self._searching:
+            return None
+        self._seq += 1
+        camera = f"{self.name}_camera"
+        header = Header(stamp_ns, clock, self.name, camera, self._seq)
+        found = tuple(sighting.subject for sighting in seen)
+        return SearchedPicture(header=header, observer=self.name, camera=camera, found=found)
 
     def _sight(
         self, carried: Carried, state: Array, rotation: Array, position: Array, now_s: float
@@ -141,7 +160,7 @@ class Eye:
         pixels = self._lens.fx_px * _square_m(carried.board) / float(np.linalg.norm(centre))
         if pixels < (_TRACKED_PX if tracked else _SEARCH_PX):
             return None
-        if not tracked and self._rng.random() > 3.0 * _SEARCH_SHARE:
+        if not tracked and not self._searching:
             return None
         self._last_seen[carried.body] = now_s
         return centre, self._covariance(corners, centre, rotation.T[:, 2])
@@ -188,3 +207,12 @@ class Eye:
             roll_rad=reported[0],
             pitch_rad=reported[1],
         )
+
+
+def eyes_of(site: Site, cameras: CameraScenario, outliers: float, seed: int) -> list[Eye]:
+    """Return the eyes of a site: fixed ones first."""
+    mounts: list[tuple[str, Lens, SiteDrone | SiteCamera]] = [(n, c.calibration, c) for n, c in site.cameras.items()]
+    mounts += [(name, d.camera.calibration, d) for name, d in site.drones.items() if d.camera is not None]
+    return [
+        Eye(name, lens, mount, site, cameras, outliers, generator_of_eye(seed, name)) for name, lens, mount in mounts
+    ]

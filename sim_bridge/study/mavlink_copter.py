@@ -1,11 +1,13 @@
 """What driver and autopilot make of a MAVLink vehicle at message level: odometry, setpoints, and poses fed back.
 
 The loop is closed as in flight: what the tracker believes aids the vehicle's estimate, whose velocity comes back as
-odometry. Nothing of the driver's code is used here.
+odometry. Of the driver's code only the feedback of the drift is used here, and what it makes of the attitude's doubt.
 """
 
 import math
 
+from drivers.mavlink.drift import DriftFeedback
+from drivers.mavlink.uncertainty import StatedUncertainty
 from groundstation.bus.messages import EntityEstimate, FlightState, Header, Odometry, VehicleStatus
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 from sim_bridge.world.world import TICK_S
@@ -16,8 +18,8 @@ _VISION_TICKS = 7  # 28.6 Hz
 _MAX_AGE_S, _MAX_STD_M = 10.0, 0.07
 _LAND_AFTER_S = 2.0  # without a pose
 _STAND_S, _TAKE_OFF_M, _CLIMB_M_S = 2.0, 0.8, 0.4
-_COVARIANCE = (0.0225, 0.0, 0.0, 0.0, 0.0225, 0.0, 0.0, 0.0, 0.05)
-_STILL: Vector3 = (0.0, 0.0, 0.0)
+_COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.05)
+_ATTITUDE_STD_RAD = math.radians(0.3)
 
 
 class CopterLink:
@@ -31,13 +33,16 @@ class CopterLink:
         self._climbing = True
         self.landed = False
         self._fed: Vector3 | None = None
+        self._doubt_rad = _ATTITUDE_STD_RAD
+        self._drift, self._stated = DriftFeedback(), StatedUncertainty()
         body = copter.airframe
         self._pad, self._pad_yaw = (body.x, body.y, body.z), body.yaw
 
     def obey(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
         """Take a setpoint [base_stabilized]."""
         if not self._climbing and not self.landed:
-            self._copter.fly(velocity, yaw_rate)
+            self._drift.let_go()
+            self._fly(velocity, yaw_rate, now_s)
             self._until_s = now_s + self._lifetime_s
 
     def step(self, now_s: float, estimates: tuple[EntityEstimate, ...]) -> None:
@@ -46,27 +51,38 @@ class CopterLink:
         copter = self._copter
         self._heading = math.remainder(self._heading + copter.estimate.yaw_rate * TICK_S, math.tau)
         if self._ticks % _VISION_TICKS == 0:
-            self._feed(estimates)
+            self._feed(estimates, round(now_s * 1e9))
         if self._climbing and now_s > _STAND_S:
             if copter.steering is Steering.OFF:
                 copter.steer(Steering.IDLE)
-            copter.fly((0.0, 0.0, _CLIMB_M_S), 0.0)
+            forward, left, _ = self._drift.hold(round(now_s * 1e9))
+            self._fly((forward, left, _CLIMB_M_S), 0.0, now_s)
             if copter.estimate.position[2] > _TAKE_OFF_M:
                 self._climbing = False
         elif copter.airborne and copter.estimate.aided_s > _LAND_AFTER_S:
             copter.steer(Steering.LAND)
             self.landed = True
         elif not self._climbing and not self.landed and now_s > self._until_s:
-            copter.fly(_STILL, 0.0)
+            self._fly(self._drift.hold(round(now_s * 1e9)), 0.0, now_s)
         elif self.landed and not copter.airborne:
             copter.steer(Steering.OFF)
 
-    def _feed(self, estimates: tuple[EntityEstimate, ...]) -> None:
+    def _fly(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
+        now_ns = round(now_s * 1e9)
+        (x, y, z), (drift_x, drift_y, _) = velocity, self._drift.drift(now_ns)
+        corrected = (x + drift_x, y + drift_y, z)
+        self._drift.tell(now_ns, corrected)
+        self._copter.fly(corrected, yaw_rate)
+
+    def _feed(self, estimates: tuple[EntityEstimate, ...], now_ns: int) -> None:
         position, yaw = self._pad, self._pad_yaw
         if self._copter.airborne:
             mine = [e for e in estimates if e.name == self._name and _is_good(e)]
             if not mine:
                 return
+            self._drift.hear(now_ns, mine[0], self._reported())
+            self._stated.see_drift(now_ns, self._drift.size_m_s)
+            self._doubt_rad = max(_ATTITUDE_STD_RAD, self._stated.attitude_std_rad(now_ns))
             position, yaw = (mine[0].mean[0], mine[0].mean[1], mine[0].mean[2]), mine[0].mean[3]
         if self._fed is not None and math.dist(position, self._fed) > 0.3:
             self._resets += 1
@@ -78,16 +94,21 @@ class CopterLink:
         e = self._copter.estimate
         if self._ticks % _PERIOD_TICKS or not e.has_position:
             return None
-        c, s = math.cos(e.yaw), math.sin(e.yaw)
-        vx, vy, vz = e.velocity
         return Odometry(
             header=self._header(stamp_ns),
-            velocity_m_s=(c * vx + s * vy, c * vy - s * vx, vz),
+            velocity_m_s=self._reported(),
             velocity_covariance=_COVARIANCE,
             yaw_rad=self._heading,
             roll_rad=e.roll,
             pitch_rad=e.pitch,
+            attitude_std_rad=self._doubt_rad,
         )
+
+    def _reported(self) -> Vector3:
+        e = self._copter.estimate
+        c, s = math.cos(e.yaw), math.sin(e.yaw)
+        vx, vy, vz = e.velocity
+        return c * vx + s * vy, c * vy - s * vx, vz
 
     def status(self, stamp_ns: int) -> VehicleStatus:
         """Return the vehicle's state."""

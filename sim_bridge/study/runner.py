@@ -2,7 +2,6 @@
 
 import heapq
 import itertools
-import math
 import time
 from collections import defaultdict
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from groundstation.tracker import Tracker, tracker_from_field
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 from sim_bridge.study.ardrone_pilot import Pilot
-from sim_bridge.study.camera_model import Eye
+from sim_bridge.study.camera_model import eyes_of
 from sim_bridge.study.mavlink_copter import CopterLink
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
@@ -74,34 +73,10 @@ class Study:
             name: Pilot(drone, world.onboard[name], field.drones[name].odometry.velocity_scale, lifetime)
             for name, drone in world.ardrones.items()
         }
-        self._eyes = self._build_eyes(field)
+        self._eyes = eyes_of(self.site, scenario.cameras, options.outliers, options.seed)
         fence = field.room.fence
         self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])
         self.fence_violation_m = 0.0
-
-    def _build_eyes(self, field: ResolvedField) -> list[Eye]:
-        site, cameras, outliers = self.site, self._scenario.cameras, self.options.outliers
-        seed = self.options.seed
-        eyes = [
-            Eye(
-                name,
-                c.calibration,
-                c,
-                site,
-                cameras,
-                outliers,
-                generator_of(seed, f"{name}/eye"),
-                (math.radians(known.attitude_std_deg), known.position_std_m),
-            )
-            for name, c in site.cameras.items()
-            for known in [field.cameras[name]]
-        ]
-        eyes += [
-            Eye(name, d.camera.calibration, d, site, cameras, outliers, generator_of(seed, f"{name}/eye"))
-            for name, d in site.drones.items()
-            if d.camera is not None
-        ]
-        return eyes
 
     @property
     def now_ns(self) -> int:
@@ -155,9 +130,12 @@ class Study:
             if frame == before:
                 continue
             delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
-            for sighting in eye.look(world, now_ns, CLOCK):
+            seen = eye.look(world, now_ns, CLOCK)
+            for sighting in seen:
                 # A later frame arrives with the delay that its stamp was corrupted by.
                 self._send(sighting.header.stamp_ns + round(delay_ms * 1e6), f"observation/{eye.name}", sighting)
+            if (searched := eye.searched(seen, now_ns, CLOCK)) is not None:
+                self._send(now_ns + round(delay_ms * 1e6), f"searched_picture/{eye.name}", searched)
 
     def _send(self, arrival_ns: int, key: str, message: Message) -> None:
         heapq.heappush(self._queue, (arrival_ns, next(self._order), key, message))

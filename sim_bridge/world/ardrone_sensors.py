@@ -70,6 +70,7 @@ class Onboard:
         self.vx = self.vy = self.vz = self.height = self.roll = self.pitch = self.yaw = 0.0
         self.gyros = self.accelerometers = (0.0, 0.0, 0.0)
         self.battery = 1.0
+        self.flow_bias, self.below_m = (0.0, 0.0), 0.0
         self._tick_s, self._ticks = tick_s, 0
         self._yaw_offset = -start.yaw
         self._lifted = self._jumped = False
@@ -107,6 +108,10 @@ class Onboard:
             gain, white = self.velocity_gain, self._white
             self.vx = gain * forward + self._slow[0].step() + white * draw()
             self.vy = gain * left + self._slow[1].step() + white * draw()
+            if self.flow_bias != (0.0, 0.0):
+                c, s = math.cos(body.yaw), math.sin(body.yaw)
+                self.vx += c * self.flow_bias[0] + s * self.flow_bias[1]
+                self.vy += c * self.flow_bias[1] - s * self.flow_bias[0]
         else:
             self.vx = self.vy = 0.0
         self._measure_height(body, crosstalk)
@@ -122,7 +127,7 @@ class Onboard:
         self._ticks += 1
 
     def _measure_height(self, body: Airframe, crosstalk: bool) -> None:
-        height, climb = self._vertical.push((body.z, body.vz))
+        height, climb = self._vertical.push((body.z - self.below_m, body.vz))
         self._lifted = self._lifted or height > _MAGNETOMETER_SEEN_M
         if self._ticks % _HEIGHT_TICKS:
             return

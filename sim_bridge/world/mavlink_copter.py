@@ -72,6 +72,10 @@ class MavlinkCopter:
         self.battery = float(rng.uniform(*scenario.battery))
         self.since_s = 0.0  # in this steering
         self._response, self._tick_s = response, tick_s
+        low, high = scenario.velocity_gain or (response.gain, response.gain)
+        self._gain = low if low == high else float(rng.uniform(low, high))
+        drift = scenario.hover_drift_m_s
+        self._drift = (drift * draw(), drift * draw()) if drift else (0.0, 0.0)
         self._drain = scenario.battery_drain_per_min / 60.0 * tick_s
         self._unrest = tuple(
             GaussMarkov(scenario.air_unrest_m_s2 * share, _UNREST_CORRELATION_S, tick_s, draw)
@@ -134,8 +138,8 @@ class MavlinkCopter:
                 (forward, left, up), turn = wanted
                 if body.on_ground and up <= 0.05:
                     return
-                gain = self._response.gain
-                self._pursue((gain * forward, gain * left, up), turn, wake)
+                drift_x, drift_y = self._drift
+                self._pursue((self._gain * forward + drift_x, self._gain * left + drift_y, up), turn, wake)
             case Steering.HOLD:
                 self._pursue(self._towards_held(), 0.0, wake)
             case Steering.LAND:

@@ -45,6 +45,8 @@ class InertialEstimate:
             GaussMarkov(tilt, _TILT_CORRELATION_S, tick_s, draw),
             GaussMarkov(tilt, _TILT_CORRELATION_S, tick_s, draw),
         )
+        self._lift_off_m_s = scenario.lift_off_velocity_m_s
+        self._stood = True
         self._gyro_bias = float(rng.normal(0.0, math.radians(scenario.gyro_bias_deg_s)))
         self._up_bias = float(rng.normal(0.0, 0.05))
         self._bias = [0.0, 0.0, 0.0]
@@ -86,6 +88,10 @@ class InertialEstimate:
         self.velocity = (vx, vy, vz + _BAROMETER_GAIN * dt * (body.vz + 0.1 * draw() - vz))
         if body.on_ground:
             self.velocity = (0.0, 0.0, 0.0)  # the landing detector tells the filter so
+        elif self._stood and self._lift_off_m_s:
+            vx, vy, vz = self.velocity
+            self.velocity = (vx + self._lift_off_m_s * draw(), vy + self._lift_off_m_s * draw(), vz)
+        self._stood = body.on_ground
         self.position = _sum(self.position, self.velocity, dt)
 
     def aid(self, position: Vector3, yaw: float, resets: int) -> bool:

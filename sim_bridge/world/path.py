@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from sim_bridge.scenario import FigureEight
+from sim_bridge.target_paths import FigureEight
 
 
 class PathPoint(NamedTuple):

@@ -1,12 +1,15 @@
 """The TurtleBot 2: a Kobuki base that follows a path or is steered, with limits and slipping wheels."""
 
 import math
+from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
-from sim_bridge.scenario import FigureEight, TargetScenario
+from sim_bridge.scenario import TargetScenario
+from sim_bridge.target_paths import Path, Standstill
+from sim_bridge.world.course import Course, course_of
 from sim_bridge.world.noise import GaussMarkov, standard_normals
-from sim_bridge.world.path import EightPath
 
 # Kobuki: 0.7 m/s and 180 deg/s; accelerations of its velocity smoother.
 KOBUKI_SPEED_M_S = 0.7
@@ -15,24 +18,47 @@ ACCELERATION_M_S2 = 0.5
 TURN_ACCELERATION_RAD_S2 = 3.5
 _SLIP_CORRELATION_S = 1.5
 
-# Path follower: aims at a point of the path's tangent this far ahead; gains along it [1/s] and on the heading [1/s].
-_LOOK_AHEAD_M = 0.4
-_ALONG, _ABOUT = 1.0, 2.5
-_LARGEST_ERROR_M = 0.5
+
+class BaseLimits(NamedTuple):
+    """What a base can do at most: speed [m/s], acceleration [m/s^2], turn rate [rad/s], turn acceleration [rad/s^2]."""
+
+    speed_m_s: float
+    acceleration_m_s2: float
+    turn_rate_rad_s: float
+    turn_acceleration_rad_s2: float
+
+
+BASES = {
+    "turtlebot_2": BaseLimits(KOBUKI_SPEED_M_S, ACCELERATION_M_S2, KOBUKI_TURN_RATE_RAD_S, TURN_ACCELERATION_RAD_S2),
+    "person": BaseLimits(1.5, 2.0, math.tau, 20.0),
+    "rc_car": BaseLimits(3.0, 4.0, math.pi, 20.0),
+}
+_WALL_M = 0.5
 
 
 class Unicycle:
     """State x, y, yaw, forward speed and turn rate [world]."""
 
-    def __init__(self, scenario: TargetScenario, tick_s: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        scenario: TargetScenario,
+        tick_s: float,
+        rng: np.random.Generator,
+        half_room_m: tuple[float, float] = (50.0, 50.0),
+    ) -> None:
+        # Their own streams: what drives it does not change how its wheels slip.
+        on_course, self._rng = rng.spawn(2)
         draw = standard_normals(rng)
         self._tick_s = tick_s
-        self._max_speed = min(scenario.max_speed_m_s, KOBUKI_SPEED_M_S)
-        self._path = EightPath(scenario.path) if isinstance(scenario.path, FigureEight) else None
-        self._steered: tuple[float, float] | None = None if self._path else (0.0, 0.0)
+        self._limits, self._half_room_m = BASES[scenario.base], half_room_m
+        self._max_speed = min(scenario.max_speed_m_s, self._limits.speed_m_s)
+        self._course = course_of(scenario.path, tick_s, half_room_m, on_course)
+        self._steered: tuple[float, float] | None = None if self._course else (0.0, 0.0)
+        self._kidnaps = deque(sorted(scenario.kidnaps, key=lambda kidnap: kidnap.at_s))
+        self._driven_ticks = 0
         self._slip = GaussMarkov(scenario.slip, _SLIP_CORRELATION_S, tick_s, draw)
         self._turn_slip = GaussMarkov(scenario.slip, _SLIP_CORRELATION_S, tick_s, draw)
-        self.x, self.y, self.yaw = _start(scenario, self._path)
+        self.x, self.y, self.yaw = _start(scenario.path, self._course)
         self.speed = self.turn_rate = 0.0
         self._wheels = (0.0, 0.0)
         self.parked = scenario.departs_after_team_s is not None
@@ -42,11 +68,11 @@ class Unicycle:
         self._steered = (speed_m_s, turn_rate_rad_s)
 
     def follow_path(self) -> None:
-        """Go on along the path from its nearest point; without a path, stop."""
-        if self._path is None:
+        """Go on along the path, an eight from its nearest point; without a path, stop."""
+        if self._course is None:
             self._steered = (0.0, 0.0)
         else:
-            self._path.jump_to_nearest(self.x, self.y)
+            self._course.resume(self.x, self.y)
             self._steered = None
 
     def place(self, x_m: float, y_m: float) -> None:
@@ -57,17 +83,22 @@ class Unicycle:
 
     def step(self) -> None:
         """Advance by one tick."""
+        limits = self._limits
+        if self._kidnaps and not self.parked:
+            self._kidnap()
         parked = self.parked and self._steered is None
-        speed, turn_rate = (0.0, 0.0) if parked else self._steered or self._follow()
+        speed, turn_rate = (0.0, 0.0) if parked else self._asked()
         self._wheels = (
-            _approach(self._wheels[0], _clamp(speed, self._max_speed), ACCELERATION_M_S2 * self._tick_s),
+            _approach(self._wheels[0], _clamp(speed, self._max_speed), limits.acceleration_m_s2 * self._tick_s),
             _approach(
-                self._wheels[1], _clamp(turn_rate, KOBUKI_TURN_RATE_RAD_S), TURN_ACCELERATION_RAD_S2 * self._tick_s
+                self._wheels[1],
+                _clamp(turn_rate, limits.turn_rate_rad_s),
+                limits.turn_acceleration_rad_s2 * self._tick_s,
             ),
         )
         # Wheels that slip cover less than they turn, never more than the base can do.
-        self.speed = _clamp(self._wheels[0] * (1.0 + self._slip.step()), KOBUKI_SPEED_M_S)
-        self.turn_rate = _clamp(self._wheels[1] * (1.0 + self._turn_slip.step()), KOBUKI_TURN_RATE_RAD_S)
+        self.speed = _clamp(self._wheels[0] * (1.0 + self._slip.step()), limits.speed_m_s)
+        self.turn_rate = _clamp(self._wheels[1] * (1.0 + self._turn_slip.step()), limits.turn_rate_rad_s)
         self.yaw = math.remainder(self.yaw + self.turn_rate * self._tick_s, math.tau)
         self.x += self.speed * math.cos(self.yaw) * self._tick_s
         self.y += self.speed * math.sin(self.yaw) * self._tick_s
@@ -81,29 +112,42 @@ class Unicycle:
         vx, vy = self.speed * math.cos(self.yaw), self.speed * math.sin(self.yaw)
         return (self.x, self.y, 0.0, vx, vy, 0.0, 0.0, 0.0, self.yaw, 0.0, 0.0, self.turn_rate, 1.0)
 
-    def _follow(self) -> tuple[float, float]:
-        path = self._path
-        assert path is not None
-        goal = path.point()
-        dx, dy = goal.x - self.x, goal.y - self.y
-        c, s = math.cos(goal.heading), math.sin(goal.heading)
-        ahead, aside = c * dx + s * dy, c * dy - s * dx
-        aim = goal.heading + math.atan2(aside, _LOOK_AHEAD_M)
-        turn = math.remainder(aim - self.yaw, math.tau)
-        # The running point waits for a robot that is far behind it.
-        patience = max(0.0, min(1.0, 1.5 - ahead / _LARGEST_ERROR_M))
-        path.advance(path.speed_m_s * self._tick_s * patience)
-        speed = max(0.0, path.speed_m_s * math.cos(turn) + _ALONG * _clamp(ahead, _LARGEST_ERROR_M))
-        return speed, path.speed_m_s * goal.curvature + _ABOUT * turn
+    def _asked(self) -> tuple[float, float]:
+        if self._steered is not None:
+            return self._steered
+        assert self._course is not None
+        return self._course.drive(self.x, self.y, self.yaw)
+
+    def _kidnap(self) -> None:
+        """Be carried away when it is time for it."""
+        self._driven_ticks += 1
+        while self._kidnaps and self._driven_ticks * self._tick_s >= self._kidnaps[0].at_s:
+            kidnap = self._kidnaps.popleft()
+            goal = kidnap.to_m or _away(self.x, self.y, kidnap.distance_m, self._half_room_m, self._rng)
+            self.place(*goal)
+            if self._course is not None:
+                self._course.resume(*goal)
 
 
-def _start(scenario: TargetScenario, path: EightPath | None) -> tuple[float, float, float]:
-    if path is not None:
-        point = path.point()
-        return point.x, point.y, point.heading
-    standstill = scenario.path
-    assert not isinstance(standstill, FigureEight)
-    return *standstill.position_m, math.radians(standstill.yaw_deg)
+def _away(
+    x: float, y: float, distance_m: float, half_room_m: tuple[float, float], rng: np.random.Generator
+) -> tuple[float, float]:
+    """Return a place that far away in a random direction, not near a wall; the farthest tried where none is."""
+    tried = []
+    for angle in rng.uniform(-math.pi, math.pi, 32).tolist():
+        there = x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)
+        inside = tuple(_clamp(a, half - _WALL_M) for a, half in zip(there, half_room_m, strict=True))
+        tried.append((inside[0], inside[1]))
+        if inside == there:
+            return there
+    return max(tried, key=lambda at: math.dist(at, (x, y)))
+
+
+def _start(path: Path, course: Course | None) -> tuple[float, float, float]:
+    if course is not None:
+        return course.start
+    assert isinstance(path, Standstill)
+    return *path.position_m, math.radians(path.yaw_deg)
 
 
 def _clamp(value: float, limit: float) -> float:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import assert_never
 
 import numpy as np
@@ -15,37 +15,57 @@ from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.noise import generator_of
+from sim_bridge.world.obstacles import boxes_of, floor_below
+from sim_bridge.world.puppet import Puppet
 from sim_bridge.world.unicycle import Unicycle
 
 TICK_S = 0.005
 TICK_NS = 5_000_000
+_TARGET_RADIUS_M = 0.18
 _STILL_AIR = (0.0, 0.0, 0.0)
 # How far a drone's ultrasound disturbs another's, and how often that is looked at.
 CROSSTALK_M = 2.0
 _CROSSTALK_TICKS = 8
+_NOWHERE = (math.nan,) * WIDTH
 
 
 class World:
     """Drones, targets, and the onboard sensors of each drone.
 
-    `bodies` names the rows of `states()`: the drones, then the targets.
+    `bodies` names the rows of `states()`: the drones, then the targets. real: those of them that exist, and are only
+    followed (drones: `puppets`) or not known of (targets); waiting: real drones that stand on their pads until they
+    are heard of.
     """
 
-    def __init__(self, site: Site, scenario: Scenario, seed: int) -> None:
+    def __init__(
+        self, site: Site, scenario: Scenario, seed: int, real: Collection[str] = (), waiting: Collection[str] = ()
+    ) -> None:
         self.bodies = site.bodies
         self.ticks = 0
         self.drones: dict[str, Quadrotor | MavlinkCopter] = {}
+        self.puppets: dict[str, Puppet] = {}
         self.onboard: dict[str, Onboard] = {}
+        room = self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         for name, drone in site.drones.items():
-            self.drones[name] = self._drone(name, drone, scenario, seed)
-        paths = scenario.of_targets(site.tracked)
-        self.targets = {name: Unicycle(path, TICK_S, generator_of(seed, name)) for name, path in paths.items()}
+            if name in real:
+                pad = (drone.pad_m, drone.pad_yaw_rad) if name in waiting else None
+                self.puppets[name] = Puppet(room, TICK_S, pad)
+            else:
+                self.drones[name] = self._drone(name, drone, scenario, seed)
+        paths = {name: path for name, path in scenario.of_targets(site.tracked).items() if name not in real}
+        half_floor = (site.room.size_m[0] / 2, site.room.size_m[1] / 2)
+        self.targets = {
+            name: Unicycle(path, TICK_S, generator_of(seed, name), half_floor) for name, path in paths.items()
+        }
+        self.obstacles = boxes_of(scenario.obstacles, TICK_S, seed, half_floor)
+        self._zones = scenario.floor_zones
+        self._echoes = scenario.drones.echoes_of_bodies
+        self._target_tops = {name: one.marker.height_m for name, one in site.tracked.items()}
         self._depart_after_s = {name: path.departs_after_team_s or 0.0 for name, path in paths.items()}
         self._together_s = 0.0
         self._downwash = scenario.drones.downwash
         self._crosstalk = scenario.drones.ultrasound_crosstalk
         self._disturbed: frozenset[str] = frozenset()
-        self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         self._states = np.zeros((len(self.bodies), WIDTH))
 
     def _drone(self, name: str, drone: SiteDrone, scenario: Scenario, seed: int) -> Quadrotor | MavlinkCopter:
@@ -71,12 +91,16 @@ class World:
     @property
     def airborne(self) -> tuple[str, ...]:
         """Return the names of the drones without contact to the floor."""
-        return tuple(name for name, drone in self.drones.items() if drone.airborne)
+        bodies = (*self.drones.items(), *self.puppets.items())
+        return tuple(name for name, drone in bodies if drone.airborne)
 
     def step(self) -> None:
         """Advance everything by one tick."""
         drones = self.drones
-        wakes = {name: self._wake(name) for name in drones} if self._downwash and len(drones) > 1 else {}
+        for puppet in self.puppets.values():
+            puppet.step()
+        together = len(drones) + len(self.puppets) > 1
+        wakes = {name: self._wake(name) for name in drones} if self._downwash and together else {}
         if self._crosstalk and self.ticks % _CROSSTALK_TICKS == 0:
             self._disturbed = _disturbed(self.ardrones)
         for name, drone in drones.items():
@@ -85,24 +109,51 @@ class World:
             if isinstance(drone, MavlinkCopter):
                 drone.estimate.step(drone.airframe, drone.motors_on)
             else:
+                if self._zones or self._echoes:
+                    self._disturb(name, drone)
                 self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed, drone.air)
         self._let_targets_depart()
         for target in self.targets.values():
             target.step()
             target.confine(self._half_room[0], self._half_room[1])
+        for box in self.obstacles:
+            box.step()
         self.ticks += 1
 
+    def _disturb(self, name: str, drone: Quadrotor) -> None:
+        """Let floor and bodies below a drone mislead its optical flow and its ultrasound."""
+        onboard, body = self.onboard[name], drone.airframe
+        onboard.flow_bias = next(
+            (z.flow_bias_m_s for z in self._zones if _in(body.x, z.x_m) and _in(body.y, z.y_m)), (0.0, 0.0)
+        )
+        if self._echoes:
+            tops = [(one.x, one.y, _TARGET_RADIUS_M, self._target_tops[n]) for n, one in self.targets.items()]
+            tops += [(one.body.x, one.body.y, min(one.size_m[:2]) / 2, one.size_m[2]) for one in self.obstacles]
+            below_m = floor_below(body.x, body.y, body.z, tops)
+            if below_m != onboard.below_m:  # what a fault puts there stays until then
+                onboard.below_m = drone.autopilot.floor_m = below_m
+
     def states(self) -> NDArray[np.float64]:
-        """Return the true states (n, 13), columns as in `truth.FIELDS`; the array is reused by the next call."""
+        """Return the true states (n, 13), columns as in `truth.FIELDS`, NaN where they are not known.
+
+        The array is reused by the next call.
+        """
         rows = self._states
-        for index, drone in enumerate(self.drones.values()):
-            rows[index] = drone.airframe.row()
-        for index, target in enumerate(self.targets.values(), len(self.drones)):
-            rows[index] = target.row()
+        for index, name in enumerate(self.bodies):
+            rows[index] = self._row(name)
         return rows
 
+    def _row(self, name: str) -> tuple[float, ...]:
+        if name in self.drones:
+            return self.drones[name].airframe.row()
+        if name in self.puppets:
+            return self.puppets[name].row()
+        return self.targets[name].row() if name in self.targets else _NOWHERE
+
     def _let_targets_depart(self) -> None:
-        if len(self.airborne) == len(self.drones) and any(target.parked for target in self.targets.values()):
+        if len(self.airborne) == len(self.drones) + len(self.puppets) and any(
+            target.parked for target in self.targets.values()
+        ):
             self._together_s += TICK_S
             for name, target in self.targets.items():
                 target.parked = target.parked and self._together_s < self._depart_after_s[name]
@@ -128,10 +179,14 @@ class World:
         if below.on_ground:
             return _STILL_AIR
         strongest = _STILL_AIR
-        for other, drone in self.drones.items():
+        for other, drone in (*self.drones.items(), *self.puppets.items()):
             if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
                 strongest = push  # wakes do not add
         return strongest
+
+
+def _in(value: float, side: tuple[float, float]) -> bool:
+    return side[0] <= value <= side[1]
 
 
 def _disturbed(drones: Mapping[str, Quadrotor]) -> frozenset[str]:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from sim_bridge.fault_kinds import Fault, FaultKind
-from sim_bridge.scenario import FigureEight, Scenario
+from sim_bridge.scenario import Scenario
+from sim_bridge.target_paths import FigureEight
 from sim_bridge.world.noise import generator_of
 
 _HEALTHY_SHARE = 0.1

@@ -2,10 +2,9 @@
 
 import heapq
 import itertools
-import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import msgspec
@@ -16,8 +15,8 @@ from groundstation.arrays import Array
 from groundstation.bus import clock
 from groundstation.bus.api import Received
 from groundstation.bus.keys import Key
-from groundstation.bus.messages import Message, RelativeObservation
-from groundstation.bus.topics import OBSERVATION
+from groundstation.bus.messages import Message
+from groundstation.bus.topics import OBSERVATION, SEARCHED_PICTURE, Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
 from groundstation.planning.planner import Planner
@@ -27,8 +26,9 @@ from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Trac
 from groundstation.tracker import PlanRequest
 from sim_bridge.fault_kinds import Fault
 from sim_bridge.faults import FaultSchedule, described
+from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
-from sim_bridge.study.camera_model import Eye
+from sim_bridge.study.camera_model import eyes_of
 from sim_bridge.study.faults.ardrone_device import MemoryArDrone
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.judge import Judge
@@ -44,7 +44,8 @@ from sim_bridge.world.world import TICK_NS, World
 
 _START_NS = 1_000_000_000_000
 _DETECTOR_MS = (10.0, 50.0)
-_JUDGE_TICKS = 10  # 20 Hz
+_JUDGE_TICKS = 10
+JUDGE_S = _JUDGE_TICKS * TICK_NS / 1e9
 _ORDER_TICKS = 20
 # By when the team must track: AR.Drones take 8 s, MAVLink vehicles longer.
 TRACKING_BY_S = 30.0
@@ -105,7 +106,13 @@ class InlineWorker:
 class FaultFlight:
     """A flight in progress. `run` flies it to its end and returns the verdict, with the time spent on each part."""
 
-    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float) -> None:
+    def __init__(
+        self,
+        drawn: Drawn,
+        sections: Sequence[Section],
+        seconds: float,
+        planner_of: Callable[[Planner], Planner] = lambda planner: planner,
+    ) -> None:
         field = field_from_json(msgspec.json.encode(drawn.field))
         self._drawn, self._seconds, self._field = drawn, seconds, field
         scenario, seed = drawn.scenario, drawn.seed
@@ -116,7 +123,7 @@ class FaultFlight:
         self.spent_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(seed, "study")
         self._exchange, self._network = LocalExchange(), MemoryNetwork()
-        self._queue: list[tuple[int, int, RelativeObservation]] = []
+        self._queue: list[tuple[int, int, Topic, Message]] = []
         self._order = itertools.count()
         faults = scenario.faults
         self._values = {n: ObservedValues(fault for fault in faults if fault.entity == n) for n in self.world.drones}
@@ -128,31 +135,20 @@ class FaultFlight:
         self._orders = TeamOrders(self._bus("operator"))
         self._tracker_bus = self._bus("tracker")
         section = TrackerSection(field, epoch=1)
-        feed = TrackerFeed(Arrivals(self._tracker_bus), InlineWorker, clock.clock_id())
+        feed = TrackerFeed(
+            Arrivals(self._tracker_bus), lambda planner: InlineWorker(planner_of(planner)), clock.clock_id()
+        )
         self.tracking = Tracking(self._tracker_bus, section, feed)
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
-        self._eyes = self._build_eyes()
+        self._eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
         controls = {name: one.control for name, one in self.devices.items() if isinstance(one, MemoryArDrone)}
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices, controls)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
-        self.judge = Judge(drawn.field["room"]["fence"], limits, _JUDGE_TICKS * TICK_NS / 1e9)
+        self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S)
         self._tracking_since_s: float | None = None
 
     def _bus(self, source: str) -> LocalBus:
         return LocalBus(self._exchange, self._field.site, source)
-
-    def _build_eyes(self) -> list[WrongEye]:
-        site, cameras, seed = self.site, self._drawn.scenario.cameras, self._drawn.seed
-        eyes = []
-        for name, camera in site.cameras.items():
-            known, rng = self._field.cameras[name], generator_of(seed, f"{name}/eye")
-            mounting = (math.radians(known.attitude_std_deg), known.position_std_m)
-            eyes.append(Eye(name, camera.calibration, camera, site, cameras, 0.0, rng, mounting))
-        for name, drone in site.drones.items():
-            if drone.camera is not None:
-                rng = generator_of(seed, f"{name}/eye")
-                eyes.append(Eye(name, drone.camera.calibration, drone, site, cameras, 0.0, rng))
-        return [WrongEye(eye, self._drawn.scenario.faults) for eye in eyes]
 
     @property
     def now_ns(self) -> int:
@@ -210,15 +206,19 @@ class FaultFlight:
             if frame == before:
                 continue
             delay_ms = self._drawn.scenario.cameras.video_delay_ms + self._rng.uniform(*_DETECTOR_MS)
-            for sighting in eye.look(world, now_ns, clock.clock_id()):
-                arrival_ns = sighting.header.stamp_ns + round(delay_ms * 1e6)
-                heapq.heappush(self._queue, (arrival_ns, next(self._order), sighting))
+            seen = eye.look(world, now_ns, clock.clock_id())
+            messages: list[tuple[Topic, Message]] = [(OBSERVATION, sighting) for sighting in seen]
+            if (searched := eye.searched(seen, now_ns, clock.clock_id())) is not None:
+                messages.append((SEARCHED_PICTURE, searched))
+            for topic, message in messages:
+                arrival_ns = message.header.stamp_ns + round(delay_ms * 1e6)
+                heapq.heappush(self._queue, (arrival_ns, next(self._order), topic, message))
 
     def _deliver(self, now_ns: int) -> None:
         while self._queue and self._queue[0][0] <= now_ns:
-            sighting = heapq.heappop(self._queue)[2]
-            key = Key(self._field.site, sighting.header.entity, OBSERVATION, sighting.header.source)
-            self._exchange.deliver(Received(key, sighting.header, sighting, b""))
+            _, _, topic, message = heapq.heappop(self._queue)
+            key = Key(self._field.site, message.header.entity, topic, message.header.source)
+            self._exchange.deliver(Received(key, message.header, message, b""))
 
     def _judge(self) -> None:
         now_s = self.world.time_s
@@ -235,10 +235,20 @@ class FaultFlight:
             return
         truth = dict(zip(self.world.bodies, self.world.states().copy(), strict=True))
         told = {name: decision.action is Action.FLY for name, decision in self.drivers.decisions.items()}
-        believed = {name: self._believed(name) for name in self.world.drones}
+        believed = {name: self.believed(name) for name in self.world.drones}
         self.judge.see(now_s, truth, told, believed)
+        self.watch()
 
-    def _believed(self, name: str) -> Array | None:
+    def watch(self) -> None:
+        """Look on as the team tracks, each time that it is judged: for other studies."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """Return the scenario with its faults."""
+        return self._drawn.scenario
+
+    def believed(self, name: str) -> Array | None:
+        """Return where a body is believed to be [x, y in m]; None where nothing is known."""
         belief = self.tracking.tracker.belief
         return np.asarray(belief.mean_of(name)[:2]) if name in belief.layout else None
 

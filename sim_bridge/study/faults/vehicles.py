@@ -48,6 +48,9 @@ class HostedProcess:
     def degrade(self, detail: str) -> None:
         """Nobody waits."""
 
+    def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
+        """Keep no addresses: nobody dies here."""
+
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         """Nobody watches."""
 

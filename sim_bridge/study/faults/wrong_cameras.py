@@ -1,11 +1,11 @@
 """Cameras at message level whose pictures are wrong."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from groundstation.bus.messages import RelativeObservation
+from groundstation.bus.messages import RelativeObservation, SearchedPicture
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.study.camera_model import Eye
 from sim_bridge.world.world import World
@@ -14,12 +14,13 @@ _NOTHING = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL, FaultKind.PI
 
 
 class WrongEye:
-    """An eye whose faults come and go; `look` as the eye's."""
+    """An eye whose faults come and go; `look` and `searched` as the eye's."""
 
     def __init__(self, eye: Eye, faults: Iterable[Fault]) -> None:
         self.eye, self.name, self.period_s = eye, eye.name, eye.period_s
         self._faults = tuple(fault for fault in faults if fault.entity == eye.name)
         self._frozen: list[RelativeObservation] = []
+        self._shows = True
         self._numbers = itertools.count(1_000_000)  # beyond those of the eye
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
@@ -28,13 +29,18 @@ class WrongEye:
         bumped = [fault for fault in active if fault.kind is FaultKind.CAMERA_BUMPED]
         self.eye.bump(bumped[0].amount, bumped[0].direction_deg) if bumped else self.eye.bump(0.0, 0.0)
         kinds = {fault.kind for fault in active}
-        if kinds & _NOTHING:
+        self._shows = not kinds & _NOTHING
+        if not self._shows:
             return []
         seen = self.eye.look(world, stamp_ns, clock)
         if FaultKind.PICTURE_FROZEN not in kinds:
             self._frozen = seen or self._frozen
             return seen
         return [self._again(old, stamp_ns) for old in self._frozen]
+
+    def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
+        """Return that the last picture, if there was one, was searched all over, and what it shows."""
+        return self.eye.searched(seen, stamp_ns, clock) if self._shows else None
 
     def _again(self, old: RelativeObservation, stamp_ns: int) -> RelativeObservation:
         header = msgspec.structs.replace(old.header, stamp_ns=stamp_ns, seq=next(self._numbers))

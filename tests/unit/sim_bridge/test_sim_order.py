@@ -205,6 +205,7 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
     )
     assert schedule.apply(0.5) == [("ceiling", "fault camera_cut of ceiling begins")]
     assert len(schedule.apply(1.6)) == 2
+    assert [line.split()[1] for _, line in schedule.apply(1.7, flies=True)] == ["camera_cut", "at_deaf", "battery_drop"]
     assert emulators["drone_2"].deaf
     assert world.drones["drone_1"].battery == 0.1
     assert not emulators["drone_1"].silent
@@ -281,8 +282,8 @@ class Process:
         self.bus = MemoryBus(MemoryExchange(), "lab", "sim_bridge")
         self.events: list[tuple[str, str, str]] = []
 
-    def event(self, severity: Severity, text: str, remedy: str = "", entity: str = "") -> None:
-        self.events.append((str(severity), entity, text))
+    def event(self, severity: Severity, text: str, remedy: str = "", entity: str = "", injected: bool = False) -> None:
+        self.events.append((str(severity) * injected, entity, text))
 
     def tick_status(self, ticks: int = 0, overruns: int = 0) -> None:
         pass

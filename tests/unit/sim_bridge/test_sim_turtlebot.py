@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sim_bridge.scenario import FigureEight, Standstill, TargetScenario
+from sim_bridge.scenario import TargetScenario
+from sim_bridge.target_paths import FigureEight, Standstill
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.unicycle import KOBUKI_SPEED_M_S, Unicycle
 from sim_bridge.world.world import TICK_S

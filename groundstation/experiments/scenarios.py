@@ -1,0 +1,88 @@
+"""Scenarios flown under strategies: their figures over seeds, and paired differences between strategies."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+STRATEGIES = ("ours", "string", "flat", "two-level", "relay", "chase")
+# Student's factor at 95 % by its expansion in 1 / degrees of freedom.
+_NORMAL_95 = 1.96
+_SUMS = ("landings", "switches")
+
+
+def rows_of(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row for each scenario and strategy, in their order: flights and how many were as expected, then figures.
+
+    rmse_m: mean, median, worst over the flights that found the target; lost_s: mean; longest_s, found_s: worst;
+    against: how much larger the rmse is than that of the first strategy for the same seeds, mean and half width of the
+    95 % interval [m]; None with fewer than two seeds.
+    """
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for flight in flights:
+        groups.setdefault((flight["scenario"], flight["strategy"]), []).append(flight)
+    first: dict[str, list[Mapping[str, Any]]] = {}
+    rows = []
+    for (scenario, strategy), own in groups.items():
+        reference = first.setdefault(scenario, own)
+        against = None if reference is own else paired(own, reference)
+        rows.append({"scenario": scenario, "strategy": strategy, **_figures(own), "against": against})
+    return rows
+
+
+def _figures(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    found = [one for one in flights if one.get("rmse_m") is not None]
+    errors = [one["rmse_m"] for one in found]
+    return {
+        "flights": len(flights),
+        "as_expected": sum(not one["missed"] for one in flights),
+        "never_found": len(flights) - len(found),
+        "rmse_m": [float(pick(errors)) for pick in (np.mean, np.median, np.max)] if errors else None,
+        "lost_s": float(np.mean([one["lost_s"] for one in found])) if found else None,
+        "longest_s": max((one["longest_loss_s"] for one in found), default=None),
+        "found_s": max((one["found_s"] for one in found), default=None),
+        **{key: sum(one.get(key, 0) for one in flights) for key in _SUMS},
+        "violations": sum(bool(one.get("violations")) for one in flights),
+        "missed": {one["seed"]: one["missed"] for one in flights if one["missed"]},
+    }
+
+
+def paired(own: Iterable[Mapping[str, Any]], other: Iterable[Mapping[str, Any]]) -> tuple[float, float] | None:
+    """Return mean and half width of the 95 % interval of own rmse minus the other's over the seeds that both found."""
+    known = {one["seed"]: one["rmse_m"] for one in other if one.get("rmse_m") is not None}
+    gaps = [one["rmse_m"] - known[one["seed"]] for one in own if one["seed"] in known and one.get("rmse_m") is not None]
+    freedom = len(gaps) - 1
+    if freedom < 1:
+        return None
+    factor = _NORMAL_95 + 2.37 / freedom + 2.82 / freedom**2
+    return float(np.mean(gaps)), float(factor * np.std(gaps, ddof=1) / math.sqrt(len(gaps)))
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the rows as lines of text."""
+    head = (
+        "scenario",
+        "strategy",
+        "ok",
+        "mean m",
+        "median",
+        "worst",
+        "lost s",
+        "longest",
+        "found s",
+        "land",
+        "viol",
+        "switch",
+    )
+    layout = "{:17s} {:9s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
+    lines = [layout.format(*head) + "  against the first [m]"]
+    for row in rows:
+        errors = [f"{value:.3f}" for value in row["rmse_m"] or ()] or ["never", "-", "-"]
+        seconds = ["-" if row[key] is None else f"{row[key]:.1f}" for key in ("lost_s", "longest_s", "found_s")]
+        counts = [str(row[key]) for key in ("landings", "violations", "switches")]
+        against = "" if row["against"] is None else "{:+.3f} +- {:.3f}".format(*row["against"])
+        share = f"{row['as_expected']}/{row['flights']}"
+        cells = layout.format(row["scenario"], row["strategy"], share, *errors, *seconds, *counts)
+        lines.append(f"{cells}  {against}".rstrip())
+    return lines

@@ -1,0 +1,23 @@
+"""How a camera fixed in the room really hangs: a little off what the field says, as a real one is."""
+
+import math
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
+from sim_bridge.site import SiteCamera
+from sim_bridge.world.noise import generator_of
+
+
+def generator_of_eye(seed: int, name: str) -> np.random.Generator:
+    """Return what a camera draws from: first its mounting, alike at message level and at the wire."""
+    return generator_of(seed, f"{name}/eye")
+
+
+def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return world_from_optical (3, 3) and position [m; world] of a camera, off by its deviations if it has errors."""
+    turn, shift = math.radians(camera.attitude_std_deg), camera.position_std_m
+    error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
+    known, place = world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m, dtype=np.float64)
+    return (rotation_from_euler(*error) @ known, place + off) if errors else (known, place)

@@ -1,0 +1,1 @@
+"""Scenarios flown at message level: drivers, watchdogs and tracker as they fly, judged by what each file expects."""

@@ -1,0 +1,69 @@
+"""What a flight of a scenario comes to, and whether that is what its file expects."""
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from groundstation.arrays import Array, BoolArray
+from sim_bridge.surroundings import ScenarioExpectation
+
+FOUND_M, LOST_M, SEPARATION_M = 0.3, 0.5, 0.6
+
+
+@dataclass(slots=True)
+class TrackingErrors:
+    """Errors of all targets at an even rate from when the team tracks; unknown: inf."""
+
+    period_s: float
+    errors: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def take(self, truth: Mapping[str, Array], believed: Mapping[str, Array | None]) -> None:
+        """Take one moment: rows of the truth board, and where each target is believed."""
+        for name, place in believed.items():
+            off = math.inf if place is None else float(np.hypot(*(place[:2] - truth[name][:2])))
+            self.errors[name].append(off)
+
+    def figures(self) -> dict[str, Any]:
+        """Return those of the worst target: when it was found, then its errors [m] and losses [s]."""
+        found = [self._of(np.array(errors)) for errors in self.errors.values()]
+        return max(found, key=lambda one: (one["found_s"] is None, one["rmse_m"] or 0.0))
+
+    def _of(self, errors: Array) -> dict[str, Any]:
+        near = np.flatnonzero(errors < FOUND_M)
+        if not near.size:
+            return {"found_s": None, "rmse_m": None, "worst_m": None, "lost_s": None, "longest_loss_s": None}
+        since = errors[near[0] :]
+        known = np.where(np.isfinite(since), since, 2.0 * LOST_M)
+        lost = known > LOST_M
+        return {
+            "found_s": round(float(near[0]) * self.period_s, 2),
+            "rmse_m": round(float(np.sqrt(np.mean(known**2))), 4),
+            "worst_m": round(float(known.max()), 3),
+            "lost_s": round(float(lost.sum()) * self.period_s, 2),
+            "longest_loss_s": round(_longest(lost) * self.period_s, 2),
+        }
+
+
+def _longest(lost: BoolArray) -> int:
+    longest = run = 0
+    for now in lost.tolist():
+        run = run + 1 if now else 0
+        longest = max(longest, run)
+    return longest
+
+
+def shortfalls(figures: Mapping[str, Any], expected: ScenarioExpectation) -> list[str]:
+    """Return what a flight did not do that its scenario expects of it; empty: all was as expected."""
+    missed = []
+    for key in ("found_s", "rmse_m", "lost_s"):
+        limit, value = getattr(expected, key), figures[key]
+        if limit is not None and (value is None or value > limit):
+            missed.append(f"{key} {'never' if value is None else value} > {limit:g}")
+    if figures["landings"] > expected.landings:
+        missed.append(f"landings {figures['landings']} > {expected.landings}")
+    missed += [f"{what}" for what in figures["violations"]]
+    return missed

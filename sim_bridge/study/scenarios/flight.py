@@ -1,0 +1,69 @@
+"""One flight of a scenario: the campaign's, with the file's own target, things about and faults, and other figures."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sim_bridge.link_bursts import with_bursts
+from sim_bridge.scenario import Scenario
+from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.flight import JUDGE_S, FaultFlight
+from sim_bridge.study.faults.vehicles import Section
+from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
+from sim_bridge.study.scenarios.strategies import STRATEGIES
+from sim_bridge.surroundings import ScenarioExpectation
+
+_DOWN = ("LANDING", "LANDED")
+
+
+def as_drawn(field: dict[str, Any], scenario: Scenario, seed: int) -> Drawn:
+    """Return the flight of a seed."""
+    drones = field["drones"]
+    return Drawn(field, with_bursts(scenario, drones, drones, seed), seed)
+
+
+class ScenarioFlight(FaultFlight):
+    """A flight of a scenario under a strategy; `run` returns its figures."""
+
+    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, strategy: str) -> None:
+        super().__init__(drawn, sections, seconds, STRATEGIES[strategy])
+        self._strategy = strategy
+        self._errors = TrackingErrors(JUDGE_S)
+        self._switches, self._topology = 0, ""
+
+    def watch(self) -> None:
+        """Compare what is believed of the targets with the truth."""
+        world = self.world
+        truth = dict(zip(world.bodies, world.states(), strict=True))
+        self._errors.take(truth, {name: self.believed(name) for name in world.targets})
+        topology = str(self.tracking.tracker.topology)
+        self._switches += bool(self._topology) and topology != self._topology
+        self._topology = topology
+
+    def figures(self) -> dict[str, Any]:
+        """Return what the flight came to."""
+        judge = self.judge
+        violations = [f"fence {judge.fence_m:.2f} m"] * (judge.fence_m > 0.0)
+        violations += [f"separation {judge.separation_m:.2f} m"] * (judge.separation_m < SEPARATION_M)
+        modes = [str(host.watchdog.mode) for host in self.drivers.hosts.values()]
+        figures = {
+            **self._errors.figures(),
+            "landings": sum(mode in _DOWN for mode in modes),
+            "violations": violations,
+            "switches": self._switches,
+        }
+        expected = self.scenario.expected or ScenarioExpectation()
+        return {**figures, "missed": shortfalls(figures, expected)}
+
+    def fly(self) -> dict[str, Any]:
+        """Fly to the end; returns seed, strategy, figures and the time spent."""
+        report = self.run()
+        flown = report["tracking_since_s"] is not None
+        nothing: dict[str, Any] = {"missed": ["did not take off"]}
+        return {
+            "seed": report["seed"],
+            "strategy": self._strategy,
+            "flown": flown,
+            **(self.figures() if flown else nothing),
+            "reasons": {n: r for n, r in report["reasons"].items() if report["modes"][n] in _DOWN},
+            "spent_s": report["spent_s"],
+        }

@@ -1,0 +1,70 @@
+"""Boxes that stand or move in the room, and what they hide."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from groundstation.arrays import Array
+from sim_bridge.scenario import TargetScenario
+from sim_bridge.surroundings import Obstacle
+from sim_bridge.world.noise import generator_of
+from sim_bridge.world.unicycle import BASES, Unicycle
+
+_PARALLEL = 1e-12
+
+
+class Box:
+    """One obstacle; x, y of its middle are `body`'s."""
+
+    def __init__(
+        self, obstacle: Obstacle, tick_s: float, rng: np.random.Generator, half_room: tuple[float, float]
+    ) -> None:
+        most = BASES[obstacle.base].speed_m_s
+        driven = TargetScenario(
+            path=obstacle.path, base=obstacle.base, departs_after_team_s=None, max_speed_m_s=most, slip=0.0
+        )
+        self.body = Unicycle(driven, tick_s, rng, half_room)
+        self.size_m = obstacle.size_m
+
+    def step(self) -> None:
+        """Move on by one tick."""
+        self.body.step()
+
+    def hides(self, eye: Array, point: Array) -> bool:
+        """Return whether it is in the way between two points [world]."""
+        width, depth, height = self.size_m
+        low = (self.body.x - width / 2, self.body.y - depth / 2, 0.0)
+        high = (self.body.x + width / 2, self.body.y + depth / 2, height)
+        enters, leaves = 0.0, 1.0
+        for a, b, lower, upper in zip(eye.tolist(), point.tolist(), low, high, strict=True):
+            way = b - a
+            if abs(way) < _PARALLEL:
+                if not lower <= a <= upper:
+                    return False
+                continue
+            near, far = sorted(((lower - a) / way, (upper - a) / way))
+            enters, leaves = max(enters, near), min(leaves, far)
+        return enters < leaves
+
+
+def boxes_of(
+    obstacles: Iterable[Obstacle], tick_s: float, seed: int, half_room: tuple[float, float]
+) -> tuple[Box, ...]:
+    """Return the obstacles of a scenario, each with chance of its own."""
+    return tuple(
+        Box(one, tick_s, generator_of(seed, f"obstacle {index}"), half_room) for index, one in enumerate(obstacles)
+    )
+
+
+def floor_below(x: float, y: float, z: float, tops: Iterable[tuple[float, float, float, float]]) -> float:
+    """Return the height [m] of what an ultrasound at a place hears: the highest of the tops under it, else the floor.
+
+    tops: x, y, radius and height of what stands about [m]; an echo within 15 degrees of straight down counts.
+    """
+    heard = 0.0
+    for top_x, top_y, radius, height in tops:
+        reach = radius + max(0.0, z - height) * math.tan(math.radians(15.0))
+        if height < z and math.hypot(x - top_x, y - top_y) < reach:
+            heard = max(heard, height)
+    return heard

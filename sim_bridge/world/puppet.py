@@ -1,0 +1,90 @@
+"""A body that somebody else moves: it follows the poses of a real vehicle, and is nowhere when they stop."""
+
+import math
+from dataclasses import dataclass
+
+from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.downwash import wake_between
+
+Vector3 = tuple[float, float, float]
+STALE_S = 0.5
+_AIRBORNE_M = 0.05  # above where it stands
+_NOWHERE = (math.nan,) * 13
+
+
+@dataclass(frozen=True, slots=True)
+class OutsidePose:
+    """Where a real body is: position [m], velocity [m/s; world], roll, pitch, yaw [rad; FLU] and body rates [rad/s]."""
+
+    position: Vector3
+    velocity: Vector3
+    attitude: Vector3
+    rates: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Puppet:
+    """Follows poses from outside, between them at their velocity. It has no motors and no sensors here.
+
+    room_m: half length, half width, height; beyond it, and `STALE_S` after the last pose, it is nowhere. pad: where it
+    stands until the first pose, None: nowhere.
+    """
+
+    def __init__(self, room_m: Vector3, tick_s: float, pad: tuple[tuple[float, float], float] | None = None) -> None:
+        self.airframe = Airframe(*(pad or ((0.0, 0.0), 0.0))[0], pad[1] if pad else 0.0)
+        self._room_m, self._tick_s = room_m, tick_s
+        self._rates: Vector3 = (0.0, 0.0, 0.0)
+        self.age_s = math.inf
+        self._waits = pad is not None
+        self.poses = 0
+
+    def follow(self, pose: OutsidePose) -> None:
+        """Be where the real body is now."""
+        body = self.airframe
+        body.x, body.y, body.z = pose.position
+        body.vx, body.vy, body.vz = pose.velocity
+        body.roll, body.pitch, body.yaw = pose.attitude
+        body.on_ground = body.z < STANDING_HEIGHT_M + _AIRBORNE_M
+        self._rates, self.age_s, self._waits = pose.rates, 0.0, False
+        self.poses += 1
+
+    def step(self) -> None:
+        """Advance by one tick, as the last pose says."""
+        self.age_s += self._tick_s
+        if self.stale or self._waits:
+            return
+        body, dt = self.airframe, self._tick_s
+        body.x, body.y, body.z = body.x + body.vx * dt, body.y + body.vy * dt, body.z + body.vz * dt
+        body.yaw = math.remainder(body.yaw + self._rates[2] * dt, math.tau)
+
+    @property
+    def stale(self) -> bool:
+        """Whether its last pose is too old to say where it is."""
+        return self.age_s > STALE_S and not self._waits
+
+    @property
+    def outside(self) -> bool:
+        """Whether its pose lies beyond walls or ceiling."""
+        body, (x, y, z) = self.airframe, self._room_m
+        return abs(body.x) > x or abs(body.y) > y or body.z > z
+
+    @property
+    def nowhere(self) -> str:
+        """Return why nobody can see it, or ""."""
+        if self.stale:
+            return f"no pose of the real one for {STALE_S:g} s" if self.poses else "no pose of the real one yet"
+        return "the pose of the real one lies outside of the room" if self.outside else ""
+
+    @property
+    def airborne(self) -> bool:
+        """Whether it flies, as far as its poses say."""
+        return self.poses > 0 and not self.stale and not self.airframe.on_ground
+
+    def row(self) -> tuple[float, ...]:
+        """Return the 13 numbers of the truth board; NaN where nobody knows where it is."""
+        if self.nowhere:
+            return _NOWHERE
+        return (*self.airframe.row()[:9], *self._rates, float(self.airframe.on_ground))
+
+    def wake_on(self, other: Airframe) -> Vector3 | None:
+        """Return how its downwash accelerates a body below it, None when out of its reach."""
+        return wake_between(self.airframe, other) if self.airborne else None

@@ -1,0 +1,84 @@
+"""Figures of flown scenarios: what counts as found, lost and as expected, and how strategies are compared."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.experiments.scenarios import STRATEGIES, paired, rows_of, table
+from groundstation.settings.files import SHIPPED
+from sim_bridge.study.scenarios.figures import TrackingErrors, shortfalls
+from sim_bridge.surroundings import ScenarioExpectation
+
+
+def errors_of(*meters: float | None) -> dict[str, Any]:
+    errors = TrackingErrors(period_s=0.5)
+    for off in meters:
+        errors.take({"target": np.zeros(13)}, {"target": None if off is None else np.array([off, 0.0])})
+    return errors.figures()
+
+
+def flight(seed: int, rmse_m: float | None, strategy: str = "ours", **more: Any) -> dict[str, Any]:
+    figures = {"rmse_m": rmse_m, "lost_s": 0.0, "longest_loss_s": 0.0, "found_s": 0.5, "switches": 1}
+    return {"scenario": "walk", "strategy": strategy, "seed": seed, "missed": [], **figures, **more}
+
+
+def test_figures_count_from_when_the_target_was_found() -> None:
+    figures = errors_of(None, 5.0, 0.1, 0.1, 0.7, 0.8, 0.1, 0.9)
+    assert figures["found_s"] == 1.0
+    assert figures["lost_s"] == 1.5
+    assert figures["longest_loss_s"] == 1.0
+    assert figures["worst_m"] == 0.9
+    assert figures["rmse_m"] == pytest.approx(np.sqrt((3 * 0.01 + 0.49 + 0.64 + 0.81) / 6), abs=1e-4)
+
+
+def test_a_target_that_is_given_up_counts_as_lost() -> None:
+    assert errors_of(0.1, None, None)["lost_s"] == 1.0
+
+
+def test_a_target_that_was_never_found_has_no_error() -> None:
+    assert errors_of(None, 2.0)["found_s"] is None
+    assert errors_of(None, 2.0)["rmse_m"] is None
+
+
+def test_what_was_missed_is_named_with_its_limit() -> None:
+    expected = ScenarioExpectation(rmse_m=0.05, lost_s=0.0, found_s=10.0)
+    flown = {"found_s": None, "rmse_m": 0.1, "lost_s": 0.0, "landings": 1, "violations": ["fence 0.10 m"]}
+    assert shortfalls(flown, expected) == [
+        "found_s never > 10", "rmse_m 0.1 > 0.05", "landings 1 > 0", "fence 0.10 m",
+    ]  # fmt: skip
+    good = {"found_s": 1.0, "rmse_m": 0.01, "lost_s": 0.0, "landings": 0, "violations": []}
+    assert shortfalls(good, expected) == []
+
+
+def test_strategies_are_compared_seed_by_seed() -> None:
+    ours = [flight(seed, value) for seed, value in ((1, 0.02), (2, 0.04), (3, 0.03))]
+    relay = [flight(seed, value, "relay") for seed, value in ((1, 0.03), (2, 0.05), (4, 9.0))]
+    assert paired(relay, ours) == pytest.approx((0.01, 0.0), abs=1e-12)
+    assert paired(relay[:1], ours) is None
+    first, second = rows_of([*ours, *relay])
+    assert first["against"] is None
+    assert second["rmse_m"] == pytest.approx([(0.03 + 0.05 + 9.0) / 3, 0.05, 9.0])
+    assert "+0.010" in table([first, second])[2]
+
+
+def test_a_scenario_that_never_found_its_target_has_a_row() -> None:
+    lost = flight(1, None, missed=["found_s never > 25"], lost_s=None, longest_loss_s=None, found_s=None)
+    (row,) = rows_of([lost])
+    assert (row["never_found"], row["as_expected"]) == (1, 0)
+    assert "never" in table([row])[1]
+
+
+def test_both_sides_know_the_same_strategies() -> None:
+    from sim_bridge.study.scenarios.strategies import STRATEGIES as SIMULATED  # here: it compiles kernels
+
+    assert tuple(SIMULATED) == STRATEGIES
+
+
+def test_each_scenario_says_what_it_expects_in_its_header() -> None:
+    told = [
+        path for path in (SHIPPED / "scenarios").glob("*.yaml") if "\nexpected:" in path.read_text(encoding="utf-8")
+    ]
+    assert len(told) >= 15
+    for path in told:
+        assert "# Expected: " in path.read_text(encoding="utf-8"), path.name

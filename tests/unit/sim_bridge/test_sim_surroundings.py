@@ -1,0 +1,113 @@
+"""What stands about in the room: hidden markers, misled sensors, bursts of radio, cameras that hang a little off."""
+
+import json
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from groundstation.field.resolved import ResolvedField
+from sim_bridge.cameras import render_specs
+from sim_bridge.fault_kinds import FaultKind
+from sim_bridge.link_bursts import with_bursts
+from sim_bridge.mounting import generator_of_eye, mounted
+from sim_bridge.scenario import Scenario, parse_scenario
+from sim_bridge.site import Site, parse_site
+from sim_bridge.study.camera_model import Eye
+from sim_bridge.surroundings import Obstacle
+from sim_bridge.world.obstacles import Box, floor_below
+from sim_bridge.world.world import TICK_S, World
+
+
+@pytest.fixture(scope="module")
+def site(lab_field: ResolvedField) -> Site:
+    return parse_site(msgspec.to_builtins(lab_field))
+
+
+def scenario(**data: Any) -> Scenario:
+    return parse_scenario(json.dumps(data))
+
+
+def box(**data: Any) -> Box:
+    return Box(Obstacle.model_validate(data), TICK_S, np.random.default_rng(1), (4.0, 3.0))
+
+
+def test_a_box_hides_what_is_behind_it_and_nothing_else() -> None:
+    person = box(size_m=(0.5, 0.5, 1.75), path={"shape": "none", "position_m": (1.0, 0.0)})
+    eye = np.array([0.0, 0.0, 1.0])
+    assert person.hides(eye, np.array([2.0, 0.0, 0.4]))
+    assert not person.hides(eye, np.array([0.7, 0.0, 0.4]))
+    assert not person.hides(eye, np.array([2.0, 1.0, 0.4]))
+    assert not person.hides(np.array([0.0, 0.0, 4.2]), np.array([0.0, 2.0, 0.4]))
+    assert not person.hides(np.array([0.9, 0.0, 4.2]), np.array([0.9, 0.0, 1.9]))
+
+
+def test_a_person_moves() -> None:
+    person = box(path={"shape": "waypoints", "points_m": [[0, 0], [3, 0]], "speed_m_s": 1.2})
+    for _ in range(400):
+        person.step()
+    assert person.body.x > 1.5
+
+
+@pytest.mark.parametrize(("place", "seen"), [((0.0, 0.0), False), ((1.5, 1.5), True)])
+def test_an_obstacle_under_the_ceiling_camera_hides_the_drone(
+    site: Site, place: tuple[float, float], seen: bool
+) -> None:
+    name, drone = next(iter(site.drones.items()))
+    told = scenario(obstacles=[{"size_m": [0.6, 0.6, 3.0], "path": {"shape": "none", "position_m": place}}])
+    world = World(site, told, 1)
+    world.drones[name].airframe.x, world.drones[name].airframe.y = 0.0, 0.0
+    camera, mount = next(iter(site.cameras.items()))
+    eye = Eye(camera, mount.calibration, mount, site, told.cameras, 0.0, generator_of_eye(1, camera))
+    found = {one.subject for _ in range(60) for one in eye.look(world, 0, "clock")}
+    assert (name in found) is seen
+    assert drone.kind == "ardrone"
+
+
+def test_a_floor_zone_misleads_the_flow_of_those_above_it(site: Site) -> None:
+    zones = [{"x_m": [-10, 10], "y_m": [-10, 10], "flow_bias_m_s": [0.5, 0.0]}]
+    readings = []
+    for told in (scenario(), scenario(floor_zones=zones)):
+        world = World(site, told, 1)
+        for drone in world.ardrones.values():
+            drone.autopilot.take_off()
+        for _ in range(600):
+            world.step()
+        readings.append([np.array((one.vx, one.vy)) for one in world.onboard.values()])
+    for honest, misled in zip(*readings, strict=True):
+        assert np.linalg.norm(misled - honest) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_an_echo_comes_from_what_stands_below() -> None:
+    tops = [(0.0, 0.0, 0.18, 0.4)]
+    assert floor_below(0.1, 0.0, 1.1, tops) == 0.4
+    assert floor_below(0.3, 0.0, 1.1, tops) == 0.4
+    assert floor_below(0.5, 0.0, 1.1, tops) == 0.0
+    assert floor_below(0.0, 0.0, 0.3, tops) == 0.0
+
+
+def test_bursts_silence_one_vehicle_both_ways_and_its_pictures() -> None:
+    told = with_bursts(scenario(link_bursts={"per_minute": 6.0, "from_s": 10.0}), ("a", "b"), ("a",), seed=1)
+    starts = {name: {f.start_s for f in told.faults if f.entity == name} for name in "ab"}
+    assert 60 < len(starts["a"]) < 120
+    assert not starts["a"] & starts["b"]
+    assert {f.kind for f in told.faults if f.entity == "b"} == {FaultKind.NAVDATA_SILENT, FaultKind.AT_DEAF}
+    assert {f.kind for f in told.faults if f.entity == "a"} == {
+        FaultKind.NAVDATA_SILENT, FaultKind.AT_DEAF, FaultKind.CAMERA_STALL,
+    }  # fmt: skip
+    assert min(f.start_s for f in told.faults) >= 10.0
+    assert all(f.end_s is not None and 0.2 <= f.end_s - f.start_s <= 1.5 for f in told.faults)
+    assert with_bursts(scenario(), ("a",), (), seed=1).faults == ()
+
+
+def test_rendered_cameras_hang_as_those_of_the_study(site: Site) -> None:
+    name, camera = next(iter(site.cameras.items()))
+    streams = {name: ("127.0.0.1", 8080)}
+    (spec,) = render_specs(site, scenario(), streams, "board", seed=4)
+    rotation, place = mounted(camera, True, generator_of_eye(4, name))
+    assert np.array_equal(spec.mount.parent_from_optical.rotation, rotation)
+    assert np.array_equal(spec.mount.parent_from_optical.translation, place)
+    assert 0.0 < np.linalg.norm(place - camera.position_m) < 4 * camera.position_std_m
+    (exact,) = render_specs(site, scenario(cameras={"mounting_errors": False}), streams, "board", seed=4)
+    assert exact.mount.parent_from_optical.translation == pytest.approx(camera.position_m)

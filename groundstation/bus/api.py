@@ -102,10 +102,14 @@ class Subscription:
 
 
 class Bus(Protocol):
-    """One process's end of the star. `source` is the process's own name and goes into every key it publishes."""
+    """One process's end of the star. `source` is the process's own name and goes into every key it publishes.
+
+    run: name of the run that the process takes part in, "" where nobody said.
+    """
 
     site: str
     source: str
+    run: str
 
     def header(self, entity: str, stamp_ns: int | None = None) -> Header:
         """Return a header of this process, stamped now unless a measurement time is given."""

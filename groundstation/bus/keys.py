@@ -29,6 +29,11 @@ def expression(site: str, topic: Topic, entity: str = "*", source: str = "*") ->
     return f"{_ROOT}/{site}/{plane}{entity}/{topic.name}/{source}"
 
 
+def plane_expression(site: str, plane: Plane) -> str:
+    """Return the expression of everything in one plane of a site, and of nothing in the others."""
+    return "/".join((_ROOT, site, *([plane.value] if plane else []), "**"))
+
+
 def parse(text: str) -> Key:
     """Return the parts of a concrete key.
 

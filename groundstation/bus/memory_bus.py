@@ -29,8 +29,8 @@ class MemoryExchange:
 class MemoryBus(Sender):
     """A bus that delivers within this process, in the caller's thread."""
 
-    def __init__(self, exchange: MemoryExchange, site: str, source: str) -> None:
-        super().__init__(site, source)
+    def __init__(self, exchange: MemoryExchange, site: str, source: str, run: str = "") -> None:
+        super().__init__(site, source, run)
         self._exchange = exchange
 
     def subscribe(

@@ -10,11 +10,12 @@ from groundstation.bus.topics import Topic
 
 
 class Sender:
-    """Builds headers and keys for one source; subclasses implement `put`."""
+    """Builds headers and keys for one source; subclasses implement `put`. run: the run that its orders are for."""
 
-    def __init__(self, site: str, source: str) -> None:
+    def __init__(self, site: str, source: str, run: str = "") -> None:
         self.site = site
         self.source = source
+        self.run = run
         self._sequence: defaultdict[str, Iterator[int]] = defaultdict(itertools.count)
 
     def header(self, entity: str, stamp_ns: int | None = None) -> Header:

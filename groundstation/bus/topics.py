@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from groundstation.bus import messages as m
+from groundstation.bus.roles import PROCESSES, Role
 
 
 class Quality(StrEnum):
@@ -32,63 +33,79 @@ class Plane(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A name on the bus; `type` is None for raw bytes (their `Header` travels as attachment)."""
+    """A name on the bus; `type` is None for raw bytes (their `Header` travels as attachment).
+
+    senders: the roles that may publish it; the router lets nobody else.
+    """
 
     name: str
     type: type[m.Message] | None
     rate_hz: float
     quality: Quality
+    senders: frozenset[Role]
     plane: Plane = Plane.PRODUCTION
     encoding: str = "application/json"
 
 
-IMU = Topic("imu", m.ImuSample, 200, Quality.SENSOR)
+_DRIVER = frozenset({Role.DRIVER})
+_CAMERA = frozenset({Role.CAMERA})
+_TRACKER = frozenset({Role.TRACKER})
+_SUPERVISOR = frozenset({Role.SUPERVISOR})
+_CONSOLE = frozenset({Role.CONSOLE})
+_SIMULATOR = frozenset({Role.SIM_BRIDGE})
+_ORDERING = frozenset({Role.SUPERVISOR, Role.TRACKER, Role.CONSOLE, Role.CLI})
+_ANSWERING = frozenset({Role.DRIVER, Role.SUPERVISOR})
+_NOBODY: frozenset[Role] = frozenset()
+
+IMU = Topic("imu", m.ImuSample, 200, Quality.SENSOR, _DRIVER)
 """Driver: body rates and specific force of a vehicle."""
-ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR)
+ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR, _DRIVER)
 """Driver to tracker: velocity, attitude and height as the vehicle measured them."""
-OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR)
+OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: one marker that a camera saw."""
-VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE)
+SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
+"""Camera driver to tracker: a picture that was searched all over, and whose markers it shows, if any."""
+VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
-CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE)
+CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA)
 """Camera driver: whether images arrive, and how many were used."""
-ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE)
+ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE, _TRACKER)
 """Tracker: mean and covariance of each robot and target, predicted to now."""
-BELIEF = Topic("belief", m.Belief, 5, Quality.STATE)
+BELIEF = Topic("belief", m.Belief, 5, Quality.STATE, _TRACKER)
 """Tracker: the whole joint belief."""
-SETPOINT = Topic("setpoint", m.VelocitySetpoint, 50, Quality.CONTROL)
+SETPOINT = Topic("setpoint", m.VelocitySetpoint, 50, Quality.CONTROL, _TRACKER)
 """Tracker to driver: velocity of one drone."""
-COMMAND = Topic("command", m.Command, 0, Quality.CONTROL)
+COMMAND = Topic("command", m.Command, 0, Quality.CONTROL, _ORDERING)
 """Operator, any shell or tracker to drivers: a discrete request."""
-COMMAND_ACK = Topic("command_ack", m.CommandAck, 0, Quality.CONTROL)
+COMMAND_ACK = Topic("command_ack", m.CommandAck, 0, Quality.CONTROL, _ANSWERING)
 """Driver: how far a command has come."""
-LEASE = Topic("lease", m.Lease, 2, Quality.CONTROL)
+LEASE = Topic("lease", m.Lease, 2, Quality.CONTROL, _SUPERVISOR)
 """Operator to drivers: who may start and resume."""
-PLAN = Topic("plan", m.Plan, 10, Quality.STATE)
+PLAN = Topic("plan", m.Plan, 10, Quality.STATE, _TRACKER)
 """Tracker: the plan that was adopted, with its alternatives."""
-INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE)
+INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE, _TRACKER)
 """Tracker: what became of each observation."""
-EVENT = Topic("event", m.Event, 0, Quality.STATE)
+EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
-PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE)
+PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)
 """Every process and the supervisor: lifecycle, CPU, deadlines."""
-CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE)
+CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE, _NOBODY)
 """Offset between the clocks of two hosts. Nothing publishes it yet: all processes run on one host."""
-JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK)
+JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK, _TRACKER)
 """Tracker: what each tick ingested and adopted."""
-IMAGE = Topic("image", None, 5, Quality.BULK, encoding="image/jpeg")
+IMAGE = Topic("image", None, 5, Quality.BULK, _CAMERA, encoding="image/jpeg")
 """Camera driver: single images for the console."""
-VIDEO = Topic("video", None, 30, Quality.BULK, encoding="video/h264")
+VIDEO = Topic("video", None, 30, Quality.BULK, _CAMERA, encoding="video/h264")
 """Camera driver: every access unit of an H.264 camera, as received."""
-RAW_RX = Topic("raw_rx", None, 200, Quality.BULK, encoding="application/octet-stream")
+RAW_RX = Topic("raw_rx", None, 200, Quality.BULK, _DRIVER, encoding="application/octet-stream")
 """Driver: datagrams received, with their times."""
-RAW_TX = Topic("raw_tx", None, 30, Quality.BULK, encoding="application/octet-stream")
+RAW_TX = Topic("raw_tx", None, 30, Quality.BULK, _DRIVER, encoding="application/octet-stream")
 """Driver: datagrams sent, with their times."""
-TRUTH = Topic("state", m.TruthState, 50, Quality.STATE, Plane.TRUTH)
+TRUTH = Topic("state", m.TruthState, 50, Quality.STATE, _SIMULATOR, Plane.TRUTH)
 """Simulator: true state of one body."""
-SIM_COMMAND = Topic("drive", m.SimCommand, 0, Quality.CONTROL, Plane.SIM)
+SIM_COMMAND = Topic("drive", m.SimCommand, 0, Quality.CONTROL, _CONSOLE, Plane.SIM)
 """Console or shell to simulator: steer a target."""
-SIM_STATUS = Topic("status", m.SimStatus, 1, Quality.STATE, Plane.SIM)
+SIM_STATUS = Topic("status", m.SimStatus, 1, Quality.STATE, _SIMULATOR, Plane.SIM)
 """Simulator: whether it keeps real time."""
 
 TOPICS: dict[tuple[Plane, str], Topic] = {
@@ -97,6 +114,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         IMU,
         ODOMETRY,
         OBSERVATION,
+        SEARCHED_PICTURE,
         VEHICLE_STATUS,
         CAMERA_STATUS,
         ESTIMATE,

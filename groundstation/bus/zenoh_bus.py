@@ -1,18 +1,23 @@
 """The bus over Zenoh: one router listens, every other process is a client of it (a star).
 
-The only module that imports zenoh and the only place where its configuration is built.
+The only module that imports zenoh and the only place where its configuration is built. What flies speaks TLS with a
+certificate at both ends and an access list at the router; without an identity everything is plain, for tests and
+benches of other things.
 """
 
 import json
 import logging
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import zenoh
 
 from groundstation.bus import keys
+from groundstation.bus.access import AccessList, access_control
 from groundstation.bus.api import Sample, Subscription
+from groundstation.bus.roles import Identity
 from groundstation.bus.sender import Sender
 from groundstation.bus.topics import Quality, Topic
 from groundstation.errors import GroundStationError
@@ -32,9 +37,15 @@ _PRIORITY = {
 _QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
 
 
-def _configuration(mode: str, endpoint: str) -> zenoh.Config:
+AUTHORITY, CERTIFICATE, KEY = "authority.pem", ".pem", ".key"
+REFUSED_BY = "zenoh_link_tls"
+# The crate that reports who was refused at the door; what the access list denies is only told at a cost per message.
+_LOGGED = f"error,{REFUSED_BY}=warn"
+
+
+def _configuration(mode: str, endpoint: str) -> dict[str, Any]:
     listens = mode == "router"
-    settings: dict[str, Any] = {
+    return {
         "mode": mode,
         "listen": {"endpoints": [endpoint] if listens else [], "exit_on_failure": True},
         "connect": {
@@ -58,13 +69,40 @@ def _configuration(mode: str, endpoint: str) -> zenoh.Config:
             "shared_memory": {"enabled": False},
         },
     }
-    return zenoh.Config.from_json5(json.dumps(settings))
 
 
-def open_router(endpoint: str) -> Any:
-    """Return a listening router session; raises GroundStationError when the port is taken."""
+def _secured(configuration: dict[str, Any], identity: Identity, end: str) -> dict[str, Any]:
+    """Add to a configuration what proves one end of a link ("listen" or "connect"), and refuse all links but TLS."""
+    folder = Path(identity.folder)
+    configuration["transport"]["link"] |= {
+        "protocols": ["tls"],
+        "tls": {
+            "root_ca_certificate": str(folder / AUTHORITY),
+            f"{end}_certificate": str(folder / f"{identity.name}{CERTIFICATE}"),
+            f"{end}_private_key": str(folder / f"{identity.name}{KEY}"),
+            "enable_mtls": True,
+            "verify_name_on_connect": True,
+        },
+    }
+    return configuration
+
+
+def _opened(configuration: dict[str, Any]) -> Any:
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
+
+
+def open_router(endpoint: str, identity: Identity | None = None, access: AccessList | None = None) -> Any:
+    """Return a listening router session, guarded if there are an identity and an access list.
+
+    A guarded one writes a line with REFUSED_BY to standard output for each stranger. Raises GroundStationError when the
+    port is taken.
+    """
+    configuration = _configuration("router", endpoint)
+    if identity is not None and access is not None:
+        zenoh.init_log_from_env_or(_LOGGED)
+        configuration = _secured(configuration, identity, "listen") | {"access_control": access_control(access)}
     try:
-        return zenoh.open(_configuration("router", endpoint))
+        return _opened(configuration)
     except zenoh.ZError as error:
         raise GroundStationError(f"cannot listen on {endpoint}: is another run using this port? ({error})") from error
 
@@ -72,8 +110,8 @@ def open_router(endpoint: str) -> Any:
 class ZenohBus(Sender):
     """A client of the router. Callbacks only enqueue; publishers are declared once per key."""
 
-    def __init__(self, session: Any, site: str, source: str) -> None:
-        super().__init__(site, source)
+    def __init__(self, session: Any, site: str, source: str, run: str = "") -> None:
+        super().__init__(site, source, run)
         self._session = session
         self._publishers: dict[str, Any] = {}
         self._subscribers: list[Any] = []
@@ -127,12 +165,20 @@ def _enqueue_into(subscription: Subscription) -> Callable[[Any], None]:
     return enqueue
 
 
-def open_bus(endpoint: str, site: str, source: str, timeout_s: float = 10.0) -> ZenohBus:
-    """Connect to the router, retrying until the time-out; raises GroundStationError naming the endpoint."""
+def open_bus(
+    endpoint: str, site: str, source: str, timeout_s: float = 10.0, identity: Identity | None = None
+) -> ZenohBus:
+    """Connect to the router, retrying until the time-out; raises GroundStationError naming the endpoint.
+
+    identity: what a guarded router asks for.
+    """
+    configuration = _configuration("client", endpoint)
+    if identity is not None:
+        configuration = _secured(configuration, identity, "connect")
     deadline = time.monotonic() + timeout_s
     while True:
         try:
-            return ZenohBus(zenoh.open(_configuration("client", endpoint)), site, source)
+            return ZenohBus(_opened(configuration), site, source, identity.run if identity else "")
         except zenoh.ZError as error:
             if time.monotonic() > deadline:
                 raise GroundStationError(f"no router answers at {endpoint}: is the ground station running?") from error

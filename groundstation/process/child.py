@@ -3,6 +3,7 @@
 import logging
 import os
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
@@ -10,6 +11,7 @@ from typing import Self
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.roles import Identity
 from groundstation.bus.topics import EVENT, PROCESS_STATUS
 from groundstation.process import log
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
@@ -23,10 +25,11 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class ChildSpec:
-    """What a child is told at its start.
+    """Settings of a child, read at its start.
 
     name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none),
-    with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did).
+    with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did); identity:
+    what it shows the router, or the router shows others (None: nobody asks).
     """
 
     name: str
@@ -37,6 +40,7 @@ class ChildSpec:
     heartbeat_index: int = 0
     section: str = "{}"
     parent_pid: int = 0
+    identity: Identity | None = None
 
 
 class Child:
@@ -58,6 +62,7 @@ class Child:
         self._counters = (0, 0, 0)
         self._next_status_ns = 0
         self._cpu_mark = (time.monotonic_ns(), time.process_time_ns())
+        self._addresses: tuple[tuple[str, int], ...] = ()
 
     def __enter__(self) -> Self:
         with suppress(PermissionError):  # already the leader of a group
@@ -72,7 +77,7 @@ class Child:
         if self.spec.endpoint:
             from groundstation.bus.zenoh_bus import open_bus
 
-            self.bus = open_bus(self.spec.endpoint, self.spec.site, self.name)
+            self.bus = open_bus(self.spec.endpoint, self.spec.site, self.name, identity=self.spec.identity)
             self.publish_status()
         return self
 
@@ -127,6 +132,12 @@ class Child:
         if self._block is not None:
             self._block.beat(self.spec.heartbeat_index)
 
+    def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
+        """Record where vehicles that call us were heard last, for whoever speaks to them after this process."""
+        if self._block is not None and tuple(addresses) != self._addresses:
+            self._addresses = tuple(addresses)
+            self._block.set_addresses(self.spec.heartbeat_index, self._addresses)
+
     def starting(self, detail: str) -> None:
         """Say what the start waits for; shown to the operator."""
         self._announce(Lifecycle.STARTING, detail)
@@ -167,14 +178,23 @@ class Child:
         )
         self.bus.publish(PROCESS_STATUS, status)
 
-    def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
+    def event(
+        self,
+        severity: Severity | str,
+        text: str,
+        remedy: str = "",
+        entity: str | None = None,
+        *,
+        injected: bool = False,
+    ) -> None:
         """Publish and log something that happened, about this process unless an entity is named."""
         level = {Severity.INFO: logging.INFO, Severity.WARNING: logging.WARNING, Severity.ERROR: logging.ERROR}
         severity = Severity(severity)
         _log.log(level[severity], "%s%s", text, f" ({remedy})" if remedy else "")
         if self._has_bus:
             header = self.bus.header(entity or self.name)
-            self.bus.publish(EVENT, Event(header=header, severity=severity, text=text, remedy=remedy))
+            event = Event(header=header, severity=severity, text=text, remedy=remedy, injected=injected)
+            self.bus.publish(EVENT, event)
 
     def _announce(self, state: Lifecycle, detail: str) -> None:
         if (state, detail) == (self._state, self._detail):

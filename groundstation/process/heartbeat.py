@@ -6,16 +6,19 @@ tracker removes the block as soon as any attached process ends (Python before 3.
 
 import mmap
 import os
+import socket
 import tempfile
 import time
+from collections.abc import Sequence
 from enum import IntEnum
 from pathlib import Path
 
 from groundstation.errors import GroundStationError
 
 SUPERVISOR_SLOT = 0
-_WORDS_PER_SLOT = 8  # one cache line each, so that two beating processes never share one
+_WORDS_PER_SLOT = 16  # whole cache lines, so that two beating processes never share one
 _STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE = 0, 1, 2, 3, 4, 5
+_ADDRESSES, MOST_ADDRESSES = 8, 8
 _LEFT_BEHIND_NS = 10_000_000_000
 
 
@@ -87,8 +90,23 @@ class HeartbeatBlock:
         """Record since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
         self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE] = since_ns
 
+    def set_addresses(self, slot: int, addresses: Sequence[tuple[str, int]]) -> None:
+        """Record where the vehicles of a slot's holder were heard last (IPv4, port): the first eight of them."""
+        base = slot * _WORDS_PER_SLOT + _ADDRESSES
+        for index in range(MOST_ADDRESSES):
+            address = addresses[index] if index < len(addresses) else ("0.0.0.0", 0)
+            # One word each: a reader never sees one vehicle's address with another one's port.
+            self._words[base + index] = int.from_bytes(socket.inet_aton(address[0]), "big") << 16 | address[1]
+
+    def addresses(self, slot: int) -> tuple[tuple[str, int], ...]:
+        """Return the same; a restart of the holder does not erase them."""
+        base = slot * _WORDS_PER_SLOT + _ADDRESSES
+        words = [self._words[base + index] for index in range(MOST_ADDRESSES)]
+        return tuple((socket.inet_ntoa((word >> 16).to_bytes(4, "big")), word & 0xFFFF) for word in words if word)
+
     def clear(self, slot: int) -> None:
-        """Forget the former holder of a slot, before its successor starts; not since when others speak for it."""
+        """Forget the former holder of a slot, before its successor starts; not since when others speak for it,
+        nor where its vehicles are."""
         base = slot * _WORDS_PER_SLOT
         self._words[base : base + _SILENT_SINCE] = memoryview(bytes(_SILENT_SINCE * 8)).cast("q")
 

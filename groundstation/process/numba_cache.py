@@ -50,7 +50,7 @@ def activate(packages: Iterable[str] = FLIGHT) -> Path:
 
 
 def is_complete(folder: Path) -> bool:
-    """Tell whether this checkout's flying kernels are all in a cache that `activate` returned."""
+    """Return whether this checkout's flying kernels are all in a cache that `activate` returned."""
     return _mark(folder).exists()
 
 

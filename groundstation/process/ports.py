@@ -11,7 +11,7 @@ from ipaddress import IPv4Address, IPv6Address
 from pathlib import Path
 
 _PROC = Path("/proc")
-_LISTENING, _UNCONNECTED = "0A", "07"  # of TCP, of UDP (proc_pid_net(5))
+_LISTENING, _ESTABLISHED, _UNCONNECTED = "0A", "01", "07"  # two of TCP, one of UDP (proc_pid_net(5))
 _WORD = 8
 
 
@@ -37,6 +37,16 @@ class _Socket:
     inode: str
 
 
+def host_of(endpoint: str) -> str:
+    """Return the address in an endpoint of the bus, as in "tls/127.0.0.1:4717"."""
+    return endpoint.partition("/")[2].rpartition(":")[0]
+
+
+def port_of(endpoint: str) -> int:
+    """Return the port in an endpoint of the bus."""
+    return int(endpoint.rpartition(":")[2])
+
+
 def holder_of(address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> Holder:
     """Return who keeps others from binding an address and port: it holds that address, or all of them."""
     everywhere = ("0.0.0.0", "::")
@@ -55,6 +65,17 @@ def why_refused(error: OSError, address: str, port: int, kind: socket.SocketKind
     if error.errno == errno.EADDRINUSE:
         return f"the port is taken by {holder_of(address, port, kind)}"
     return os.strerror(error.errno or 0)
+
+
+def user_of(peer: tuple[str, int], server: tuple[str, int]) -> int | None:
+    """Return the user id of the program at the other end of a TCP connection within this machine, None if unknown.
+
+    A connection that its program has closed counts as unknown: the kernel calls it root's.
+    """
+    for fields in _lines("tcp"):
+        if fields[3] == _ESTABLISHED and (_end(fields[1]), _end(fields[2])) == (peer, server):
+            return int(fields[7])
+    return None
 
 
 def networks_in_use() -> set[str]:
@@ -77,14 +98,21 @@ def is_free(address: str, port: int) -> bool:
 def _sockets(kind: socket.SocketKind) -> Iterator[_Socket]:
     name, state = ("tcp", _LISTENING) if kind is socket.SOCK_STREAM else ("udp", _UNCONNECTED)
     for table in (name, f"{name}6"):
-        try:
-            lines = (_PROC / "net" / table).read_text().splitlines()[1:]
-        except OSError:
-            continue  # a kernel without IPv6, or without this file
-        for fields in map(str.split, lines):
+        for fields in _lines(table):
             if fields[3] == state:
-                address, _, port = fields[1].partition(":")
-                yield _Socket(_address(address), int(port, 16), fields[9])
+                yield _Socket(*_end(fields[1]), fields[9])
+
+
+def _lines(table: str) -> list[list[str]]:
+    try:
+        return [line.split() for line in (_PROC / "net" / table).read_text().splitlines()[1:]]
+    except OSError:
+        return []  # a kernel without IPv6, or without this file
+
+
+def _end(text: str) -> tuple[str, int]:
+    address, _, port = text.partition(":")
+    return _address(address), int(port, 16)
 
 
 def _address(text: str) -> str:

@@ -1,28 +1,67 @@
 """Speaks to a drone whose driver is dead or hangs: hover, and after a while land, in the drone's own protocol."""
 
-import socket
+import logging
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from enum import IntEnum
 
+from groundstation.errors import GroundStationError
 from groundstation.supervisor.process_spec import FailsafeDatagrams
+from groundstation.supervisor.voice import Address, Voice, open_voice
 from groundstation.time_units import NS_PER_S
 
 _PERIOD_NS = 100_000_000
+_log = logging.getLogger(__name__)
+
+
+class Speaker(IntEnum):
+    """Who speaks for a driver; the driver itself is 1."""
+
+    SUPERVISOR = 2
+    GUARDIAN = 3
+
+
+@dataclass(slots=True)
+class _Speech:
+    words: FailsafeDatagrams
+    since_ns: int
+    addresses: Sequence[Address]
 
 
 class FailsafeSender:
     """Repeats the datagrams of each silent driver every 100 ms until they are called off."""
 
-    def __init__(self) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._speaking: dict[str, tuple[FailsafeDatagrams, int]] = {}
+    def __init__(self, speaker: Speaker = Speaker.SUPERVISOR) -> None:
+        self._speaker = speaker
+        self._voices: dict[str, Voice] = {}
+        self._speaking: dict[str, _Speech] = {}
         self._next_ns = 0
 
-    def begin(self, name: str, words: FailsafeDatagrams, since_ns: int) -> bool:
-        """Start to speak, at once, for a driver that is silent since then; returns whether that is news."""
+    def prepare(self, name: str, words: FailsafeDatagrams) -> str:
+        """Open what carries the words of a driver, before they are needed; returns "" or why it cannot be."""
+        if name in self._voices:
+            return ""
+        try:
+            self._voices[name] = open_voice(words, self._speaker)
+        except (OSError, GroundStationError) as error:
+            return str(error)
+        return ""
+
+    def begin(
+        self, name: str, words: FailsafeDatagrams, since_ns: int, heard_at: Callable[[], Sequence[Address]] = tuple
+    ) -> bool:
+        """Start to speak, at once, for a driver that is silent since then; returns whether that is news.
+
+        heard_at: where the vehicles of a link that they call themselves were heard last.
+        """
         if name in self._speaking:
             return False
-        self._speaking[name] = (words, since_ns)
+        why = self.prepare(name, words)
+        if why:
+            _log.error("nobody can speak for %s: %s", name, why)
+        addresses = heard_at() if words.called else ((words.address, words.port),)
+        self._speaking[name] = _Speech(words, since_ns, addresses)
         self._next_ns = 0
         return True
 
@@ -35,12 +74,16 @@ class FailsafeSender:
         if now_ns < self._next_ns or not self._speaking:
             return
         self._next_ns = now_ns + _PERIOD_NS
-        for words, since_ns in self._speaking.values():
-            too_long = now_ns - since_ns >= words.land_after_s * NS_PER_S
-            with suppress(OSError):
-                self._socket.sendto(words.land if too_long else words.hover, (words.address, words.port))
+        for name, speech in self._speaking.items():
+            voice, words = self._voices.get(name), speech.words
+            if voice is not None:
+                too_long = now_ns - speech.since_ns >= words.land_after_s * NS_PER_S
+                with suppress(OSError):
+                    voice.say(words.land if too_long else words.hover, speech.addresses)
 
     def close(self) -> None:
         """Fall silent; idempotent."""
         self._speaking.clear()
-        self._socket.close()
+        for voice in self._voices.values():
+            voice.close()
+        self._voices.clear()

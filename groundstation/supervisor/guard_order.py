@@ -1,4 +1,4 @@
-"""What the guardian is told: which slots of the heartbeat block it watches, and what their drones are told."""
+"""The guardian's order: the slots of the heartbeat block that it watches, and the datagrams for their drones."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ _MARGIN_S = 3.0
 
 
 class Post(msgspec.Struct, frozen=True):
-    """One guarded driver: its name, its slot in the heartbeat block, what its drone is told."""
+    """One guarded driver: its name, its slot in the heartbeat block, the datagrams for its drone."""
 
     name: str
     slot: int
@@ -26,7 +26,7 @@ class GuardOrder(msgspec.Struct, frozen=True):
 
 
 def guarded(table: tuple[ProcessSpec, ...]) -> tuple[ProcessSpec, ...]:
-    """Return the table with a guardian ahead, if there is a drone that others than its driver can speak to."""
+    """Return the table with a guardian ahead, if there is a drone."""
     posts = tuple(
         Post(spec.name, slot_of(index), spec.failsafe_datagrams)
         for index, spec in enumerate(table, start=1)

@@ -9,13 +9,14 @@ import os
 import select
 import signal
 import time
+from functools import partial
 
 import msgspec
 
 from groundstation.process.child import Child
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.priority import go_first
-from groundstation.supervisor.failsafe_sender import FailsafeSender
+from groundstation.supervisor.failsafe_sender import FailsafeSender, Speaker
 from groundstation.supervisor.guard_order import GuardOrder, Post
 from groundstation.supervisor.silence import DriverSigns, Guard, SupervisorSigns, SupervisorState, Word, signs_of
 from groundstation.time_units import NS_PER_MS
@@ -69,7 +70,10 @@ class Guardian:
     def __init__(self, order: GuardOrder, block: HeartbeatBlock) -> None:
         self._block = block
         self._drivers = [GuardedDriver(post, order.landing_s, block) for post in order.posts]
-        self._sender = FailsafeSender()
+        self._sender = FailsafeSender(Speaker.GUARDIAN)
+        self.speechless = {
+            post.name: why for post in order.posts if (why := self._sender.prepare(post.name, post.words))
+        }
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
         self.settled = False
 
@@ -90,7 +94,7 @@ class Guardian:
         if decision.word is Word.NONE:
             if self._sender.end(post.name):
                 _log.info("%s: the word is %s", post.name, "the supervisor's" if supervised else "the driver's")
-        elif self._sender.begin(post.name, post.words, decision.since_ns):
+        elif self._sender.begin(post.name, post.words, decision.since_ns, partial(self._block.addresses, slot)):
             _log.warning("%s is silent, and so is the supervisor: its drone is told to hover, then to land", post.name)
         if decision.since_ns != before_ns:
             self._block.set_silent_since(slot, decision.since_ns)
@@ -112,7 +116,12 @@ def run(child: Child) -> int:
     block = HeartbeatBlock.attach(child.spec.heartbeat)
     guardian = Guardian(order, block)
     go_first()
-    child.ready(", ".join(post.name for post in order.posts))
+    names = ", ".join(post.name for post in order.posts)
+    missing = "; ".join(f"nobody can speak for {name}: {why}" for name, why in guardian.speechless.items())
+    if missing:
+        child.degrade(missing)
+    else:
+        child.ready(names)
     while True:
         now_ns = time.monotonic_ns()
         stops = block.state(SUPERVISOR_SLOT) is SlotState.STOPPING

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import BinaryIO
 
+from groundstation.bus.roles import Identity
 from groundstation.errors import GroundStationError
 from groundstation.process.child import ChildSpec
 from groundstation.supervisor.process_spec import ProcessSpec
@@ -20,11 +21,12 @@ _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 class Launcher:
     """Knows the run folder and the environment that children get; log files stay open across restarts."""
 
-    def __init__(self, run_dir: Path, endpoint: str, site: str, heartbeat: str) -> None:
+    def __init__(self, run_dir: Path, endpoint: str, site: str, heartbeat: str, identities: Path | None = None) -> None:
         self._run_dir = run_dir
         self._endpoint = endpoint
         self._site = site
         self._heartbeat = heartbeat
+        self._identities = identities
         self._logs: dict[str, BinaryIO] = {}
 
     def log_path(self, name: str) -> Path:
@@ -56,6 +58,7 @@ class Launcher:
                 heartbeat_index=slot,
                 section=json.dumps(section),
                 parent_pid=os.getpid(),
+                identity=self._identity(spec),
             )
         )
         if spec.command:
@@ -64,6 +67,11 @@ class Launcher:
         with _memory_file(json.dumps(child).encode()) as specification:
             command = [sys.executable, "-m", "groundstation.process.entry", spec.name, spec.entry]
             return self._popen(spec, command, specification.fileno())
+
+    def _identity(self, spec: ProcessSpec) -> Identity | None:
+        if self._identities is None or not (spec.on_bus or spec.is_router):
+            return None
+        return Identity(str(self._identities), spec.name, self._run_dir.name)
 
     def _command(self, spec: ProcessSpec, document: dict[str, object]) -> list[str]:
         path = self._run_dir / f"{spec.name}.json"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.errors import GroundStationError
-from groundstation.process.ports import holder_of, is_free, networks_in_use
+from groundstation.process.ports import holder_of, host_of, is_free, networks_in_use, port_of
 from groundstation.supervisor import runtime_file
 
 _FIRST_DRONE, _FIRST_CAMERA, _STREAM_PORT = 11, 50, 8080
@@ -29,7 +29,7 @@ class Network:
     @property
     def endpoint(self) -> str:
         """Where the router listens."""
-        return f"tcp/{self.prefix}.1:{self.bus_port}"
+        return f"tls/{self.prefix}.1:{self.bus_port}"
 
     def drone_address(self, index: int) -> str:
         """Return the address of an emulated drone."""
@@ -87,10 +87,10 @@ def _free_port(prefix: str, wanted: int) -> int:
 
 def require_free(endpoint: str) -> None:
     """Raise GroundStationError naming who already listens where the router should."""
-    address, _, port = endpoint.removeprefix("tcp/").rpartition(":")
-    if not is_free(address, int(port)):
+    address, port = host_of(endpoint), port_of(endpoint)
+    if not is_free(address, port):
         raise GroundStationError(
-            f"{_taken(address, int(port))}: end it, or give this ground station another port (--set bus.port=...)"
+            f"{_taken(address, port)}: end it, or give this ground station another port (--set bus.port=...)"
         )
 
 

@@ -26,9 +26,11 @@ class StopOrder(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class FailsafeDatagrams:
-    """What supervisor or guardian tell a drone for a driver that died or hangs, in the drone's own protocol.
+    """Datagrams of supervisor or guardian for a drone whose driver died or hangs, in the drone's own protocol.
 
-    hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead.
+    hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead. voice:
+    "module:function" that makes what carries them from way and a speaker's number, "" for UDP. called: vehicles call
+    the driver, so that they are where they were heard last.
     """
 
     address: str
@@ -36,6 +38,9 @@ class FailsafeDatagrams:
     hover: bytes
     land: bytes
     land_after_s: float = 3.0
+    voice: str = ""
+    way: str = ""
+    called: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +51,7 @@ class ProcessSpec:
     a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
     silence_limit_s: heartbeat older than this starts its fail-safe datagrams; hang_limit_s: it is killed (both after
     READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it.
-    on_terminal: it writes to the operator's terminal.
+    on_terminal: it writes to the operator's terminal. entities: the vehicles or the camera that a device speaks of.
     """
 
     name: str
@@ -67,6 +72,12 @@ class ProcessSpec:
     on_bus: bool = True
     on_terminal: bool = False
     keep_open: tuple[int, ...] = ()
+    entities: tuple[str, ...] = ()
+
+    @property
+    def is_router(self) -> bool:
+        """Whether the bus is its own."""
+        return self.stop_order is StopOrder.CONNECTS
 
 
 def slot_of(index: int) -> int:

@@ -1,10 +1,12 @@
-"""The runtime file: tells `groundstation land` and friends where a run's router and processes are.
+"""The runtime file: where `groundstation land` and friends find a run's router and processes.
 
-Lives in $XDG_RUNTIME_DIR, or /tmp/skein-<uid>, as SITE-PID.json, readable by its owner only. A pid counts only with
-its start time, so a file left by a crash never points at a stranger.
+Lives in $XDG_RUNTIME_DIR, or /tmp/skein-<uid>, as SITE-PID.json, readable by its owner only, beside SITE-PID, the
+folder of the run's certificates. A pid counts only with its start time, so a file left by a crash never points at a
+stranger.
 """
 
 import os
+import shutil
 import stat
 import tempfile
 from contextlib import suppress
@@ -12,11 +14,12 @@ from pathlib import Path
 
 import msgspec
 
+from groundstation.bus.roles import Identity, Role, shell
 from groundstation.errors import GroundStationError
 
 
 class ProcessRecord(msgspec.Struct, frozen=True):
-    """One process of a run; start_time in clock ticks since boot, as the kernel tells it."""
+    """One process of a run; start_time in clock ticks since boot, from the kernel."""
 
     name: str
     role: str
@@ -30,7 +33,7 @@ class ProcessRecord(msgspec.Struct, frozen=True):
 
 
 class RuntimeRecord(msgspec.Struct, frozen=True):
-    """A run as others see it."""
+    """A run as others see it; real: those of its drones that exist."""
 
     site: str
     field: str
@@ -40,6 +43,9 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
     drones: tuple[str, ...]
     supervisor: ProcessRecord
     processes: tuple[ProcessRecord, ...]
+    identities: str = ""
+    """Folder of the run's certificates; "" where the bus asks for none."""
+    real: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -51,10 +57,19 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
         """Whether any process of it still runs (drivers outlive a killed supervisor until they have landed)."""
         return any(process.alive for process in (self.supervisor, *self.processes))
 
+    def identity(self, role: Role) -> Identity | None:
+        """Return what a program of another shell joins the bus with."""
+        return Identity(self.identities, shell(role), Path(self.run_dir).name) if self.identities else None
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether a simulator runs in it, which tells the true states of what it emulates."""
+        return any(process.role == "sim_bridge" for process in self.processes)
+
     @property
     def simulated(self) -> bool:
-        """Whether its drones are emulated."""
-        return any(process.role == "sim_bridge" for process in self.processes)
+        """Whether all of its drones are emulated."""
+        return self.has_truth and not self.real
 
 
 def start_time(pid: int) -> int | None:
@@ -113,9 +128,16 @@ def live_records() -> list[RuntimeRecord]:
     return records
 
 
+def identities_of(site: str, pid: int) -> Path:
+    """Return where the certificates of a run are, or are to be."""
+    return folder() / f"{site}-{pid}"
+
+
 def remove(record: RuntimeRecord) -> None:
-    """Remove a record, and the heartbeat block that a killed supervisor could not remove."""
+    """Remove a record, and the certificates and heartbeat block that a killed supervisor could not remove."""
     (folder() / f"{record.name}.json").unlink(missing_ok=True)
+    if record.identities:
+        shutil.rmtree(folder() / record.name, ignore_errors=True)
     block = Path(record.heartbeat)
     if block.name.startswith("skein-"):
         with suppress(OSError):

@@ -21,7 +21,7 @@ BRAKE_NS = NS_PER_S
 
 
 class Word(Enum):
-    """What a drone without driver is told."""
+    """The command for a drone without driver."""
 
     NONE = 0
     HOVER = 1
@@ -100,7 +100,7 @@ def silent_since(signs: DriverSigns, before_ns: int, now_ns: int, awake_since_ns
 
 
 def word_at(since_ns: int, now_ns: int, land_after_s: float) -> Word:
-    """Return what a drone is told that is without its driver since then (0: it is not)."""
+    """Return the command for a drone that has had no driver since then (0: it has one)."""
     if not since_ns:
         return Word.NONE
     return Word.LAND if now_ns - since_ns >= land_after_s * NS_PER_S else Word.HOVER

@@ -3,15 +3,19 @@
 import logging
 import os
 import select
+import shutil
 import signal
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from groundstation.bus.api import Subscription
 from groundstation.bus.messages import Lifecycle, ProcessStatus, Severity
+from groundstation.bus.roles import SHELLS, Identity
 from groundstation.bus.topics import PROCESS_STATUS
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
+from groundstation.process import ports
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.events import ProcessEvents
@@ -35,13 +39,19 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a run is called and where it happens."""
+    """What a run is called and where it happens; real: the drones that exist."""
 
     site: str
     field: str
     endpoint: str
     run_dir: Path
     drones: tuple[str, ...]
+    real: tuple[str, ...] = ()
+
+    @property
+    def guarded(self) -> bool:
+        """Whether its bus belongs to it alone."""
+        return self.endpoint.startswith("tls/")
 
 
 class Supervisor:
@@ -56,7 +66,8 @@ class Supervisor:
         self.events = ProcessEvents(terminal)
         self.interrupts = Interrupts()
         self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
-        self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path))
+        self._identities = runtime_file.identities_of(run.site, os.getpid()) if run.guarded else None
+        self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path), self._identities)
         self.processes = [ManagedProcess(spec, slot_of(index), self._block) for index, spec in enumerate(table)]
         self._last_words = FailsafeSender()
         self.bus: ZenohBus | None = None
@@ -73,13 +84,35 @@ class Supervisor:
         """Listen to the operator's signals and open the log files; raises GroundStationError when it cannot."""
         self.interrupts.install()
         self._launcher.prepare(tuple(process.spec for process in self.processes))
+        self._find_words()
+        self._make_identities()
         self._block.set_state(SUPERVISOR_SLOT, SlotState.READY)
+
+    def _find_words(self) -> None:
+        """Open what the fail-safe datagrams need; a link whose driver cannot use it either fails its start."""
+        for process in self.processes:
+            words = process.spec.failsafe_datagrams
+            why = "" if words is None else self._last_words.prepare(process.spec.name, words)
+            if why:
+                _log.error("nobody could speak for %s: %s", process.spec.name, why)
+
+    def _make_identities(self) -> None:
+        if self._identities is None:
+            return
+        from groundstation.supervisor.authority import make_identities
+
+        members = [process.spec.name for process in self.processes if process.spec.on_bus or process.spec.is_router]
+        names = (*members, SOURCE, *(member.name for member in SHELLS))
+        make_identities(self._identities, ports.host_of(self.run.endpoint), names)
 
     def connect(self) -> None:
         """Join the bus; its router is up."""
-        self.bus = self.events.bus = open_bus(self.run.endpoint, self.run.site, SOURCE)
+        self.bus = self.events.bus = open_bus(self.run.endpoint, self.run.site, SOURCE, identity=self._identity())
         self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
         self._publisher = StatusPublisher(self.bus)
+
+    def _identity(self) -> Identity | None:
+        return Identity(str(self._identities), SOURCE, self.run.run_dir.name) if self._identities else None
 
     def launch(self, process: ManagedProcess) -> None:
         """Start a process; one that cannot be executed is tried again, or is the failure of a run that needs it."""
@@ -108,8 +141,10 @@ class Supervisor:
             run_dir=str(self.run.run_dir.absolute()),
             heartbeat=str(self._block.path),
             drones=self.run.drones,
+            real=self.run.real,
             supervisor=own,
             processes=tuple(record(process) for process in self.processes if process.running),
+            identities=str(self._identities or ""),
         )
         try:
             runtime_file.write(self._record)
@@ -199,7 +234,8 @@ class Supervisor:
         words = process.spec.failsafe_datagrams
         if words is None or self._stopping:
             return
-        if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns):
+        heard_at = partial(self._block.addresses, process.slot)
+        if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns, heard_at):
             self.events.event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
 
     def _kill(self, process: ManagedProcess, reason: str, due: bool) -> None:
@@ -273,5 +309,7 @@ class Supervisor:
         if self._record is not None:
             runtime_file.remove(self._record)
             self._record = None
+        if self._identities is not None:
+            shutil.rmtree(self._identities, ignore_errors=True)
         self._launcher.close()
         self._block.path.unlink(missing_ok=True)

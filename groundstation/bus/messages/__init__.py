@@ -11,6 +11,7 @@ from groundstation.bus.messages.belief import (
     Innovation,
     JournalEntry,
     SensorLateness,
+    TargetSearch,
     Verdict,
 )
 from groundstation.bus.messages.flight import (
@@ -32,6 +33,7 @@ from groundstation.bus.messages.sensing import (
     Odometry,
     PoseHypothesis,
     RelativeObservation,
+    SearchedPicture,
 )
 from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthState
 
@@ -63,11 +65,13 @@ __all__ = [
     "ProcessStatus",
     "Quaternion",
     "RelativeObservation",
+    "SearchedPicture",
     "SensorLateness",
     "Severity",
     "SimCommand",
     "SimStatus",
     "SolverReport",
+    "TargetSearch",
     "TruthState",
     "Vector3",
     "VehicleStatus",

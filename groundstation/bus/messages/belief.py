@@ -24,6 +24,27 @@ class EntityEstimate(msgspec.Struct, frozen=True):
     """Whether the estimate is good enough to fly on."""
     age_s: float
     """Time since the last observation that corrected it [s]."""
+    unlocalised_s: float = 0.0
+    """For how long a flying robot may not have been where it is believed [s]; 0 while it is known."""
+
+
+class TargetSearch(msgspec.Struct, frozen=True):
+    """The search for a target that is not seen where it was expected."""
+
+    target: str
+    """The target."""
+    mode: str
+    """`SEARCH`, or `LOST` when most of the room was searched: a person is asked."""
+    since_s: float
+    """For how long it has lasted [s]."""
+    place_m: tuple[float, float]
+    """Where the target most likely is [m; world]."""
+    searched: float
+    """Share of the room that was searched."""
+    expected_s: float | None
+    """About how much longer it takes [s]; none: nobody can search now."""
+    text: str
+    """The same in words."""
 
 
 class Estimate(Message, frozen=True, kw_only=True):
@@ -33,6 +54,8 @@ class Estimate(Message, frozen=True, kw_only=True):
     """One estimate per robot and target."""
     epoch: int
     """The tracker's epoch: rises when it restarts or its belief breaks."""
+    searches: tuple[TargetSearch, ...] = ()
+    """One search per target that is searched for."""
 
 
 class SensorLateness(msgspec.Struct, frozen=True):

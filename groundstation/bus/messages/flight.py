@@ -35,6 +35,8 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     """The vehicle's own report."""
     mode: str
     """Mode of the driver's watchdog: CONNECTING, LANDED, TAKING_OFF, HOVER, TRACK, HOLD, LANDING or CUT."""
+    failsafe: str = ""
+    """Condition of the table of failsafes that acts or led to this mode; empty: an order or the vehicle itself did."""
     battery: float | None = None
     """Charge, 0 to 1; none: unknown."""
     link_quality: float | None = None
@@ -91,7 +93,9 @@ class Command(Message, frozen=True, kw_only=True):
     issuer: str
     """Process that gave it."""
     expires_ns: int = 0
-    """Time after which it is ignored [ns; boot clock]; 0: never, as for all stops."""
+    """Time after which it is ignored [ns; boot clock]; 0: as for all stops, 30 s after its stamp."""
+    run: str = ""
+    """Run that it was given for: drivers of another refuse it."""
 
 
 class AckStage(StrEnum):

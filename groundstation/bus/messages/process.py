@@ -28,6 +28,8 @@ class Event(Message, frozen=True, kw_only=True):
     """What happened."""
     remedy: str = ""
     """What the operator can do about it."""
+    injected: bool = False
+    """Whether a scenario of the simulator does it: a fault that begins, lasts or ends."""
 
 
 class Lifecycle(StrEnum):

@@ -35,6 +35,8 @@ class Odometry(Message, frozen=True, kw_only=True):
     """Position [m; odom], if measured."""
     reset: int = 0
     """Rises by one when yaw or position jump: differences across a reset mean nothing."""
+    attitude_std_rad: float = 0.0
+    """Standard deviation of roll and of pitch [rad]; 0: as the field file says."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -80,6 +82,17 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_square("covariance", self.covariance, (3,) if self.yaw_rad is None else (4,))
+
+
+class SearchedPicture(Message, frozen=True, kw_only=True):
+    """A picture that a camera searched all over for markers, also when it shows none; stamped with the exposure."""
+
+    observer: str
+    """A drone, or the name of a world-fixed camera."""
+    camera: str
+    """The camera."""
+    found: tuple[str, ...] = ()
+    """The robots and targets whose markers it shows."""
 
 
 class CameraStatus(Message, frozen=True, kw_only=True):

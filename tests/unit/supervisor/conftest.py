@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.flight.composition import router_section
 from groundstation.supervisor.process_spec import ProcessSpec, StopOrder
 from groundstation.supervisor.supervisor import Run, Supervisor
 from groundstation.supervisor.terminal import Terminal
@@ -29,13 +30,13 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[.
     made: list[Supervisor] = []
     sink = os.open(tmp_path / "terminal", os.O_WRONLY | os.O_CREAT)
 
-    def build(*specs: ProcessSpec) -> Supervisor:
-        endpoint = f"tcp/127.0.0.1:{free_port()}"
+    def build(*specs: ProcessSpec, guarded: bool = False) -> Supervisor:
+        endpoint = f"{'tls' if guarded else 'tcp'}/127.0.0.1:{free_port()}"
         router = ProcessSpec(
             "router",
             "router",
             entry="groundstation.runtime.router:run",
-            section=json.dumps({"endpoint": endpoint}),
+            section=router_section(endpoint, "lab", specs) if guarded else json.dumps({"endpoint": endpoint}),
             stop_order=StopOrder.CONNECTS,
             on_bus=False,
         )

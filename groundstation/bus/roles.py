@@ -1,0 +1,76 @@
+"""Who takes part in a run: the roles that the table of topics and the access control speak of."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Role(StrEnum):
+    """What a member of the bus is there for."""
+
+    SUPERVISOR = "supervisor"
+    """The run's main process: watches the others, and is the operator's hands."""
+    TRACKER = "tracker"
+    """Estimates and plans."""
+    DRIVER = "driver"
+    """Speaks for its vehicles."""
+    CAMERA = "camera"
+    """Speaks for one camera."""
+    RECORDER = "recorder"
+    """Writes all of it down."""
+    CONSOLE = "console"
+    """Serves the operator's page."""
+    MONITOR = "monitor"
+    """Draws on the operator's terminal."""
+    SIM_BRIDGE = "sim_bridge"
+    """Emulates devices and knows the truth."""
+    CLI = "cli"
+    """A command in another shell."""
+    VIEW = "view"
+    """Listens, and says nothing."""
+
+
+DEVICES = frozenset({Role.DRIVER, Role.CAMERA})
+"""Roles that speak of their own vehicles and cameras only."""
+WITNESSES = frozenset({Role.RECORDER, Role.CONSOLE, Role.MONITOR, Role.SIM_BRIDGE, Role.VIEW})
+"""Roles that may hear ground truth and the simulator; nothing that estimates or flies is among them."""
+PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
+"""Roles of the processes that a run starts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One certificate of a run and what it stands for.
+
+    name: the certificate's common name. sources: the sources that it may speak as, key chunks in which `$*` stands for
+    any ending. entities: what a device speaks of.
+    """
+
+    name: str
+    role: Role
+    sources: tuple[str, ...]
+    entities: tuple[str, ...] = ()
+
+
+def shell(role: Role) -> str:
+    """Return the name in the certificate that programs of a role share which join from another shell."""
+    return f"{role}-shell"  # no process can be called so: its name has no hyphen
+
+
+SHELLS = (
+    Member(shell(Role.CLI), Role.CLI, ("cli_$*", "deadman_$*")),
+    Member(shell(Role.CONSOLE), Role.CONSOLE, ("console_$*",)),
+    Member(shell(Role.VIEW), Role.VIEW, ("view_$*", "monitor_$*")),
+)
+"""What the owner of a run may join it as, from any shell."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a process joins with: the folder of its run's certificates, and the name in its own.
+
+    run: name of the run; an order carries it.
+    """
+
+    folder: str
+    name: str
+    run: str

@@ -23,3 +23,8 @@ def require_foxglove() -> None:
 def require_parquet() -> None:
     """Raise OperatorMistake, with the remedy, when the extra [parquet] is not installed."""
     _require("pyarrow", "pyarrow", "parquet")
+
+
+def require_ros2() -> None:
+    """Raise OperatorMistake, with the remedy, when the extra [ros2] is not installed."""
+    _require("rosbags", "rosbags", "ros2")

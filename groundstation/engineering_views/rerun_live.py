@@ -57,7 +57,7 @@ class RerunServer:
 
 
 class RerunView:
-    """Shows what comes over the bus, on a server or into a file."""
+    """Shows the bus's messages, on a server or in a file."""
 
     def __init__(
         self,

@@ -29,7 +29,7 @@ class LiveView(Protocol):
 
 
 def watch(bus: Bus, view: LiveView, goes_on: Callable[[], bool]) -> int:
-    """Show what comes until `goes_on` says no or the view is gone; returns how many samples were dropped."""
+    """Show new messages until `goes_on` says no or the view is gone; returns how many samples were dropped."""
     queues = (bus.subscribe(_SHOWN, capacity=4096), bus.subscribe(IMAGE_TOPICS, capacity=64))
     while view.alive and goes_on():
         now_ns = clock.now_ns()

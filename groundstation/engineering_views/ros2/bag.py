@@ -1,0 +1,58 @@
+"""A recorded run as a rosbag2 folder (MCAP, profile ros2) that ROS 2 tools open."""
+
+from pathlib import Path
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from groundstation.bus.topics import IMAGE
+from groundstation.engineering_views.field import field_of
+from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
+from groundstation.engineering_views.ros2.scene import Ros2Scene
+from groundstation.errors import MessageError
+from groundstation.recording.outputs import errors_named, require_absent
+from groundstation.recording.reader import decode, payload
+from groundstation.recording.run import RecordedRun
+
+
+def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tuple[int, list[str]]:
+    """Write a new folder; returns how many ROS 2 messages it holds, and what could not be decoded.
+
+    Raises RecordingError when the folder exists, OutputError when it cannot be written.
+    """
+    require_absent(folder)
+    codec = Ros2Codec(distribution)
+    scene = Ros2Scene(codec, field_of(run.attachments))
+    unread: dict[str, None] = {}
+    with errors_named(folder), Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        bag = _Bag(writer, codec)
+        bag.write(run.start_ns, scene.static(run.start_ns))
+        for raw in run.records_from(run.start_ns, lambda topic: topic.type is not None or topic is IMAGE):
+            try:
+                if raw.key.topic.type is None:
+                    found = scene.take_picture(raw.log_time_ns, raw.key.entity, payload(raw)[1])
+                else:
+                    found = scene.take(raw.log_time_ns, decode(raw).message)
+            except MessageError as error:
+                unread[str(error)] = None
+                continue
+            for message in found:
+                bag.write(raw.log_time_ns, message)
+    return bag.written, list(unread)
+
+
+class _Bag:
+    def __init__(self, writer: Writer, codec: Ros2Codec) -> None:
+        self._writer, self._codec = writer, codec
+        self._connections: dict[str, Connection] = {}
+        self.written = 0
+
+    def write(self, stamp_ns: int, message: RosMessage) -> None:
+        """Write one message at a Unix time."""
+        connection = self._connections.get(message.topic)
+        if connection is None:
+            connection = self._connections[message.topic] = self._writer.add_connection(
+                message.topic, message.type, typestore=self._codec.store
+            )
+        self._writer.write(connection, stamp_ns, self._codec.encode(message))
+        self.written += 1

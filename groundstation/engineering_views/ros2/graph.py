@@ -1,0 +1,40 @@
+"""Keys, liveliness tokens and attachments of rmw_zenoh, by which ROS 2 nodes find and read each other over Zenoh.
+
+WIRE: all of it is in docs/reference/ros2.md 1 and 2.
+"""
+
+import struct
+
+_ADMIN_SPACE = "@ros2_lv"
+_NODE, _PUBLISHER = "NN", "MP"
+# reliable, volatile, keep the last 10; all else as the system likes it
+_QOS = "::,10:,:,:,,"
+_ENCLAVE = _NAMESPACE = "%"
+
+
+def dds_type(kind: str) -> str:
+    """Return the DDS name of a type: std_msgs/msg/String is std_msgs::msg::dds_::String_."""
+    package, group, name = kind.split("/")
+    return f"{package}::{group}::dds_::{name}_"
+
+
+def topic_key(domain: int, topic: str, kind: str, type_hash: str) -> str:
+    """Return the key under which a topic is published."""
+    return f"{domain}/{topic.lstrip('/')}/{dds_type(kind)}/{type_hash}"
+
+
+def node_token(domain: int, session: str, node: str) -> str:
+    """Return the token that says that a node lives."""
+    return f"{_ADMIN_SPACE}/{domain}/{session}/0/0/{_NODE}/{_ENCLAVE}/{_NAMESPACE}/{node}"
+
+
+def publisher_token(domain: int, session: str, node: str, number: int, topic: str, kind: str, type_hash: str) -> str:
+    """Return the token that says that a node publishes a topic; numbers of a session differ."""
+    name = topic.replace("/", "%")
+    entity = f"{_ADMIN_SPACE}/{domain}/{session}/0/{number}/{_PUBLISHER}/{_ENCLAVE}/{_NAMESPACE}/{node}"
+    return f"{entity}/{name}/{dds_type(kind)}/{type_hash}/{_QOS}"
+
+
+def attachment(sequence: int, stamp_ns: int, publisher: bytes) -> bytes:
+    """Return what goes with each message: its number, its Unix time and the 16 bytes of its publisher."""
+    return struct.pack("<qqB", sequence, stamp_ns, len(publisher)) + publisher

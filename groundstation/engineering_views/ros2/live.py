@@ -1,0 +1,99 @@
+"""A bridge to a ROS 2 Zenoh router: a client there, that publishes what the flight says and reads nothing."""
+
+import json
+import os
+import time
+from typing import Any
+
+import zenoh
+
+from groundstation.bus import codec as bus_codec
+from groundstation.bus import keys
+from groundstation.bus.api import Sample
+from groundstation.bus.keys import Key
+from groundstation.bus.topics import IMAGE
+from groundstation.engineering_views.ros2 import graph
+from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
+from groundstation.engineering_views.ros2.scene import Ros2Scene
+from groundstation.errors import MessageError, OperatorMistake
+from groundstation.field.resolved import ResolvedField
+from groundstation.recording.timeline import Timeline
+from groundstation.time_units import NS_PER_S
+
+_STATIC_NS = NS_PER_S
+_NODE = "skein"
+
+
+class Ros2View:
+    """Publishes until closed. It subscribes to nothing: no ROS 2 program can move a drone through it."""
+
+    def __init__(
+        self, router: str, domain: int, distribution: str, field: ResolvedField | None, timeline: Timeline
+    ) -> None:
+        self._codec, self._timeline, self._domain = Ros2Codec(distribution), timeline, domain
+        self._scene = Ros2Scene(self._codec, field)
+        # A peer would not be brokered by the router, and scouting would find other people's.
+        settings = {
+            "mode": "client",
+            "connect": {"endpoints": [router], "timeout_ms": 3000, "exit_on_failure": True},
+            "scouting": {"multicast": {"enabled": False}},
+        }
+        self._session: Any
+        try:
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+        except zenoh.ZError as error:
+            remedy = "start one (ros2 run rmw_zenoh_cpp rmw_zenohd), or name it with --router"
+            raise OperatorMistake(f"{router}: no ROS 2 Zenoh router answers; {remedy}") from error
+        self._zid = str(self._session.zid())
+        node = graph.node_token(domain, self._zid, _NODE)
+        self._tokens: list[Any] = [self._session.liveliness().declare_token(node)]
+        self._publishers: dict[str, tuple[Any, bytes, int]] = {}
+        self._keys: dict[str, Key] = {}
+        self._next_static_ns = 0
+
+    @property
+    def alive(self) -> bool:
+        """Return whether it still can publish."""
+        return not self._session.is_closed()
+
+    def take(self, sample: Sample, now_ns: int) -> None:
+        """Say on what arrived at a boot-clock time; what does not decode is passed over."""
+        if now_ns >= self._next_static_ns:
+            self._next_static_ns = now_ns + _STATIC_NS
+            self._publish(self._scene.static(now_ns + self._timeline.unix_offset_ns))
+        try:
+            messages = self._messages(sample, now_ns)
+        except MessageError:
+            return
+        for message in messages:
+            self._publish(message)
+
+    def _messages(self, sample: Sample, now_ns: int) -> list[RosMessage]:
+        key = self._keys.get(sample.key) or self._keys.setdefault(sample.key, keys.parse(sample.key))
+        if key.topic is IMAGE:
+            header = bus_codec.decode_header(key, sample.attachment)
+            stamp_ns, _ = self._timeline.times(header.stamp_ns, header.clock, now_ns)
+            return self._scene.take_picture(stamp_ns, key.entity, sample.payload)
+        if key.topic.type is None:
+            return []
+        message = bus_codec.decode(key, sample.payload)
+        stamp_ns, _ = self._timeline.times(message.header.stamp_ns, message.header.clock, now_ns)
+        return self._scene.take(stamp_ns, message)
+
+    def _publish(self, message: RosMessage) -> None:
+        publisher, identity, count = self._publishers.get(message.topic) or self._declare(message)
+        self._publishers[message.topic] = publisher, identity, count + 1
+        publisher.put(self._codec.encode(message), attachment=graph.attachment(count + 1, time.time_ns(), identity))
+
+    def _declare(self, message: RosMessage) -> tuple[Any, bytes, int]:
+        type_hash = self._codec.hash_of(message.type)
+        key = graph.topic_key(self._domain, message.topic, message.type, type_hash)
+        publisher = self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+        number = len(self._tokens)
+        token = graph.publisher_token(self._domain, self._zid, _NODE, number, message.topic, message.type, type_hash)
+        self._tokens.append(self._session.liveliness().declare_token(token))
+        return publisher, os.urandom(16), 0
+
+    def close(self) -> None:
+        """Leave the ROS 2 graph."""
+        self._session.close()

@@ -1,0 +1,80 @@
+"""A ROS-like Zenoh router, the bridge, and a foreign client that lists topics and decodes them."""
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rosbags")
+import zenoh
+
+from groundstation.bus import clock
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.engineering_views.ros2.codec import Ros2Codec
+from groundstation.engineering_views.ros2.live import Ros2View
+from groundstation.errors import OperatorMistake
+from groundstation.recording.timeline import Timeline
+
+
+def opened(**settings: Any) -> Any:
+    silent = {"scouting": {"multicast": {"enabled": False}}}
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def router() -> Iterator[str]:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    session = opened(mode="router", listen={"endpoints": [endpoint]})
+    yield endpoint
+    session.close()
+
+
+def test_a_foreign_client_lists_and_decodes(router: str) -> None:
+    exchange = MemoryExchange()
+    tracker, watcher = MemoryBus(exchange, "lab", "tracker"), MemoryBus(exchange, "lab", "view")
+    queue = watcher.subscribe([t.ESTIMATE, t.EVENT])
+    foreign = opened(mode="client", connect={"endpoints": [router]})
+    heard: dict[str, list[Any]] = {}
+    listening = foreign.declare_subscriber(
+        "7/**", lambda sample: heard.setdefault(str(sample.key_expr), []).append(sample)
+    )
+    bridge = Ros2View(router, 7, "jazzy", None, Timeline(clock.clock_id(), clock.unix_offset_ns()))
+    robot = m.EntityEstimate("drone_1", "robot", (1.0, 2.0, 1.5, 0.0), (0.01,) * 16, (0.0, 0.0, 0.0), True, 0.0)
+    try:
+        for _ in range(3):
+            tracker.publish(t.ESTIMATE, m.Estimate(header=tracker.header("team"), entities=(robot,), epoch=1))
+            for sample in queue.drain_samples():
+                bridge.take(sample, clock.now_ns())
+        deadline = time.monotonic() + 5
+        while len(heard) < 4 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        tokens = [str(reply.ok.key_expr) for reply in foreign.liveliness().get("@ros2_lv/7/**") if reply.ok]
+        assert any("/NN/" in token for token in tokens)
+        assert any("/MP/" in token and "%drone_1%pose" in token for token in tokens)
+        codec, kind = Ros2Codec(), "geometry_msgs/msg/PoseWithCovarianceStamped"
+        key = f"7/drone_1/pose/geometry_msgs::msg::dds_::PoseWithCovarianceStamped_/{codec.hash_of(kind)}"
+        pose: Any = codec.store.deserialize_cdr(heard[key][-1].payload.to_bytes(), kind)
+        assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == (1.0, 2.0)
+        assert len(heard[key][-1].attachment.to_bytes()) == 33
+    finally:
+        bridge.close()
+        listening.undeclare()
+        foreign.close()
+
+
+def test_a_missing_router_is_named_with_the_remedy() -> None:
+    timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
+    with pytest.raises(OperatorMistake, match="no ROS 2 Zenoh router answers"):
+        Ros2View(f"tcp/127.0.0.1:{free_port()}", 0, "jazzy", None, timeline)

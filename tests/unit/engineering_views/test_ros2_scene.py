@@ -1,0 +1,106 @@
+"""Messages of a flight as ROS 2 reads them: values, frames, keys and tokens, a bag that its own reader opens."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from groundstation.bus import messages as m
+from groundstation.engineering_views.ros2 import graph
+from groundstation.engineering_views.ros2.bag import write_bag
+from groundstation.engineering_views.ros2.codec import Ros2Codec
+from groundstation.engineering_views.ros2.scene import Ros2Scene
+from groundstation.recording.run import open_run
+from groundstation.recording.synthetic import write_run
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+
+STAMP_NS = 1_700_000_000_250_000_000
+
+
+def header(entity: str = "drone_1") -> m.Header:
+    return m.Header(1, "boot", entity, "tracker", 1)
+
+
+def scene() -> Ros2Scene:
+    return Ros2Scene(Ros2Codec(), None)
+
+
+def taken(message: m.Message) -> dict[str, Any]:
+    return {one.topic: one.content for one in scene().take(STAMP_NS, message)}
+
+
+def robot_heading_along_y() -> m.EntityEstimate:
+    covariance = np.diag([0.04, 0.09, 0.01, 0.25])
+    covariance[0, 1] = covariance[1, 0] = 0.02
+    mean = (1.0, 2.0, 1.5, math.pi / 2)
+    return m.EntityEstimate("drone_1", "robot", mean, tuple(covariance.ravel()), (0.0, 0.3, 0.1), True, 0.0)
+
+
+def test_an_estimate_is_a_frame_a_pose_and_odometry() -> None:
+    found = taken(m.Estimate(header=header("team"), entities=(robot_heading_along_y(),), epoch=1))
+    (frame,) = found["/tf"].transforms
+    assert (frame.header.frame_id, frame.child_frame_id) == ("world", "drone_1")
+    assert (frame.header.stamp.sec, frame.header.stamp.nanosec) == (1_700_000_000, 250_000_000)
+    rotation = frame.transform.rotation
+    assert (rotation.z, rotation.w) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)))
+    covariance = found["/drone_1/pose"].pose.covariance.reshape(6, 6)
+    assert covariance[0, 1] == 0.02 and covariance[5, 5] == 0.25 and covariance[3, 3] == 1e6
+    # Odometry's twist is in the body's frame: it flies along y, which is where it heads.
+    assert found["/drone_1/odom"].twist.twist.linear.x == pytest.approx(0.3)
+    assert found["/drone_1/odom"].twist.twist.linear.y == pytest.approx(0.0)
+    assert len(found["/skein/markers"].markers) == 2
+
+
+def test_a_planar_target_says_nothing_of_height_and_heading() -> None:
+    target = m.EntityEstimate("bot", "target", (1.0, 2.0), (0.01, 0.0, 0.0, 0.02), (0.1, 0.0), True, 0.0)
+    pose = taken(m.Estimate(header=header("team"), entities=(target,), epoch=1))["/bot/pose"]
+    covariance = pose.pose.covariance.reshape(6, 6)
+    assert covariance[1, 1] == 0.02 and covariance[2, 2] == covariance[5, 5] == 1e6
+
+
+def test_an_unknown_battery_is_not_an_empty_one() -> None:
+    status = m.VehicleStatus(header=header(), flight_state=m.FlightState.LOST, mode="HOVER", detail="not heard")
+    found = taken(status)
+    assert math.isnan(found["/drone_1/battery"].percentage)
+    (line,) = found["/diagnostics"].status
+    assert line.level == 2 and "not heard" in line.message
+
+
+def test_every_message_encodes_and_decodes_in_every_distribution() -> None:
+    for name in ("humble", "jazzy", "lyrical"):
+        codec = Ros2Codec(name)
+        made = Ros2Scene(codec, None)
+        event = m.Event(header=header(), severity=m.Severity.ERROR, text="lost", remedy="look")
+        for one in made.take(STAMP_NS, event) + made.take_picture(STAMP_NS, "ceiling", b"\xff\xd8") + [made.static(1)]:
+            assert codec.store.deserialize_cdr(codec.encode(one), one.type) is not None
+
+
+def test_keys_tokens_and_attachments_are_those_of_rmw_zenoh() -> None:
+    kind = "std_msgs/msg/String"
+    assert Ros2Codec("humble").hash_of(kind) == "TypeHashNotSupported"
+    known = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    assert Ros2Codec("jazzy").hash_of(kind) == known
+    assert graph.topic_key(5, "/chatter", kind, known) == f"5/chatter/std_msgs::msg::dds_::String_/{known}"
+    assert graph.node_token(5, "abc", "skein") == "@ros2_lv/5/abc/0/0/NN/%/%/skein"
+    token = graph.publisher_token(5, "abc", "skein", 3, "/drone_1/odom", kind, known)
+    assert token == (f"@ros2_lv/5/abc/0/3/MP/%/%/skein/%drone_1%odom/std_msgs::msg::dds_::String_/{known}/::,10:,:,:,,")
+    assert graph.attachment(2, 3, b"x" * 16) == b"\2" + bytes(7) + b"\3" + bytes(7) + b"\x10" + b"x" * 16
+
+
+def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
+    write_run(tmp_path / "run", load_field(find_field("lab"), ()).model_dump_json().encode(), 1.0)
+    count, unread = write_bag(open_run(tmp_path / "run"), tmp_path / "bag")
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    with file.open("rb") as stream:
+        read = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
+    topics = {one.channel.topic for one in read}
+    assert unread == [] and len(read) == count and len(topics) >= 15, topics
+    assert {"/tf", "/tf_static", "/drone_1/odom", "/skein/markers", "/diagnostics"} <= topics
+    assert (tmp_path / "bag" / "metadata.yaml").is_file()

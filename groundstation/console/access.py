@@ -1,8 +1,14 @@
-"""Who is let in: pages of this server in a browser on this host, and nobody that another site sent."""
+"""Who is let in: pages of this server in a browser of its own user, or of one who has the code; no other site."""
 
+import hmac
+import os
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from http.cookies import CookieError, SimpleCookie
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
+
+from groundstation.process.ports import user_of
 
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
@@ -48,11 +54,59 @@ def security_headers(host: str) -> list[tuple[bytes, bytes]]:
     ]
 
 
+class Door:
+    """Tells the programs of the user who runs this server from those of others, who have to show a code.
+
+    code: what others show, once as `/?code=`, then as a cookie; code_file: where its owner finds it.
+    """
+
+    def __init__(self, code: str, code_file: str = "") -> None:
+        self._code, self._file = code, code_file
+
+    def admits(self, scope: Mapping[str, Any]) -> bool:
+        """Return whether a request comes from our own user, or with the code."""
+        return self._is_own(scope) or hmac.compare_digest(
+            _cookie(scope, self._cookie_name(scope)).encode(), self._code.encode()
+        )
+
+    def shows_code(self, scope: Mapping[str, Any]) -> bool:
+        """Return whether the address of a request holds the code."""
+        query = parse_qs(scope["query_string"].decode("latin-1"))
+        return hmac.compare_digest(query.get("code", [""])[0].encode(), self._code.encode())
+
+    def cookie(self, scope: Mapping[str, Any]) -> bytes:
+        """Return the cookie that stands for the code from then on."""
+        return f"{self._cookie_name(scope)}={self._code}; HttpOnly; SameSite=Strict; Path=/".encode()
+
+    @property
+    def reason(self) -> str:
+        """Return what somebody is told who is not let in."""
+        place = f" It is in {self._file}." if self._file else ""
+        return f"another user of this machine runs this console; ask for its code and open /?code=CODE.{place}"
+
+    def _is_own(self, scope: Mapping[str, Any]) -> bool:
+        client, server = scope.get("client"), scope.get("server")
+        if client is None or server is None:
+            return False
+        return user_of((client[0], client[1]), (server[0], server[1])) in (os.getuid(), 0)
+
+    @staticmethod
+    def _cookie_name(scope: Mapping[str, Any]) -> str:
+        return f"skein_{(scope.get('server') or ('', 0))[1]}"  # cookies of one host are seen on all of its ports
+
+
+def _cookie(scope: Mapping[str, Any], name: str) -> str:
+    cookies = SimpleCookie()
+    with suppress(CookieError):
+        cookies.load(b"; ".join(value for key, value in scope["headers"] if key == b"cookie").decode("latin-1"))
+    return cookies[name].value if name in cookies else ""
+
+
 class Gate:
     """ASGI middleware that answers 403 to everything `refusal` has a reason for; counts them in `refused`."""
 
-    def __init__(self, app: Asgi) -> None:
-        self._app = app
+    def __init__(self, app: Asgi, door: Door) -> None:
+        self._app, self._door = app, door
         self.refused = 0
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
@@ -60,6 +114,11 @@ class Gate:
         if scope["type"] not in ("http", "websocket"):
             return
         reason = refusal(scope)
+        if not reason and not self._door.admits(scope):
+            if scope["type"] == "http" and self._door.shows_code(scope):
+                await _answer(send, 303, [(b"location", b"/"), (b"set-cookie", self._door.cookie(scope))], b"")
+                return
+            reason = self._door.reason
         if reason:
             self.refused += 1
             await _answer_403(scope, receive, send, reason)
@@ -80,5 +139,9 @@ async def _answer_403(scope: Any, receive: Any, send: Any, reason: str) -> None:
         await send({"type": "websocket.close", "code": 1008, "reason": reason})
         return
     headers = [(b"content-type", b"text/plain"), (b"x-content-type-options", b"nosniff")]
-    await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": reason.encode()})
+    await _answer(send, 403, headers, reason.encode())
+
+
+async def _answer(send: Any, status: int, headers: list[tuple[bytes, bytes]], body: bytes) -> None:
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})

@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from groundstation.console.access import Gate
+from groundstation.console.access import Door, Gate
 from groundstation.console.pages import StaticFile
 from groundstation.console.protocol import Hello, decode
 from groundstation.console.session import Sessions
@@ -40,6 +40,7 @@ class ConsoleApp:
         sessions: Sessions,
         seed: Callable[[int], str],
         clock: Callable[[], int],
+        door: Door,
     ) -> None:
         self._pages, self._token, self._board, self._sessions, self._seed = pages, token, board, sessions, seed
         self._clock = clock
@@ -51,7 +52,7 @@ class ConsoleApp:
             Route("/token", self._give_token),
             Route("/{path:path}", self._file),
         ]
-        self.asgi = Gate(Starlette(routes=routes))
+        self.asgi = Gate(Starlette(routes=routes), door)
 
     async def _file(self, request: Request) -> Response:
         file = self._pages.get(request.url.path)

@@ -73,7 +73,13 @@ class CommandDesk:
         scope = drones if stop else (OPERATOR, *drones)
         expires_ns = 0 if stop else header.stamp_ns + _EXPIRY_NS
         command = Command(
-            header=header, id=identity, verb=verb, scope=scope, issuer=self._bus.source, expires_ns=expires_ns
+            header=header,
+            id=identity,
+            verb=verb,
+            scope=scope,
+            issuer=self._bus.source,
+            expires_ns=expires_ns,
+            run=self._bus.run,
         )
         self._keep(Followed(self._book(command), now_ns, now_ns, by, ref))
         self._bus.publish(COMMAND, command)

@@ -31,7 +31,7 @@ class History:
         return now_ns >= self._next_trail_ns or self.sample_due(now_ns)
 
     def sample_due(self, now_ns: int) -> bool:
-        """Return whether a sample of the curves is to be taken."""
+        """Return whether a sample of the curves is due."""
         return now_ns >= self._next_sample_ns
 
     def step(

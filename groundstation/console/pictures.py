@@ -36,7 +36,7 @@ class PictureDesk:
         self.refused: dict[str, str] = {}
 
     def take_picture(self, camera: str, header: Header, jpeg: bytes, now_ns: int) -> bool:
-        """Keep a picture; returns whether it is to be shown. Its frame for viewers is in `frames`.
+        """Keep a picture; returns whether to show it. Its frame for viewers is in `frames`.
 
         Why the newest of a camera is not shown, if it is not, is in `refused`.
         """

@@ -9,7 +9,7 @@ from groundstation.field.resolved import ResolvedField
 
 
 class ConsoleSection(msgspec.Struct, frozen=True):
-    """The resolved field, the run folder, and whether ground truth is to be had."""
+    """The resolved field, the run folder, and whether there is ground truth."""
 
     field: ResolvedField
     run_dir: str

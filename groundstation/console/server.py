@@ -30,8 +30,11 @@ from groundstation.bus.topics import (
     TRUTH,
     VEHICLE_STATUS,
 )
+from groundstation.console.access import Door
 from groundstation.console.app import ConsoleApp
+from groundstation.console.code_file import CodeFile
 from groundstation.console.commands import CommandDesk
+from groundstation.console.half_open import HalfOpen, protocol
 from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
 from groundstation.console.player import Player
@@ -104,7 +107,11 @@ class ConsoleServer:
         steered = cast.targets if scene["truth"] and player is None else ()
         desk = CommandDesk(bus, tuple(cast.drones))
         self.sessions = Sessions(bus, desk, token, run, steered, lambda: self._pictures.frames, player)
-        self.app = ConsoleApp(load_pages(token, run), token, self.board, self.sessions, self._seed, self._now_ns)
+        self.half_open = HalfOpen()
+        self._code = CodeFile(listener.getsockname()[1])
+        door = Door(self._code.code, str(self._code.path))
+        pages = load_pages(token, run)
+        self.app = ConsoleApp(pages, token, self.board, self.sessions, self._seed, self._now_ns, door)
         self._run = run
         self._end: Event | None = None
         less_often = (*_LESS_OFTEN, TRUTH) if scene["truth"] else _LESS_OFTEN
@@ -132,7 +139,7 @@ class ConsoleServer:
             log_level="warning",
             lifespan="off",
             ws="websockets-sansio",
-            http="h11",
+            http=protocol(self.half_open),
             ws_max_size=16 * 1024,
             ws_per_message_deflate=False,
             ws_ping_interval=10.0,
@@ -144,8 +151,9 @@ class ConsoleServer:
         server = _Server(config)
         serving = asyncio.create_task(server.serve(sockets=[self._listener]))
         try:
-            await self._turns(go_on, serving)
-            await self._say_farewell()
+            with self._code:
+                await self._turns(go_on, serving)
+                await self._say_farewell()
         finally:
             server.should_exit = True
             await serving
@@ -171,7 +179,7 @@ class ConsoleServer:
             await asyncio.sleep(0.01)
 
     def turn(self, now_ns: int) -> None:
-        """Take in what has arrived and tell the viewers."""
+        """Take in new messages and update the viewers."""
         self.take_in(now_ns)
         self.board.begin()
         self.state.put(self.board, now_ns)
@@ -198,7 +206,7 @@ class ConsoleServer:
             self._hear(item.message, now_ns)
 
     def begin_anew(self) -> None:
-        """Forget what was seen: a replay has gone to another time. `show_anew` tells the viewers."""
+        """Forget what was seen: a replay has gone to another time. `show_anew` updates the viewers."""
         for subscription in (self._newest, self._less_often, self._each, self._images):
             subscription.drain_samples()
         self.state = ConsoleState(self._cast, self._now_ns())
@@ -206,7 +214,7 @@ class ConsoleServer:
         self.sessions.desk = CommandDesk(self._bus, tuple(self._cast.drones))
 
     def show_anew(self, now_ns: int) -> None:
-        """Tell all viewers everything, as to one that has just come."""
+        """Send everything to all viewers, as to a new one."""
         self._take_pictures(now_ns)
         self.board.begin()
         self.board.forget()

@@ -1,4 +1,4 @@
-"""What viewers are told: named sections of JSON, each with the turn in which it last changed."""
+"""The viewers' data: named sections of JSON, each with the turn in which it last changed."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ class Snapshot:
         self._composed.clear()
 
     def forget(self) -> None:
-        """Forget all sections: what comes next belongs to another time."""
+        """Forget all sections: later ones belong to another time."""
         self._sections.clear()
         self._changed.clear()
         self._composed.clear()

@@ -13,6 +13,7 @@ from groundstation.monitor.state import Cast, MonitorState, StampedMessage
 
 _EVENTS = 40
 _ALTERNATIVES = 8
+_AIRBORNE = frozenset({m.FlightState.TAKING_OFF, m.FlightState.FLYING, m.FlightState.HOVERING, m.FlightState.LANDING})
 # Sections that change slowly are looked at every so many turns.
 _OFTEN, _SELDOM = 2, 5
 
@@ -27,6 +28,8 @@ class ConsoleState:
         self.setpoints: dict[str, StampedMessage[m.VelocitySetpoint]] = {}
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self._sample: dict[str, Any] | None = None
+        self._airborne_since_ns: int | None = None
+        self._flown = False
 
     def ingest(self, received: Iterable[Received]) -> None:
         """Remember messages."""
@@ -68,9 +71,19 @@ class ConsoleState:
         """Put what changes ten times a second."""
         known = self.monitor
         board.put("vehicles", {name: _vehicle(seen) for name, seen in known.vehicles.items()})
+        board.put("flight", self._flight())
         board.put("plan", _plan(known.plan))
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [_event(seen) for seen in list(known.events)[-_EVENTS:]])
+
+    def _flight(self) -> dict[str, Any]:
+        """Return since when somebody is in the air, and whether anybody ever was."""
+        seen = self.monitor.vehicles.values()
+        airborne = [status.stamp_ns for status in seen if status.message.flight_state in _AIRBORNE]
+        self._flown |= bool(airborne)
+        self._airborne_since_ns = (self._airborne_since_ns or min(airborne)) if airborne else None
+        since_ns = self._airborne_since_ns
+        return {"airborne_since_ms": None if since_ns is None else since_ns / 1e6, "flown": self._flown}
 
     def put_seldom(self, board: Snapshot, now_ns: int) -> None:
         """Put what may be a quarter of a second old."""
@@ -107,7 +120,8 @@ def _estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
         }
         for entity in seen.message.entities
     ]
-    return {"at": _ms(seen), "epoch": seen.message.epoch, "entities": entities}
+    searches = {search.target: [search.mode, search.text] for search in seen.message.searches}
+    return {"at": _ms(seen), "epoch": seen.message.epoch, "entities": entities, "searches": searches}
 
 
 def _setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:

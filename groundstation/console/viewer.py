@@ -57,7 +57,7 @@ class PageConnection:
         self._wake.set()
 
     def reseed(self) -> None:
-        """Tell everything once more: what was said so far belongs to another time."""
+        """Send everything once more: earlier data belong to another time."""
         self._unseeded = True
         self._pictures.clear()
         self._wake.set()

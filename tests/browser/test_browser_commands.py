@@ -69,6 +69,7 @@ def test_cut_motors_wants_a_second_of_pressing(stage: Any) -> None:
 
 
 def test_one_operator_at_a_time(stage: Any) -> None:
+    stage.flight.modes = dict.fromkeys(stage.flight.modes, "LANDED")
     first, second = stage.open(), stage.open()
     first.there("take-off").click()
     first.wait(lambda s: verbs(stage) == ["TAKEOFF"])
@@ -82,6 +83,7 @@ def test_one_operator_at_a_time(stage: Any) -> None:
     second.page.wait_for_timeout(600)
     assert "you are the operator" in second.there("operator").inner_text()
     assert first.there("track").is_disabled()
+    stage.flight.modes["drone_1"] = "HOVER"
     second.there("track").click()
     second.wait(lambda s: verbs(stage)[-1] == "TRACK")
     first.shot("taken_over")

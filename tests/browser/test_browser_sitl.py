@@ -22,8 +22,10 @@ from serve_fake import field_json
 
 from groundstation.bus import topics as t
 from groundstation.bus.messages import ProcessStatus, TruthState
-from groundstation.bus.zenoh_bus import ZenohBus, open_bus
+from groundstation.bus.roles import Role
+from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.joining import join
 
 pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -98,7 +100,7 @@ def _answers(url: str) -> bool:
 
 
 def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord, served: str, open_page: Any) -> None:
-    bus = open_bus(flight.endpoint, flight.site, "witness")
+    bus = join(flight, "view", Role.VIEW)
     try:
         witness = Witness(bus)
         page: Seen = open_page(served)
@@ -125,7 +127,7 @@ def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
     flight: runtime_file.RuntimeRecord, served: str, record_property: Callable[[str, object], None]
 ) -> None:
     """Ten pages that take nothing, in every other window of the same flight: what else the machine does is in both."""
-    bus = open_bus(flight.endpoint, flight.site, "witness")
+    bus = join(flight, "view", Role.VIEW)
     try:
         witness, pace = Witness(bus), Pace(bus)
         eventually(lambda: _aloft(witness.look()), 150.0, "both drones fly")

@@ -85,6 +85,7 @@ def test_canvas_is_painted_and_dark_differs_from_light(stage: Any) -> None:
 
 
 def test_phone_and_keyboard(stage: Any) -> None:
+    stage.flight.modes["drone_1"] = "LANDED"  # or there would be nothing to take off
     page = stage.open()
     page.page.set_viewport_size({"width": 390, "height": 844})
     page.page.wait_for_timeout(800)
@@ -203,6 +204,7 @@ def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:
     )
     assert {camera["name"] for camera in state["scene"]["cameras"]} == set(mixed_stage.flight.cameras)
     for camera in (*mixed_stage.flight.cameras, "drone_1_camera", "drone_2_camera", "drone_3_camera"):
+        page.there(f"camera-{camera}").scroll_into_view_if_needed()
         page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden")
     assert page.there("land-all").inner_text().startswith("LAND ALL 3")
     assert page.there("drone_3-battery").inner_text() == "?"  # not told is not empty

@@ -2,6 +2,7 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
+import { refusalOf } from "./glance.js";
 import { me, on, send } from "./link.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
@@ -89,7 +90,7 @@ function holdToPress(button, fire) {
 
 export function showControls() {
   const names = droneNames(), session = store.s.session ?? {}, replay = replaying();
-  for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land]")) {
+  for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land], [data-hold]")) {
     node.dataset.title ??= node.title;
     node.disabled = replay || runOver();
     node.title = runOver() ? OVER : node.dataset.title;
@@ -100,7 +101,16 @@ export function showControls() {
   byId("takeover").hidden = replay || !me.trusted || free || mine;
   const able = !replay && !runOver() && me.trusted && store.connected && (free || mine) && Boolean(session.lease);
   const why = replay ? "a replay: nothing here can be commanded" : runOver() ? OVER : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
-  for (const id of ["takeoff", "track", "resume"]) { byId(id).disabled = !able; byId(id).title = why; }
+  for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
+    const reason = why || refusalOf(verb);
+    byId(id).disabled = !able || Boolean(reason);
+    byId(id).title = reason;
+  }
+  for (const node of document.querySelectorAll("[data-takeoff]")) {
+    const reason = why || refusalOf("TAKEOFF", [node.dataset.takeoff]);
+    node.disabled = !able || Boolean(reason);
+    node.title = reason;
+  }
 }
 
 export function showOrders() {

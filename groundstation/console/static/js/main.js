@@ -1,8 +1,10 @@
 // Puts the page together: what comes in marks what is to be drawn; drawing happens once per picture of the screen.
 
+import { showBar, startBar } from "./bar.js";
 import { buildCameras, pictures, showCameras, showDetections, startCameras } from "./cameras.js";
 import { buildCharts, showSamples } from "./charts.js";
 import { byId, el, svg } from "./dom.js";
+import { drawHeights } from "./heights.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
 import { give, showControls, showOrders, startOrders } from "./commands.js";
@@ -10,6 +12,7 @@ import { ink, nameRobots, startTheme } from "./palette.js";
 import { showPlan, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
+import { listen, startSounds } from "./sounds.js";
 import { ghostPoint, startSteering } from "./steer.js";
 import { droneNames, entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
 import { buildTeam, paint, showTeam } from "./team.js";
@@ -60,8 +63,8 @@ on("notice", (notice) => { addNotice(notice); showBanners(); });
 on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
 
 function showAll() {
-  showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showControls(); showOrders(); showPlayback();
-  describe();
+  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showControls(); showOrders(); showPlayback();
+  listen(); describe();
 }
 
 function describe() {
@@ -83,6 +86,7 @@ function frame(at) {
   if (dirty) {
     dirty = false;
     drawMap(view, ghostPoint());
+    drawHeights(byId("heights"), view.ratio ?? 1);
     if (undrawnStamp !== null) {
       drawn.latencies.push(now() - undrawnStamp);
       if (drawn.latencies.length > 200) drawn.latencies.shift();
@@ -118,6 +122,7 @@ const toggleTheme = startTheme(() => {
   paint(); buildLegend(); buildCharts(); showPlan();
   dirty = true;
 });
+const toggleWall = startBar(() => view.resize()), toggleSound = startSounds();
 byId("theme").onclick = toggleTheme;
 byId("help").onclick = () => byId("about").showModal();
 
@@ -128,6 +133,8 @@ addEventListener("keydown", (event) => {
   else if (key === "l") give("LAND");
   else if (key === "h") give("HOLD");
   else if (key === "t") toggleTheme();
+  else if (key === "w") toggleWall();
+  else if (key === "m") toggleSound();
   else if (key === "p" && steerable()) for (const { name } of store.scene.targets) send("followpath", { target: name });
   else if (key === "?") byId("about").open ? byId("about").close() : byId("about").showModal();
 });

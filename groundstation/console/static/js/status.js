@@ -1,5 +1,6 @@
 // Is what you see true? Banners, the pills of the top bar, estimator health, events, processes.
 
+import { showMore } from "./bar.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { drawn } from "./map.js";
 import { ageS, estimateAge, replaying, runOver, silentS, store } from "./store.js";
@@ -25,6 +26,7 @@ export function showBanners() {
   for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, 4) : []) {
     if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave ? "grave" : "mild", alarm.text, ""]);
   }
+  banners.sort(([, a], [, b]) => (b === "grave") - (a === "grave"));
   const host = byId("banners"), kinds = banners.map(([kind]) => kind).join();
   if (host.dataset.kinds !== kinds) {
     noteSilence(kinds.split(","), (host.dataset.kinds ?? "").split(","), { tracker: age, silent: silentS() });
@@ -37,6 +39,7 @@ export function showBanners() {
     text(node.children[0], `${level === "grave" ? "⚠ " : ""}${title}`);
     text(node.children[1], more);
   });
+  showMore(banners.length);
 }
 
 // For tests: how late the page was to say that something is silent.

@@ -20,21 +20,31 @@ export function buildTeam() {
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
 const BELIEF = ["position", "ellipse", "speed"];
+// What stays on a screen that is read from 3 m.
+const CHIEF = new Set(["battery", "seen"]);
 const WIDE = new Set(["position", "ellipse", "by"]);
 
 function card(name, fields, drone) {
   const values = Object.fromEntries(fields.map((field) => [field, el("dd", { data: { testid: `${name}-${field}` } })]));
   const mode = el("span", { class: "pill", data: { testid: `${name}-mode` } });
   const chip = svg("svg", { viewBox: "0 0 18 18", class: "chip", "aria-hidden": "true" });
-  const land = drone ? el("button", { class: "small", "aria-label": `Land ${name}`, data: { testid: `${name}-land`, land: name } }, "Land") : null;
-  if (land) land.onclick = () => give("LAND", [name]);
   const detail = el("p", { class: "detail", hidden: true });
   const root = el("article", { class: "unit", "aria-label": name, data: { testid: `card-${name}` } },
-    el("div", { class: "head" }, chip, el("strong", {}, name), mode, land),
-    el("dl", {}, ...fields.map((field) => el("div", { class: WIDE.has(field) ? "wide" : "" }, el("dt", {}, TITLES[field]), values[field]))), detail);
+    el("div", { class: "head" }, chip, el("strong", {}, name), mode),
+    el("dl", {}, ...fields.map((field) => el("div", { class: `${WIDE.has(field) ? "wide" : ""}${CHIEF.has(field) ? " chief" : ""}` }, el("dt", {}, TITLES[field]), values[field]))), detail, drone ? actions(name) : null);
   cards.set(name, { root, values, mode, chip, detail, drone });
   paint(name);
   return root;
+}
+
+// Each in its place for good: a click that comes late must not find another button there.
+function actions(name) {
+  const button = (verb, words) => {
+    const kind = verb.toLowerCase(), made = el("button", { class: "small", "aria-label": `${words} ${name}`, data: { testid: `${name}-${kind}`, [kind]: name } }, words);
+    made.onclick = () => give(verb, [name]);
+    return made;
+  };
+  return el("div", { class: "actions" }, button("TAKEOFF", "Take off"), button("HOLD", "Hold"), button("LAND", "Land"));
 }
 
 export function paint(only) {
@@ -90,14 +100,17 @@ function showBattery(node, value, least) {
   node.replaceChildren(el("span", { class: "battery" }, fill), words);
 }
 
-function showBelief(name, { root, values, mode, drone }) {
+function showBelief(name, { root, values, mode, detail, drone }) {
   const body = entity(name), age = body ? estimateAge() + body.age_s : Infinity;
   const old = estimateAge() > STALE_S;
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s;
-    text(mode, !body ? "not found yet" : lost ? "lost" : "tracked");
-    mode.dataset.level = !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
+    const [search, words] = store.s.estimate?.searches?.[name] ?? [];
+    text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : "tracked"));
+    mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
+    detail.hidden = !words;
+    text(detail, words ?? "");
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   text(values.seen, body ? `${seconds(age)} ago` : "not yet");

@@ -1,0 +1,68 @@
+"""Connections that do not say what they want: each has 5 s, and when there are too many the oldest one goes.
+
+A browser sends its request at once, so the oldest is never somebody's page; without this, a few hundred silent
+connections keep everybody else out.
+"""
+
+import asyncio
+from typing import Any
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+PATIENCE_S = 5.0
+MOST = 64
+
+
+class HalfOpen:
+    """The connections of one server that have no request under way; `ended` counts those that were shown out."""
+
+    def __init__(self, patience_s: float = PATIENCE_S, most: int = MOST) -> None:
+        self._patience_s, self._most = patience_s, most
+        self._waiting: dict[asyncio.Transport, asyncio.TimerHandle] = {}
+        self.ended = 0
+
+    def enter(self, transport: asyncio.Transport) -> None:
+        """Begin to wait for a request; the time runs from the first byte or silence on, and is not renewed."""
+        if transport in self._waiting:
+            return
+        loop = asyncio.get_running_loop()
+        self._waiting[transport] = loop.call_later(self._patience_s, self._end, transport)
+        if len(self._waiting) > self._most:
+            self._end(next(iter(self._waiting)))
+
+    def leave(self, transport: asyncio.Transport) -> None:
+        """Stop waiting: a request came, or the connection has gone."""
+        timer = self._waiting.pop(transport, None)
+        if timer is not None:
+            timer.cancel()
+
+    def _end(self, transport: asyncio.Transport) -> None:
+        self.leave(transport)
+        self.ended += 1
+        transport.abort()
+
+
+def protocol(waiting: HalfOpen) -> type[H11Protocol]:
+    """Return uvicorn's HTTP protocol, with impatience."""
+
+    class Impatient(H11Protocol):
+        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+            super().connection_made(transport)
+            waiting.enter(transport)
+
+        def data_received(self, data: bytes) -> None:
+            super().data_received(data)
+            if self.cycle is not None and not self.cycle.response_complete:
+                waiting.leave(self.transport)
+            elif not self.transport.is_closing() and self in self.connections:
+                waiting.enter(self.transport)
+
+        def handle_websocket_upgrade(self, event: Any) -> None:
+            waiting.leave(self.transport)
+            super().handle_websocket_upgrade(event)
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            waiting.leave(self.transport)
+            super().connection_lost(exc)
+
+    return Impatient

@@ -1,0 +1,60 @@
+// The bar on top: the team at a glance, how far the run is, and what it would accept.
+
+import { byId, el, seconds, text } from "./dom.js";
+import { oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
+import { ageS, replaying, store } from "./store.js";
+
+const WALL_KEY = "skein-wall", OLD_S = 1, TOO_OLD_S = 4;
+
+function show(id, words, level) {
+  const node = byId(id);
+  text(node, words);
+  if (level) node.dataset.level = level;
+  else delete node.dataset.level;
+}
+
+export function showBar() {
+  show("team-mode", ...teamMode());
+  const since = store.s.flight?.airborne_since_ms, airborne = since ? ageS(since) : null;
+  show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
+  const battery = worstBattery();
+  show("worst-battery", !battery ? "–" : battery.value === null ? `unknown ${battery.name}` : `${(100 * battery.value).toFixed(0)} % ${battery.name}`, battery?.level);
+  const oldest = oldestS();
+  show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
+  show("recording", ...(replaying() ? ["–", ""] : recording()));
+  showStages(stage());
+}
+
+function showStages(now) {
+  const host = byId("stages");
+  if (host.dataset.now === now) return;
+  host.dataset.now = now;
+  host.replaceChildren(...STAGES.map((name) => el("li", { "aria-current": name === now ? "step" : null }, name)));
+}
+
+export function startBar(resized) {
+  const wall = byId("wall"), more = byId("more");
+  const apply = (on) => { document.body.classList.toggle("wall", on); wall.setAttribute("aria-pressed", `${on}`); resized(); };
+  const toggle = () => {
+    const on = !document.body.classList.contains("wall");
+    try { localStorage.setItem(WALL_KEY, on ? "1" : ""); } catch { /* it lasts until the page goes */ }
+    apply(on);
+  };
+  try { apply(Boolean(localStorage.getItem(WALL_KEY))); } catch { apply(false); }
+  wall.onclick = toggle;
+  more.onclick = () => openAlarms(!byId("alarms").classList.contains("open"));
+  return toggle;
+}
+
+function openAlarms(open) {
+  byId("alarms").classList.toggle("open", open);
+  byId("more").setAttribute("aria-expanded", `${open}`);
+}
+
+// All but the gravest alarm stand behind this button, so that none of them moves the page.
+export function showMore(count) {
+  const more = byId("more");
+  if (count < 2) openAlarms(false);
+  more.hidden = count < 2;
+  text(more, byId("alarms").classList.contains("open") ? "close" : `+ ${count - 1} more`);
+}

@@ -1,0 +1,64 @@
+// What the bar says of the whole team, worked out of the newest of everything.
+
+import { ageS, droneNames, estimateAge, isTarget, entities, runOver, store } from "./store.js";
+
+const FRESH_S = 3, RECORDING_SILENT_S = 3;
+const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
+export const STAGES = ["pre-flight", "take-off", "track", "land", "over"];
+
+const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filter(Boolean);
+export const modes = (names = droneNames()) => names.map((name) => store.s.vehicles?.[name]?.mode).filter(Boolean);
+export const aloft = () => modes().filter((mode) => ALOFT.has(mode)).length;
+export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
+
+// The most careful thing that any drone does is what the team does; [words, level].
+export function teamMode() {
+  const all = modes(), lost = statuses().filter((status) => ageS(status.at) > FRESH_S).length;
+  if (runOver()) return ["RUN OVER", "calm"];
+  if (lost) return [`${lost} NOT HEARD`, "bad"];
+  if (all.includes("CUT")) return ["CUT", "bad"];
+  if (all.includes("LANDING")) return ["LANDING", "warn"];
+  if (all.includes("TAKING_OFF")) return ["TAKING OFF", "warn"];
+  if (all.includes("HOLD")) return ["HOLD", "warn"];
+  if (all.includes("TRACK")) return targetAgeS() > (store.scene?.lost_after_s ?? 3) ? ["SEARCH", "warn"] : ["TRACK", "good"];
+  if (all.includes("HOVER")) return ["HOVER", "warn"];
+  return all.length ? ["ON THE GROUND", "calm"] : ["–", "calm"];
+}
+
+export function stage() {
+  const all = modes();
+  if (runOver()) return "over";
+  if (all.includes("LANDING")) return "land";
+  if (all.includes("TAKING_OFF") || (all.includes("HOVER") && !all.includes("TRACK"))) return "take-off";
+  return aloft() ? "track" : store.s.flight?.flown ? "land" : "pre-flight";
+}
+
+// The least battery, and whose it is; null where a drone does not say.
+export function worstBattery() {
+  const known = droneNames().map((name) => [name, store.s.vehicles?.[name]?.battery]);
+  if (!known.length || known.some(([, value]) => value === undefined)) return null;
+  const unknown = known.find(([, value]) => value === null);
+  if (unknown) return { name: unknown[0], value: null, level: "warn" };
+  const [name, value] = known.reduce((least, one) => (one[1] < least[1] ? one : least));
+  const limit = store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15;
+  return { name, value, level: value < limit + 0.05 ? "bad" : value < limit + 0.15 ? "warn" : "good" };
+}
+
+export const oldestS = () => Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));
+
+export function recording() {
+  const recorder = store.s.processes?.recorder;
+  if (!recorder) return ["none", "warn"];
+  if (ageS(recorder.at) > RECORDING_SILENT_S) return ["STOPPED", "bad"];
+  return recorder.state === "READY" ? ["on", "good"] : [recorder.state.toLowerCase(), "warn"];
+}
+
+// Why a start would be refused now; "" if it would not. Stops are never withheld while a run goes on.
+export function refusalOf(verb, names = droneNames()) {
+  const all = modes(names);
+  if (modes().includes("TAKING_OFF")) return "a drone is taking off";
+  if (verb === "TAKEOFF") return all.some((mode) => mode === "LANDED" || mode === "CUT") ? "" : "no drone stands on the floor";
+  if (!aloft()) return "no drone is in the air";
+  if (verb === "HOLD" || all.some((mode) => mode === "HOVER" || mode === "HOLD")) return "";
+  return all.includes("TRACK") ? "the team tracks already" : "no drone hovers or holds";
+}

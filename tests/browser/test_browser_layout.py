@@ -1,0 +1,102 @@
+"""What stops and warns keeps its place, nothing is cut off at any size, and the bar says what the team does."""
+
+from typing import Any
+
+import pytest
+from seen_page import Seen
+
+from groundstation.bus.messages import Severity
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+FIXED = ("hold", "land-all", "cut-motors", "take-off", "track", "resume", "team", "map")
+# Elements whose content sticks out of them; inner_text returns what is cut off as well. Half a pixel is rounding.
+CUT_OFF = """() => [...document.querySelectorAll(
+    "button, dd, dt, .pill, .banner, .brand, .stages li, h2, figcaption, .order, #team strong, .detail")]
+  .filter((node) => node.clientWidth > 0 &&
+    (node.scrollWidth > node.clientWidth + 1 || node.scrollHeight > node.clientHeight + 2))
+  .map((node) => `${node.className || node.tagName}: ${node.textContent}`)"""
+OUTSIDE = """() => [...document.querySelectorAll("#shell *")].filter((node) => {
+    const box = node.getBoundingClientRect();
+    return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1); })
+  .map((node) => node.outerHTML.slice(0, 80))"""
+
+
+def boxes(page: Seen) -> dict[str, dict[str, float]]:
+    return {name: page.there(name).bounding_box() for name in FIXED}
+
+
+def test_nothing_moves_while_alarms_and_orders_come(stage: Any) -> None:
+    page = stage.open()
+    page.page.wait_for_timeout(500)
+    before = boxes(page)
+    for number in range(10):
+        stage.flight.event(Severity.ERROR, f"trouble {number} that takes some words to tell", f"drone_{1 + number % 2}")
+    stage.flight.battery["drone_1"] = 0.03
+    stage.flight.frozen = True
+    page.there("hold").click()
+    page.there("drone_2-land").click()
+    page.there("banner-tracker").wait_for(timeout=20_000)
+    page.wait(lambda s: len(s["orders"]) == 2)
+    page.page.wait_for_timeout(700)
+    assert boxes(page) == before
+    page.there("more-alarms").click()
+    assert page.page.locator(".banner:visible").count() > 1
+    assert boxes(page) == before
+    page.shot("alarms_open")
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (2560, 1440), (1024, 768), (390, 844)])
+def test_nothing_is_cut_off(stage: Any, size: tuple[int, int]) -> None:
+    page = stage.open()
+    page.page.set_viewport_size({"width": size[0], "height": size[1]})
+    stage.flight.battery["drone_1"] = 0.17
+    stage.flight.link["drone_1"] = 0.08
+    stage.flight.modes["drone_2"] = "TAKING_OFF"
+    page.there("hold").click()
+    page.wait(lambda s: s["orders"])
+    page.page.wait_for_timeout(800)
+    assert page.page.evaluate(CUT_OFF) == []
+    assert page.page.evaluate(OUTSIDE) == []
+    assert page.page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
+    page.shot(f"layout_{size[0]}")
+
+
+def test_the_bar_says_what_the_team_does(stage: Any) -> None:
+    page = stage.open()
+    page.wait(lambda s: page.there("team-mode").inner_text() == "TRACK")
+    assert page.there("worst-battery").inner_text() == "34 % drone_2"
+    assert page.there("recording").inner_text() == "on"
+    assert page.there("air-time").inner_text().startswith("0:")
+    stage.flight.modes["drone_1"] = "LANDING"
+    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
+    stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
+    page.wait(lambda s: page.there("team-mode").inner_text() == "ON THE GROUND")
+    stage.flight.battery["drone_1"] = None
+    page.wait(lambda s: page.there("worst-battery").inner_text() == "unknown drone_1")
+
+
+def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
+    page = stage.open()
+    page.wait(lambda s: page.there("take-off").get_attribute("title") == "no drone stands on the floor")
+    assert page.there("take-off").is_disabled() and page.there("drone_1-takeoff").is_disabled()
+    assert page.there("track").get_attribute("title") == "the team tracks already"
+    stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}
+    page.wait(lambda s: page.there("drone_1-takeoff").is_enabled())
+    assert page.there("resume").is_enabled() and page.there("drone_2-takeoff").is_disabled()
+    page.there("drone_1-takeoff").click()
+    page.wait(lambda s: [command.scope for command in stage.flight.commands] == [("operator", "drone_1")])
+
+
+def test_the_wall_is_read_from_three_metres(stage: Any) -> None:
+    page = stage.open()
+    page.page.set_viewport_size({"width": 1920, "height": 1080})
+    page.page.keyboard.press("w")
+    page.page.wait_for_timeout(500)
+    sizes = page.page.evaluate(
+        """() => ["#team-mode", "#worst-battery", "[data-testid=drone_1-battery]", "[data-testid=drone_1-seen]"]
+             .map((of) => parseFloat(getComputedStyle(document.querySelector(of)).fontSize))"""
+    )
+    assert min(sizes) >= 45
+    assert page.page.evaluate(OUTSIDE) == []
+    page.shot("wall")

@@ -31,9 +31,9 @@ def _address(_context: click.Context, _parameter: click.Parameter, value: str) -
     "Exit codes: 0 it answered, 2 no address, 4 nobody answers there."
 )
 @click.argument("address", callback=_address)
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def probe(address: str, as_json: bool) -> int:
-    """Tell model, firmware, battery, navdata, link and configuration of the drone at ADDRESS.
+    """Print model, firmware, battery, navdata, link and configuration of the drone at ADDRESS.
 
     Safe at any time: nothing is sent that starts, moves or ends a flight, and to a drone in the air no command at all.
     """

@@ -127,8 +127,12 @@ def measure(count: int, rounds: int) -> dict[str, Any]:
 
 
 @click.command(epilog="\b\nExample:\n  groundstation bench ardrone --json")
-@click.option("--count", type=click.IntRange(10, 1_000_000), default=2000, show_default=True, help="Calls a round.")
-@click.option("--rounds", type=click.IntRange(1, 1000), default=7, show_default=True, help="Rounds; the median counts.")
+@click.option(
+    "--count", type=click.IntRange(10, 1_000_000), default=2000, show_default=True, help="Calls in each round."
+)
+@click.option(
+    "--rounds", type=click.IntRange(1, 1000), default=7, show_default=True, help="Number of rounds; the median counts."
+)
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
 def ardrone(count: int, rounds: int, as_json: bool) -> int:
     """Time the AR.Drone codec in CPU time of one core.

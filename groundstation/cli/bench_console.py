@@ -13,8 +13,8 @@ _LIMITS = {"cpu_percent_of_core": 5.0, "estimate_to_socket_ms": 60.0, "estimate_
 
 
 @click.command(epilog="Example: groundstation bench console --seconds 20 --json")
-@click.option("--seconds", type=FiniteRange(2, 600), default=20.0, show_default=True, help="How long.")
-@click.option("--drones", type=click.IntRange(1, 20), default=4, show_default=True, help="How many talk.")
+@click.option("--seconds", type=FiniteRange(2, 600), default=20.0, show_default=True, help="Length of the run [s].")
+@click.option("--drones", type=click.IntRange(1, 20), default=4, show_default=True, help="Number of drones that send.")
 @click.option("--no-browser", is_flag=True, help="Leave out what needs Chromium.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int:

@@ -67,7 +67,9 @@ class DemoOutcome:
 @click.command(
     epilog="\b\nExamples:\n  groundstation bench demo --seeds 10\n  groundstation bench demo --seeds 3 --json"
 )
-@click.option("--seeds", type=click.IntRange(1, 1000), default=3, show_default=True, help="How many.")
+@click.option(
+    "--seeds", type=click.IntRange(1, 1000), default=3, show_default=True, help="Number of flights, one for each seed."
+)
 @click.option("--first", type=int, default=1, show_default=True, help="The first seed.")
 @click.option("--duration", type=FiniteRange(1, 3600), help="Seconds of tracking each (default: the demo's own).")
 @click.option(

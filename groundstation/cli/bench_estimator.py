@@ -16,12 +16,16 @@ from groundstation.cli.exits import ExitCode
 )
 @click.option("--robots", default="5,10,30", show_default=True, help="Team sizes; 30 are judged.")
 @click.option(
-    "--rounds", type=click.IntRange(2, 10_000), default=30, show_default=True, help="The least of them counts."
+    "--rounds",
+    type=click.IntRange(2, 10_000),
+    default=30,
+    show_default=True,
+    help="Number of rounds; the fastest counts.",
 )
 @click.option("--duration", "duration_ms", type=click.IntRange(200, 60_000), default=1000, show_default=True,
               help="Milliseconds of flight through the product's path.")  # fmt: skip
 @click.option("--field", "field_name", default="lab", show_default=True, help="Field file whose first drone is copied.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of beliefs and noise.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of beliefs and noise.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
 def estimator(robots: str, rounds: int, duration_ms: int, field_name: str, seed: int, as_json: bool) -> int:
     """Time the joint filter: a prediction of the team, a correction per edge, and an observation from bytes to bytes.

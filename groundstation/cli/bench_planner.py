@@ -44,8 +44,14 @@ def numbers(value: str, option: str, low: int, high: int) -> list[int]:
 @click.option("--robots", default="2,5,10,20,30,50,100", show_default=True, help="Team sizes.")
 @click.option("--layout", default="two-level,random,string", show_default=True, help=f"Of {', '.join(_LAYOUTS)}.")
 @click.option("--peer", default="", help=f"Also time {', '.join(_PEERS)} (comma-separated), each in a child process.")
-@click.option("--repeats", type=click.IntRange(1, 1000), default=9, show_default=True, help="Rounds; each runs all.")
-@click.option("--seed", type=click.IntRange(0), default=3, show_default=True, help="Of the beliefs.")
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 1000),
+    default=9,
+    show_default=True,
+    help="Number of rounds; each runs all peers.",
+)
+@click.option("--seed", type=click.IntRange(0), default=3, show_default=True, help="Seed of the beliefs.")
 @click.option("--limit", "limit_s", type=FiniteRange(0.1), default=20.0, show_default=True, help="Seconds a peer "
               "may take for one step; beyond it the rest is extrapolated and marked.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")

@@ -15,9 +15,13 @@ import click
     "  groundstation bench vision --json | jq .targets"
 )
 @click.option(
-    "--pictures", type=click.IntRange(8, 10_000), default=60, show_default=True, help="Per cell of the tables."
+    "--pictures",
+    type=click.IntRange(8, 10_000),
+    default=60,
+    show_default=True,
+    help="Pictures in each cell of the tables.",
 )
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the pictures.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the pictures.")
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for figures and plots (default: in ./runs)."
 )

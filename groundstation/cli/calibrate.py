@@ -15,7 +15,7 @@ from groundstation.cli.calibrate_extrinsics import extrinsics
     'The order of work for a new lab: "Calibrate lenses, mountings and delays" in docs/how-to.'
 )
 def calibrate() -> None:
-    """Measure what the field file and its calibrations say of cameras and sensors."""
+    """Measure lenses, mountings and delays for a field file."""
 
 
 for command in (camera, extrinsics, delay, check):

@@ -31,16 +31,16 @@ _SHOWN_MISSING = 3
     "  groundstation calibrate camera ardrone://192.168.1.11 --board skein --square-mm 44 --name drone_1_front\n"
     "  groundstation calibrate camera pictures/ --board 9x6 --preview judged/\n\n"
     "Show the board in every part of the picture, near and far, tilted to all sides, and hold still for each view.\n\n"
-    "Exit codes: 0 written, 2 wrong usage, 4 no pictures or no lens comes of them."
+    "Exit codes: 0 written, 2 wrong usage, 4 no pictures or no lens can be fitted."
 )
 @click.argument("source", callback=source_of)
 @click.option("--board", default="9x6", show_default=True, help="Inner corners along its sides, or skein: a marker.")
 @click.option("--square-mm", type=float, default=25.0, show_default=True, help="Side of a square.")
-@click.option("--name", default="camera", show_default=True, help="Of the camera: NAME.yaml is written.")
-@click.option("--views", type=click.IntRange(6, 200), default=20, show_default=True, help="As many are enough.")
+@click.option("--name", default="camera", show_default=True, help="Name of the camera; NAME.yaml is written.")
+@click.option("--views", type=click.IntRange(6, 200), default=20, show_default=True, help="Views to collect.")
 @click.option("--output", type=click.Path(path_type=Path), help=f"File to write.  [default: {_FOLDER}/NAME.yaml]")
 @click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write judged pictures here.")
-@click.option("--force", is_flag=True, help="Overwrite a calibration that is there.")
+@click.option("--force", is_flag=True, help="Overwrite an existing calibration.")
 @click.option(
     "--recipe",
     type=click.Choice(["skein", "opencv"]),
@@ -82,7 +82,7 @@ def _require_output(path: Path, force: bool) -> Path:
 
 
 class CalibrationSession:
-    """Looking at pictures of one source until they suffice; tells the operator what is still missing."""
+    """Looking at pictures of one source until they suffice; names to the operator what is still missing."""
 
     def __init__(self, pattern: "Pattern", enough: int, preview: Path | None) -> None:
         self._pattern, self._enough, self._preview = pattern, enough, preview
@@ -188,7 +188,7 @@ class CalibrationSession:
 
 
 class ProgressLine:
-    """Tells of every picture on stderr: on a terminal one line that changes, else one line each that was kept."""
+    """Reports every picture on stderr: on a terminal one line that changes, else one line each that was kept."""
 
     def __init__(self) -> None:
         self._stream = sys.stderr
@@ -196,7 +196,7 @@ class ProgressLine:
         self._told_s = 0.0
 
     def show(self, name: str, flaw: "Flaw | None", count: int, enough: int, missing: tuple[str, ...]) -> None:
-        """Tell what became of a picture, and what is missing now."""
+        """Report what became of a picture, and what is missing now."""
         verdict = str(flaw) if flaw is not None else "kept"
         wanted = ", ".join(missing[:_SHOWN_MISSING]) + (
             f" and {len(missing) - _SHOWN_MISSING} more" * (len(missing) > 3)

@@ -26,7 +26,7 @@ _PLACE_SIGMAS, _SAME_PLACE_M = 4.0, 0.03
 
 @dataclass(frozen=True, slots=True)
 class CheckFinding:
-    """One thing that was looked at: what, whether it holds (None: could not be told), and what to do if it does not."""
+    """One thing that was looked at: what, whether it holds (None: unknown), and what to do if it does not."""
 
     what: str
     holds: bool | None
@@ -35,7 +35,7 @@ class CheckFinding:
     @property
     def text(self) -> str:
         """Return it in a line."""
-        word = {True: "holds", False: "DOES NOT HOLD", None: "cannot be told"}[self.holds]
+        word = {True: "holds", False: "DOES NOT HOLD", None: "is unknown"}[self.holds]
         return f"{word}: {self.what}" + (f"; {self.remedy}" if self.remedy and not self.holds else "")
 
 
@@ -48,7 +48,9 @@ class CheckFinding:
     "Exit codes: 0 all holds, 1 something does not, 2 wrong usage, 4 no pictures."
 )
 @click.argument("what")
-@click.option("--calibration", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="With a source.")
+@click.option(
+    "--calibration", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Calibration file of a source."
+)
 @click.option("--marker", "given", multiple=True, metavar="CODE=X,Y", help="A marker at a known place; repeatable.")
 @click.option("--square-mm", type=FiniteRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
 @click.option("--frames", type=click.IntRange(1, 1000), default=10, show_default=True, help="Pictures to look at.")

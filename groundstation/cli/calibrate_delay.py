@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     epilog="\b\nExamples:\n  groundstation calibrate delay runs/20261120T101500Z-lab\n"
     "  groundstation calibrate delay RUN --json\n\n"
     "The flight should turn the drones in sight of the fixed camera and move them briskly, for a minute or more; "
-    "heights want five take-offs and landings. What a recording does not tell to 15 ms is not proposed, and what "
-    "flight would tell it is said.\n\n"
+    "heights need five take-offs and landings. A delay that the recording does not show to 15 ms is not proposed; the "
+    "flight that would show it is named.\n\n"
     "Exit codes: 0 done, 2 wrong usage, or no recording that can be used."
 )
 @click.argument("recording", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def delay(recording: tuple[Path, ...], as_json: bool) -> int:
     """Measure the delays of cameras, velocities and heights in RECORDING; prints the settings to change.
 
@@ -68,5 +68,5 @@ def _lines(found: "list[Delay]") -> list[str]:
         if not one.sure or one.reason:
             flights.setdefault(one.flight, []).append(one.sensor)
     if flights:
-        lines.append("not told by this recording; a flight that would tell:")
+        lines.append("not shown by this recording; a flight that would show it:")
     return lines + [f"  {', '.join(sensors)}: {flight}" for flight, sensors in flights.items()]

@@ -31,7 +31,7 @@ _ROLLED_DEG = 1.0
     "      --onboard --marker 3=0.9,0.0,-0.12,0\n\n"
     "A marker is CODE=X,Y[,Z[,HEADING]]: centre [m], heading of its bar [deg]. Fixed cameras: in the world. --onboard: "
     "relative to the drone, which stands level: x ahead, y left, z up; Z is then mostly below zero.\n\n"
-    "Exit codes: 0 measured, 2 wrong usage, 4 no pictures, or what they show does not tell."
+    "Exit codes: 0 measured, 2 wrong usage, 4 no pictures, or too little in them."
 )
 @click.argument("source", callback=source_of)
 @click.option(
@@ -45,7 +45,9 @@ _ROLLED_DEG = 1.0
     "--markers", "layout", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="YAML with all markers."
 )
 @click.option("--square-mm", type=FiniteRange(5, 200), help="Side of their squares.  [default: 44]")
-@click.option("--marker-std-mm", type=FiniteRange(0.1, 200), help="How well they were placed.  [default: 5]")
+@click.option(
+    "--marker-std-mm", type=FiniteRange(0.1, 200), help="Standard deviation of their positions.  [default: 5]"
+)
 @click.option("--frames", type=click.IntRange(1, 1000), default=20, show_default=True, help="Pictures to average.")
 @click.option("--onboard", is_flag=True, help="A drone's camera on a bench instead of one fixed in the world.")
 @click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write the last picture, annotated.")

@@ -35,7 +35,9 @@ def camera() -> None:
 @click.option("--square-mm", type=FiniteRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Write annotated pictures here.")
 @click.option("--stream", is_flag=True, help="Serve them as MJPEG on loopback, for a browser.")
-@click.option("--port", type=click.IntRange(0, 65535), default=_PORT, show_default=True, help="Where; 0: any free one.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=_PORT, show_default=True, help="Port to serve on; 0: any free one."
+)
 @click.option("--frames", type=click.IntRange(1), help="End after so many pictures.")
 def view(
     source: str,

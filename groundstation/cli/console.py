@@ -1,6 +1,5 @@
 """`groundstation console`: the web page of a run that goes on, from any terminal."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,24 +13,25 @@ if TYPE_CHECKING:
 
 
 @click.command(epilog="\b\nExamples:\n  groundstation console\n  groundstation console --port 9000 --run lab-4711")
-@click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
-@click.option("--port", type=click.IntRange(1024, 65535), help="Where to serve (default: the field's console.port).")
+@click.option("--run", "name", metavar="NAME", help="The run to show, where there are several.")
+@click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
 def console(name: str | None, port: int | None) -> None:
     """Serve the operator's page for a running ground station, on loopback. Leaving it stops nothing."""
     import asyncio
 
-    from groundstation.bus.zenoh_bus import open_bus
+    from groundstation.bus.roles import Role
     from groundstation.console.room import bare_scene, scene_from_field
     from groundstation.console.section import run_id
     from groundstation.console.server import ConsoleServer, claim_port
     from groundstation.field.behaviour import ConsoleValues
+    from groundstation.supervisor.joining import join
 
     record = choose(name)
     cast, field = cast_of(record), _field_of(record)
-    truth = record.simulated
+    truth = record.has_truth
     scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
     listener = claim_port(port or (field.console if field else ConsoleValues()).port)
-    bus = open_bus(record.endpoint, record.site, f"console_{os.getpid()}", timeout_s=2.0)
+    bus = join(record, "console", Role.CONSOLE)
     try:
         server = ConsoleServer(bus, cast, scene, field, listener, run_id(record.run_dir))
         click.echo(f"console of {record.name} at {server.url} (Ctrl-C leaves it; the flight goes on)")

@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.bus.messages import CommandAck, Verb
+from groundstation.bus.roles import Role
 from groundstation.bus.topics import COMMAND_ACK
-from groundstation.bus.zenoh_bus import open_bus
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.stop import choose_run
 from groundstation.console.commands import CommandDesk
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError, OperatorMistake
+from groundstation.supervisor.joining import join
 from groundstation.time_units import NS_PER_MS
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ class Handle:
 def deadman(name: str | None, gamepad: str | None) -> int:
     """Hold on, and the flight goes on; let go, and the drones hold at once and land 5 s later. No emergency stop."""
     record = choose_run(name)
-    bus = open_bus(record.endpoint, record.site, f"deadman_{os.getpid()}", timeout_s=2.0)
+    bus = join(record, "deadman", Role.CLI)
     grip = "any button (the second lands)" if gamepad else "the space bar"
     click.echo(f"{record.name}: hold {grip}. Let go: HOLD, 5 s later LAND. l: LAND now. q: HOLD and leave.")
     try:

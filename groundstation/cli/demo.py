@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from groundstation.cli.run import run_simulated, simulated_options
+from groundstation.cli.run import Rehearsal, run_simulated, simulated_options
 
 DEFAULT_DURATION_S = 60.0
 
@@ -22,4 +22,4 @@ def demo(**arguments: Any) -> int:
     """
     if arguments["duration"] is None:
         arguments["duration"] = DEFAULT_DURATION_S
-    return run_simulated("demo", "lab", **arguments)
+    return run_simulated("demo", "lab", Rehearsal(**arguments))

@@ -10,6 +10,7 @@ import click
 from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
 from groundstation.cli.experiment_faults import faults
 from groundstation.cli.experiment_mrclam import mrclam
+from groundstation.cli.experiment_scenarios import scenarios
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.progress import progress
 from groundstation.errors import GroundStationError
@@ -33,7 +34,7 @@ def _world(command: Callable[..., None]) -> Callable[..., None]:
         _option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-NAME."),
         _option("--kidnap", type=FiniteRange(0, 1), default=0.0, help="Chance per step that the target jumps."),
         _option("--dropout", type=FiniteRange(0, 1), default=0.0, help="Share of readings that are lost."),
-        _option("--first-seed", type=click.IntRange(0), default=1, help="Of the seeds, which count up from it."),
+        _option("--first-seed", type=click.IntRange(0), default=1, help="First seed; the others count up from it."),
     ):
         command = option(command)
     return command
@@ -49,12 +50,13 @@ def experiment() -> None:
 
 experiment.add_command(mrclam)
 experiment.add_command(faults)
+experiment.add_command(scenarios)
 
 
 @experiment.command()
 @_option("--robots", type=click.IntRange(1, 100), default=5, help="Team size.")
-@_option("--strategies", default="paper,certified", help=f"Of {', '.join(_STRATEGIES)}.")
-@_option("--seeds", type=click.IntRange(1), default=50, help="How many runs each.")
+@_option("--strategies", default="paper,certified", help=f"Strategies, of {', '.join(_STRATEGIES)}.")
+@_option("--seeds", type=click.IntRange(1), default=50, help="Number of runs of each.")
 @_world
 def figure1(robots: int, strategies: str, seeds: int, **world: Any) -> None:
     """A team follows a target that leaves the global sensor: string, two levels, three levels."""
@@ -65,9 +67,9 @@ def figure1(robots: int, strategies: str, seeds: int, **world: Any) -> None:
 
 @experiment.command()
 @_option("--robots", default="2,3,5,8,10,20,30", help="Team sizes.")
-@_option("--strategies", default="paper,certified,fixed-two-level", help=f"Of {', '.join(_STRATEGIES)}.")
+@_option("--strategies", default="paper,certified,fixed-two-level", help=f"Strategies, of {', '.join(_STRATEGIES)}.")
 @_option("--starts", default="string", help=f"First topologies, of {', '.join(_STARTS)}.")
-@_option("--seeds", type=click.IntRange(1), default=20, help="How many runs each.")
+@_option("--seeds", type=click.IntRange(1), default=20, help="Number of runs of each.")
 @_world
 def teams(robots: str, strategies: str, starts: str, seeds: int, **world: Any) -> None:
     """Teams of 2 to 100 robots and a receding target: uncertainty relative to the paper's heuristic."""
@@ -79,8 +81,8 @@ def teams(robots: str, strategies: str, starts: str, seeds: int, **world: Any) -
 
 @experiment.command("figure-eight")
 @_option("--robots", default="2,3,5", help="Team sizes.")
-@_option("--strategies", default="paper,certified,fixed-string", help=f"Of {', '.join(_STRATEGIES)}.")
-@_option("--seeds", type=click.IntRange(1), default=20, help="How many runs each.")
+@_option("--strategies", default="paper,certified,fixed-string", help=f"Strategies, of {', '.join(_STRATEGIES)}.")
+@_option("--seeds", type=click.IntRange(1), default=20, help="Number of runs of each.")
 @_world
 def figure_eight(robots: str, strategies: str, seeds: int, **world: Any) -> None:
     """The target walks a figure of eight at 0.3 m/s, as in the authors' program.
@@ -96,7 +98,7 @@ def figure_eight(robots: str, strategies: str, seeds: int, **world: Any) -> None
 
 @experiment.command()
 @_option("--robots", type=click.IntRange(2, 7), default=5, help="Team size.")
-@_option("--seeds", type=click.IntRange(1), default=5, help="How many runs per sensor and topology.")
+@_option("--seeds", type=click.IntRange(1), default=5, help="Number of runs of each sensor and topology.")
 @_world
 def sensors(robots: int, seeds: int, **world: Any) -> None:
     """Which topology wins with which sensor: ranges, growing noise, bearings, ranges only, displaced disc."""
@@ -129,9 +131,9 @@ def sensors(robots: int, seeds: int, **world: Any) -> None:
     help="Which experiment.",
 )
 @_option("--robots", default="2,5,10,20", help="Team sizes.")
-@_option("--strategies", default="paper,certified", help=f"Of {', '.join(_STRATEGIES)}.")
+@_option("--strategies", default="paper,certified", help=f"Strategies, of {', '.join(_STRATEGIES)}.")
 @_option("--starts", default="string,two-level,random", help=f"First topologies, of {', '.join(_STARTS)}.")
-@_option("--seeds", type=click.IntRange(1), default=20, help="How many runs each.")
+@_option("--seeds", type=click.IntRange(1), default=20, help="Number of runs of each.")
 @_option("--scheduler", default="local", help="tcp://host:8786 of a dask cluster, `local` for one here, `none`.")
 @_option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
 @_world
@@ -177,7 +179,7 @@ def _tasks(
 
 
 def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: str = "", workers: int = 0) -> None:
-    """Run the tasks, write the tables and pictures, and say what came out."""
+    """Run the tasks, write the tables and pictures, and print the result."""
     use_kernel_cache()
     from groundstation.experiments.runner import SweepError, run_tasks, write_atomically
     from groundstation.experiments.summary import add_ratios, summarise, timings

@@ -19,9 +19,13 @@ from groundstation.errors import GroundStationError
     "  groundstation experiment faults --flights 100 --kinds velocity_stuck,telemetry_frozen\n\n"
     "Exit codes: 0 no unsafe end, 1 unsafe ends, 2 wrong settings."
 )
-@click.option("--flights", type=click.IntRange(1), default=100, show_default=True, help="How many, one for each seed.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the first flight.")
-@click.option("--seconds", type=FiniteRange(12, 600), default=20.0, show_default=True, help="Tracked in each flight.")
+@click.option(
+    "--flights", type=click.IntRange(1), default=100, show_default=True, help="Number of flights, one for each seed."
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
+@click.option(
+    "--seconds", type=FiniteRange(12, 600), default=20.0, show_default=True, help="Seconds of tracking in each flight."
+)
 @click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
 @click.option("--scenario", default="realistic", show_default=True, help="Scenario without faults: sensor errors.")
 @click.option("--kinds", default="", help="Only these kinds of faults, by commas (default: all that are drawn).")
@@ -65,7 +69,7 @@ def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path | No
 
 
 def _order(name: str, scenario: str, options: tuple[str, ...], seconds: float, kinds: str) -> str:
-    """Return what the simulator is told besides the seeds."""
+    """Return the simulator's order besides the seeds."""
     import msgspec
 
     from groundstation.settings.files import find_field, find_scenario

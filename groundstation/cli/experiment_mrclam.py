@@ -17,8 +17,16 @@ _FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
 @click.command(epilog="Example: groundstation experiment mrclam ../shared/data/mrclam7")
 @click.argument("folder", type=_FOLDER)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the emulated camera's noise.")
-@click.option("--span", type=(float, float), default=(0.0, 1.0), show_default=True, help="Share of the set's time.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the emulated camera's noise."
+)
+@click.option(
+    "--span",
+    type=(float, float),
+    default=(0.0, 1.0),
+    show_default=True,
+    help="Part of the data set, as shares of its length.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Write the results to standard output as JSON.")
 def mrclam(folder: Path, seed: int, span: tuple[float, float], as_json: bool) -> None:
     """Run the joint filter over a set of the UTIAS multi-robot localisation data (plain .dat files or .dat.xz).

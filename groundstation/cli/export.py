@@ -31,13 +31,14 @@ _MAX_LINES = 5
     help="A copy with ellipses, links and arrows for Foxglove's 3D panel; extra [foxglove].",
 )
 @click.option("--tlog", "formats", flag_value="tlog", multiple=True, help="MAVLink logs, one for each vehicle.")
+@click.option("--rosbag2", "formats", flag_value="rosbag2", multiple=True, help="A bag for ROS 2 tools; extra [ros2].")
 @click.option("--output", type=click.Path(path_type=Path), help="Where to (default: beside the recording).")
 def export(recording: Path, formats: tuple[str, ...], output: Path | None) -> int:
     """Write RECORDING, a run folder or one file of it, in other formats. Cut recordings are read as far as they go."""
     from groundstation.recording.run import open_run
 
     if not formats:
-        raise click.UsageError("say which format: --csv, --parquet, --rrd, --foxglove-scene or --tlog")
+        raise click.UsageError("say which format: --csv, --parquet, --rrd, --foxglove-scene, --tlog or --rosbag2")
     if output is not None and len(formats) > 1:
         raise click.UsageError("--output names one place: export one format at a time, or leave it out")
     run = open_run(recording)
@@ -91,12 +92,25 @@ def _tlog(run: "RecordedRun", recording: Path, output: Path | None) -> None:
         _tell(f"{path.stem}: left out", (f"{n} x {reason.replace('_', ' ')}" for reason, n in log.refused.items()))
 
 
+def _rosbag2(run: "RecordedRun", recording: Path, output: Path | None) -> None:
+    from groundstation.engineering_views.extras import require_ros2
+
+    require_ros2()
+    from groundstation.engineering_views.ros2.bag import write_bag
+
+    folder = output or _beside(recording, "rosbag2", is_folder=True)
+    count, unread = write_bag(run, folder)
+    click.echo(f"{folder}: {count} messages; ros2 bag info {folder}")
+    _tell("not readable", unread)
+
+
 _WRITERS: "dict[str, Callable[[RecordedRun, Path, Path | None], None]]" = {
     "csv": _tables("csv"),
     "parquet": _tables("parquet"),
     "rrd": _rrd,
     "scene": _scene,
     "tlog": _tlog,
+    "rosbag2": _rosbag2,
 }
 
 

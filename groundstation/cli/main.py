@@ -1,96 +1,23 @@
-"""The command line: a table of verbs, each imported only when it is called, and one place for errors."""
+"""The command line: each verb imported only when it is called, and one place for errors."""
 
 import importlib
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
 import click
 
 from groundstation.cli.exits import ExitCode, exit_code_of
+from groundstation.cli.verbs import ELSEWHERE, VERBS
 from groundstation.errors import GroundStationError, SettingsError
-
-
-@dataclass(frozen=True, slots=True)
-class CommandRow:
-    """One row of the table: where the command is (`module:function`), and its line in the help."""
-
-    family: str
-    target: str
-    summary: str
-
-
-VERBS: dict[str, CommandRow] = {
-    "demo": CommandRow(
-        "Fly", "groundstation.cli.demo:demo", "Two emulated drones track a TurtleBot; needs no hardware."
-    ),
-    "sitl": CommandRow("Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras."),
-    "fly": CommandRow("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones."),
-    "takeoff": CommandRow("Command", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
-    "track": CommandRow("Command", "groundstation.cli.stop:track", "Let the tracker move the drones."),
-    "resume": CommandRow("Command", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),
-    "hold": CommandRow("Stop", "groundstation.cli.stop:hold", "Hover where they are."),
-    "land": CommandRow("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones."),
-    "cut-motors": CommandRow("Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall."),
-    "deadman": CommandRow(
-        "Stop", "groundstation.cli.deadman:deadman", "Hold a key or button; let go: they hold, then land."
-    ),
-    "monitor": CommandRow("Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station."),
-    "console": CommandRow(
-        "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station."
-    ),
-    "view": CommandRow("Look", "groundstation.cli.view:view", "Live engineering view in Rerun or Foxglove."),
-    "report": CommandRow("Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run."),
-    "replay": CommandRow(
-        "Look", "groundstation.cli.replay:replay", "A recorded run in the console, or once more computed."
-    ),
-    "recording": CommandRow(
-        "Look", "groundstation.cli.recording:recording", "Look into, repair, cut and convert recordings."
-    ),
-    "export": CommandRow("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
-    "bench": CommandRow("Look", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
-    "experiment": CommandRow(
-        "Look", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."
-    ),
-    "config": CommandRow("Settings", "groundstation.cli.config:config", "Check, show or start a field file."),
-    "ardrone": CommandRow("Settings", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
-    "calibrate": CommandRow(
-        "Settings", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."
-    ),
-    "camera": CommandRow(
-        "Settings", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."
-    ),
-    "markers": CommandRow("Settings", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
-    "mavlink": CommandRow(
-        "Settings", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."
-    ),
-    "version": CommandRow(
-        "Settings", "groundstation.cli.version:version", "Versions of this program and its libraries."
-    ),
-}
-
-
-_ELSEWHERE = {
-    **dict.fromkeys(("stop", "halt", "abort", "emergency", "kill"), "'land', 'hold' or 'cut-motors'"),
-    **dict.fromkeys(("start", "run", "launch"), "'sitl' or 'fly'"),
-    **{word: f"'config {word}'" for word in ("check", "init", "show", "draw", "schema")},
-    **{word: f"'recording {word}'" for word in ("info", "recover", "cut")},
-    "compare": "'report RUN --compare OTHER'",
-    "print": "'markers print'",
-    "probe": "'ardrone probe' or 'mavlink probe'",
-    "record": "'recording' (each run is recorded by itself)",
-    "setup": "'mavlink setup'",
-}
-"""Words of other ground stations, and those that stand one level down here: the likeness of letters would mislead."""
 
 
 def _meant(word: str) -> str:
     from difflib import get_close_matches
 
     near = get_close_matches(word, VERBS, 1, 0.5)
-    meant = _ELSEWHERE.get(word.lower()) or (f"'{near[0]}'" if near else "")
+    meant = ELSEWHERE.get(word.lower()) or (f"'{near[0]}'" if near else "")
     return f" Did you mean {meant}?" if meant else ""
 
 
@@ -112,7 +39,9 @@ class VerbGroup(click.Group):
         return command
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the arguments; `help VERB` asks for what `VERB --help` prints."""
+        """Read the arguments; `help VERB` asks for what `VERB --help` prints, `help all` for every command."""
+        if args == ["help", "all"]:
+            ctx.obj, args = "all", ["help"]
         return super().parse_args(ctx, [*args[1:], "--help"] if args[:1] == ["help"] else args)
 
     def resolve_command(
@@ -124,10 +53,15 @@ class VerbGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the table by families, without importing any command."""
-        for family in dict.fromkeys(verb.family for verb in VERBS.values()):
+        """Write the table by families, without importing any command: the first page, or all of it."""
+        shown = {name: verb for name, verb in VERBS.items() if verb.first or ctx.obj == "all"}
+        for family in dict.fromkeys(verb.family for verb in shown.values()):
             with formatter.section(family):
-                formatter.write_dl([(name, verb.summary) for name, verb in VERBS.items() if verb.family == family])
+                formatter.write_dl([(name, verb.summary) for name, verb in shown.items() if verb.family == family])
+        if len(shown) < len(VERBS):
+            with formatter.section("More"):
+                every = f"All {len(VERBS)} commands: those to prepare, study and develop as well."
+                formatter.write_dl([("help all", every), ("help COMMAND", "What one command does, with its options.")])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the examples and the exit codes."""

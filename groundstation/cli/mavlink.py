@@ -70,8 +70,8 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
 )
 @click.argument("field", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.argument("drone")
-@click.option("--check/--apply", default=True, help="Only tell the differences, or write them as well.")
-@click.option("--address", help="Where it is, if not where the field file says: ADDRESS:PORT.")
+@click.option("--check/--apply", default=True, help="Only print the differences, or write them as well.")
+@click.option("--address", help="ADDRESS:PORT, if not the field file's.")
 def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
     """Compare the parameters of DRONE in FIELD with what indoor flight needs; with --apply, write what differs."""
     from drivers.mavlink.links.opening import open_link
@@ -85,7 +85,8 @@ def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
     opened = open_link(link)
     left = 0
     try:
-        work = ParameterSetup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id)
+        work = ParameterSetup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id,
+                              vehicle.parameters)  # fmt: skip
         work.connect()
         for found in work.differences():
             taken = not check and work.apply(found.wanted)

@@ -1,6 +1,5 @@
 """`groundstation monitor`: the live table of a run, from any terminal."""
 
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,15 +18,16 @@ _ONCE_S = 1.5  # every status is published at least once a second
 
 
 @click.command(epilog="\b\nExamples:\n  groundstation monitor\n  groundstation monitor --once --json")
-@click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
-@click.option("--once", is_flag=True, help="Print one picture and leave.")
-@click.option("--json", "as_json", is_flag=True, help="Print the state as JSON and leave.")
+@click.option("--run", "name", metavar="NAME", help="The run to show, where there are several.")
+@click.option("--once", is_flag=True, help="Print the state once and exit.")
+@click.option("--json", "as_json", is_flag=True, help="Print the state as JSON and exit.")
 def monitor(name: str | None, once: bool, as_json: bool) -> None:
     """Watch a running ground station. It only looks: leaving it stops nothing."""
-    from groundstation.bus.zenoh_bus import open_bus
+    from groundstation.bus.roles import Role
+    from groundstation.supervisor.joining import join
 
     record = choose(name)
-    bus = open_bus(record.endpoint, record.site, f"monitor_{os.getpid()}", timeout_s=2.0)
+    bus = join(record, "monitor", Role.VIEW)
     try:
         if once or as_json:
             _print_once(bus, cast_of(record), as_json)

@@ -26,7 +26,9 @@ _NAMES = {"options": "--set", "estimator": "--estimator", "json_file": "--json",
     "Exit codes: 0 done, or identical; 1 the re-run differs; 2 wrong usage, settings, or nothing that can be replayed."
 )
 @click.argument("recording", nargs=-1, type=click.Path(exists=True, path_type=Path))
-@click.option("--rerun", type=click.Choice(["tracker"]), help="Feed what was recorded to today's tracker and compare.")
+@click.option(
+    "--rerun", type=click.Choice(["tracker"]), help="Feed the recorded inputs to today's tracker and compare."
+)
 @click.option("--set", "options", multiple=True, metavar="A.B=C", help="Re-run with another setting; repeatable.")
 @click.option(
     "--estimator",
@@ -37,9 +39,9 @@ _NAMES = {"options": "--set", "estimator": "--estimator", "json_file": "--json",
 @click.option(
     "--output", type=click.Path(path_type=Path), help="Write a re-run as a run folder, for report and replay."
 )
-@click.option("--port", type=click.IntRange(1024, 65535), help="Where to serve (default: the field's console.port).")
+@click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
 @click.option("--from", "from_s", type=FiniteRange(0), help="Begin so many seconds after the recording's start.")
-@click.option("--speed", type=FiniteRange(0.1, 20), help="Times as fast as it was (default: 1).")
+@click.option("--speed", type=FiniteRange(0.1, 20), help="Speed relative to the recorded one (default: 1).")
 @click.option("--paused", is_flag=True, help="Wait for the page to press play.")
 @click.option("--headless", is_flag=True, help="End when the recording does, instead of waiting for the page.")
 def replay(recording: tuple[Path, ...], rerun: str | None, **options: Any) -> int:

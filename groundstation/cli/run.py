@@ -5,6 +5,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ _SIMULATED: tuple[Option, ...] = (
     click.option(
         "--report",
         type=click.Path(file_okay=False, path_type=Path),
-        help="Folder that the run's folder is made in, and the report copied to (default: runs/, no copy).",
+        help="Folder for the run's folder and a copy of the report (default: runs/, no copy).",
     ),
     _HEADLESS,
     _SETTINGS,
@@ -54,26 +55,37 @@ def simulated_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation sitl config/lab.yaml --duration 60\n"
-    "  groundstation sitl lab --seed 3 --headless --set planner.mode=paper\n\n"
+    "  groundstation sitl lab --seed 3 --headless --set planner.mode=paper\n"
+    "  groundstation sitl mixed-team --real drone_2=autopilot:19410   (firmware in the loop)\n\n"
     "Exit codes: 0 passed, 1 failed its criteria, 2 wrong settings, 4 a process failed, 130 interrupted."
 )
 @click.argument("field")
 @simulated_options
+@click.option(
+    "--real",
+    multiple=True,
+    metavar="PART[=POSE]",
+    help="A drone, camera or target of the field that is not emulated; repeatable. POSE of a drone: autopilot:PORT "
+    "(where the simulator behind its firmware tells its true pose) or estimate (default).",
+)
 def sitl(field: str, **arguments: Any) -> int:
-    """Fly a field file against emulated drones and cameras. Ctrl-C lands; a second one stops at once."""
-    return run_simulated("sitl", field, **arguments)
+    """Fly a field file against emulated drones and cameras. Ctrl-C lands; a second one stops at once.
+
+    With a real drone nobody takes off before Enter, or `groundstation takeoff`.
+    """
+    return run_simulated("sitl", field, Rehearsal(**arguments))
 
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation fly lab.yaml\n  groundstation takeoff   (from another terminal)\n"
     "  groundstation land      (from another terminal)\n\n"
-    "Exit codes: 0 all landed, 1 not all said so, 2 wrong settings, 4 a process failed."
+    "Exit codes: 0 all landed, 1 a landing was not reported, 2 wrong settings, 4 a process failed."
 )
 @click.argument("field")
 @_HEADLESS
 @_SETTINGS
 def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
-    """Fly a field file with the real drones. Nobody takes off before Enter, or `groundstation takeoff`.
+    """Fly a field file with the real drones. No drone takes off before Enter, or `groundstation takeoff`.
 
     Ctrl-C lands; a second one stops at once.
     """
@@ -91,20 +103,24 @@ def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
     return _run(path, loaded, plan, RunFacts(mode="fly", field=str(path)), headless=headless)
 
 
-def run_simulated(
-    mode: str,
-    field: str,
-    *,
-    scenario: str,
-    duration: float | None,
-    seed: int | None,
-    report: Path | None,
-    headless: bool,
-    options: tuple[str, ...],
-) -> int:
+@dataclass(frozen=True, slots=True)
+class Rehearsal:
+    """What the options of `sitl` and `demo` ask for; real: what is not emulated."""
+
+    scenario: str
+    duration: float | None
+    seed: int | None
+    report: Path | None
+    headless: bool
+    options: tuple[str, ...]
+    real: tuple[str, ...] = ()
+
+
+def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     """Fly a field in the simulator, judge the run, and return the exit code."""
     from groundstation.flight.composition import Simulation, simulated
     from groundstation.flight.flight_plan import plan_of
+    from groundstation.flight.real_parts import notes, parse_real
     from groundstation.report.run_facts import RunFacts
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
@@ -112,9 +128,12 @@ def run_simulated(
     from groundstation.settings.scenario import load_scenario
     from groundstation.supervisor import network, runtime_file
 
-    path = find_field(field)
-    loaded = load_field(path, options)
-    plan = plan_of(loaded, duration, asks=False)
+    path, scenario, duration, seed = find_field(field), asked.scenario, asked.duration, asked.seed
+    loaded = load_field(path, asked.options)
+    parts = parse_real(loaded, asked.real)
+    for line in notes(loaded, parts):
+        click.echo(line, err=True)
+    plan = plan_of(loaded, duration, asks=bool(parts.drones))
     chosen = load_scenario(find_scenario(scenario, path))
     if seed is None:
         seed = int(chosen.get("seed", 1))
@@ -122,10 +141,13 @@ def run_simulated(
         click.echo(f"scenario {scenario}: {sentence}", err=True)
     net = network.claim(runtime_file.folder(), loaded.bus.port)
     try:
-        simulation = Simulation(net, chosen, seed)
-        facts = RunFacts(mode=mode, field=str(path), scenario=scenario, seed=seed, tracking_s=duration)
-        field_there = simulated(loaded, net)
-        return _run(path, field_there, plan, facts, headless=headless, simulation=simulation, report=report)
+        simulation = Simulation(net, chosen, seed, parts)
+        facts = RunFacts(
+            mode=mode, field=str(path), scenario=scenario, seed=seed, tracking_s=duration, real=parts.names
+        )
+        there = simulated(loaded, net, parts)
+        report = asked.report
+        return _run(path, there, plan, facts, headless=asked.headless, simulation=simulation, report=report)
     finally:
         net.release()
 
@@ -156,7 +178,8 @@ def _run(
     table = process_table(field, endpoint, run_dir, simulation=simulation, monitor=monitor)
     terminal = Terminal()
     terminal.say(f"{facts.mode} {path}: {len(table)} processes, run folder {run_dir}")
-    run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones))
+    real = tuple(simulation.real.drones) if simulation else tuple(field.drones)
+    run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones), real)
     outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()
     terminal.flush()
     passed = _judge(run_dir, report) if field.recording.enabled else None

@@ -13,12 +13,14 @@ from typing import Any
 import click
 
 from groundstation.bus.messages import AckStage, Command, CommandAck, Verb
+from groundstation.bus.roles import Role
 from groundstation.bus.topics import COMMAND, COMMAND_ACK
-from groundstation.bus.zenoh_bus import ZenohBus, open_bus
+from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AwaitedAnswers
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.joining import join
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
 _OPERATOR = "operator"
@@ -80,13 +82,12 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -
     strangers = [name for name in drones if name not in record.drones]
     if strangers:
         raise OperatorMistake(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
-    source = f"cli_{os.getpid()}"
     try:
-        bus = open_bus(record.endpoint, record.site, source, timeout_s=_CONNECT_S)
+        bus = join(record, "cli", Role.CLI, timeout_s=_CONNECT_S)
     except GroundStationError as error:
         return _without_router(verb, record, as_json, error)
     try:
-        book = _book(bus, verb, drones, record, source)
+        book = _book(bus, verb, drones, record)
         say: Callable[[str], None] = (lambda _: None) if as_json else click.echo
         deliver(bus, book, _PATIENCE_S.get(verb, _PATIENCE_DEFAULT_S), say)
     finally:
@@ -94,13 +95,15 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -
     return _report(book, as_json)
 
 
-def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, source: str) -> AwaitedAnswers:
+def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord) -> AwaitedAnswers:
     header = bus.header("team" if verb in _STOPS else _OPERATOR)
     # A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease.
     scope = drones if verb in _STOPS else (_OPERATOR, *drones)
     expires_ns = 0 if verb in _STOPS else header.stamp_ns + 5_000_000_000
-    identity = f"{source}-{header.stamp_ns}"
-    command = Command(header=header, id=identity, verb=verb, scope=scope, issuer=source, expires_ns=expires_ns)
+    identity = f"{bus.source}-{header.stamp_ns}"
+    command = Command(
+        header=header, id=identity, verb=verb, scope=scope, issuer=bus.source, expires_ns=expires_ns, run=bus.run
+    )
     return AwaitedAnswers(command, (drones or record.drones) if verb in _STOPS else (_OPERATOR,))
 
 
@@ -127,7 +130,7 @@ def _without_router(verb: Verb, record: RuntimeRecord, as_json: bool, error: Gro
         answers = {name: {"stage": NOT_CONFIRMED, "reason": "signalled to land"} for name in told}
         click.echo(json.dumps({"command": verb, "confirmed": False, "router": False, "drones": answers}))
     else:
-        click.echo(f"no router answers at {record.endpoint}: told {', '.join(told)} to land and exit (SIGTERM)")
+        click.echo(f"no router answers at {record.endpoint}: ordered {', '.join(told)} to land and exit (SIGTERM)")
         click.echo(f"{NOT_CONFIRMED}: watch the drones")
     return ExitCode.FAULT
 
@@ -143,7 +146,7 @@ def _verb(verb: Verb, text: str) -> click.Command:
 
     name = verb.lower().replace("_", "-")
     if verb is Verb.CUT_MOTORS:
-        callback = click.option("--yes", is_flag=True, help="Do not ask.")(callback)
+        callback = click.option("--yes", is_flag=True, help="Do not ask for confirmation.")(callback)
     example = f"\n\n\b\nExample:\n  groundstation {name}\n  groundstation {name} drone_1 --json"
     codes = "\n\nExit codes: 0 confirmed, 3 nothing is running, 4 not confirmed."
     return click.command(name=name, help=text + example + codes)(callback)

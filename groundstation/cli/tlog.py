@@ -8,7 +8,8 @@ from pathlib import Path
 from drivers.datagrams import unpack
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import split
-from drivers.mavlink.wire.verification import MAGIC, Verifier
+from drivers.mavlink.wire.signature import MAGIC
+from drivers.mavlink.wire.verification import Verifier
 from groundstation.bus.topics import RAW_RX, RAW_TX
 from groundstation.errors import MessageError
 from groundstation.recording.compatibility import RecordingError

@@ -1,6 +1,5 @@
-"""`groundstation view`: live engineering views of a run, in Rerun or Foxglove."""
+"""`groundstation view`: live engineering views of a run, in Rerun, Foxglove or ROS 2 tools."""
 
-import os
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,36 +17,56 @@ if TYPE_CHECKING:
 _FOXGLOVE_PORT = 8766
 _RERUN_PORT = 9876
 _RERUN_PAGE_PORT = 9090
+_ROS_ROUTER = "tcp/127.0.0.1:7447"
+_ROS_DISTRIBUTIONS = ("humble", "jazzy", "lyrical")
 _PORT = click.IntRange(1024, 65535)
 
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation view --foxglove          then open ws://127.0.0.1:8766 in Foxglove\n"
     "  groundstation view --rerun             then open the page that it names\n"
-    "  groundstation view --rerun --save flight.rrd"
+    "  groundstation view --rerun --save flight.rrd\n"
+    "  groundstation view --ros2              then ros2 topic list, rviz2 ... (rmw_zenoh)"
 )
 @click.option("--rerun", "viewer", flag_value="rerun", help="Serve Rerun's web viewer; extra [rerun].")
 @click.option("--foxglove", "viewer", flag_value="foxglove", help="Serve Foxglove and Lichtblick; extra [foxglove].")
+@click.option("--ros2", "viewer", flag_value="ros2", help="Publish to a ROS 2 Zenoh router; extra [ros2].")
 @click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
 @click.option("--port", type=_PORT, help=f"Where viewers connect (Foxglove {_FOXGLOVE_PORT}, Rerun {_RERUN_PORT}).")
 @click.option("--page-port", type=_PORT, default=_RERUN_PAGE_PORT, show_default=True, help="Rerun's page.")
 @click.option("--save", type=click.Path(path_type=Path), help="Rerun: write to this new file instead of serving.")
-def view(viewer: str | None, name: str | None, port: int | None, page_port: int, save: Path | None) -> int:
+@click.option("--router", default=_ROS_ROUTER, show_default=True, metavar="ENDPOINT", help="ROS 2: its Zenoh router.")
+@click.option("--domain", type=click.IntRange(0, 232), default=0, show_default=True, help="ROS 2: its domain.")
+@click.option(
+    "--distro", type=click.Choice(_ROS_DISTRIBUTIONS), default="jazzy", show_default=True, help="ROS 2: which."
+)
+def view(  # click hands each option over as a parameter
+    viewer: str | None,
+    name: str | None,
+    port: int | None,
+    page_port: int,
+    save: Path | None,
+    router: str,
+    domain: int,
+    distro: str,
+) -> int:
     """Show a running ground station to an engineer's viewer, on loopback. It takes no orders and stops nothing."""
-    from groundstation.bus.zenoh_bus import open_bus
+    from groundstation.bus.roles import Role
     from groundstation.engineering_views.watch import watch
+    from groundstation.supervisor.joining import join
 
     if viewer is None:
-        raise click.UsageError("say which viewer: --rerun or --foxglove")
+        raise click.UsageError("say which viewer: --rerun, --foxglove or --ros2")
     if save is not None and viewer != "rerun":
         raise click.UsageError("--save goes with --rerun; a recording opens in Foxglove as it is")
     _require(viewer)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
     record = choose(name)
-    bus = open_bus(record.endpoint, record.site, f"view_{os.getpid()}", timeout_s=2.0)
+    bus = join(record, "view", Role.VIEW)
     shown: LiveView | None = None
     try:
-        shown = _open(viewer, record, port, page_port, save)
+        opened = _open_ros2(record, router, domain, distro) if viewer == "ros2" else None
+        shown = opened or _open(viewer, record, port, page_port, save)
         dropped = watch(bus, shown, lambda: record.alive)
         click.echo("the run has ended" if shown.alive else "the viewer's server has ended", err=True)
         if dropped:
@@ -62,9 +81,9 @@ def view(viewer: str | None, name: str | None, port: int | None, page_port: int,
 
 
 def _require(viewer: str) -> None:
-    from groundstation.engineering_views.extras import require_foxglove, require_rerun
+    from groundstation.engineering_views.extras import require_foxglove, require_rerun, require_ros2
 
-    {"rerun": require_rerun, "foxglove": require_foxglove}[viewer]()
+    {"rerun": require_rerun, "foxglove": require_foxglove, "ros2": require_ros2}[viewer]()
 
 
 def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int, save: Path | None) -> "LiveView":
@@ -87,6 +106,17 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
     click.echo(f"{record.name} {f'to {save}' if server is None else f'at {server.page}'} (Ctrl-C leaves it)")
     now_ns = clock.now_ns() + timeline.unix_offset_ns
     return RerunView(record.name, field, timeline, now_ns, server, save)
+
+
+def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str) -> "LiveView":
+    from groundstation.bus import clock
+    from groundstation.engineering_views.ros2.live import Ros2View
+    from groundstation.recording.timeline import Timeline
+
+    timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
+    bridge = Ros2View(router, domain, distro, _field_of(record), timeline)
+    click.echo(f"{record.name} in ROS 2 domain {domain} by {router} (Ctrl-C leaves it; the flight goes on)")
+    return bridge
 
 
 def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":

@@ -84,7 +84,8 @@ class SafetySettings(SettingsSection):
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
     """Time [s] without a fresh setpoint after which a drone lands. It then stays down until a new take-off."""
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
-    """Time [s] in flight without being seen by any camera after which a drone lands."""
+    """Time [s] after which a drone lands that is known worse than max_position_std_m, or that a camera should see and
+    does not; one that no camera sees lands after three times as long, however well it is known."""
     max_position_std_m: Annotated[float, Field(gt=0, le=5)] = 0.6
     """Largest standard deviation [m] of a drone's own position; a drone whose position is known less well hovers."""
 
@@ -99,6 +100,9 @@ class RecordingSettings(SettingsSection):
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
     """Images per second and camera that are shown in the console and recorded; 0: none. The H.264 video of a camera is
     recorded in full besides, unless this is 0."""
+    pictures: Literal["none", "blurred", "full"] = "full"
+    """Which pictures are recorded. blurred: an eighth of the detail, so that nobody can be recognised, and no video.
+    The console shows them as they are."""
     raw_datagrams: bool = True
     """Whether every datagram of the vehicle links is recorded, byte by byte."""
     rotate_mb: Annotated[float, Field(ge=0, le=100_000)] = 1000.0

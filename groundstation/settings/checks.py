@@ -162,13 +162,15 @@ _VIDEO_WIDTHS = {"h264_360p": 640, "h264_720p": 1280}
 
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
-    """An AR.Drone's video is taken from that very drone, in the size that it is told to send."""
+    """An AR.Drone's video is taken from that very drone, in the size that its settings ask for."""
     for name, camera in parts.cameras.items():
         if parse_source(camera.source).kind is SourceKind.ARDRONE:
             yield ("cameras", name, "source"), "must not be an AR.Drone's video: drones carry their cameras"
     for name, drone in parts.drones.items():
         if drone.video is not None and drone.kind != "ardrone":
             yield ("drones", name, "video"), f"has no meaning for {drone.kind}"
+        if drone.serial_number and drone.kind != "ardrone":
+            yield ("drones", name, "serial_number"), f"has no meaning for {drone.kind}"
         source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
         if source.kind is not SourceKind.ARDRONE:
             continue

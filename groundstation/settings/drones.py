@@ -131,7 +131,7 @@ class Mavlink(SettingsSection):
     """UDP port: the vehicle's, or ours with listen."""
     listen: bool = False
     """true: the vehicle opens the connection to local_address:port. Vehicles that share a port share one driver
-    process."""
+    process. When the driver is dead, others speak to the vehicle from another port than the one it called."""
     local_address: Address = "0.0.0.0"
     """IPv4 address that the driver listens on, with listen."""
     serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d+)?$")] = ""
@@ -143,6 +143,9 @@ class Mavlink(SettingsSection):
     """Height [m] that a take-off climbs to."""
     vision_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
     """Rate [Hz] at which the vehicle's position estimate is sent to its autopilot."""
+    parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
+    """Parameters of the autopilot that this drone needs otherwise than `groundstation mavlink setup` proposes, or
+    besides, by name; the driver warns of the former."""
 
 
 class Drone(SettingsSection):
@@ -158,6 +161,9 @@ class Drone(SettingsSection):
     """false: the drone stays out of the run but keeps its entry in the file."""
     address: Address
     """IPv4 address of the vehicle; each its own."""
+    serial_number: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{0,40}$")] = ""
+    """Serial number of an AR.Drone: another one at its address does not take off. groundstation ardrone probe shows
+    it."""
     limits: LimitSettings = LimitSettings()
     """What the drone is never commanded to exceed, and when its battery makes it land."""
     marker: RobotMarker

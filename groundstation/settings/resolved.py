@@ -83,7 +83,7 @@ def _safety_lines(field: Field) -> list[str]:
         f"who wins: {STOP_PRIORITY}",
         f"no fresh set-point for {safety.setpoint_lifetime_ms / 1000:g} s: hover;"
         f" for {safety.land_after_s:g} s: land (until a new take-off)",
-        f"not seen for {safety.unseen_land_after_s:g} s after take-off: land;"
+        f"not localised for {safety.unseen_land_after_s:g} s, or unseen for three times as long: land;"
         f" position known worse than {safety.max_position_std_m:g} m: hover",
         f"drones stay {safety.min_separation_m:g} m apart and inside the fence",
     ]

@@ -1,7 +1,7 @@
 """From the field to what each process is handed: its own part, as JSON, and nothing else."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -32,26 +32,36 @@ class DriverKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DriverSection:
-    """One driver process: its name, its kind, what it drives (a drone or a camera of the field), and its section."""
+    """One driver process: its name, its kind, what it drives (a drone or a camera of the field), and its section.
+
+    entities: all that it speaks of.
+    """
 
     name: str
     kind: DriverKind
     entity: str
     section: str
+    entities: tuple[str, ...]
 
 
-def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, tuple[str, int]]) -> Field:
+def rerouted(
+    field: Field,
+    addresses: Mapping[str, str],
+    streams: Mapping[str, tuple[str, int]],
+    streams_only: Collection[str] = (),
+) -> Field:
     """Return the same field with other addresses of drones and other sources of cameras, by name.
 
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
-    port), spoken to as the field's own source is where that is an AR.Drone's video, else by HTTP. This is all that
-    simulation changes. Raises KeyError for a name that is not in the field.
+    port), spoken to as the field's own source is where that is an AR.Drone's video, else by HTTP. This, and that a
+    drone may have any serial number, is all that simulation changes. streams_only: drones whose cameras are never their
+    own video. Raises KeyError for a name that is not in the field.
     """
     for name in (*addresses, *streams):
         if name not in field.drones and name not in field.cameras:
             raise KeyError(name)
     drones = {
-        name: _moved(_with_source(drone, streams.get(name)), addresses.get(name))
+        name: _moved(_with_source(drone, streams.get(name), name in streams_only), addresses.get(name))
         for name, drone in field.drones.items()
     }
     cameras = {
@@ -61,15 +71,15 @@ def rerouted(field: Field, addresses: Mapping[str, str], streams: Mapping[str, t
     return field.model_copy(update={"drones": drones, "cameras": cameras})
 
 
-def _with_source(drone: Drone, stream: tuple[str, int] | None) -> Drone:
-    camera = drone.camera.model_copy(update={"source": _source(drone.camera.source, stream)})
+def _with_source(drone: Drone, stream: tuple[str, int] | None, plain: bool) -> Drone:
+    camera = drone.camera.model_copy(update={"source": _source(drone.camera.source, stream, plain)})
     return drone.model_copy(update={"camera": camera})
 
 
 def _moved(drone: Drone, address: str | None) -> Drone:
     if address is None:
         return drone
-    moved = drone.model_copy(update={"address": address})
+    moved = drone.model_copy(update={"address": address, "serial_number": ""})  # an emulator has its own
     match drone.kind:
         case "ardrone":
             return moved
@@ -81,10 +91,10 @@ def _moved(drone: Drone, address: str | None) -> Drone:
             raise unknown_kind(other)
 
 
-def _source(source: str, stream: tuple[str, int] | None) -> str:
+def _source(source: str, stream: tuple[str, int] | None, plain: bool = False) -> str:
     if stream is None:
         return source
-    if parse_source(source).kind is SourceKind.ARDRONE:
+    if parse_source(source).kind is SourceKind.ARDRONE and not plain:
         return f"ardrone://{stream[0]}:{stream[1]}"
     return f"http://{stream[0]}:{stream[1]}/video.mjpg"
 
@@ -102,12 +112,18 @@ def driver_sections(field: Field) -> list[DriverSection]:
     count = len(field.cameras) + len(field.drones)
     phases = [index / (count * SEARCH_RATE_HZ) for index in range(count)]
     fixed = [
-        DriverSection(name, DriverKind.CAMERA, name, world_camera(field, name, camera, phase).model_dump_json())
+        DriverSection(
+            name, DriverKind.CAMERA, name, world_camera(field, name, camera, phase).model_dump_json(), (name,)
+        )
         for (name, camera), phase in zip(field.cameras.items(), phases, strict=False)
     ]
     carried = [
         DriverSection(
-            camera_name(name), DriverKind.CAMERA, name, onboard_camera(field, name, drone, phase).model_dump_json()
+            camera_name(name),
+            DriverKind.CAMERA,
+            name,
+            onboard_camera(field, name, drone, phase).model_dump_json(),
+            (name, camera_name(name)),
         )
         for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
     ]
@@ -121,14 +137,14 @@ def _vehicles(field: Field) -> list[DriverSection]:
         match drone.kind:
             case "ardrone":
                 settings = _ardrone(field, name, index).model_dump_json()
-                alone.append(DriverSection(name, DriverKind.ARDRONE, name, settings))
+                alone.append(DriverSection(name, DriverKind.ARDRONE, name, settings, (name,)))
             case "mavlink":
                 mavlink = drone.require_mavlink()
                 links.setdefault(mavlink.port if mavlink.listen else name, []).append(name)
             case other:
                 raise unknown_kind(other)
     return alone + [
-        DriverSection(names[0], DriverKind.MAVLINK, names[0], _mavlink(field, names).model_dump_json())
+        DriverSection(names[0], DriverKind.MAVLINK, names[0], _mavlink(field, names).model_dump_json(), tuple(names))
         for names in links.values()
     ]
 
@@ -139,6 +155,7 @@ def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
     return ArDroneDriverSettings(
         name=name,
         address=drone.address,
+        serial_number=drone.serial_number,
         limits=ArDroneLimits(
             max_speed_m_s=limits.max_speed_m_s,
             max_climb_m_s=limits.max_climb_m_s,
@@ -151,6 +168,7 @@ def _ardrone(field: Field, name: str, index: int) -> ArDroneDriverSettings:
             velocity_scale=drone.odometry.velocity_scale, velocity_std_m_s=drone.odometry.velocity_std_m_s
         ),
         safety=_silence(field.safety),
+        pad_m=drone.pad_m,
         # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
         flight=FlightConfiguration(
             altitude_max_m=max(0.5, field.room.fence.z_m[1]), ultrasound_freq=8 if index % 2 else 7
@@ -165,6 +183,7 @@ def _silence(safety: SafetySettings) -> SilenceLimits:
         setpoint_lifetime_ms=safety.setpoint_lifetime_ms,
         land_after_s=safety.land_after_s,
         unseen_land_after_s=safety.unseen_land_after_s,
+        min_separation_m=safety.min_separation_m,
     )
 
 
@@ -204,5 +223,7 @@ def _mavlink_vehicle(name: str, drone: Drone) -> VehicleSettings:
             battery_hold_s=limits.battery_hold_s,
         ),
         take_off_m=mavlink.take_off_m,
+        parameters=mavlink.parameters,
         velocity_std_m_s=drone.odometry.velocity_std_m_s,
+        attitude_std_rad=drone.odometry.attitude_std_rad,
     )

@@ -1,6 +1,6 @@
 """Settings of the targets: marker and motion model."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -17,6 +17,17 @@ _BELONGS_TO = {
     "turning_s": _SWITCHING,
 }
 Duration = Annotated[float, Field(ge=0.1, le=600)]
+Base = Literal["turtlebot_2", "person", "rc_car"]
+# What each base does at most: speed [m/s], acceleration [m/s^2], turn rate [deg/s]. A Kobuki's own figures; people walk
+# briskly, and turn about within half a second; a model car of 1:10, indoors.
+_MEANS: dict[str, tuple[float, float, float]] = {
+    "turtlebot_2": (0.7, 0.5, 180.0),
+    "person": (1.5, 2.0, 360.0),
+    "rc_car": (3.0, 4.0, 180.0),
+}
+_MEANS_KEYS = ("max_speed_m_s", "max_acceleration_m_s2", "max_turn_rate_deg_s")
+# Deviation of the acceleration in a manoeuvre over what the base keeps up.
+_BRISK = 2.4
 
 
 class TargetMarkerSettings(MarkerSettings):
@@ -39,12 +50,22 @@ class TrackedBody(SettingsSection):
     model: Literal["constant_velocity", "coordinated_turn", "manoeuvring"] = "constant_velocity"
     """Motion model. constant_velocity: straight ahead with white accelerations; coordinated_turn: arcs; manoeuvring:
     switches between the two, with a belief for each."""
-    acceleration_std_m_s2: Annotated[float, Field(gt=0, le=10)] = 1.2
+    base: Base = "turtlebot_2"
+    """What kind of target it is, which says what it can do at most: turtlebot_2: 0.7 m/s, 0.5 m/s^2, 180 deg/s;
+    person: 1.5 m/s, 2 m/s^2, 360 deg/s; rc_car: 3 m/s, 4 m/s^2, 180 deg/s. For any other, the next three keys."""
+    max_speed_m_s: Annotated[float, Field(gt=0, le=10)] | None = None
+    """Highest speed [m/s]; none: the base's."""
+    max_acceleration_m_s2: Annotated[float, Field(gt=0, le=20)] | None = None
+    """Highest acceleration along its way that it keeps up [m/s^2]; none: the base's."""
+    max_turn_rate_deg_s: Annotated[float, Field(gt=0, le=720)] | None = None
+    """Highest turn rate [deg/s]; none: the base's."""
+    acceleration_std_m_s2: Annotated[float, Field(gt=0, le=50)] | None = None
     """Standard deviation [m/s^2] of each component of the target's acceleration while it manoeuvres, which is assumed
-    for 7 % of the time and 0.12 s at a time. Rule: 2.5 times its steady acceleration: TurtleBot 1.2, person 5,
-    RC car 10. Too small: turns are taken for errors and the target is lost; too large costs little."""
+    for 7 % of the time and 0.12 s at a time; none: 2.4 times `max_acceleration_m_s2` (turtlebot_2 1.2, person 4.8,
+    rc_car 9.6). Too small: turns are taken for errors and the target is lost; too large costs little."""
     turn_rate_std_deg_s: Annotated[float, Field(gt=0, le=360)] | None = None
-    """Models that turn: standard deviation [deg/s] of the turn rate; none: 28.6."""
+    """Models that turn: standard deviation [deg/s] of the turn rate; none: 0.16 of `max_turn_rate_deg_s`
+    (turtlebot_2 28.6)."""
     turn_rate_correlation_s: Duration | None = None
     """Models that turn: time [s] for which a turn rate persists; none: 3."""
     straight_s: Duration | None = None
@@ -53,6 +74,20 @@ class TrackedBody(SettingsSection):
     """manoeuvring: mean time [s] in a turn; none: 2."""
     heading: bool = False
     """Whether the heading of the target's marker is estimated too, which helps the models that turn."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_its_base(cls, given: Any) -> Any:
+        """Fill in what the base can do."""
+        base = given.get("base", "turtlebot_2") if isinstance(given, dict) else None
+        if base not in get_args(Base):
+            return given
+        means = dict(zip(_MEANS_KEYS, _MEANS[str(base)], strict=True))
+        told = {**given, **{key: value for key, value in means.items() if given.get(key) is None}}
+        steady = told["max_acceleration_m_s2"]
+        if told.get("acceleration_std_m_s2") is None and isinstance(steady, float | int):
+            told["acceleration_std_m_s2"] = _BRISK * steady
+        return told
 
     @model_validator(mode="after")
     def _of_its_model(self) -> Self:

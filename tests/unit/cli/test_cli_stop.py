@@ -166,7 +166,7 @@ def test_silent_router_signals_the_drivers_and_no_stranger(runtime: Path) -> Non
         announce("tcp/127.0.0.1:9", processes=processes)
         result = cli("land")
         assert result.returncode == 4
-        assert "no router answers" in result.stdout and "told drone_1 to land" in result.stdout
+        assert "no router answers" in result.stdout and "ordered drone_1 to land" in result.stdout
         assert driver.wait(5) == -signal.SIGTERM
         assert stranger.poll() is None
         stranger.kill()

@@ -195,7 +195,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     assert [problem.removeprefix(f"{path}") for problem in caught.value.problems] == [
         "--set cameras.blur_px=20: cameras.blur_px: must be <= 10 (got 20)",
         "--set seed: must look like path.to.key=value",
-        ":3: target.path.speed_m_s: must be <= 0.7 (got 7)",
+        ":3: target.path.speed_m_s: must be <= 5 (got 7)",
         ":4: target.path.half_lenght_m: unknown key, did you mean half_length_m?",
         ":6: cameras.fps: must be <= 60 (got 90)",
         ":7: cameras.corner_noise: unknown key, did you mean corner_noise_px?",
@@ -206,8 +206,8 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     with pytest.raises(SettingsError) as caught:
         load_scenario(path)
     assert caught.value.problems == [
-        f"{path}:3: target.path: shape must be one of 'figure_eight', 'none' (got \"figure_eigth\"),"
-        " did you mean figure_eight?"
+        f"{path}:3: target.path: shape must be one of 'figure_eight', 'none', 'waypoints', 'random_walk', 'sprint',"
+        " 'along_walls' (got \"figure_eigth\"), did you mean figure_eight?"
     ]
 
 

@@ -9,7 +9,7 @@ import pytest
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import Measurement
-from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera
+from groundstation.estimation.models import ConstantVelocityTarget, CoordinatedTurnTarget, FixedMount, MountedCamera
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import parameters_from_field as planner_from_field
@@ -69,3 +69,33 @@ def test_estimator_and_planner_take_the_same_share_of_it_for_usual(lab_field: Re
     assert isinstance(target, ConstantVelocityTarget)
     assert target.acceleration_std_m_s2 == pytest.approx(usual)
     assert planner_from_field(lab_field).noise.target_acceleration == pytest.approx(0.5 * usual**2)
+
+
+@pytest.mark.parametrize(
+    ("base", "speed_m_s", "noise_m_s2", "turn_deg_s"),
+    [("turtlebot_2", 0.7, 1.2, 180.0), ("person", 1.5, 4.8, 360.0), ("rc_car", 3.0, 9.6, 180.0)],
+)
+def test_a_base_says_what_a_target_can_do(base: str, speed_m_s: float, noise_m_s2: float, turn_deg_s: float) -> None:
+    field = resolved_field(load_field(CONFIG / "lab.yaml", [f"target.base={base}"]))
+    target = field.tracked["turtlebot"]
+    assert (target.max_speed_m_s, target.max_turn_rate_deg_s) == (speed_m_s, turn_deg_s)
+    assert target.acceleration_std_m_s2 == pytest.approx(noise_m_s2)
+    model = parameters_from_field(field).entities["turtlebot"]
+    assert isinstance(model, ConstantVelocityTarget)
+    assert model.speed_std_m_s == pytest.approx(4 / 7 * speed_m_s)
+
+
+def test_single_figures_go_before_the_base() -> None:
+    told = ["target.base=person", "target.max_acceleration_m_s2=3", "target.max_speed_m_s=1"]
+    target = resolved_field(load_field(CONFIG / "lab.yaml", told)).tracked["turtlebot"]
+    assert (target.max_speed_m_s, target.max_turn_rate_deg_s) == (1.0, 360.0)
+    assert target.acceleration_std_m_s2 == pytest.approx(7.2)
+    direct = resolved_field(load_field(CONFIG / "lab.yaml", [*told, "target.acceleration_std_m_s2=0.3"]))
+    assert direct.tracked["turtlebot"].acceleration_std_m_s2 == 0.3
+
+
+def test_the_model_that_turns_is_scaled_by_the_turn_rate() -> None:
+    field = resolved_field(load_field(CONFIG / "lab.yaml", ["target.model=coordinated_turn"]))
+    model = parameters_from_field(field).entities["turtlebot"]
+    assert isinstance(model, CoordinatedTurnTarget)
+    assert model.turn_rate_std_rad_s == pytest.approx(0.5)

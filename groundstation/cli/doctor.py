@@ -1,0 +1,56 @@
+"""`groundstation doctor`: what this machine lacks for flying."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from groundstation.cli.exits import ExitCode
+
+if TYPE_CHECKING:
+    from groundstation.doctor.finding import Finding
+
+
+@click.command(epilog="\b\nExamples:\n  groundstation doctor\n  groundstation doctor my_lab/lab.yaml --json")
+@click.argument("field", default="lab")
+@click.option("--json", "as_json", is_flag=True, help="Print a list of {level, subject, found, remedy}.")
+def doctor(field: str, as_json: bool) -> int:
+    """Say what this machine lacks for flying a field file, and the remedy; nothing is started.
+
+    Exit code 1 when something must be mended before a flight.
+    """
+    from groundstation.doctor.finding import Level
+
+    findings = _examine(field)
+    if as_json:
+        click.echo(json.dumps([finding._asdict() for finding in findings], indent=2))
+    else:
+        width = max(len(finding.subject) for finding in findings)
+        for finding in findings:
+            click.echo(f"{finding.level:6}  {finding.subject:{width}}  {finding.found}")
+            if finding.remedy:
+                click.echo(f"{'':6}  {'':{width}}  -> {finding.remedy}")
+    return ExitCode.FAILED if any(finding.level is Level.MUST for finding in findings) else ExitCode.OK
+
+
+def _examine(name: str) -> "list[Finding]":
+    from groundstation.doctor import network, processor, storage
+    from groundstation.settings.files import find_field
+    from groundstation.settings.load import load_field
+
+    field = load_field(find_field(name))
+    folder = Path(field.recording.directory)
+    found = [
+        processor.cores(),
+        processor.real_time_right(),
+        processor.clock_source(),
+        processor.governor(),
+        storage.memory(),
+        storage.open_files(),
+        storage.room(folder),
+        storage.speed(folder),
+        network.port(field.console.port, "console"),
+        *network.power_saving(),
+    ]
+    return [finding for finding in found if finding is not None]

@@ -1,0 +1,154 @@
+"""`groundstation experiment scenarios`: the scenario files, flown at message level under several strategies."""
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.progress import progress
+from groundstation.errors import GroundStationError, SettingsError
+
+if TYPE_CHECKING:
+    from groundstation.experiments.faults import FlightBatch
+
+_BATCH = 5
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation experiment scenarios                     (all of them, one seed each)\n"
+    "  groundstation experiment scenarios random-walk kidnap-2m --seeds 20 --workers 4\n"
+    "  groundstation experiment scenarios corridor-2 --seeds 5 --strategies ours,string,relay\n"
+    "  groundstation experiment scenarios my_lab/scenarios/hard.yaml --field my_lab/lab.yaml\n\n"
+    "Exit codes: 0 all flights were as expected, 1 some were not, 2 wrong settings."
+)
+@click.argument("names", nargs=-1)
+@click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each scenario.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the first flight.")
+@click.option(
+    "--strategies", default="ours", show_default=True, help="By commas: ours,string,flat,two-level,relay,chase."
+)
+@click.option(
+    "--seconds", type=FiniteRange(5, 3600), default=None, help="Tracked in each flight; default: as its file."
+)
+@click.option(
+    "--field", default=None, help="Field file, or a shipped one's name; default: as the scenario's file says."
+)
+@click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting of the field; repeatable.")
+@click.option(
+    "--scheduler", default="local", show_default=True, help="tcp://host:8786 of a dask cluster, `local`, or `none`."
+)
+@click.option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
+@click.option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-scenarios.")
+@click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output.")
+def scenarios(
+    names: tuple[str, ...], strategies: str, scheduler: str, workers: int, out: Path | None, as_json: bool, **flown: Any
+) -> int:
+    """Fly scenario files at message level and compare what comes of them with what each file expects.
+
+    NAMES: files, or names of shipped ones; none: all shipped ones that say what they expect. Drivers, watchdogs,
+    estimator and planner are those that fly. Strategies beside ours: fixed topologies (string, flat, two-level), the
+    relay rule (the drone nearest to the target stays 0.9 m from it on the side of the ceiling camera's view, the others
+    look at it from there) and the chase (the nearest drone goes there from its own side). Figures count from when the
+    target was found; lost is an error above 0.5 m.
+    """
+    from groundstation.experiments.faults import flights_of, fly
+    from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks, write_atomically
+    from groundstation.experiments.scenarios import rows_of, table
+
+    planned = _planned(names, _known(strategies), **flown)
+    if scheduler == "local" and (len(planned) == 1 or not dask_is_there()):
+        scheduler = "none"
+    folder, began = Path(out or Path("runs") / "experiment-scenarios"), time.monotonic()
+    batches = [batch for _, batch in planned]
+    try:
+        found = run_tasks(batches, None, "" if scheduler == "none" else scheduler, workers, progress, fly)
+    except (SweepError, RuntimeError) as error:
+        raise GroundStationError(str(error)) from error
+    flights = [
+        {"scenario": name, **one} for (name, _), row in zip(planned, found, strict=True) for one in flights_of([row])[0]
+    ]
+    rows = rows_of(flights)
+    document = {
+        "experiment": "scenarios",
+        "elapsed_s": round(time.monotonic() - began, 1),
+        "rows": rows,
+        "flights": flights,
+    }
+    write_atomically(folder / "scenarios.json", json.dumps(document, indent=1) + "\n")
+    if as_json:
+        click.echo(json.dumps(document, indent=1))
+    else:
+        _tell(table(rows), rows, folder)
+    return ExitCode.FAILED if any(row["missed"] for row in rows) else ExitCode.OK
+
+
+def _known(strategies: str) -> list[str]:
+    from groundstation.experiments.scenarios import STRATEGIES
+
+    chosen = list(dict.fromkeys(name.strip() for name in strategies.split(",") if name.strip()))
+    strangers = [name for name in chosen if name not in STRATEGIES]
+    if strangers or not chosen:
+        what = f"no strategy {', '.join(map(repr, strangers))}" if strangers else "names none"
+        raise SettingsError([f"--strategies: {what}; there are {', '.join(STRATEGIES)}"])
+    return chosen
+
+
+def _planned(
+    names: tuple[str, ...], strategies: list[str], seeds: int, seed: int, seconds: float | None, field: str | None,
+    options: tuple[str, ...],
+) -> "list[tuple[str, FlightBatch]]":  # fmt: skip
+    """Return each batch of flights with its scenario's name: some seeds of a scenario under a strategy each."""
+    from groundstation.experiments.faults import batches
+
+    planned = []
+    for name in names or _shipped():
+        order = _order(name, seconds, field, options)
+        for strategy in strategies:
+            text = json.dumps(order | {"strategy": strategy}, sort_keys=True)
+            flights = batches(text, seed, seeds, _BATCH, "scenarios")
+            planned += [(Path(name).name.removesuffix(".yaml"), flight) for flight in flights]
+    return planned
+
+
+def _shipped() -> list[str]:
+    """Return the names of the shipped scenarios that say what they expect."""
+    from groundstation.settings.document import read
+    from groundstation.settings.files import SHIPPED
+
+    files = sorted((SHIPPED / "scenarios").glob("*.yaml"))
+    return [file.stem for file in files if isinstance(tree := read(file).value, dict) and "expected" in tree]
+
+
+def _order(name: str, seconds: float | None, field: str | None, options: tuple[str, ...]) -> dict[str, Any]:
+    """Return what the simulator is told besides strategy and seeds."""
+    import msgspec
+
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import resolved_field
+    from groundstation.settings.scenario import load_scenario
+    from groundstation.settings.sections import DriverKind, driver_sections
+
+    scenario = load_scenario(find_scenario(name, find_field(field or "lab")))
+    expected = scenario.get("expected") or {}
+    path = find_field(field or expected.get("field", "lab"))
+    loaded = load_field(path, (*expected.get("set", ()), *options, "recording.raw_datagrams=false"))
+    return {
+        "field": msgspec.to_builtins(resolved_field(loaded)),
+        "sections": [(str(s.kind), s.section) for s in driver_sections(loaded) if s.kind is not DriverKind.CAMERA],
+        "scenario": scenario,
+        "seconds": seconds or expected.get("seconds", 45.0),
+    }
+
+
+def _tell(lines: list[str], rows: list[dict[str, Any]], folder: Path) -> None:
+    for line in lines:
+        click.echo(line)
+    for row in rows:
+        for seed, missed in row["missed"].items():
+            click.echo(f"{row['scenario']} {row['strategy']} seed {seed}: {'; '.join(missed)}")
+    click.echo(f"written to {folder}/scenarios.json")

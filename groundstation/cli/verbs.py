@@ -1,0 +1,89 @@
+"""The table of verbs: where each command is, and its line in the help."""
+
+from typing import NamedTuple
+
+
+class CommandRow(NamedTuple):
+    """One row: family, place (`module:function`), line in the help, and whether it stands on the first page."""
+
+    family: str
+    target: str
+    summary: str
+    first: bool = False
+
+
+VERBS: dict[str, CommandRow] = {
+    "demo": CommandRow(
+        "Fly", "groundstation.cli.demo:demo", "Two emulated drones track a TurtleBot; needs no hardware.", first=True
+    ),
+    "sitl": CommandRow(
+        "Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras.", first=True
+    ),
+    "fly": CommandRow("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones.", first=True),
+    "takeoff": CommandRow("Fly", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
+    "track": CommandRow("Fly", "groundstation.cli.stop:track", "Let the tracker move the drones."),
+    "resume": CommandRow("Fly", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),
+    "hold": CommandRow("Stop", "groundstation.cli.stop:hold", "Hover where they are.", first=True),
+    "land": CommandRow("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones.", first=True),
+    "cut-motors": CommandRow(
+        "Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall.", first=True
+    ),
+    "deadman": CommandRow(
+        "Stop", "groundstation.cli.deadman:deadman", "Hold a key or button; let go: they hold, then land."
+    ),
+    "monitor": CommandRow(
+        "Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station.", first=True
+    ),
+    "console": CommandRow(
+        "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station.", first=True
+    ),
+    "report": CommandRow(
+        "Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run.", first=True
+    ),
+    "replay": CommandRow(
+        "Look", "groundstation.cli.replay:replay", "Show a recorded run, or compute it again.", first=True
+    ),
+    "view": CommandRow("Look", "groundstation.cli.view:view", "Live engineering view in Rerun or Foxglove."),
+    "recording": CommandRow(
+        "Look", "groundstation.cli.recording:recording", "Look into, repair, cut and convert recordings."
+    ),
+    "export": CommandRow("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
+    "new": CommandRow("Prepare", "groundstation.cli.new:new", "Write a field file from a few questions.", first=True),
+    "config": CommandRow(
+        "Prepare", "groundstation.cli.config:config", "Check, show or start a field file.", first=True
+    ),
+    "doctor": CommandRow(
+        "Prepare", "groundstation.cli.doctor:doctor", "What this machine lacks for flying, and the remedy."
+    ),
+    "calibrate": CommandRow(
+        "Prepare", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."
+    ),
+    "camera": CommandRow(
+        "Prepare", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."
+    ),
+    "markers": CommandRow("Prepare", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
+    "ardrone": CommandRow("Prepare", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
+    "mavlink": CommandRow(
+        "Prepare", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."
+    ),
+    "experiment": CommandRow(
+        "Study", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."
+    ),
+    "bench": CommandRow("Develop", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
+    "version": CommandRow(
+        "Develop", "groundstation.cli.version:version", "Versions of this program and its libraries."
+    ),
+}
+
+ELSEWHERE = {
+    **dict.fromkeys(("stop", "halt", "abort", "emergency", "kill"), "'land', 'hold' or 'cut-motors'"),
+    **dict.fromkeys(("start", "run", "launch"), "'sitl' or 'fly'"),
+    **{word: f"'config {word}'" for word in ("check", "init", "show", "draw", "schema")},
+    **{word: f"'recording {word}'" for word in ("info", "recover", "cut")},
+    "compare": "'report RUN --compare OTHER'",
+    "print": "'markers print'",
+    "probe": "'ardrone probe' or 'mavlink probe'",
+    "record": "'recording' (each run is recorded by itself)",
+    "setup": "'mavlink setup'",
+}
+"""Words of other ground stations, and those that stand one level down here: the likeness of letters would mislead."""

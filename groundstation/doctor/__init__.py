@@ -1,0 +1,1 @@
+"""What this machine lacks for flying, and the remedy."""

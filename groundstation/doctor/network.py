@@ -1,0 +1,40 @@
+"""Ports that a run wants, and Wi-Fi that sleeps."""
+
+import shutil
+import socket
+import subprocess
+from pathlib import Path
+
+from groundstation.doctor.finding import Finding, Level, judged
+
+_NETWORKS = Path("/sys/class/net")
+
+
+def port(number: int, purpose: str) -> Finding:
+    """Return whether the port is free on loopback."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", number))
+        except OSError as error:
+            found, remedy = f"{number}: {error.strerror}", f"ss -ltnp 'sport = :{number}' names the program"
+            return Finding(Level.SHOULD, f"port of the {purpose}", found, remedy)
+    return Finding(Level.OK, f"port of the {purpose}", f"{number} is free")
+
+
+def power_saving(networks: Path = _NETWORKS, program: str = "iw") -> list[Finding]:
+    """Return, for each Wi-Fi adapter, whether it sleeps between packets: that delays datagrams by 100 ms and more."""
+    adapters = sorted(path.parent.name for path in networks.glob("*/wireless"))
+    return [_adapter(name, program) for name in adapters]
+
+
+def _adapter(name: str, program: str) -> Finding:
+    subject, remedy = f"Wi-Fi {name}", f"iw dev {name} set power_save off"
+    if not shutil.which(program):
+        return Finding(Level.SHOULD, subject, "power saving is not known: iw is not installed", f"install iw; {remedy}")
+    try:
+        answer = subprocess.run([program, "dev", name, "get", "power_save"], capture_output=True, text=True, timeout=5)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Finding(Level.SHOULD, subject, f"power saving is not known: {error}", remedy)
+    sleeps = "on" in answer.stdout.lower().split()
+    return judged(not sleeps, Level.SHOULD, subject, f"power saving {'on' if sleeps else 'off'}", remedy)

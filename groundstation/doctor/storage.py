@@ -1,0 +1,81 @@
+"""Room and speed of the disk that recordings go to, memory, open files."""
+
+import os
+import resource
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from groundstation.doctor.finding import Finding, Level, judged
+from groundstation.recording.disk_space import free_bytes
+
+# A flight writes about 2.9 GB an hour with pictures.
+_FREE_MUST, _FREE_SHOULD = 1e9, 5e9
+_SPEED_SHOULD = 20e6
+_MEMORY_SHOULD = 4e9
+_FILES_SHOULD = 1024
+_BLOCK, _BLOCKS = 1 << 20, 16
+
+
+def room(folder: Path) -> Finding:
+    """Return how much may still be written to the folder of recordings, or to the nearest parent that exists."""
+    try:
+        free = free_bytes(_nearest(folder))
+    except OSError as error:
+        return Finding(
+            Level.MUST, "disk", f"{folder}: {error.strerror}", "set recording.directory to a folder of yours"
+        )
+    level = Level.MUST if free < _FREE_MUST else Level.SHOULD
+    found = f"{free / 1e9:.1f} GB free for {folder}"
+    remedy = "make room, or set recording.directory: a flight writes about 3 GB an hour"
+    return judged(free >= _FREE_SHOULD, level, "disk", found, remedy)
+
+
+def speed(folder: Path) -> Finding:
+    """Return how fast 16 MB reach the disk [bytes/s], written beside the recordings and removed again."""
+    path = _nearest(folder) / f".skein-doctor-{os.getpid()}"
+    try:
+        took_s = _write(path)
+    except OSError as error:
+        remedy = "set recording.directory to a folder of yours"
+        return Finding(Level.MUST, "disk speed", f"cannot write to {path.parent}: {error.strerror}", remedy)
+    rate = _BLOCK * _BLOCKS / max(took_s, 1e-6)
+    found = f"{rate / 1e6:.0f} MB/s"
+    return judged(
+        rate >= _SPEED_SHOULD, Level.SHOULD, "disk speed", found, "record to a local disk, not to a network's"
+    )
+
+
+def _write(path: Path) -> float:
+    began = time.monotonic()
+    try:
+        with path.open("wb") as file:
+            for _ in range(_BLOCKS):
+                file.write(b"\0" * _BLOCK)
+            file.flush()
+            os.fsync(file.fileno())
+        return time.monotonic() - began
+    finally:
+        with suppress(OSError):
+            path.unlink()
+
+
+def _nearest(folder: Path) -> Path:
+    folder = folder.absolute()
+    return next(place for place in (folder, *folder.parents) if place.is_dir())
+
+
+def memory() -> Finding:
+    """Return how much memory the machine has."""
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return judged(
+        total >= _MEMORY_SHOULD, Level.SHOULD, "memory", f"{total / 1e9:.1f} GB", "4 GB are needed with cameras"
+    )
+
+
+def open_files() -> Finding:
+    """Return how many files a process may hold open."""
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    unlimited = soft == resource.RLIM_INFINITY
+    found = "unlimited" if unlimited else f"{soft}"
+    return judged(unlimited or soft >= _FILES_SHOULD, Level.SHOULD, "open files", found, "ulimit -n 4096")

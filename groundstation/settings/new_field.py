@@ -1,0 +1,176 @@
+"""A field file from a few answers: room, ceiling camera, drones, target."""
+
+import math
+from typing import NamedTuple
+
+from groundstation.errors import OperatorMistake
+
+Place = tuple[float, float]
+
+KINDS = ("ardrone", "px4", "ardupilot")
+# Lens of config/cameras/ceiling.yaml: half a picture over its focal length.
+_HALF_VIEW = (640.0 / 1179.0, 360.0 / 1179.0)
+_WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
+_LOWEST_CEILING_M = 3.0
+_PAD_GAP_M, _PAD_MARGIN_M, _PAD_SEEN_AT_M = 1.0, 0.15, 1.0
+_TARGET_CODE = 5
+
+
+class NewDrone(NamedTuple):
+    """One drone: its kind (of KINDS), its address, and where its camera's pictures come from."""
+
+    kind: str
+    address: str
+    camera: str
+
+
+class NewRoom(NamedTuple):
+    """Length, width and height of the room [m]; source: the ceiling camera's pictures."""
+
+    length_m: float
+    width_m: float
+    height_m: float
+    source: str
+
+    @property
+    def camera_height_m(self) -> float:
+        """Height of the ceiling camera's lens [m]."""
+        return round(self.height_m - _CAMERA_BELOW_CEILING_M, 2)
+
+    @property
+    def fence_top_m(self) -> float:
+        """Height that no drone leaves upwards [m]."""
+        return round(self.height_m - _CEILING_M, 2)
+
+    def half_view_m(self, height_m: float) -> Place:
+        """Return half the length and width of what the ceiling camera sees at a height [m]."""
+        below = self.camera_height_m - height_m
+        return below * _HALF_VIEW[0], below * _HALF_VIEW[1]
+
+
+def check_room(room: NewRoom) -> None:
+    """Raise OperatorMistake for a room in which no team can fly."""
+    if room.height_m < _LOWEST_CEILING_M:
+        raise OperatorMistake(f"a room {room.height_m:g} m high is too low: two drones need {_LOWEST_CEILING_M:g} m")
+    if min(room.length_m, room.width_m) < 3.0:
+        raise OperatorMistake(f"a room of {room.length_m:g} x {room.width_m:g} m is too small: 3 x 3 m at least")
+
+
+def pads(room: NewRoom, count: int) -> list[Place]:
+    """Return pads [m; world], one metre apart, inside what the ceiling camera sees; raises OperatorMistake."""
+    half = [length - _PAD_MARGIN_M for length in room.half_view_m(_PAD_SEEN_AT_M)]
+    columns, rows = (1 + int(2 * side / _PAD_GAP_M) for side in half)
+    if count > columns * rows:
+        raise OperatorMistake(
+            f"the ceiling camera sees room for {columns * rows} pads, not for {count}: use a wider lens"
+        )
+    used = math.ceil(count / rows)
+    column = [(index - (used - 1) / 2) * _PAD_GAP_M for index in range(used)]
+    row = [(index - (min(rows, count) - 1) / 2) * _PAD_GAP_M for index in range(min(rows, count))]
+    return [(round(x, 2), round(y, 2)) for x in column for y in row][:count]
+
+
+def field_text(site: str, room: NewRoom, drones: list[NewDrone]) -> str:
+    """Return the field file; raises OperatorMistake for a room or a team that does not fit."""
+    check_room(room)
+    kinds = list(dict.fromkeys(drone.kind for drone in drones))
+    parts = [_room(site, room), _DEFAULTS, "types:\n" + "".join(_TYPES[kind] for kind in kinds)]
+    parts.append("drones:\n" + "".join(map(_drone, range(1, 1 + len(drones)), drones, pads(room, len(drones)))))
+    return "\n".join([*parts, _TARGET, _planner(room, len(drones)), _REST])
+
+
+def _room(site: str, room: NewRoom) -> str:
+    x, y = room.length_m / 2 - _WALL_M, room.width_m / 2 - _WALL_M
+    return f"""\
+# Frame: origin on the floor in the middle of the room, x along the long side, z up. Units are in the key names.
+schema_version: 1
+site: {site}
+
+room:
+  size_m: [{room.length_m:g}, {room.width_m:g}, {room.height_m:g}]
+  fence:                         # drones are stopped before they leave this box; an arm's length from walls and lamps
+    x_m: [{-x:g}, {x:g}]
+    y_m: [{-y:g}, {y:g}]
+    z_m: [0.0, {room.fence_top_m:g}]
+
+cameras:                         # fixed in the world; they observe drones only
+  ceiling:
+    source: {room.source}
+    calibration: cameras/ceiling.yaml      # measure yours: groundstation calibrate camera
+    position_m: [0.0, 0.0, {room.camera_height_m:g}]   # survey it: groundstation calibrate extrinsics
+    looking: down                # picture x axis along world x, picture y axis along world -y
+    video_delay_ms: 120          # measure it: groundstation calibrate delay
+    attitude_std_deg: 0.2
+    position_std_m: 0.01
+"""
+
+
+def _drone(number: int, drone: NewDrone, pad: Place) -> str:
+    ids = f"    mavlink: {{system_id: {10 + number}}}\n" if drone.kind != "ardrone" else ""
+    heading = math.degrees(math.atan2(-pad[1], -pad[0])) if any(pad) else 0.0
+    return f"""\
+  drone_{number}:
+    type: {drone.kind}
+    address: {drone.address}
+{ids}    camera: {{source: "{drone.camera}"}}
+    marker: {{code: {number if number < _TARGET_CODE else number + 1}}}   # print it: groundstation markers print
+    pad_m: [{pad[0]:g}, {pad[1]:g}]          # where it stands before take-off, in the ceiling camera's view
+    pad_yaw_deg: {heading:.0f}              # towards the middle of the room
+"""
+
+
+def _planner(room: NewRoom, drones: int) -> str:
+    top = room.fence_top_m - 0.3
+    low = max(0.8, top - 1.4)
+    rows = "".join(f"    - [{_heights(top, low, levels)}]\n" for levels in range(1, max(3, drones) + 1))
+    return f"""\
+planner:
+  level_heights_m:               # heights by number of levels, top level first
+{rows}  planned_range_m: 1.9           # onboard cameras: range that the planner counts on
+"""
+
+
+def _heights(top: float, low: float, levels: int) -> str:
+    if levels == 1:
+        return f"{(top + low) / 2:.2f}"
+    return ", ".join(f"{top - (top - low) * level / (levels - 1):.2f}" for level in range(levels))
+
+
+_DEFAULTS = """\
+defaults:                        # every drone, unless its type or its own entry says otherwise
+  limits: {max_speed_m_s: 0.6, max_climb_m_s: 0.4, max_yaw_rate_deg_s: 60, battery_min: 0.15}
+  marker: {position_m: [0.0, 0.0, 0.08], square_mm: 44}
+  camera:
+    calibration: cameras/ardrone_front.yaml
+    position_m: [0.09, 0.0, 0.0]
+    tilt_down_deg: 45
+    video_delay_ms: 120
+"""
+_FED = (
+    "    odometry: {velocity_std_m_s: 0.05, velocity_delay_ms: 10, attitude_std_deg: 0.3, yaw_rate_std_deg_s: 0.07}\n"
+)
+_TYPES = {
+    "ardrone": """\
+  ardrone:
+    kind: ardrone
+    odometry:                    # calibrated figures of this vehicle's navdata
+      velocity_scale: 1.18       # true speed = scale x reported speed
+      velocity_std_m_s: 0.05
+      velocity_delay_ms: 30
+      height_std_m: 0.04
+      height_delay_ms: 85
+      attitude_std_deg: 1.0
+      yaw_rate_std_deg_s: 1.0
+""",
+    "px4": "  px4:\n    kind: mavlink\n    mavlink: {flavour: px4}\n" + _FED,
+    "ardupilot": "  ardupilot:\n    kind: mavlink\n    mavlink: {flavour: ardupilot}\n" + _FED,
+}
+_TARGET = """\
+target:
+  name: turtlebot
+  marker: {code: 5, height_m: 0.4, square_mm: 44}
+  acceleration_std_m_s2: 1.2     # 2.5 x its steady acceleration: TurtleBot 1.2, person 5, RC car 10
+"""
+_REST = """\
+recording: {directory: runs}
+"""

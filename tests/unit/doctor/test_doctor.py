@@ -1,0 +1,85 @@
+"""What the doctor finds, on machines that lack this and that."""
+
+import json
+import socket
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from groundstation.cli.doctor import doctor
+from groundstation.doctor import network, processor, storage
+from groundstation.doctor.finding import Level
+
+
+def test_one_core_is_too_few_and_two_are_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    for count, level in ((1, Level.MUST), (2, Level.SHOULD), (8, Level.OK)):
+        monkeypatch.setattr("os.sched_getaffinity", lambda _pid, n=count: set(range(n)))
+        assert processor.cores().level is level
+
+
+def test_a_missing_right_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processor, "go_first", lambda: False)
+    finding = processor.real_time_right()
+    assert finding.level is Level.SHOULD and "rtprio" in finding.remedy
+    monkeypatch.setattr(processor, "go_first", lambda: True)
+    assert processor.real_time_right().remedy == ""
+
+
+def test_clock_and_governor_are_read_where_there_are_any(tmp_path: Path) -> None:
+    said = tmp_path / "said"
+    assert processor.clock_source(said) is None and processor.governor(said) is None
+    said.write_text("hpet\n")
+    slow = processor.clock_source(said)
+    assert slow is not None and slow.level is Level.SHOULD
+    said.write_text("powersave\n")
+    saving = processor.governor(said)
+    assert saving is not None and "performance" in saving.remedy
+
+
+def test_a_full_disk_must_be_mended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for free, level in ((5e8, Level.MUST), (2e9, Level.SHOULD), (9e9, Level.OK)):
+        monkeypatch.setattr(storage, "free_bytes", lambda _folder, n=free: int(n))
+        assert storage.room(tmp_path / "not" / "there").level is level
+
+
+def test_the_probe_of_the_disk_leaves_nothing_behind(tmp_path: Path) -> None:
+    assert "MB/s" in storage.speed(tmp_path / "runs").found
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_refuses_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def refuse(_path: Path) -> float:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(storage, "_write", refuse)
+    finding = storage.speed(tmp_path)
+    assert finding.level is Level.MUST and "Read-only file system" in finding.found
+
+
+def test_a_port_in_use_is_named() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        number = server.getsockname()[1]
+        taken = network.port(number, "console")
+    assert taken.level is Level.SHOULD and f"{number}" in taken.remedy
+    assert network.port(number, "console").level is Level.OK
+
+
+def test_each_adapter_that_sleeps_is_named(tmp_path: Path) -> None:
+    (tmp_path / "wlan7" / "wireless").mkdir(parents=True)
+    (tmp_path / "eth0").mkdir()
+    program = tmp_path / "iw"
+    program.write_text("#!/bin/sh\necho 'Power save: on'\n")
+    program.chmod(0o755)
+    (asleep,) = network.power_saving(tmp_path, str(program))
+    assert asleep.level is Level.SHOULD and "iw dev wlan7 set power_save off" in asleep.remedy
+    (unknown,) = network.power_saving(tmp_path, str(tmp_path / "no-iw"))
+    assert "not installed" in unknown.found
+
+
+def test_the_command_prints_findings_and_fails_on_a_must(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(storage, "free_bytes", lambda _folder: 10)
+    result = CliRunner().invoke(doctor, ["lab", "--json"], standalone_mode=False)
+    found = {entry["subject"]: entry for entry in json.loads(result.output)}
+    assert result.return_value == 1 and found["disk"]["level"] == "MUST" and found["disk"]["remedy"]

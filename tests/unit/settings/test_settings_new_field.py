@@ -1,0 +1,67 @@
+"""A field file from a few answers: it is good for every room and team that it is written for."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from groundstation.cli.new import new
+from groundstation.errors import OperatorMistake
+from groundstation.settings.load import load_field
+from groundstation.settings.new_field import NewDrone, NewRoom, check_room, field_text, pads
+from groundstation.settings.room_text import room_text
+
+ARDRONE = NewDrone("ardrone", "192.168.1.11", "ardrone://192.168.1.11")
+SOURCE = "http://192.168.1.50:8080/video.mjpg"
+
+
+@pytest.mark.parametrize(("size", "drones"), [((8, 6, 4.5), 3), ((6, 4, 3.2), 1), ((20, 15, 8), 9)])
+def test_what_is_written_is_a_good_field(tmp_path: Path, size: tuple[float, float, float], drones: int) -> None:
+    answers = "\n".join([*map(str, size), "", str(drones), *(["", "", ""] * drones), "y", ""])
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input=answers)
+    assert result.exit_code == 0, result.output
+    field = load_field(tmp_path / "hall" / "hall.yaml")
+    assert field.room.size_m == size and len(field.drones) == drones and field.site == "hall"
+
+
+def test_kinds_may_be_mixed(tmp_path: Path) -> None:
+    team = ["", "", "", "px4", "", "", "ardupilot", "", ""]
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "3", *team, "y", ""]))
+    assert result.exit_code == 0, result.output
+    assert [drone.kind for drone in load_field(tmp_path / "hall" / "hall.yaml").drones.values()][1:] == ["mavlink"] * 2
+
+
+def test_pads_are_a_metre_apart_in_the_cameras_view() -> None:
+    room = NewRoom(8, 6, 4.5, SOURCE)
+    places = pads(room, 4)
+    apart = [((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) ** 0.5 for a in places for b in places if a is not b]
+    half = room.half_view_m(1.0)
+    assert min(apart) >= 1.0 and all(abs(x) < half[0] and abs(y) < half[1] for x, y in places)
+    with pytest.raises(OperatorMistake, match="room for"):
+        pads(room, 40)
+
+
+def test_a_low_room_is_refused_with_the_reason() -> None:
+    with pytest.raises(OperatorMistake, match="too low"):
+        check_room(NewRoom(8, 6, 2.4, SOURCE))
+    with pytest.raises(OperatorMistake, match="too low"):
+        field_text("lab", NewRoom(8, 6, 2.4, SOURCE), [ARDRONE])
+
+
+def test_the_drawing_shows_each_pad_within_the_view() -> None:
+    drawing = room_text(NewRoom(8, 6, 4.5, SOURCE), 2)
+    assert all(f".{number}." in drawing for number in (1, 2)) and len(set(map(len, drawing.splitlines()))) == 1
+
+
+def test_an_existing_field_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "hall").mkdir()
+    (tmp_path / "hall" / "hall.yaml").write_text("mine")
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")])
+    assert isinstance(result.exception, OperatorMistake) and (tmp_path / "hall" / "hall.yaml").read_text() == "mine"
+
+
+def test_a_refused_room_writes_nothing(tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "1", "", "", "", "n", ""])
+    )
+    assert isinstance(result.exception, OperatorMistake) and not (tmp_path / "hall").exists()

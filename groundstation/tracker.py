@@ -1,19 +1,22 @@
 """The tracker as a value machine: messages in, belief, plan and setpoints out; no I/O and no clock."""
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
+from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, SearchedPicture, Severity, Verdict
 from groundstation.bus.notice import Notice
+from groundstation.control.drift import DriftWatch
+from groundstation.control.lookout import Lookout
 from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
-from groundstation.control.search import spread_m
-from groundstation.control.setpoints import HOVER, setpoints_from_plan
+from groundstation.control.search_parameters import SearchParameters, search_from_field
+from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
+from groundstation.control.view import spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
 from groundstation.estimation.belief import JointBelief
@@ -22,6 +25,7 @@ from groundstation.estimation.ingest import REASONS, Intake
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning import parameters as planning
 from groundstation.planning.planner import Planner, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
@@ -31,13 +35,14 @@ from groundstation.sensing.topology import Topology
 
 @dataclass(frozen=True, slots=True)
 class TrackerParameters:
-    """Everything the tracker is told before it starts; `string_first`: first topology has one robot per level."""
+    """Settings of the tracker; `string_first`: first topology has one robot per level."""
 
     estimator: estimation.EstimatorParameters
     planner: planning.PlannerParameters
     sensors: SensorSuite
     control: ControlParameters
     safety: SafetyParameters
+    search: SearchParameters
     string_first: bool = False
 
 
@@ -49,6 +54,7 @@ def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker
         sensors_from_field(field),
         control_from_field(field),
         safety_from_field(field),
+        search_from_field(field),
         field.planner.initial_topology == "string",
     )
     return Tracker(parameters, clock, epoch)
@@ -75,17 +81,20 @@ class Tracker:
         self.planner = Planner(parameters.planner, parameters.sensors)
         self.filter = FixedLagFilter(parameters.estimator)
         self.epoch = epoch
+        self._clock = clock
         self.holding = False
         self.current: PlanResult | None = None
         self.rejected: Counter[str] = Counter()
         self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
         self._topology = Topology(())
         self._plan_stale = False
+        self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
         self._belief = self.filter.belief()
         self._corrections: list[Correction] = []
         self._notices: list[Notice] = []
         self._robots = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.ROBOT)
         self._targets = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.TARGET)
+        self.lookout = Lookout(parameters.search, parameters.control, parameters.sensors, self._robots, self._targets)
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -113,6 +122,8 @@ class Tracker:
         Never raises for what a message holds. Refused observations are also among `take_corrections`.
         """
         verdict = self._intake.take(key, message, now_ns)
+        if isinstance(message, SearchedPicture) and message.header.clock == self._clock:
+            self.lookout.take(message)
         if verdict is Verdict.ACCEPTED:
             return None
         self.rejected[f"{type(message).__name__} {verdict}"] += 1
@@ -131,6 +142,7 @@ class Tracker:
         for correction in self.filter.take_corrections():
             self._corrections.append(correction)
             self._report_joining(correction)
+        self._heed_absence(now_ns)
         self._topology = self._topology_now()
         if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):
             self.holding = False
@@ -159,18 +171,38 @@ class Tracker:
         return tuple(self._estimate(name) for name in self._belief.layout.robots + self._belief.layout.targets)
 
     def target_age_s(self) -> float | None:
-        """Return the time since any target was last observed; None if none ever was."""
+        """Return the time since any target was last observed; None if none is believed anywhere."""
         age = min((self.filter.age_s(name) for name in self._targets), default=math.inf)
         return age if math.isfinite(age) else None
 
-    def _missing(self) -> tuple[str, ...]:
-        """Return the targets that nobody has seen for too long, or ever."""
-        limit = self.parameters.control.lost_after_s
-        return tuple(name for name in self._targets if not self.filter.age_s(name) <= limit)
+    def unlocalised_s(self) -> dict[str, float]:
+        """Return for how long each airborne robot may not have been where it is believed [s]; infinite: never seen.
+
+        Who is known well enough and missed by no camera is localised, though it was seen long ago; but odometry is
+        trusted no longer than for twice the time within which a robot flies back.
+        """
+        missed, trusted_s = self.lookout.missed_s, 2.0 * self.parameters.control.return_within_s
+        ages_s = {name: self.filter.age_s(name) for name in self.airborne}
+        return {
+            name: 0.0 if self.converged(name) and name not in missed and age_s <= trusted_s else age_s
+            for name, age_s in ages_s.items()
+        }
+
+    def _heed_absence(self, now_ns: int) -> None:
+        """Take account of what pictures do not show; what is not where it was believed leaves the belief."""
+        ages_s = {name: self.filter.age_s(name) for name in (*self.airborne, *self._targets)}
+        gone = self.lookout.advance(self._belief, ages_s)
+        self._notices += self.lookout.take_notices()
+        for name in gone:
+            for present in (False, True):
+                self.filter.set_present(name, present, now_ns, now_ns)
+        if gone:
+            self.filter.advance(now_ns)
+            self._belief = self.filter.belief()
 
     def _hopeless(self) -> tuple[str, ...]:
         """Return the missing targets that no plan can go by: a scout looks for them while others are tracked."""
-        missing = self._missing()
+        missing = self.lookout.missing
         if len(missing) == len(self._targets):
             return ()
         limit = self.parameters.control.hint_std_m
@@ -178,7 +210,7 @@ class Tracker:
         return tuple(name for name in known if spread_m(self._belief, name) > limit)
 
     def request(self) -> PlanRequest:
-        """Return the snapshot that the next plan is to be made on."""
+        """Return the snapshot for the next plan."""
         warm = {} if self.current is None else {k: np.asarray(v) for k, v in self.current.controls.items()}
         return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm)
 
@@ -203,21 +235,34 @@ class Tracker:
         return plan
 
     def setpoints(self, now_ns: int) -> dict[str, Limited]:
-        """Return what each airborne robot is told, limited last on the newest belief; unknown robots hover."""
+        """Return each airborne robot's setpoint, limited last on the newest belief; unknown robots hover."""
         p = self.parameters
         airborne = self.airborne
         if self.holding or self._is_plan_stale(now_ns):
             return {name: Limited(HOVER, ("hold" if self.holding else "stale plan",)) for name in airborne}
         belief = self._belief.core()
+        lookout = self.lookout
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
-        wanted = setpoints_from_plan(
-            self.current, belief, airborne, self.target_age_s(), p.control, p.sensors, unseen_s, self._missing()
-        )
+        seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
+        sight = Sight(
+            min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
+            lambda robots, targets: lookout.stands(robots, targets, belief),
+        )  # fmt: skip
+        wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
-        return {
-            name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities)
+        drifts = {
+            name: self._drifts[name].see(now_ns, belief.mean_of(name)[:3] + p.safety.reaction_s * velocity)
+            for name, velocity in velocities.items()
+        }
+        limited = {
+            name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)
             for name, setpoint in wanted.items()
         }
+        for name, one in limited.items():
+            if name in drifts:
+                velocity = np.array(one.setpoint.velocity_m_s)
+                self._drifts[name].tell(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
+        return limited
 
     def _is_plan_stale(self, now_ns: int) -> bool:
         """Return whether the planner has been silent for too long; its held controls must not be flown for ever."""
@@ -271,4 +316,5 @@ class Tracker:
             velocity_m_s=velocity,
             converged=self.converged(name),
             age_s=self.filter.age_s(name),
+            unlocalised_s=self.unlocalised_s().get(name, 0.0),
         )

@@ -132,7 +132,7 @@ def _page_of(url: str, cameras: list[str]) -> Iterator[ClientConnection]:
 
 
 def watch(page: ClientConnection, seconds: float) -> Viewed:
-    """Take what comes for so long, answering as the page does."""
+    """Receive for so long, answering as the page does."""
     viewed, deadline_s = Viewed(), time.monotonic() + seconds
     while (left_s := deadline_s - time.monotonic()) > 0.0:
         try:

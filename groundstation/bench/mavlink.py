@@ -45,6 +45,7 @@ class _Host:
     def ready(self, detail: str = "") -> None: ...
     def degrade(self, detail: str) -> None: ...
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
+    def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None: ...
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None: ...
     def sleep_until(self, deadline_ns: int) -> bool:
         """Sleep; never asked to stop."""
@@ -79,6 +80,11 @@ class _TimedLink:
         self.told_ns: dict[int, int] = {}
         self.late_ms: list[float] = []
         self.frames = 0
+
+    @property
+    def called_from(self) -> tuple[tuple[str, int], ...]:
+        """Where the vehicles were heard last."""
+        return self.link.called_from
 
     def receive(self) -> list[Heard]:
         heard = self.link.receive()

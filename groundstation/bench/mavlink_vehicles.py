@@ -21,7 +21,7 @@ _HEALTHY = 0b1111
 
 
 class TalkingVehicle:
-    """A PX4 that stands where it is, whatever it is told."""
+    """A PX4 that stands still, whatever its commands."""
 
     def __init__(self, system: int, port: int) -> None:
         self._encoder, self._decoder = FrameEncoder(system, 1), FrameDecoder()

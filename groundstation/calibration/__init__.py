@@ -1,1 +1,1 @@
-"""What recorded flights tell of sensors: delays, and how cameras are mounted."""
+"""Calibration from recorded flights: delays of sensors, mountings of cameras."""

@@ -58,7 +58,7 @@ def _onboard(
     if found is None:
         return replace(none, reason="none within 100 ms of the setting fits best")
     if not math.isfinite(found.std_ms):
-        return replace(none, reason="the recording does not tell")
+        return replace(none, reason="the recording does not show it")
     doubt = "" if sum(seen[name] for name in resolved.drones) >= LEAST_SEEN else _TARGET_ONLY
     std_ms = math.hypot(found.std_ms, common_ms)
     return replace(none, measured_ms=now_ms + found.later_ms, std_ms=std_ms, reason=doubt)

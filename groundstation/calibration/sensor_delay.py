@@ -1,4 +1,4 @@
-"""What a recording tells of one sensor's delay."""
+"""One sensor's delay as a recording shows it."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Delay:
 
     @property
     def sure(self) -> bool:
-        """Return whether the recording tells it to better than 15 ms."""
+        """Return whether the recording shows it to better than 15 ms."""
         return self.measured_ms is not None and self.std_ms is not None and self.std_ms <= _UNSURE_MS
 
     @property

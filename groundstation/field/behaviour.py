@@ -45,6 +45,7 @@ class RecordingValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     enabled: bool = True
     directory: str = "runs"
     image_fps: float = 5.0
+    pictures: Literal["none", "blurred", "full"] = "full"
     raw_datagrams: bool = True
     rotate_mb: float = 1000.0
     rotate_minutes: float = 60.0

@@ -68,6 +68,7 @@ class MavlinkLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     key_file: str = ""
     take_off_m: float = 0.8
     vision_hz: float = 30.0
+    parameters: dict[str, float] = {}
 
 
 class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -78,6 +79,7 @@ class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     video: VideoChoice | None = None
     enabled: bool = True
     address: str
+    serial_number: str = ""
     limits: DroneLimits = DroneLimits()
     marker: DroneMarker
     camera: OnboardCamera

@@ -35,6 +35,10 @@ class Target(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     marker: TargetMarker
     model: Literal["constant_velocity", "coordinated_turn", "manoeuvring"] = "constant_velocity"
+    base: Literal["turtlebot_2", "person", "rc_car"] = "turtlebot_2"
+    max_speed_m_s: float = 0.7
+    max_acceleration_m_s2: float = 0.5
+    max_turn_rate_deg_s: float = 180.0
     acceleration_std_m_s2: float = 1.2
     turn_rate_std_deg_s: float | None = None
     turn_rate_correlation_s: float | None = None

@@ -1,4 +1,4 @@
-"""The marker: a checkerboard of 5 x 4 squares beside a bar of 8 cells that says whose it is.
+"""The marker: a checkerboard of 5 x 4 squares beside a bar of 8 cells that identifies its carrier.
 
 Marker frame: origin at the centre of the checkerboard, x along the side of five squares (the bar lies beyond its
 positive end), y to the left, z out of the face. Seen from above with x to the right:

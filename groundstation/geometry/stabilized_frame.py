@@ -1,10 +1,12 @@
-"""Velocities between the world and a robot's yaw-only frame."""
+"""Gravity, and velocities between the world and a robot's yaw-only frame, which stands upright against it."""
 
 import math
 
 import numpy as np
 
 from groundstation.arrays import Array
+
+STANDARD_GRAVITY_M_S2 = 9.80665  # also the unit of accelerometers that measure in g; local gravity differs by 0.3 %
 
 
 def world_from_stabilized(velocity: Array, yaw_rad: float) -> Array:

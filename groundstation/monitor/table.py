@@ -44,7 +44,7 @@ def render(state: MonitorState, now_ns: int) -> RenderableType:
     parts: list[RenderableType] = [_title(state, now_ns)]
     for alarm in alarms_of(state, now_ns)[:_ALARMS]:
         parts.append(Text(f" {alarm.text} ", style="bold white on red" if alarm.grave else "black on yellow"))
-    parts += [Text(), _Entities(state, now_ns), Text(), _plan(state, now_ns)]
+    parts += [Text(), _Entities(state, now_ns), *_searches(state), Text(), _plan(state, now_ns)]
     if state.cameras:
         parts.append(_cameras(state, now_ns))
     if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
@@ -113,6 +113,12 @@ class _Entities:
                 *(Text(name, style="bold"), Text(), Text("target"), Text(), Text()),
                 *_belief(state, name, now_ns),
             )
+
+
+def _searches(state: MonitorState) -> Iterator[Text]:
+    for search in state.estimate.message.searches if state.estimate else ():
+        style = "bold red" if search.mode == "LOST" else "yellow"
+        yield Text(f"{search.target} {search.mode}: {search.text}", style=style)
 
 
 def _vehicle(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Text, Text]:

@@ -1,4 +1,4 @@
-"""What the planner is told once: horizon, limits, slots, noise it counts on, weights."""
+"""Settings of the planner: horizon, limits, slots, noise it counts on, weights."""
 
 import math
 from collections.abc import Mapping

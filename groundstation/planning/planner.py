@@ -101,13 +101,17 @@ class Planner:
         if not scene.robots or not scene.targets:
             return self._idle(current, belief.stamp_ns)
         search = _Search(should_stop, max_evaluations)
-        candidates = [t for t in (current, *current.neighbours()) if self.parameters.slots(len(t.levels))]
+        candidates = [t for t in (current, *self.options(current)) if self.parameters.slots(len(t.levels))]
         if current not in candidates:
             candidates.insert(0, Topology.flat(current.robots))
         problems = {t: self._builder.build(scene, t) for t in dict.fromkeys(candidates)}
         warm = self._warm(scene, warm_start)
         self._optimise(search, scene, problems, warm)
         return self._result(belief.stamp_ns, scene, current, search, problems)
+
+    def options(self, current: Topology) -> tuple[Topology, ...]:
+        """Return the other topologies that a step looks at."""
+        return current.neighbours()
 
     def _warm(self, scene: PlanningScene, warm_start: Mapping[str, Array] | None) -> Array:
         held = warm_start if warm_start and self.parameters.mode != "paper" else {}

@@ -72,7 +72,7 @@ class ViewerChannels:
         }
 
     def derived(self, entry: Entry) -> Entry | None:
-        """Return what viewers are told beside an entry; None where there is nothing to add, or nothing readable."""
+        """Return the viewers' extra message for an entry; None where there is nothing to add, or nothing readable."""
         make = self._makers.get(entry.facts["topic"])
         if make is None:
             return None

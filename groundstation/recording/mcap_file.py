@@ -9,6 +9,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from groundstation.recording.capture import Entry
 from groundstation.recording.compatibility import PROFILE
+from groundstation.recording.packed_index import pack_indices
 from groundstation.recording.preamble import Preamble
 from groundstation.recording.schemas import Description
 
@@ -69,6 +70,7 @@ class McapFile:
         A file that somebody has removed is an error: the kernel would take everything, and nothing would be left.
         """
         self._writer.flush()
+        pack_indices(self._writer)
         self._sound_bytes = self._stream.tell()
         if os.fstat(self._stream.fileno()).st_nlink == 0:
             raise OSError(errno.ENOENT, "the file was removed")

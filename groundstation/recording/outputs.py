@@ -17,7 +17,7 @@ class OutputError(GroundStationError):
 
 
 def require_absent(path: Path) -> None:
-    """Raise RecordingError when there is something at a path that is to be written."""
+    """Raise RecordingError when a path to write exists already."""
     if path.exists() or path.is_symlink():
         raise RecordingError(f"{path}: exists already; name another place with --output")
 

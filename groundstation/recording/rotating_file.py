@@ -34,7 +34,7 @@ class Rotation:
     age_ns: int = 0
 
     def due(self, size_bytes: int, age_ns: int) -> bool:
-        """Return whether a part of that size and age is to be followed by the next."""
+        """Return whether a part of that size and age is complete."""
         return age_ns >= NS_PER_S and (0 < self.size_bytes <= size_bytes or 0 < self.age_ns <= age_ns)
 
 

@@ -97,7 +97,7 @@ class Reel:
         return [*self._source_damage, *self._run.damage]
 
     def between(self, after_ns: int, until_ns: int, wanted: Wanted = is_shown) -> Iterator[Arrival]:
-        """Yield what came after one time and not after another, in the order in which it came."""
+        """Yield the messages that arrived after one time and not after another, in order of arrival."""
         streams = [file.between(after_ns, until_ns, wanted) for file in self._files]
         yield from heapq.merge(*streams, key=lambda arrival: arrival[0])
 

@@ -82,7 +82,7 @@ class Show:
         return marks
 
     def turn(self) -> None:
-        """Bring the server's board to where the replay is now; the server's own turn tells the viewers."""
+        """Bring the server's board to where the replay is now; the server's own turn updates the viewers."""
         now_s = time.monotonic()
         elapsed_s, self._at_s = now_s - self._at_s, now_s
         if self.playback.take_sought():

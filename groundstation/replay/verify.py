@@ -131,7 +131,7 @@ class Repetition:
         return Rerun(self._resolved, site, entry, self._epoch(tick))
 
     def _epoch(self, tick: Tick) -> int:
-        """Return the number of the tracker's life: its first estimate tells, else what the recorder was told."""
+        """Return the number of the tracker's life: from its first estimate, else from the recorder's settings."""
         records = self.tape.said.get((ESTIMATE.name, "team", tick.at_ns))
         first = _decoded(records[0]) if records else None
         if isinstance(first, Estimate):

@@ -22,20 +22,22 @@ MIN_TRACKED_SHARE = 0.98
 Value = float | bool | None
 
 
-class Criterion(msgspec.Struct, frozen=True):
-    """One requirement: value relation limit. A value of None was not measured, and fails."""
+class Criterion(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One requirement: value relation limit. A value of None was not measured, and fails. why: what it failed by."""
 
     name: str
     value: Value
     relation: str
     limit: float | bool
     ok: bool
+    why: str = ""
 
 
 def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> list[Criterion]:
     """Return all criteria that apply: those against the truth need a simulator."""
     criteria = [
         *_promises(figures, facts),
+        _of_failsafes(figures),
         _below("planner_p99_ms", figures.planner_p99_ms, MAX_PLANNER_P99_MS),
         _under("tracker_missed_percent", figures.tracker_missed_percent, MAX_MISSED_PERCENT),
         _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * field.estimator.rate_hz),
@@ -77,6 +79,12 @@ def _promises(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
     if facts.command_unix_ns:
         limit = MAX_AIRBORNE_WARM_S if facts.warm_cache else MAX_AIRBORNE_COLD_S
         yield _below("command_to_airborne_s", figures.command_to_airborne_s, limit)
+
+
+def _of_failsafes(figures: RunFigures) -> Criterion:
+    """A flight that a failsafe ended may be a good test of the failsafe; it is no flight as it should be."""
+    found = figures.failsafe_landings
+    return Criterion("failsafe_landings", float(len(found)), "==", 0.0, not found, "; ".join(found))
 
 
 def _below(name: str, value: float | None, limit: float) -> Criterion:

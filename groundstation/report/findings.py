@@ -1,9 +1,10 @@
-"""Everything a report finds beyond the figures: consistency per edge, decisions, interventions, links."""
+"""Everything a report finds beyond the figures: consistency per edge, decisions, interventions, links, failsafes."""
 
 import msgspec
 
 from groundstation.report.consistency import EdgeConsistency, edges
 from groundstation.report.decisions import Intervention, Switch, interventions, switches
+from groundstation.report.happenings import Happening, happenings
 from groundstation.report.links import VehicleLink, links
 from groundstation.report.tracks import RunData
 
@@ -15,8 +16,9 @@ class Findings(msgspec.Struct, frozen=True):
     switches: list[Switch]
     interventions: list[Intervention]
     links: list[VehicleLink]
+    happenings: list[Happening] = []
 
 
 def findings_of(data: RunData) -> Findings:
     """Return the findings of a run."""
-    return Findings(edges(data), switches(data), interventions(data), links(data))
+    return Findings(edges(data), switches(data), interventions(data), links(data), happenings(data))

@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.bus.messages import Severity, Verdict
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import Accuracy, accuracy, time_grid
+from groundstation.report.happenings import happenings, landings
 from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData
 
@@ -16,6 +17,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     """What report.json says of a run; None where there was nothing to measure.
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error.
+    failsafe_landings: which drones a failsafe landed or cut, when and why.
     """
 
     tracked_s: float
@@ -27,6 +29,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     max_fence_violation_m: float | None
     min_separation_m: float | None
     landed: bool | None
+    failsafe_landings: list[str] = []
     topology_seconds: dict[str, float]
     topology_switches: int
     planner_p50_ms: float | None
@@ -68,6 +71,7 @@ def figures_of(data: RunData) -> RunFigures:
         max_fence_violation_m=safety.max_fence_violation_m(data),
         min_separation_m=safety.min_separation_m(data),
         landed=safety.landed(data),
+        failsafe_landings=[item.line for item in landings(happenings(data))],
         topology_seconds=topology_use.topology_seconds(data, start, end),
         topology_switches=topology_use.switches(data, start, end),
         planner_p50_ms=planner[0] if planner else None,
@@ -125,7 +129,8 @@ def _mean_nis(data: RunData) -> dict[str, float]:
 
 
 def _loud(data: RunData) -> list[str]:
-    loud = [event for event in data.events if event.message.severity is not Severity.INFO]
+    # What a scenario breaks stands among the happenings.
+    loud = [e for e in data.events if e.message.severity is not Severity.INFO and not e.message.injected]
     return [
         f"{event.time_s:.1f} s {event.message.severity} {event.message.header.entity}: {event.message.text}"
         for event in loud[-_LOUD_EVENTS:]

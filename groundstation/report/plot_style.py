@@ -1,4 +1,4 @@
-"""Colours that colour-blind people tell apart (Okabe and Ito), and the look of all plots."""
+"""Colours that colour-blind people distinguish (Okabe and Ito), and the look of all plots."""
 
 from typing import Any
 

@@ -11,7 +11,8 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     """How a run was asked for.
 
     mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
-    tracking asked for; warm_cache: whether compiled kernels were there at the start, if known.
+    tracking asked for; warm_cache: whether compiled kernels were there at the start, if known; real: what of a
+    simulated run was not emulated.
     """
 
     mode: str = ""
@@ -21,6 +22,7 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     command_unix_ns: int = 0
     tracking_s: float | None = None
     warm_cache: bool | None = None
+    real: tuple[str, ...] = ()
 
 
 def write(run_dir: Path, facts: RunFacts) -> None:

@@ -7,8 +7,10 @@ from rich.text import Text
 from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
 from groundstation.report.compare import differences, labels
 from groundstation.report.criteria import Criterion, Value
+from groundstation.report.happenings import Happening
 from groundstation.report.judge import RunReport
 
+_HAPPENINGS_SHOWN = 12
 _UNITS = (("_m", "m"), ("_s", "s"), ("_ms", "ms"), ("_percent", "%"), ("_hz", "Hz"), ("_cores", "cores"))
 
 
@@ -18,6 +20,7 @@ def summary(report: RunReport) -> RenderableType:
     if report.criteria:
         parts.append(_criteria(report.criteria))
     parts.append(_details(report))
+    parts += _happenings(report.findings.happenings)
     for line in report.figures.loud_events[-5:]:
         parts.append(Text(f"  {line}", style="yellow"))
     for line in report.damage[:3]:
@@ -54,8 +57,9 @@ def _verdict(report: RunReport) -> Text:
         return Text("PASSED", style="bold green")
     if not report.valid:
         return Text("INVALID: the simulator did not keep real time; close other programs and repeat", style="bold red")
-    failed = ", ".join(criterion.name for criterion in report.criteria if not criterion.ok)
-    return Text(f"FAILED: {failed}", style="bold red")
+    failed = [criterion for criterion in report.criteria if not criterion.ok]
+    names = ", ".join(f"{one.name} ({one.why})" if one.why else one.name for one in failed)
+    return Text(f"FAILED: {names}", style="bold red")
 
 
 def _criteria(criteria: tuple[Criterion, ...]) -> Table:
@@ -83,6 +87,16 @@ def _details(report: RunReport) -> Text:
             label = "target" if len(figures.targets) == 1 else f"{name}: rms error {target.rmse_m:.3f} m"
             lines.append(f"{label}: covered {target.covered:.0%}, normalised error {target.anees:.2f} (1 = honest)")
     return Text("\n".join(f"  {line}" for line in lines))
+
+
+def _happenings(found: list[Happening]) -> list[RenderableType]:
+    """Return the first of what was broken and what reacted, and how many more there are."""
+    lines: list[RenderableType] = [
+        Text(f"  {item.line}", style="red" if item.ended_flight else "yellow") for item in found[:_HAPPENINGS_SHOWN]
+    ]
+    if len(found) > _HAPPENINGS_SHOWN:
+        lines.append(Text(f"  {len(found) - _HAPPENINGS_SHOWN} more: {HTML_NAME}, Safety", style="dim"))
+    return lines
 
 
 def _text(value: Value) -> str:

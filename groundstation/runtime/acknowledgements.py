@@ -17,7 +17,7 @@ class Progress:
 
     @property
     def settled(self) -> bool:
-        """Whether no further answer is to be expected."""
+        """Whether the last expected answer has arrived."""
         return self.stage in (AckStage.EFFECTIVE, AckStage.REFUSED)
 
     def text(self, final: bool = False) -> str:

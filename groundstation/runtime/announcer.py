@@ -7,7 +7,6 @@ import numpy as np
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
     Belief,
-    Command,
     Control,
     Estimate,
     Innovation,
@@ -15,9 +14,8 @@ from groundstation.bus.messages import (
     Plan,
     SensorLateness,
     VelocitySetpoint,
-    Verb,
 )
-from groundstation.bus.topics import BELIEF, COMMAND, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT
+from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT
 from groundstation.control.output_limiter import Limited
 from groundstation.estimation.measurement import Correction
 from groundstation.planning.planner import PlanResult
@@ -32,12 +30,13 @@ class Announcer:
     def __init__(self, bus: Bus, lifetime_ms: int) -> None:
         self._bus = bus
         self._lifetime_ms = lifetime_ms
-        self._orders = 0
 
     def estimate(self, tracker: Tracker, now_ns: int) -> None:
         """Publish what is believed of each entity."""
         header = self._bus.header(TEAM, now_ns)
-        self._bus.publish(ESTIMATE, Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch))
+        searches = tracker.lookout.searches(now_ns)
+        message = Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch, searches=searches)
+        self._bus.publish(ESTIMATE, message)
 
     def belief(self, tracker: Tracker, lateness: tuple[SensorLateness, ...], now_ns: int) -> None:
         """Publish the joint belief, and by how much cameras seem late."""
@@ -53,7 +52,7 @@ class Announcer:
         self._bus.publish(BELIEF, message)
 
     def setpoints(self, tracker: Tracker, limited: Mapping[str, Limited], now_ns: int) -> None:
-        """Publish one setpoint per airborne robot; one that is not localised is told to hover, as not converged."""
+        """Publish one setpoint per airborne robot; one that is not localised hovers, as not converged."""
         for name, entry in limited.items():
             message = VelocitySetpoint(
                 header=self._bus.header(name, now_ns),
@@ -104,15 +103,3 @@ class Announcer:
     def journal(self, entry: JournalEntry) -> None:
         """Publish a journal entry."""
         self._bus.publish(JOURNAL, entry)
-
-    def land(self, robot: str, epoch: int) -> None:
-        """Order one robot to land: anyone may stop."""
-        self._orders += 1
-        order = Command(
-            header=self._bus.header(robot),
-            id=f"{self._bus.source}-{epoch}-{self._orders}",
-            verb=Verb.LAND,
-            scope=(robot,),
-            issuer=self._bus.source,
-        )
-        self._bus.publish(COMMAND, order)

@@ -10,7 +10,11 @@ def compile_kernels(cache: Path) -> None:
     """Fill the kernel cache, which `numba_cache.activate` has returned."""
     # Two halves that take about as long and share little.
     other_half = numba_cache.ParallelCompilation(["groundstation.planning.planner", "groundstation.estimation.models"])
-    for module in ("groundstation.estimation.observe", "groundstation.estimation.replay"):
+    for module in (
+        "groundstation.estimation.observe",
+        "groundstation.estimation.replay",
+        "groundstation.sensing.footprint",
+    ):
         importlib.import_module(module)
     other_half.finish()
     numba_cache.mark_complete(cache)

@@ -1,4 +1,4 @@
-"""Who contradicts the belief for seconds on end? The operator is told whom, and what to do; nothing is done by itself.
+"""Which entity contradicts the belief for seconds on end? The operator is warned, with the remedy; no action follows.
 
 The filter inflates what lies beyond the gate and re-initialises what diverged. What goes on all the same has a cause
 that it cannot mend: a camera that was knocked, a wrong setting, a sensor or a stream that hangs.
@@ -45,7 +45,7 @@ class _Edge:
 
 @dataclass(slots=True)
 class _Alarm:
-    """One entity: whether it is told of, and since when it asks for the other."""
+    """One entity: whether a warning stands, and since when the evidence says otherwise."""
 
     raised: bool = False
     since_ns: int | None = None

@@ -32,7 +32,7 @@ class Deadlines:
 
 
 class UnseenWatch:
-    """Finds robots that fly although no camera has seen them for too long; they are to land."""
+    """Finds robots that fly although nobody knows where they are for too long; their drivers land them."""
 
     def __init__(self, limit_s: float) -> None:
         self._limit_ns = round(limit_s * NS_PER_S)
@@ -40,9 +40,9 @@ class UnseenWatch:
         self._told: dict[str, int] = {}
 
     def step(self, now_ns: int, ages_s: Mapping[str, float]) -> list[str]:
-        """Return who must be told to land now; ages_s: since each airborne robot was last observed (inf: never).
+        """Return who is to be named now; ages_s: for how long each airborne robot is not localised (inf: never).
 
-        An order is repeated once a second for as long as it applies.
+        A name is repeated once a second for as long as it applies.
         """
         for name in [name for name in self._airborne_since if name not in ages_s]:
             del self._airborne_since[name]

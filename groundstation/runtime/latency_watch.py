@@ -1,4 +1,4 @@
-"""Are a camera's pictures as old as its setting says? The operator is told when they are not; nothing else follows."""
+"""Are a camera's pictures as old as its setting says? If not, the operator is warned; no action follows."""
 
 from groundstation.bus.messages import Message, Odometry, RelativeObservation, SensorLateness, Severity
 from groundstation.bus.notice import Notice
@@ -11,7 +11,7 @@ _SIGMAS_AGAIN, _TOLERATED_AGAIN_S = 2.0, 0.010
 
 
 class PictureAge:
-    """Feeds a LatenessWatch with what the tracker accepted, and turns what it tells into notices.
+    """Feeds a LatenessWatch with accepted sightings, and turns its findings into notices.
 
     clock: whose stamps count; those of another host would need its offset.
     """
@@ -43,7 +43,7 @@ class PictureAge:
         return tuple(SensorLateness(one.sensor, 1e3 * one.offset_s, 1e3 * one.std_s) for one in self._watch.told())
 
     def notices(self) -> list[Notice]:
-        """Return which cameras are to be told of, or no longer; call it about once a second."""
+        """Return new warnings about cameras, and their ends; call it about once a second."""
         found = []
         for one in self._watch.told():
             told, off_s = self._told.get(one.sensor, False), abs(one.offset_s)

@@ -111,7 +111,15 @@ class Operator:
         header = self._bus.header(_TEAM)
         expires_ns = 0 if verb in _STOPS else header.stamp_ns + _EXPIRY_NS
         identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
-        command = Command(header=header, id=identity, verb=verb, scope=scope, issuer=OPERATOR, expires_ns=expires_ns)
+        command = Command(
+            header=header,
+            id=identity,
+            verb=verb,
+            scope=scope,
+            issuer=OPERATOR,
+            expires_ns=expires_ns,
+            run=self._bus.run,
+        )
         met = tuple(name for name, member in self.team.members.items() if member.heard_ns)
         book = AwaitedAnswers(command, scope or met)
         self._dialogues.append(_Dialogue(book, now_ns, now_ns, request))
@@ -131,7 +139,7 @@ class Operator:
             match received.message:
                 case CommandAck() as ack:
                     self._hear_ack(ack, now_ns)
-                case Command(issuer=issuer) as command if issuer != OPERATOR:
+                case Command() as command if command.header.source != self._bus.source:
                     self._hear_command(command, now_ns)
         self._follow(now_ns)
         if self._sequence is not None:
@@ -175,7 +183,9 @@ class Operator:
         ):
             return  # a repetition
         self._answer(request, AckStage.RECEIVED)
-        if strangers:
+        if request.run != self._bus.run:
+            self._answer(request, AckStage.REFUSED, f"given for another run ({request.run})")
+        elif strangers:
             self._answer(request, AckStage.REFUSED, f"there is no drone {', '.join(strangers)}")
         elif self._sequence is not None:
             self._answer(request, AckStage.REFUSED, f"{self._sequence.current} is taking off")

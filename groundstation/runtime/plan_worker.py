@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class PlanWorker:
-    """One request at a time: `submit` while `idle`, `poll` each tick for what came back.
+    """One request at a time: `submit` while `idle`, `poll` each tick for the result.
 
     budget_s: wall time after which the planner is asked to stop with the best plan so far.
     """

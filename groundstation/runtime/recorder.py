@@ -3,13 +3,16 @@
 Started as `groundstation.runtime.recorder:run`. See groundstation/recording for files and formats.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from groundstation.bus import clock
+from groundstation.bus.api import Sample
 from groundstation.bus.messages import Severity
+from groundstation.bus.topics import IMAGE, Topic
 from groundstation.field.behaviour import RecordingValues
 from groundstation.field.resolved import field_from_json
 from groundstation.process.child import Child
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 # 15 turns a second: the heartbeat needs 10, and each turn costs a wake-up of the interpreter.
 _PERIOD_NS = 66 * NS_PER_MS
 _SPACE_PERIOD_NS = 2 * NS_PER_S
+_PICTURES: dict[str, tuple[Topic, ...]] = {"none": (), "blurred": (IMAGE,), "full": IMAGE_TOPICS}
 _CONSEQUENCE = {
     Space.LOW: "pictures stop below 200 MB",
     Space.NO_IMAGES: "no pictures any more",
@@ -37,6 +41,13 @@ class RecorderSection(msgspec.Struct, frozen=True):
     field: msgspec.Raw
     run_dir: str
     epoch: int = 0
+
+
+def _blurred(pictures: list[Sample]) -> list[Sample]:
+    from groundstation.recording.blurring import blurred
+
+    soft = ((sample, blurred(sample.payload)) for sample in pictures)
+    return [replace(sample, payload=payload) for sample, payload in soft if payload is not None]
 
 
 def _rotation(settings: RecordingValues) -> "Rotation":
@@ -54,7 +65,8 @@ class Recorder:
         # in bytes as well as in number: a picture is a hundred times a state message.
         settings = field_from_json(section.field).recording
         self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
-        self._image_queue = child.bus.subscribe(IMAGE_TOPICS, capacity=64)
+        self._image_queue = child.bus.subscribe(_PICTURES[settings.pictures], capacity=64)
+        self._blurs = settings.pictures == "blurred"
         self._datagram_queue = child.bus.subscribe(DATAGRAM_TOPICS if settings.raw_datagrams else (), capacity=4096)
         # Only here: formats and compression take half a second, which a recorder that was killed does not have.
         from groundstation.recording.writing import RunWriter
@@ -79,7 +91,7 @@ class Recorder:
         writer.write(self._datagram_queue.drain_samples(), writer.raw, now_ns)
         pictures = self._image_queue.drain_samples()
         if self._space < Space.NO_IMAGES:
-            writer.write(pictures, writer.raw, now_ns)
+            writer.write(_blurred(pictures) if self._blurs else pictures, writer.raw, now_ns)
         writer.tick(now_ns)
         for series in self._series:
             self._report(series)

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
+from groundstation.estimation.event_log import HASTY
 from groundstation.estimation.measurement import Correction
 
 _AT_ONCE_NS, _AGAIN_NS, _QUIET_NS = 3_000_000_000, 20_000_000_000, 20_000_000_000
@@ -28,20 +29,22 @@ class RejoinWatch:
         """Take corrections; returns what is worth telling now."""
         found = []
         for c in corrections:
-            if c.joined and c.nis is not None and c.subject in self._robots:
+            given_up = c.joined and c.nis is not None
+            if c.subject in self._robots and (given_up or c.reason == HASTY):
                 times = self._given_up.setdefault((c.observer, c.subject), [])
-                times[:] = [at for at in times if now_ns - at <= _AGAIN_NS] + [now_ns]
+                times[:] = [at for at in times if now_ns - at <= _AGAIN_NS] + [now_ns] * given_up
                 found += self._judge(c.observer, c.subject, now_ns)
         return found
 
     def _judge(self, observer: str, subject: str, now_ns: int) -> list[Notice]:
-        lost = sorted(
+        recent = {
             name
             for (by, name), times in self._given_up.items()
             if by == observer and times and now_ns - times[-1] <= _AT_ONCE_NS
-        )
+        }
+        lost = sorted(recent | {subject})
         if len(lost) > 1:
-            text = f"{' and '.join(lost)} re-initialised by {observer} at once: suspect {observer}, not them"
+            text = f"{' and '.join(lost)} contradicted by {observer} at once: suspect {observer}, not them"
             return self._once(observer, text, _CAMERA_REMEDY, now_ns)
         count = len(self._given_up[observer, subject])
         if count >= _AGAIN:

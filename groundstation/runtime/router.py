@@ -5,8 +5,12 @@ from typing import Any
 
 import msgspec
 
-from groundstation.bus.zenoh_bus import open_router
+from groundstation.bus.access import AccessList
+from groundstation.bus.messages import Event, Severity
+from groundstation.bus.topics import EVENT
+from groundstation.bus.zenoh_bus import ZenohBus, open_router
 from groundstation.process.child import Child
+from groundstation.runtime.refused_strangers import RefusedStrangers
 
 _TURN_NS = 50_000_000
 # Longer than sim_bridge and drivers take to land without a supervisor; they still want to be heard meanwhile.
@@ -14,14 +18,18 @@ _LINGER_NS = 25_000_000_000
 
 
 class RouterSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the router: where to listen."""
+    """What the supervisor hands to the router: where to listen, and whom to let in (None: everybody)."""
 
     endpoint: str
+    access: AccessList | None = None
 
 
 def run(child: Child) -> int:
     """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
-    session = open_router(msgspec.json.decode(child.section, type=RouterSection).endpoint)
+    section = msgspec.json.decode(child.section, type=RouterSection)
+    strangers = RefusedStrangers()
+    session = open_router(section.endpoint, child.spec.identity, section.access)
+    bus = ZenohBus(session, child.spec.site, child.name)
     child.ready()
     orphaned_ns = 0
     while not child.stop_requested:
@@ -30,9 +38,13 @@ def run(child: Child) -> int:
             orphaned_ns = orphaned_ns or now_ns
             if now_ns - orphaned_ns > _LINGER_NS or not _has_clients(session):
                 break
+        if refused := strangers.take(now_ns):
+            text = f"the bus refused {refused} connections of programs that are not of this run"
+            bus.publish(EVENT, Event(header=bus.header(child.name), severity=Severity.WARNING, text=text))
         child.beat()
         child.sleep_until(now_ns + _TURN_NS)
-    session.close()
+    bus.close()
+    strangers.close()
     return 0
 
 

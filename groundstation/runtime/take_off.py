@@ -121,6 +121,7 @@ class TakeOff:
         if is_seen_in_flight(member, now_ns):
             self.up.append(self._waiting.pop(0))
             self._next(now_ns)
+            self._ordered_ns = now_ns  # the next one's driver has to hear first where this one flies
         elif self._late(now_ns, self._limits.unseen_s):
             return self._leave_out(why_unseen(member, now_ns, self._limits.unseen_s), now_ns, land=True)
         return None

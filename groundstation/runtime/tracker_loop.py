@@ -145,9 +145,8 @@ class Tracking:
     def _watch(self, now_ns: int) -> None:
         tracker = self.tracker
         self.notices += tracker.take_notices()
-        for name in self._unseen.step(now_ns, {name: tracker.filter.age_s(name) for name in tracker.airborne}):
-            self._announcer.land(name, tracker.epoch)
-            text = "flies, but no camera has seen it for too long: ordered to land"
+        for name in self._unseen.step(now_ns, tracker.unlocalised_s()):
+            text = "flies, and nobody knows well enough where it is: its driver lands it"
             self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
         if self._tick % self.rate_hz == 0:
             self.notices += self._contradictions.notices(now_ns) + self._picture_age.notices()

@@ -77,7 +77,7 @@ def _beliefs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str
         if name in data.estimates
     ]
     note = "larger semi-axis of the target's 95 % ellipse"
-    return Chart("Believed uncertainty of the target", "m", note, times(grid), curves)
+    return Chart("Estimated uncertainty of the target", "m", note, times(grid), curves)
 
 
 def _costs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:

@@ -31,7 +31,7 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
         ("Flight", holders(flight, 0)),
         ("Topology", tables.switches_table(findings)),
         ("Consistency", holders(health, len(flight)) + tables.edges_table(findings)),
-        ("Safety", tables.interventions_table(findings)),
+        ("Safety", tables.happenings_table(findings) + tables.interventions_table(findings)),
         ("Links and timing", tables.links_table(findings) + tables.processes_table(data)),
         ("Events", tables.events_table(data)),
         *(

@@ -52,8 +52,8 @@ def _beliefs(data: RunData, grid: Array) -> Chart:
         for name in _names(data)
         if name in data.estimates
     ]
-    note = "larger semi-axis of the 95 % ellipse in the plane: what the filter believed of its own error"
-    return Chart("Believed uncertainty", "m", note, times(grid), curves)
+    note = "larger semi-axis of the 95 % ellipse in the plane: the error that the filter expected"
+    return Chart("Estimated uncertainty", "m", note, times(grid), curves)
 
 
 def semi_axis_m(estimate: EstimateTrack, grid: Array) -> Array:

@@ -33,7 +33,7 @@ def _nis(data: RunData, start_s: float, end_s: float) -> Chart:
         Curve("95 % bounds", MUTED, points(low), dashed=True),
         Curve("", MUTED, points(high), dashed=True),
     ]
-    note = "per degree of freedom in windows of 1 s; 1 is honest, above the bounds the filter is too sure of itself"
+    note = "per degree of freedom in windows of 1 s; 1 is consistent, above the bounds the filter is overconfident"
     return Chart("NIS", "", note, times(middles), curves)
 
 
@@ -49,7 +49,7 @@ def _nees(data: RunData, grid: Array) -> Chart:
     low, high = bounds(4)
     limits = [Curve(f"{text} bound of one robot", MUTED, [value] * len(grid), dashed=True)
               for text, value in ((f"95 % {low:.2f}", low), (f"{high:.2f}", high))]  # fmt: skip
-    note = "error against the truth in units of the believed covariance, per degree of freedom; 1 is honest"
+    note = "error against the truth in units of the estimated covariance, per degree of freedom; 1 is consistent"
     return Chart("NEES", "", note, times(grid), curves and [*curves, *limits], log=True)
 
 

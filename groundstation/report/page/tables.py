@@ -33,11 +33,12 @@ def number(value: Value, digits: int = 3) -> str:
 def criteria_table(report: RunReport) -> str:
     """Return verdict, value and limit of each criterion."""
     rows = [
-        ("met" if item.ok else "MISSED", item.name, number(item.value), f"{item.relation} {number(item.limit)}")
+        ("met" if item.ok else "MISSED", item.name, number(item.value), f"{item.relation} {number(item.limit)}",
+         item.why)
         for item in report.criteria
-    ]
+    ]  # fmt: skip
     empty = "A re-run is no flight: no criterion applies." if report.rerun else "No criterion applies."
-    return table(("", "criterion", "value", "limit"), rows, empty)
+    return table(("", "criterion", "value", "limit", "why"), rows, empty)
 
 
 def accuracy_table(report: RunReport) -> str:
@@ -83,6 +84,12 @@ def interventions_table(findings: Findings) -> str:
     ]
     head = ("robot", "cause", "episodes", "plans", "longest [s]", "most cut [m/s]")
     return table(head, rows, "Safety never changed a velocity.")
+
+
+def happenings_table(findings: Findings) -> str:
+    """Return what a scenario broke and which failsafes reacted, beside each other in order of time."""
+    rows = [(f"{item.time_s:.1f}", item.entity, item.cause, item.text) for item in findings.happenings]
+    return table(("time [s]", "about", "cause", "what"), rows, "No fault was injected, and no failsafe acted.")
 
 
 def links_table(findings: Findings) -> str:

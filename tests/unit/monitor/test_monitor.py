@@ -48,14 +48,15 @@ class World:
             m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7),
         )
 
-    def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0) -> None:
+    def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch) -> None:
         wide = (0.04, 0.0, 0.0, 0.01)
         robot = tuple(0.01 if index % 5 == 0 else 0.0 for index in range(16))
         entities = (
             m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, 0.2),
             m.EntityEstimate("turtlebot", "target", (0.75, 0.25), wide, (0.0, 0.0), True, target_age_s),
         )
-        self.say(t.ESTIMATE, m.Estimate(header=self.header("team", age_s), entities=entities, epoch=1))
+        header = self.header("team", age_s)
+        self.say(t.ESTIMATE, m.Estimate(header=header, entities=entities, epoch=1, searches=searches))
 
     def status(self, name: str, state: m.Lifecycle = m.Lifecycle.READY, age_s: float = 0.0, detail: str = "") -> None:
         header = self.header(name, age_s)
@@ -108,6 +109,12 @@ def test_the_table_shows_mode_battery_link_position_and_ellipse(world: World) ->
     (row,) = (line for line in text.splitlines() if line.startswith("turtlebot"))
     for part in ("0.75   0.25", "0.49 x 0.24", "drone_1"):
         assert part in row
+
+
+def test_a_search_is_shown_with_its_place(world: World) -> None:
+    search = m.TargetSearch("turtlebot", "SEARCH", 4.0, (1.2, -0.5), 0.3, 9.0, "now around (1.2, -0.5)")
+    world.estimate(0.1, 0.0, search)
+    assert "turtlebot SEARCH: now around (1.2, -0.5)" in world.text()
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 140])

@@ -7,13 +7,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import cv2
 import msgspec
+import numpy as np
 import pytest
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Event, Severity
-from groundstation.bus.topics import EVENT, IMAGE
+from groundstation.bus.topics import EVENT, IMAGE, VIDEO
 from groundstation.recording import disk_space
 from groundstation.recording import rotating_file as series_module
 from groundstation.recording.mcap_file import McapFile
@@ -58,7 +60,7 @@ def now(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return now_ns
 
 
-def _recorder(child: Any, folder: Path, **recording: bool) -> Recorder:
+def _recorder(child: Any, folder: Path, **recording: bool | str) -> Recorder:
     options = [f"recording.{key}={json.dumps(value)}" for key, value in recording.items()]
     field = load_field(find_field("lab"), options).model_dump_json().encode()
     return Recorder(child, RecorderSection(msgspec.Raw(field), str(folder), 1))
@@ -163,3 +165,29 @@ def test_garbage_on_the_bus_is_counted_and_not_recorded(
     recorder.close()
     assert recorder.dropped == 1
     assert recorder.written == 1
+
+
+@pytest.mark.parametrize(("pictures", "count"), [("none", 0), ("blurred", 1), ("full", 2)])
+def test_pictures_are_recorded_as_far_as_the_field_allows(
+    pictures: str, count: int, sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path
+) -> None:
+    fine = np.random.default_rng(1).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+    sharp = cv2.imencode(".jpg", fine)[1].tobytes()
+    bus, child = sender
+    recorder = _recorder(child, tmp_path, pictures=pictures)
+    bus.publish_bytes(IMAGE, bus.header("ceiling"), sharp)
+    bus.publish_bytes(VIDEO, bus.header("ceiling"), b"access unit")
+    recorder.turn()
+    recorder.close()
+    path = tmp_path / "raw.mcap"
+    kept = [record.data for record in open_recording(path).raw_records()] if path.exists() else []
+    assert len(kept) == count
+    if pictures == "blurred":
+        jpeg = kept[0][kept[0].index(b"\xff\xd8") :]
+        seen = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+        assert seen is not None and seen.shape == fine.shape
+        assert _detail(seen) < 0.2 * _detail(fine)
+
+
+def _detail(picture: Any) -> float:
+    return float(np.abs(np.diff(picture.astype(float), axis=1)).mean())

@@ -16,7 +16,8 @@ from mcap.writer import Writer
 
 from groundstation.bus.topics import ESTIMATE
 from groundstation.cli.exits import ExitCode, exit_code_of
-from groundstation.cli.main import VERBS, groundstation
+from groundstation.cli.main import groundstation
+from groundstation.cli.verbs import VERBS
 from groundstation.recording import compatibility
 from groundstation.recording.capture import Entry
 from groundstation.recording.mcap_file import McapFile

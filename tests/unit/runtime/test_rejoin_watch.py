@@ -1,6 +1,7 @@
 """Who is named when beliefs are given up for what a camera says."""
 
 from groundstation.bus.messages import Severity, Verdict
+from groundstation.estimation.event_log import HASTY
 from groundstation.estimation.measurement import Correction
 from groundstation.runtime.rejoin_watch import RejoinWatch
 
@@ -9,6 +10,10 @@ S = 1_000_000_000
 
 def given_up(subject: str, observer: str = "ceiling") -> Correction:
     return Correction(observer, subject, Verdict.ACCEPTED, nis=300.0, joined=True)
+
+
+def put_off(subject: str, observer: str = "ceiling") -> Correction:
+    return Correction(observer, subject, Verdict.IMPLAUSIBLE, HASTY, nis=300.0)
 
 
 def watch() -> RejoinWatch:
@@ -28,6 +33,20 @@ def test_all_robots_at_once_are_the_cameras_fault_and_that_is_said_once() -> Non
     assert "drone_1 and drone_2" in notice.text
     assert w.take([given_up("drone_1"), given_up("drone_2")], 8 * S) == []
     assert len(w.take([given_up("drone_1"), given_up("drone_2")], 30 * S)) == 1, "still so, much later"
+
+
+def test_who_is_not_given_up_yet_counts_among_those_of_the_camera() -> None:
+    w = watch()
+    assert w.take([given_up("drone_1")], S) == []
+    (notice,) = w.take([put_off("drone_2")] * 5, S + S // 10)
+    assert notice.entity == "ceiling" and "drone_1 and drone_2" in notice.text
+
+
+def test_one_robot_that_is_put_off_was_given_up_three_times_before() -> None:
+    w = watch()
+    assert w.take([given_up("drone_1")], S) + w.take([given_up("drone_1")], 5 * S) == []
+    assert len(w.take([given_up("drone_1")], 9 * S)) == 1
+    assert w.take([put_off("drone_1")], 10 * S) == []
 
 
 def test_two_robots_long_apart_or_by_two_cameras_are_chance() -> None:

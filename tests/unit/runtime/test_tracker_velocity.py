@@ -118,6 +118,20 @@ def test_after_a_lie_the_dark_is_known_to_be_darker(flight: Flight) -> None:
     assert flight.anees < 4.0, "what it says while nobody looks counts for little"
 
 
+def test_a_velocity_that_was_seen_to_be_wrong_is_not_right_because_nobody_looks(flight: Flight) -> None:
+    """It drifts off by 3 cm/s each second, too slowly to surprise anybody; then the robot leaves the camera's view."""
+    began = flight.ticks
+
+    def drifting(velocity: np.ndarray) -> np.ndarray:
+        return velocity + np.array([0.0003 * min(flight.ticks - began, 500), 0.0])
+
+    assert flight.run(5.0, drifting) < 0.1
+    assert flight.run(2.5, drifting, look=False) < 0.2, "0.3 m, were it believed again"
+    assert flight.anees < 3.0, "11 then"
+    flight.run(4.0)
+    assert flight.run(2.0) < 0.05, "and believed again once it is right"
+
+
 def test_an_honest_velocity_is_as_good_as_before(flight: Flight) -> None:
     flight.run(3.0, speed=0.5)
     assert flight.run(3.0, speed=0.5, look=False) < 0.15

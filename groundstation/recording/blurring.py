@@ -1,0 +1,18 @@
+"""Pictures in which nobody can be recognised: an eighth of the resolution, drawn large again."""
+
+import cv2
+import numpy as np
+
+_QUALITY = 60
+_LEAST_PX = 8
+
+
+def blurred(jpeg: bytes) -> bytes | None:
+    """Return a JPEG of the same size with an eighth of the detail; None for what is no picture that large."""
+    coarse = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_8) if jpeg else None
+    if coarse is None or min(coarse.shape[:2]) < _LEAST_PX:
+        return None
+    soft = cv2.GaussianBlur(coarse, (3, 3), 0)
+    large = cv2.resize(soft, None, fx=8, fy=8, interpolation=cv2.INTER_LINEAR)
+    done, data = cv2.imencode(".jpg", large, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    return data.tobytes() if done else None

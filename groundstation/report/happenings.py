@@ -1,0 +1,95 @@
+"""What was broken and what reacted: faults of the scenario and rows of the table of failsafes, by time; pure."""
+
+from collections.abc import Iterator
+
+import msgspec
+
+from groundstation.bus.messages import FlightState, Verb
+from groundstation.report.tracks import RunData
+
+_ENDING = frozenset({"LANDING", "CUT"})
+_UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
+_DOWN = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+_STOPS = frozenset({Verb.LAND, Verb.CUT_MOTORS})
+UNEXPLAINED = "unordered"
+
+
+class Happening(msgspec.Struct, frozen=True):
+    """One line of what happened to an entity.
+
+    cause: the condition of the table of failsafes, "fault" for what a scenario broke, "unordered" for a drone that came
+    down without an order and without its driver; text: in words.
+    """
+
+    time_s: float
+    entity: str
+    cause: str
+    text: str
+    ended_flight: bool = False
+
+    @property
+    def line(self) -> str:
+        """Return it as it is printed."""
+        return f"{self.time_s:.1f} s  {self.entity}: {self.text}"
+
+
+def happenings(data: RunData) -> list[Happening]:
+    """Return faults and reactions in order of time."""
+    found = [*_faults(data)]
+    for drone in data.vehicles:
+        found += _reactions(data, drone)
+    return sorted(found, key=lambda item: item.time_s)
+
+
+def landings(found: list[Happening]) -> list[Happening]:
+    """Return what ended a flight though nobody ordered it, the first of each drone."""
+    first: dict[str, Happening] = {}
+    for item in found:
+        if item.ended_flight:
+            first.setdefault(item.entity, item)
+    return list(first.values())
+
+
+def _faults(data: RunData) -> Iterator[Happening]:
+    begun: set[str] = set()
+    for event in data.events:
+        text, entity = event.message.text, event.message.header.entity
+        if not event.message.injected:
+            continue
+        if text.endswith(" lasts"):
+            text = f"{text.removesuffix(' lasts')} begins"
+            if text in begun:
+                continue
+            text += ", or did before"
+        begun.add(text)
+        yield Happening(event.time_s, entity, "fault", text)
+
+
+def _reactions(data: RunData, drone: str) -> Iterator[Happening]:
+    """Yield each entry into a mode by a failsafe, and each end of a flight that nobody explains."""
+    before, up_since_s, explained = ("", ""), None, False
+    for item in sorted(data.vehicles[drone], key=lambda item: item.time_s):
+        status, now = item.message, (item.message.mode, item.message.failsafe)
+        if status.failsafe and now != before:
+            ends = status.mode in _ENDING
+            explained = explained or ends
+            text = f"{status.mode} by failsafe {status.failsafe}: {status.detail}"
+            yield Happening(item.time_s, drone, status.failsafe, text, ends)
+        before = now
+        if status.flight_state in _UP and up_since_s is None:
+            up_since_s, explained = item.time_s, False
+        elif status.flight_state in _DOWN and up_since_s is not None:
+            if not explained and not _ordered(data, drone, up_since_s, item.time_s):
+                text = "came down without an order and without its driver"
+                yield Happening(item.time_s, drone, UNEXPLAINED, text, True)
+            up_since_s = None
+
+
+def _ordered(data: RunData, drone: str, start_s: float, end_s: float) -> bool:
+    """Return whether somebody ordered a drone down in a span of time."""
+    return any(
+        command.message.verb in _STOPS
+        and start_s <= command.time_s <= end_s
+        and drone in (command.message.scope or (drone,))
+        for command in data.commands
+    )

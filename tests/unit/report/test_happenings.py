@@ -1,0 +1,126 @@
+"""What was broken and what reacted, in the report: a flight that a failsafe ended does not pass."""
+
+import msgspec
+from rich.console import Console
+
+from groundstation.bus import messages as m
+from groundstation.report.criteria import criteria_of
+from groundstation.report.findings import findings_of
+from groundstation.report.happenings import UNEXPLAINED, happenings, landings
+from groundstation.report.judge import judge
+from groundstation.report.metrics import figures_of
+from groundstation.report.page.tables import criteria_table, happenings_table
+from groundstation.report.run_facts import RunFacts
+from groundstation.report.summary import summary
+from groundstation.report.tracks import UNKNOWN_FIELD, RunData, TimedMessage
+
+UP, DOWN, SINKS = m.FlightState.FLYING, m.FlightState.LANDED, m.FlightState.LANDING
+
+
+def header(entity="team"):
+    return m.Header(0, "here", entity, "tester", 0)
+
+
+def data(*statuses, events=(), commands=()):
+    """Return the data of one drone, from (time, state, mode, failsafe)."""
+    told = [
+        TimedMessage(
+            float(at),
+            m.VehicleStatus(header=header("a"), flight_state=state, mode=mode, failsafe=why, detail=f"because {why}"),
+        )
+        for at, state, mode, why in statuses
+    ]
+    found = [TimedMessage(at, event(text, injected)) for at, text, injected in events]
+    ordered = [
+        TimedMessage(at, m.Command(header=header(), id="x", verb=verb, scope=scope, issuer="me"))
+        for at, verb, scope in commands
+    ]
+    return RunData(UNKNOWN_FIELD, RunFacts(), end_s=60.0, vehicles={"a": told}, events=found, commands=ordered)
+
+
+def event(text, injected=True):
+    return m.Event(header=header("a"), severity=m.Severity.WARNING, text=text, injected=injected)
+
+
+LANDED_BY_FAILSAFE = data(
+    (1, UP, "TRACK", ""),
+    (12, UP, "HOVER", "telemetry_silent"),
+    (12.2, UP, "HOVER", "telemetry_silent"),
+    (14, SINKS, "LANDING", "telemetry_silent"),
+    (18, DOWN, "LANDED", ""),
+    events=[(11.0, "fault navdata_silent of a begins", True), (13.0, "something else", False)],
+    commands=[(30.0, m.Verb.LAND, ())],
+)
+
+
+def test_faults_and_reactions_stand_in_order_of_time_each_once():
+    found = happenings(LANDED_BY_FAILSAFE)
+    assert [(item.time_s, item.cause, item.ended_flight) for item in found] == [
+        (11.0, "fault", False),
+        (12.0, "telemetry_silent", False),
+        (14.0, "telemetry_silent", True),
+    ]
+    assert "because telemetry_silent" in found[2].text
+
+
+def test_a_flight_that_a_failsafe_ended_fails_and_says_which():
+    figures = figures_of(LANDED_BY_FAILSAFE)
+    criterion = next(c for c in criteria_of(figures, UNKNOWN_FIELD, RunFacts()) if c.name == "failsafe_landings")
+    assert (criterion.ok, criterion.value) == (False, 1.0)
+    assert criterion.why == "14.0 s  a: LANDING by failsafe telemetry_silent: because telemetry_silent"
+
+
+def test_the_summary_and_the_page_show_fault_and_reaction(tmp_path):
+    report = judge(LANDED_BY_FAILSAFE, tmp_path)
+    console = Console(width=300, file=None, record=True)
+    with console.capture() as printed:
+        console.print(summary(report))
+    verdict = printed.get().splitlines()[0]
+    assert verdict.startswith("FAILED") and "failsafe telemetry_silent" in verdict
+    for text in (printed.get(), happenings_table(findings_of(LANDED_BY_FAILSAFE))):
+        assert text.index("navdata_silent of a begins") < text.rindex("LANDING by failsafe telemetry_silent")
+    assert "because telemetry_silent" in criteria_table(report)
+
+
+def test_a_pause_that_ended_well_is_told_and_fails_nothing():
+    flown = data((1, UP, "TRACK", ""), (5, UP, "HOVER", "driver_stood"), (9, UP, "TRACK", ""))
+    assert [item.cause for item in happenings(flown)] == ["driver_stood"]
+    assert landings(happenings(flown)) == []
+
+
+def test_an_ordered_landing_is_no_failsafe():
+    for scope in ((), ("a",)):
+        flown = data((1, UP, "TRACK", ""), (9, DOWN, "LANDED", ""), commands=[(8.0, m.Verb.LAND, scope)])
+        assert happenings(flown) == []
+
+
+def test_who_comes_down_without_order_and_driver_is_named():
+    flown = data((1, UP, "TRACK", ""), (6, DOWN, "CONNECTING", ""), commands=[(8.0, m.Verb.LAND, ())])
+    assert [(item.time_s, item.cause) for item in landings(happenings(flown))] == [(6.0, UNEXPLAINED)]
+    of_another = data((1, UP, "TRACK", ""), (6, DOWN, "LANDED", ""), commands=[(5.0, m.Verb.LAND, ("b",))])
+    assert len(landings(happenings(of_another))) == 1
+
+
+def test_an_order_of_a_former_flight_explains_nothing():
+    flown = data(
+        (1, UP, "TRACK", ""),
+        (3, DOWN, "LANDED", ""),
+        (5, UP, "TRACK", ""),
+        (8, DOWN, "LANDED", ""),
+        commands=[(2.0, m.Verb.LAND, ())],
+    )
+    assert [item.time_s for item in landings(happenings(flown))] == [8.0]
+
+
+def test_a_fault_from_before_the_recording_is_told_once():
+    lasting = data(events=[(4.0, "fault wind 1 of a lasts", True)])
+    assert [item.text for item in happenings(lasting)] == ["fault wind 1 of a begins, or did before"]
+    known = data(events=[(2.0, "fault wind 1 of a begins", True), (4.0, "fault wind 1 of a lasts", True)])
+    assert [item.time_s for item in happenings(known)] == [2.0]
+
+
+def test_only_the_first_of_a_drones_ends_is_counted():
+    flown = data((1, UP, "TRACK", ""), (5, SINKS, "LANDING", "battery_low"), (6, SINKS, "CUT", "emergency"))
+    assert [item.cause for item in landings(happenings(flown))] == ["battery_low"]
+    assert figures_of(flown).failsafe_landings == [item.line for item in landings(happenings(flown))]
+    assert msgspec.json.decode(judge(flown, None).as_json())["failsafe_landings"]  # type: ignore[arg-type]

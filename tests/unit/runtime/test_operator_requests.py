@@ -1,0 +1,158 @@
+"""What other shells ask of the operator, and whom his orders go to; each order to the drones it names alone."""
+
+import pytest
+
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import AckStage, Command, CommandAck, FlightState, VehicleStatus, Verb
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, VEHICLE_STATUS
+from groundstation.runtime.operator import OPERATOR, Operator, TeamPhase
+from groundstation.runtime.take_off import TakeOffLimits
+
+S = 10**9
+UP, DOWN = FlightState.HOVERING, FlightState.LANDED
+
+
+class Desk:
+    """An operator over drones that say what they are told to say, and another shell."""
+
+    def __init__(self, **states):
+        exchange = MemoryExchange()
+        self.said: list[str] = []
+        self.now_ns = 10**12
+        self.shell = MemoryBus(exchange, "lab", "cli_1")
+        self.drones = {name: (MemoryBus(exchange, "lab", name), state) for name, state in states.items()}
+        bus = MemoryBus(exchange, "lab", "supervisor")
+        self.operator = Operator(bus, tuple(states), {}, TakeOffLimits(), self.said.append)
+        self.given = self.shell.subscribe([COMMAND])
+        self.answers = self.shell.subscribe([COMMAND_ACK], entity=OPERATOR)
+        self.turn()
+
+    def turn(self, seconds=0.1):
+        for name, (bus, state) in self.drones.items():
+            bus.publish(VEHICLE_STATUS, VehicleStatus(header=bus.header(name), flight_state=state, mode="HOVER"))
+        self.now_ns += round(seconds * S)
+        self.operator.step(self.now_ns)
+
+    def ask(self, verb, *scope, identity="r"):
+        header = self.shell.header("team")
+        request = Command(header=header, id=identity, verb=verb, scope=scope, issuer="cli_1")
+        self.shell.publish(COMMAND, request)
+        self.turn()
+
+    def confirm(self, *stages, refused=()):
+        """Let every drone answer the newest order of the operator."""
+        command = self.orders()[-1]
+        for name in command.scope or tuple(self.drones):
+            bus, _ = self.drones[name]
+            for stage in (AckStage.REFUSED,) if name in refused else stages:
+                ack = CommandAck(header=bus.header(name), command_id=command.id, verb=command.verb, stage=stage)
+                bus.publish(COMMAND_ACK, ack)
+        self.turn()
+
+    def orders(self):
+        self._orders = [*getattr(self, "_orders", []), *(r.message for r in self.given.drain())]
+        return [command for command in self._orders if command.issuer == OPERATOR]
+
+    def stages(self):
+        answers = [r.message for r in self.answers.drain() if isinstance(r.message, CommandAck)]
+        return [(ack.stage, ack.reason) for ack in answers]
+
+
+DONE = (AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE)
+
+
+@pytest.mark.parametrize("verb", [Verb.RESUME, Verb.HOLD, Verb.LAND, Verb.TRACK])
+def test_a_request_goes_to_the_drones_that_it_names_alone_and_is_answered(verb):
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.ask(verb, OPERATOR, "drone_2")
+    assert [(order.verb, order.scope) for order in desk.orders()] == [(verb, ("drone_2",))]
+    assert [stage for stage, _ in desk.stages()] == [AckStage.RECEIVED, AckStage.ACCEPTED]
+    desk.confirm(*DONE)
+    assert desk.stages() == [(AckStage.EFFECTIVE, "")]
+
+
+@pytest.mark.parametrize(("verb", "phase"), [(Verb.RESUME, TeamPhase.TRACKING), (Verb.HOLD, TeamPhase.GROUND)])
+def test_only_what_moves_drones_again_is_tracking(verb, phase):
+    desk = Desk(drone_1=UP)
+    desk.ask(verb, OPERATOR, "drone_1")
+    assert desk.operator.phase is phase
+
+
+def test_stops_never_expire_and_starts_do():
+    desk = Desk(drone_1=UP)
+    desk.ask(Verb.RESUME, OPERATOR, "drone_1", identity="a")
+    desk.ask(Verb.LAND, OPERATOR, "drone_1", identity="b")
+    start, stop = desk.orders()
+    assert start.expires_ns == start.header.stamp_ns + 5 * S and stop.expires_ns == 0
+    assert start.id != stop.id
+
+
+def test_a_refusal_of_one_is_the_answer_with_its_name():
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.ask(Verb.RESUME, OPERATOR, "drone_1", "drone_2")
+    desk.stages()
+    desk.confirm(*DONE, refused=("drone_1",))
+    ((stage, reason),) = desk.stages()
+    assert stage is AckStage.REFUSED and reason.startswith("drone_1: ") and "drone_2" not in reason
+
+
+def test_strangers_and_repetitions_order_nothing():
+    desk = Desk(drone_1=UP)
+    desk.ask(Verb.RESUME, OPERATOR, "drone_9")
+    assert desk.stages() == [(AckStage.RECEIVED, ""), (AckStage.REFUSED, "there is no drone drone_9")]
+    assert desk.orders() == []
+    for _ in range(2):
+        desk.ask(Verb.RESUME, OPERATOR, "drone_1", identity="same")
+    assert len({order.id for order in desk.orders()}) == 1
+    assert [stage for stage, _ in desk.stages()] == [AckStage.RECEIVED, AckStage.ACCEPTED]
+
+
+def test_nothing_else_is_begun_during_a_take_off_and_its_request_is_not_begun_twice():
+    desk = Desk(drone_1=DOWN)
+    for _ in range(2):
+        desk.ask(Verb.TAKEOFF, OPERATOR, "drone_1", identity="t")
+    desk.ask(Verb.RESUME, OPERATOR, "drone_1", identity="r")
+    assert [stage for stage, _ in desk.stages()] == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.RECEIVED,
+                                                     AckStage.REFUSED]  # fmt: skip
+    assert {order.verb for order in desk.orders()} == {Verb.TAKEOFF}
+
+
+@pytest.mark.parametrize(("verb", "limit_s"), [(Verb.LAND, 20.0), (Verb.RESUME, 6.0)])
+def test_an_order_that_nobody_answers_is_given_up_after_its_time_and_not_before(verb, limit_s):
+    desk = Desk(drone_1=UP)
+    desk.ask(verb, OPERATOR, "drone_1")
+    desk.stages()
+    while desk.now_ns < 10**12 + (limit_s - 0.1) * S:
+        desk.turn()
+    assert desk.stages() == [] and len(desk.orders()) > 3
+    for _ in range(6):
+        desk.turn()
+    ((stage, reason),) = desk.stages()
+    assert stage is AckStage.REFUSED and "NOT CONFIRMED" in reason
+    count = len(desk.orders())
+    desk.turn(5.0)
+    assert len(desk.orders()) == count
+
+
+def test_a_stop_of_all_drones_by_name_is_one_of_the_team_and_a_stop_of_some_is_not():
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.operator.track(desk.now_ns)
+    desk.ask(Verb.LAND, "drone_1", identity="a")
+    phases = [desk.operator.phase]
+    for verb, scope, identity in ((Verb.HOLD, ("drone_1", "drone_2"), "b"), (Verb.LAND, (), "c"), (Verb.HOLD, (), "d")):
+        desk.ask(verb, *scope, identity=identity)
+        phases.append(desk.operator.phase)
+    # The last: a landing is not taken back.
+    assert phases == [TeamPhase.TRACKING, TeamPhase.HELD, TeamPhase.LANDING, TeamPhase.LANDING]
+    assert sum("by cli_1" in line for line in desk.said) == 2
+
+
+def test_landing_is_ordered_once_and_drops_what_was_to_start():
+    desk = Desk(drone_1=UP)
+    desk.operator.track(desk.now_ns)
+    desk.operator.land(desk.now_ns)
+    desk.operator.land(desk.now_ns)
+    assert [order.verb for order in desk.orders()] == [Verb.TRACK, Verb.LAND]
+    assert desk.orders()[-1].scope == ()
+    desk.turn(1.0)
+    assert desk.orders()[-1].verb is Verb.LAND and Verb.TRACK not in [o.verb for o in desk.orders()[2:]]

@@ -1,4 +1,4 @@
-"""What all tests share: the kernel cache of these sources, shipped settings, and the evidence that tests look at."""
+"""Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded evidence."""
 
 import os
 from collections.abc import Callable
@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import NoReturn
 
 import pytest
+
+from measurement import Measurement
+
+MEASUREMENT = Measurement()
 
 from groundstation.field.resolved import ResolvedField
 from groundstation.process import numba_cache
@@ -29,6 +33,9 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     nothing_to_repeat = session.config.getoption("last_failed_no_failures", "all") == "none"
     if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and nothing_to_repeat:
         session.exitstatus = pytest.ExitCode.OK
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    skipped = len(reporter.stats.get("skipped", ())) if reporter else 0
+    MEASUREMENT.finish(skipped, repeated=bool(session.config.getoption("lf", False)))
 
 
 @pytest.fixture(scope="session")

@@ -97,10 +97,10 @@ def test_settings_open_no_socket() -> None:
 @pytest.mark.parametrize(
     ("library", "owners"),
     [
-        ("zenoh", ("groundstation.bus.zenoh_bus",)),
+        ("zenoh", ("groundstation.bus.zenoh_bus", "groundstation.engineering_views.ros2.live")),
         ("ruamel", ("groundstation.settings", "groundstation.cli")),
         ("yaml", ()),
-        ("cv2", ("drivers.camera", "sim_bridge.render", "sim_bridge.study.vision")),
+        ("cv2", ("drivers.camera", "sim_bridge.render", "sim_bridge.study.vision", "groundstation.recording.blurring")),
         ("av", ("drivers.camera", "drivers.ardrone", "sim_bridge.devices", "sim_bridge.study.vision")),
         ("click", ("groundstation.cli",)),
         (

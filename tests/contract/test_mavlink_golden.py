@@ -126,8 +126,8 @@ def test_many_frames_in_one_datagram_and_what_is_refused():
         assert refused.value.reason == reason
 
 
-# Kinds that nothing here decodes: of ArduPilot's dialect (GPS_RAW_INT) and of another (STORM32_GIMBAL_MANAGER_STATUS).
-UNUSED = ((24, 24, b"\1" * 30), (60011, 183, b"\1" * 7))
+# Kinds that nothing here decodes: of ArduPilot's dialect (VFR_HUD) and of another (STORM32_GIMBAL_MANAGER_STATUS).
+UNUSED = ((74, 20, b"\1" * 20), (60011, 183, b"\1" * 7))
 
 
 @pytest.mark.parametrize(("number", "extra", "payload"), UNUSED)

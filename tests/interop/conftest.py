@@ -20,9 +20,9 @@ _addresses = itertools.count(1)
 
 
 class Hangar:
-    """Emulated drones served by `python -m sim_bridge.standalone`; `truth` holds all true states so far."""
+    """Emulated drones served by `python -m sim_bridge.standalone`; kind: of MAVLink vehicle, "" for AR.Drones."""
 
-    def __init__(self, count: int, *options: str) -> None:
+    def __init__(self, count: int, *options: str, kind: str = "") -> None:
         pid = os.getpid()
         net = f"127.{60 + pid % 60}.{pid // 60 % 250}"
         self.addresses = [f"{net}.{next(_addresses)}" for _ in range(count)]
@@ -31,7 +31,7 @@ class Hangar:
             sys.executable,
             "-m",
             "sim_bridge.standalone",
-            *self.addresses,
+            *(f"{kind}@{address}" if kind else address for address in self.addresses),
             "--truth",
             "--seconds",
             "170",
@@ -62,8 +62,8 @@ class Hangar:
 def hangar() -> Iterator[Any]:
     opened: list[Hangar] = []
 
-    def open_hangar(count: int, *options: str) -> Hangar:
-        opened.append(Hangar(count, *options))
+    def open_hangar(count: int, *options: str, kind: str = "") -> Hangar:
+        opened.append(Hangar(count, *options, kind=kind))
         return opened[-1]
 
     yield open_hangar
@@ -78,21 +78,24 @@ class Programs:
         self._absent = absent
         self._running: list[subprocess.Popen[str]] = []
 
-    def node(self, script: str, *arguments: object) -> subprocess.Popen[str]:
+    def node(self, script: str, *arguments: object, package: str = "ar-drone") -> subprocess.Popen[str]:
         modules = INTEROP / "node" / "node_modules"
         if shutil.which("node") is None:
             self._absent("node is not installed: run `make interop`")
-        if not (modules / "ar-drone").is_dir():
-            self._absent("npm ar-drone is not installed: run `make interop`")
+        if not (modules / package).is_dir():
+            self._absent(f"npm {package} is not installed: run `make interop`")
         binaries = INTEROP / "bin"
         path = f"{binaries}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "NODE_PATH": str(modules), "NODE_NO_WARNINGS": "1", "PATH": path}
         return self._start(["node", str(HERE / script), *map(str, arguments)], environment)
 
     def pyardrone(self, script: str, *arguments: object) -> subprocess.Popen[str]:
-        python = INTEROP / "pyardrone" / "bin" / "python"
+        return self.python("pyardrone", script, *arguments)
+
+    def python(self, package: str, script: str, *arguments: object) -> subprocess.Popen[str]:
+        python = INTEROP / package / "bin" / "python"
         if not python.exists():
-            self._absent("PyPI pyardrone is not installed: run `make interop`")
+            self._absent(f"PyPI {package} is not installed: run `make interop`")
         return self._start([str(python), str(HERE / script), *map(str, arguments)], dict(os.environ))
 
     def _start(self, command: list[str], environment: dict[str, str]) -> subprocess.Popen[str]:

@@ -28,7 +28,12 @@ UNIX_OFFSET_NS = 1_795_000_000_000_000_000
 _EVALUATIONS = 40
 _PLANNING_TICKS = 2
 _FREQUENT = (t.ESTIMATE, t.SETPOINT)
-_TOPICS = {"odometry": t.ODOMETRY, "status": t.VEHICLE_STATUS, "observation": t.OBSERVATION}
+_TOPICS = {
+    "odometry": t.ODOMETRY,
+    "status": t.VEHICLE_STATUS,
+    "observation": t.OBSERVATION,
+    "searched_picture": t.SEARCHED_PICTURE,
+}
 
 
 class Arrivals:

@@ -155,7 +155,7 @@ def test_the_truth_is_for_judging_only(flown: Path, tmp_path: Path, verdict: Any
     ("topics", "reason"),
     [
         (("journal",), "no journal of the tracker"),
-        (("odometry", "observation", "vehicle_status"), "nothing to re-run with"),
+        (("odometry", "observation", "vehicle_status", "searched_picture"), "nothing to re-run with"),
     ],
 )
 def test_what_cannot_be_repeated_says_why(flown: Path, tmp_path: Path, topics: tuple[str, ...], reason: str) -> None:

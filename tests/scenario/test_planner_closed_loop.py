@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from groundstation.arrays import Array
+from groundstation.bus.messages import Header, SearchedPicture
+from groundstation.control.lookout import Lookout
 from groundstation.control.output_limiter import limit_setpoint
 from groundstation.control.parameters import control_from_field, safety_from_field
-from groundstation.control.setpoints import setpoints_from_plan
+from groundstation.control.search_parameters import search_from_field
+from groundstation.control.setpoints import Sight, setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.field.resolved import ResolvedField
@@ -90,9 +93,23 @@ class World:
         self.mean = np.concatenate([starts.ravel(), path[0], np.zeros(2)])
         self.P = np.diag([0.03**2, 0.03**2, 0.04**2, 0.03**2] * len(starts) + [0.1**2] * 2 + [0.2**2] * 2)
         self.last_seen = 0.0
+        self.robots_seen = dict.fromkeys(self.names, 0.0)
+        self.lookout = Lookout(search_from_field(resolved), self.control, self.sensors, self.names, (self.target,))
 
     def belief(self, now: float) -> JointBelief:
         return JointBelief(self.mean, self.P, self.layout, round(now * 1e9))
+
+    def sight(self, belief: JointBelief, now: float) -> Sight:
+        """Return what the tracker makes of the pictures; a target that is given up may be anywhere."""
+        age_s = now - self.last_seen
+        if self.lookout.advance(belief, {**dict.fromkeys(self.names, 0.0), self.target: age_s}):
+            t = 4 * len(self.names)
+            self.P[t:, :] = self.P[:, t:] = 0.0
+            self.P[range(t, t + 4), range(t, t + 4)] = 9.0, 9.0, 0.04, 0.04
+        missing = self.lookout.missing
+        stands = lambda robots, targets: self.lookout.stands(robots, targets, belief)  # noqa: E731
+        unseen_s = {name: now - seen for name, seen in self.robots_seen.items()}
+        return Sight(None if missing else age_s, unseen_s, missing=missing, search=stands)
 
     def velocities(self) -> dict[str, Array]:
         """Return what odometry says of each robot's velocity [world]."""
@@ -135,10 +152,12 @@ class World:
         markers = [self.sensors.marker(n, x, is_robot=True) for n, x in zip(self.names, self.x, strict=True)]
         markers.append(np.array([*self.path[k], self.sensors.marker_height_m[self.target]]))
         for i, name in enumerate(self.names):
+            found: list[str] = []
             height = self.x[i, 2:3] + self.rng.normal(0, 0.04)
             self.correct(np.eye(d)[[4 * i + 2]], height - self.mean[4 * i + 2], np.array([0.04**2]))
             for camera, eye in self.sensors.world.items():
                 if self.sensors.world_in_view(camera, markers[i]) and self.rng.random() > 0.05:
+                    self.robots_seen[name] = k * STEP_S
                     std = eye.noise.position_std_m(float(np.linalg.norm(markers[i] - eye.position_m)))
                     R = np.array([std, std, std, eye.noise.yaw_rad]) ** 2
                     z = self.x[i] + self.rng.normal(0, np.sqrt(R))
@@ -149,7 +168,11 @@ class World:
                 if j == i or not self.sensors.onboard_in_view(name, self.x[i], marker) or self.rng.random() < 0.05:
                     continue
                 seen |= j == len(self.names)
+                found.append((*self.names, self.target)[j])
                 self.observe(i, j, marker)
+            header = Header(round(k * STEP_S * 1e9), "boot", name, f"{name}_camera", k)
+            picture = SearchedPicture(header=header, observer=name, camera=f"{name}_camera", found=tuple(found))
+            self.lookout.take(picture)
         return seen
 
     def observe(self, i: int, j: int, marker: Array) -> None:
@@ -190,8 +213,7 @@ def fly(world: World, topology: Topology, sight_hz: float = 5.0) -> Trace:
         if k % 5 == 0:
             plan, topology = coming, coming.topology if coming else topology
             coming = planner.plan(belief, topology, plan.controls if plan else None, lambda: False)
-        age = now - world.last_seen
-        wanted = setpoints_from_plan(plan, belief, world.names, age, world.control, world.sensors)
+        wanted = setpoints_from_plan(plan, belief, world.names, world.control, world.sensors, world.sight(belief, now))
         speeds = world.velocities()
         limited = {n: limit_setpoint(n, wanted[n], belief, belief.stamp_ns, world.safety, speeds) for n in world.names}
         commands = [(*limited[n].setpoint.velocity_m_s, limited[n].setpoint.yaw_rate_rad_s) for n in world.names]
@@ -231,7 +253,7 @@ def flight(seed: int, duration_s: float = 70.0, start: str = "flat") -> Trace:
     return fly(world, make(world.names))
 
 
-@pytest.mark.parametrize(("seed", "start"), [(1, "flat"), (2, "string")])
+@pytest.mark.parametrize(("seed", "start"), [(1, "flat"), (1, "string")])
 def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -> None:
     trace = flight(seed, start=start)
     error, away = np.array(trace.error), np.abs(np.array(trace.target)[:, 0])

@@ -15,9 +15,11 @@ import pytest
 
 from groundstation.bus.api import Received
 from groundstation.bus.messages import Event, Message, ProcessStatus, TruthState, VehicleStatus
+from groundstation.bus.roles import Role
 from groundstation.bus.topics import EVENT, PROCESS_STATUS, SETPOINT, TRUTH, VEHICLE_STATUS
-from groundstation.bus.zenoh_bus import ZenohBus, open_bus
+from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.joining import join
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 from wire_tap import WireTap
@@ -55,7 +57,7 @@ class SitlRun:
         for _ in range(600):
             for record in runtime_file.live_records():
                 if record.supervisor.pid == self.process.pid:
-                    self._bus = open_bus(record.endpoint, record.site, "test")
+                    self._bus = join(record, "view", Role.VIEW)
                     topics = (VEHICLE_STATUS, PROCESS_STATUS, EVENT, TRUTH, SETPOINT)
                     self._inbox = self._bus.subscribe(topics, capacity=100_000)
                     return record

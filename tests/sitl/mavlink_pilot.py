@@ -7,6 +7,7 @@ doubles in the order of FLAVOURS), takes off and flies them forward at 0.4 m/s, 
 import itertools
 import sys
 import time
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,7 @@ class Pilot:
 
     def __init__(self, port: int, kind: str, where, flavours=FLAVOURS, **vehicle) -> None:
         exchange, self.orders, self.where = MemoryExchange(), 0, where
+        self.places: dict[str, deque] = {}
         self.bus = MemoryBus(exchange, "lab", "tracker")
         self.process = FakeProcess(MemoryBus(exchange, "lab", "mavlink"))
         vehicles = [{"name": f"v{s}", "system_id": s, "flavour": f, **vehicle} for s, f in flavours.items()]
@@ -72,7 +74,7 @@ class Pilot:
             entities.append(
                 EntityEstimate(
                     name=vehicle.name, kind="robot", mean=mean, covariance=_COVARIANCE,
-                    velocity_m_s=(0.0, 0.0, 0.0), converged=True, age_s=0.0,
+                    velocity_m_s=self._velocity(vehicle.name, place[0]), converged=True, age_s=0.0,
                 )
             )  # fmt: skip
             setpoint = VelocitySetpoint(
@@ -81,6 +83,15 @@ class Pilot:
             )  # fmt: skip
             self.bus.publish(SETPOINT, setpoint)
         self.bus.publish(ESTIMATE, Estimate(header=self.bus.header("team"), entities=tuple(entities), epoch=1))
+
+    def _velocity(self, name: str, place) -> tuple[float, ...]:
+        """By where it was a quarter of a second ago, smoothed: the driver corrects the vehicle's own by it."""
+        now, places = time.monotonic(), self.places.setdefault(name, deque(maxlen=64))
+        places.append((now, place))
+        while now - places[0][0] > 0.25:
+            places.popleft()
+        (before, old), elapsed = places[0], now - places[0][0]
+        return tuple((b - a) / elapsed for a, b in zip(old, place, strict=True)) if before < now else (0.0, 0.0, 0.0)
 
     def turn(self, turn: int) -> None:
         now = time.monotonic_ns()

@@ -105,7 +105,7 @@ def test_mavproxy_flies_our_ardupilot(mavproxy, hangar, tmp_path):
     emulator, copter, (address, port) = hangar.add("ardupilot", 5, aided=True)
     interpreter = Path(mavproxy).parent / "python"
     command = [str(interpreter), mavproxy, f"--master=udpout:{address}:{port}", "--target-system=5"]
-    command += ["--default-modules=mode,arm,cmdlong,param", "--state-basedir", str(tmp_path)]
+    command += ["--state-basedir", str(tmp_path)]
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=tmp_path)
 

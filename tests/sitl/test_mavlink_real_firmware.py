@@ -1,13 +1,11 @@
 """Our driver sets up and flies real ArduCopter and PX4 SITL binaries, without GPS; our emulators by the same steps.
 
-How to run it, and what each binary needs: drivers/mavlink/README.md.
+`make test-firmware`; what each binary needs: drivers/mavlink/README.md.
 """
 
 import importlib.util
 import math
-import os
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -26,6 +24,7 @@ from groundstation.bus.messages import Verb
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+from firmware import VARIABLES, Firmware, binary_of  # noqa: E402
 from mavlink_pilot import Pilot  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(300)]
@@ -39,7 +38,6 @@ hangar, port = _hangar.hangar, _hangar.port
 
 SYSTEM = 5
 M_PER_DEGREE = 111_319.5
-PX4_API, PX4_TRUTH = 14540 + SYSTEM - 1, 19410 + SYSTEM - 1
 
 
 class Truth(threading.Thread):
@@ -88,38 +86,11 @@ class Truth(threading.Thread):
         self.place = (north, -east, altitude - self._origin[2]), -yaw
 
 
-def start(flavour, folder, port, truth_port, fresh):
-    """Start the SITL binary that a variable names, on loopback, in a folder of its own; a skip where it names none."""
-    variable = "GROUNDSTATION_ARDUCOPTER" if flavour == "ardupilot" else "GROUNDSTATION_PX4"
-    binary = os.environ.get(variable, "")
-    if not binary:
-        pytest.skip(f"{variable} names no SITL binary: none is in a package registry (see drivers/mavlink/README.md)")
-    environment = dict(os.environ)
-    if flavour == "ardupilot":
-        quiet = [item for n in range(2, 9) for item in (f"--serial{n}", "none:")]
-        command = [binary, "--model", "quad", "--home", "47.4,8.5,488,0", "-I", "0", "--sysid", str(SYSTEM)]
-        command += [
-            "--serial0",
-            f"udpclient:127.0.0.1:{port}",
-            "--serial1",
-            f"udpclient:127.0.0.1:{truth_port}",
-            *quiet,
-        ]
-        command += ["-w"] if fresh else []
-    else:
-        environment |= {"PX4_SYS_AUTOSTART": "10040", "PX4_SIM_MODEL": "sihsim_quadx", "PX4_SIMULATOR": "sihsim"}
-        environment |= {"PX4_PARAM_SENS_EN_GPSSIM": "0", "PX4_PARAM_EKF2_EVP_NOISE": "0.05"}
-        command = [binary, "-i", str(SYSTEM - 1), "-d", str(Path(binary).parents[1] / "etc")]
-    sink = subprocess.DEVNULL
-    return subprocess.Popen(command, cwd=folder, env=environment, stdin=sink, stdout=sink, stderr=sink)
-
-
-def end(process):
-    process.terminate()
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(10)
-    process.kill()
-    process.wait()
+def start(flavour, folder):
+    """Start the binary that a variable names, with its factory's parameters; a skip where it names none."""
+    if not binary_of(flavour):
+        pytest.skip(f"{VARIABLES[flavour]} names no SITL binary: none is in a package registry")
+    return Firmware(flavour, folder, SYSTEM)
 
 
 def set_up(flavour, port):
@@ -167,26 +138,26 @@ def fly(port, kind, flavour, truth, patience_s):
     return flown
 
 
+@pytest.mark.firmware
 @pytest.mark.parametrize("kind", ["pymavlink", "mavsdk"])
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
-def test_real_firmware_is_set_up_and_flown(flavour, kind, port, tmp_path):
-    port, truth_port = (PX4_API, PX4_TRUTH) if flavour == "px4" else (port, _hangar.free_port())
-    process = start(flavour, tmp_path, port, truth_port, fresh=True)
+def test_real_firmware_is_set_up_and_flown(flavour, kind, tmp_path):
+    firmware = start(flavour, tmp_path)
     truth = None
     try:
-        set_up(flavour, port)
-        end(process)  # what was set is used from the next start on
-        process = start(flavour, tmp_path, port, truth_port, fresh=False)
-        truth = Truth(truth_port, flavour == "ardupilot")
+        set_up(flavour, firmware.port)
+        firmware.restart()  # what was set is used from the next start on
+        truth = Truth(firmware.truth_port, flavour == "ardupilot")
         deadline = time.monotonic() + 30
         while truth.place is None:
+            assert firmware.process.poll() is None, (tmp_path / "log2.txt").read_text(errors="replace")[-2000:]
             assert time.monotonic() < deadline, "the simulation does not tell where it is"
             time.sleep(0.1)
-        assert 1.2 < fly(port, kind, flavour, lambda: truth.place, patience_s=90) < 3.2
+        assert 1.2 < fly(firmware.port, kind, flavour, lambda: truth.place, patience_s=90) < 3.2
     finally:
         if truth is not None:
             truth.closing.set()
-        end(process)
+        firmware.end()
 
 
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])

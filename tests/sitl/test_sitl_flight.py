@@ -12,9 +12,6 @@ from contextlib import ExitStack, suppress
 
 import pytest
 
-from groundstation.bus.messages import VelocitySetpoint
-from groundstation.bus.topics import SETPOINT
-
 pytestmark = [pytest.mark.sitl, pytest.mark.timeout(240)]
 Start = Callable[..., "SitlRun"]  # type: ignore[name-defined]  # noqa: F821 - the class lives in conftest.py
 
@@ -97,25 +94,6 @@ def test_second_ctrl_c_stops_at_once_but_for_the_guardian(sitl: Start) -> None:
         time.sleep(0.05)
     run.wait(20)
     run.until_gone(5)
-
-
-@FAULTS
-def test_restarted_tracker_moves_nothing(sitl: Start) -> None:
-    run = sitl()
-    run.until_tracking()
-    epochs_before = {m.epoch for _, m in run.history[SETPOINT.name, "drone_1"] if isinstance(m, VelocitySetpoint)}
-    pid = run.pid("tracker")
-    os.kill(pid, signal.SIGKILL)
-    broken = time.monotonic()
-    run.until(lambda: all(run.mode(n) == "LANDING" for n in run.record.drones), 6, "all landing")
-    run.until(lambda: run.restarted("tracker", pid), 40, "tracker back")
-    run.until_landed(30)
-    for name in run.record.drones:
-        # Silent for 0.3 s: hover (the mode stays TRACK); for 3 s: land. A new tracker must not change that.
-        assert run.speed_between(name, broken + 2.0, broken + 3.0) < 0.3, "motion went on or resumed by itself"
-        assert "TRACK" not in run.modes_since(name, broken + 5.0)
-    epochs = {m.epoch for _, m in run.history[SETPOINT.name, "drone_1"] if isinstance(m, VelocitySetpoint)}
-    assert all(epoch > max(epochs_before) for epoch in epochs - epochs_before)
 
 
 @FAULTS

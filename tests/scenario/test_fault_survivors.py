@@ -1,0 +1,58 @@
+"""Flights of the fault campaign that once ended unsafe, each by the name of what went wrong in it."""
+
+import json
+from typing import Any
+
+import msgspec
+import pytest
+
+from groundstation.settings.files import find_field, find_scenario
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+from groundstation.settings.scenario import load_scenario
+from groundstation.settings.sections import DriverKind, driver_sections
+from sim_bridge.study.faults.command import fly
+
+SECONDS = 20.0
+
+# An AR.Drone that sees no floor says 0 and flies on: level, it hardly slows down, and its own hover levels it.
+BLIND = {
+    "blind_at_full_speed_flies_into_the_wall": (19, ["uniform_floor"]),
+    "blind_until_it_lands_and_sees_again": (40, ["uniform_floor"]),
+    "blind_while_hardly_moving": (41, ["uniform_floor"]),
+    "blind_after_its_heading_jumped": (12, ["heading_jumping", "uniform_floor"]),
+    "blind_and_then_deaf": (23, ["at_deaf", "uniform_floor"]),
+}
+
+# The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
+BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
+
+
+@pytest.fixture(scope="module")
+def order() -> dict[str, Any]:
+    """What `groundstation experiment faults` hands to the simulator."""
+    path = find_field("lab")
+    field = load_field(path, ("recording.raw_datagrams=false",))
+    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    scenario = json.loads(json.dumps(load_scenario(find_scenario("realistic", path))))
+    builtins = msgspec.to_builtins(resolved_field(field))
+    return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
+
+
+@pytest.mark.slow
+@pytest.mark.study
+@pytest.mark.parametrize(("seed", "kinds"), BLIND.values(), ids=BLIND)
+def test_a_blind_drone_comes_to_rest(order: dict[str, Any], seed: int, kinds: list[str]) -> None:
+    flown = fly(order, seed, events=False)
+    assert flown["kinds"] == kinds, "the seed stands for another flight now"
+    assert flown["unsafe"] == {}
+    assert flown["rest_s"] <= 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_velocity_that_was_seen_to_drift_is_not_believed_again_in_the_dark(order: dict[str, Any]) -> None:
+    seed, kinds = BELIEVED_AGAIN
+    flown = fly(order, seed, events=False)
+    assert flown["kinds"] == kinds, "the seed stands for another flight now"
+    assert flown["unsafe"] == {}

@@ -12,28 +12,50 @@ PYTEST = $(BIN)/python -m pytest $(REPEAT)
 
 INTEROP := .interop
 STUDIES := .pytest_cache/studies
+COVERAGE := .pytest_cache/coverage.json
 
-.PHONY: install demo test test-slow slow-flights slow-studies check format docs interop clean
+.PHONY: install demo test raise-floors test-slow slow-flights slow-studies test-firmware mutants wire-faults soak check format docs sbom audit interop clean
 
 install: $(STAMP)
 
 demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
+# What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors raises them.
 test: $(STAMP)-test
-	$(PYTEST) -m "not slow" tests
+	COVERAGE_DATA=$(COVERAGE) $(PYTEST) -m "not slow" tests
+	$(BIN)/python tests/coverage/floors.py $(COVERAGE)
+
+raise-floors: $(STAMP)-test
+	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise
 
 # Flights are judged by the clock; what only computes runs beside them, where they leave time, and is printed at the end.
 test-slow: $(STAMP)-test-slow
 	$(MAKE) --jobs 2 --keep-going --output-sync=none slow-flights slow-studies
 
 slow-flights: $(STAMP)-test-slow
-	$(PYTEST) -m "slow and not study" --timeout 900 tests
+	$(PYTEST) -m "slow and not study and not firmware" --timeout 900 tests
+
+# Hardware in the loop: stand-ins on loopback, and the SITL binaries that $$SKEIN_PX4 and $$SKEIN_ARDUCOPTER name.
+test-firmware: $(STAMP)-test-slow
+	$(PYTEST) -m firmware --timeout 900 tests
 
 slow-studies: $(STAMP)-test-slow
 	@mkdir -p $(STUDIES) && code=0; \
 	nice -n 15 $(PYTEST) -m study --timeout 1800 -o cache_dir=$(STUDIES) tests >$(STUDIES)/log 2>&1 || code=$$?; \
 	cat $(STUDIES)/log; exit $$code
+
+# Who judges the judges: MODULES names parts of paths in tests/mutation/targets.toml, e.g. make mutants MODULES="watchdog lease".
+mutants: $(STAMP)-test
+	nice $(BIN)/python tests/mutation/run.py $(MODULES) --seconds 1200 $(MUTANTS_ARGS)
+
+# Every single kill and freeze of a process, and every pair, in flight: 200 flights of some 35 s. PART=K/N flies a part, e.g. PART=1/6.
+wire-faults: $(STAMP)-test
+	$(BIN)/python tests/sitl/wire_campaign.py --part $(or $(PART),1/1) $(WIRE_ARGS)
+
+# Memory of every process over a long flight.
+soak: $(STAMP)-test
+	$(BIN)/python tests/sitl/soak.py --minutes $(or $(MINUTES),30)
 
 check: $(STAMP)-check
 	$(BIN)/ruff check .
@@ -48,8 +70,18 @@ format: $(STAMP)-check
 docs: $(STAMP)-docs
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
+# The bill of materials of what is installed and needed to run.
+sbom: $(STAMP)
+	$(BIN)/python .ci/supply_chain.py build/sbom.cdx.json
+
+# Known faults of the pinned libraries; needs pip-audit and a database in reach, and says so where they are missing.
+audit: $(STAMP)
+	@command -v pip-audit >/dev/null || { echo "audit skipped: pip-audit is not installed (pipx install pip-audit)"; exit 0; }; \
+	pip-audit --no-deps --disable-pip --requirement constraints.txt; code=$$?; \
+	test $$code -ne 2 || { echo "audit skipped: no database of vulnerabilities is in reach"; exit 0; }; exit $$code
+
 # Clients of others for the interoperability tests, each in an environment of its own.
-interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed
+interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed $(INTEROP)/dronekit/.installed
 
 $(INTEROP)/node/.installed: tests/interop/package.json
 	@command -v npm >/dev/null || { echo "npm is missing: the tests with npm ar-drone are skipped without it"; exit 1; }

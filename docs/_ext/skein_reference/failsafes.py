@@ -28,6 +28,8 @@ EVIDENCE: dict[Condition, str] = {
     Condition.TAKE_OFF_OVERDUE: "it does not say that it flies",
     Condition.TRACKER_SILENT: "no setpoint of the authorised epoch",
     Condition.UNSEEN: "no setpoint since take-off",
+    Condition.NOT_SEEN: "the age of its own estimate, as the tracker says",
+    Condition.UNLOCATED: "nothing sharp enough to feed to an autopilot that flies by our position (MAVLink)",
     Condition.TRACKER_PAUSED: "no setpoint of the authorised epoch",
     Condition.NOT_RESUMED: "a pause of the tracker, or patches, and no TRACK, RESUME or HOLD since",
     Condition.NO_SETPOINT: "the newest setpoint has expired (0.3 s at most), or is another epoch's",
@@ -37,6 +39,8 @@ EVIDENCE: dict[Condition, str] = {
     Condition.TOO_FAST: "reported or estimated speed above 1.3 `limits.max_speed_m_s` + 0.2 m/s",
     Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
     Condition.NOT_READY: "the driver's own reason",
+    Condition.SOMEBODY_NEAR: "a vehicle in the air whose estimate, less two standard deviations, is nearer to the pad "
+    "than the separation, or that has none",
 }
 
 

@@ -35,7 +35,7 @@ def messages() -> str:
 def _plane(plane: Plane) -> str:
     title = f"### {plane.value or 'Production'}\n\n{prose(attribute_texts(Plane)[plane.name])}\n\n"
     return title + table(
-        ("topic", "message", "rate [Hz]", "delivery", "what it is"),
+        ("topic", "message", "rate [Hz]", "delivery", "may be published by", "what it is"),
         [_row(topic) for topic in TOPICS.values() if topic.plane is plane],
     )
 
@@ -44,7 +44,8 @@ def _row(topic: Topic) -> tuple[str, ...]:
     (constant,) = (name for name, value in vars(topics).items() if value is topic)
     kind = _link(topic.type) if topic.type else f"bytes, {topic.encoding}"
     rate = f"{topic.rate_hz:g}" if topic.rate_hz else "on occasion"
-    return code(topic.name), kind, rate, topic.quality.value, prose(attribute_texts(topics).get(constant, ""))
+    senders = ", ".join(sorted(topic.senders)) or "nobody"
+    return code(topic.name), kind, rate, topic.quality.value, senders, prose(attribute_texts(topics).get(constant, ""))
 
 
 def documented_types() -> list[type[Any]]:

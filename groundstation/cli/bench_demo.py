@@ -73,7 +73,11 @@ class DemoOutcome:
 @click.option("--first", type=int, default=1, show_default=True, help="The first seed.")
 @click.option("--duration", type=FiniteRange(1, 3600), help="Seconds of tracking each (default: the demo's own).")
 @click.option(
-    "--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for all runs (default: in ./runs)."
+    "-o",
+    "--output",
+    "out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for all runs (default: in ./runs).",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the outcomes as JSON.")
 def demo(seeds: int, first: int, duration: float | None, out: Path | None, as_json: bool) -> int:

@@ -11,7 +11,7 @@ import click
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation bench vision\n"
-    "  groundstation bench vision --pictures 250 --out runs/vision\n"
+    "  groundstation bench vision --pictures 250 -o runs/vision\n"
     "  groundstation bench vision --json | jq .targets"
 )
 @click.option(
@@ -23,7 +23,11 @@ import click
 )
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the pictures.")
 @click.option(
-    "--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for figures and plots (default: in ./runs)."
+    "-o",
+    "--output",
+    "out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for figures and plots (default: in ./runs).",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print all figures as JSON.")
 def vision(pictures: int, seed: int, out: Path | None, as_json: bool) -> int:
@@ -33,7 +37,7 @@ def vision(pictures: int, seed: int, out: Path | None, as_json: bool) -> int:
     """
     folder = out or Path("runs") / f"vision-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     command = [sys.executable, "-m", "sim_bridge.study", "vision", "--pictures", str(pictures), "--seed", str(seed)]
-    command += ["--out", str(folder), *(["--json"] if as_json else [])]
+    command += ["--output", str(folder), *(["--json"] if as_json else [])]
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     code = subprocess.run(command, env=os.environ | threads, check=False).returncode
     if not as_json:

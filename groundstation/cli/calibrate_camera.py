@@ -38,7 +38,7 @@ _SHOWN_MISSING = 3
 @click.option("--square-mm", type=float, default=25.0, show_default=True, help="Side of a square.")
 @click.option("--name", default="camera", show_default=True, help="Name of the camera; NAME.yaml is written.")
 @click.option("--views", type=click.IntRange(6, 200), default=20, show_default=True, help="Views to collect.")
-@click.option("--output", type=click.Path(path_type=Path), help=f"File to write.  [default: {_FOLDER}/NAME.yaml]")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help=f"File to write.  [default: {_FOLDER}/NAME.yaml]")
 @click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write judged pictures here.")
 @click.option("--force", is_flag=True, help="Overwrite an existing calibration.")
 @click.option(

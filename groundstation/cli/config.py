@@ -113,7 +113,7 @@ def schema() -> None:
 @_OPTION
 @click.option("--scenario", metavar="S", help="Draw the target's path of a scenario (a name or a path) as well.")
 @click.option(
-    "--output", type=click.Path(path_type=Path, dir_okay=False), default=Path("room.png"), help="PNG, SVG or PDF."
+    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), default=Path("room.png"), help="PNG, SVG or PDF."
 )
 def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Path) -> None:
     """Draw the room to scale: fence, pads, height slots, and what the fixed cameras see of drones in each slot."""

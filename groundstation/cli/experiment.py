@@ -31,7 +31,14 @@ def _world(command: Callable[..., None]) -> Callable[..., None]:
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Write the summary to standard output."),
         click.option("--figures/--no-figures", default=True, help="Draw pictures and an animation."),
-        _option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-NAME."),
+        _option(
+            "-o",
+            "--output",
+            "out",
+            type=click.Path(path_type=Path),
+            default=None,
+            help="Folder; default runs/experiment-NAME.",
+        ),
         _option("--kidnap", type=FiniteRange(0, 1), default=0.0, help="Chance per step that the target jumps."),
         _option("--dropout", type=FiniteRange(0, 1), default=0.0, help="Share of readings that are lost."),
         _option("--first-seed", type=click.IntRange(0), default=1, help="First seed; the others count up from it."),

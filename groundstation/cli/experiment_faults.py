@@ -34,7 +34,14 @@ from groundstation.errors import GroundStationError
     "--scheduler", default="local", show_default=True, help="tcp://host:8786 of a dask cluster, `local`, or `none`."
 )
 @click.option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
-@click.option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-faults.")
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    type=click.Path(path_type=Path),
+    default=None,
+    help="Folder; default runs/experiment-faults.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output.")
 def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path | None, as_json: bool, **flown: Any) -> int:
     """Fly random fields with one or two random faults; the drivers, watchdogs and tracker are those that fly.

@@ -42,7 +42,14 @@ _BATCH = 5
     "--scheduler", default="local", show_default=True, help="tcp://host:8786 of a dask cluster, `local`, or `none`."
 )
 @click.option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
-@click.option("--out", type=click.Path(path_type=Path), default=None, help="Folder; default runs/experiment-scenarios.")
+@click.option(
+    "-o",
+    "--output",
+    "out",
+    type=click.Path(path_type=Path),
+    default=None,
+    help="Folder; default runs/experiment-scenarios.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output.")
 def scenarios(
     names: tuple[str, ...], strategies: str, scheduler: str, workers: int, out: Path | None, as_json: bool, **flown: Any

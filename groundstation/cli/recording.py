@@ -63,7 +63,9 @@ def info(recording: Path, as_json: bool) -> int:
 
 @recording.command()
 @click.argument("recording", type=EXISTING)
-@click.option("--output", type=click.Path(path_type=Path), help="New file (default: NAME-recovered.mcap beside it).")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="New file (default: NAME-recovered.mcap beside it)."
+)
 def recover(recording: Path, output: Path | None) -> int:
     """Make a valid file of one that was cut off, for programs that refuse such files; the original stays.
 
@@ -90,7 +92,9 @@ def recover(recording: Path, output: Path | None) -> int:
 @click.argument("recording", type=EXISTING)
 @click.option("--from", "from_s", type=FiniteRange(0), default=0.0, help="Begin [s since the start].")
 @click.option("--to", "to_s", type=FiniteRange(0), help="End [s since the start] (default: the end).")
-@click.option("--output", type=click.Path(path_type=Path), help="New folder, or file for a file (default: beside it).")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="New folder, or file for a file (default: beside it)."
+)
 def cut(recording: Path, from_s: float, to_s: float | None, output: Path | None) -> int:
     """Write a stretch of a recording to a new one, with all attachments and with what was known when it begins."""
     from groundstation.recording.cut import cut_run

@@ -37,7 +37,7 @@ _NAMES = {"options": "--set", "estimator": "--estimator", "json_file": "--json",
 )
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="Write the comparison of a re-run.")
 @click.option(
-    "--output", type=click.Path(path_type=Path), help="Write a re-run as a run folder, for report and replay."
+    "-o", "--output", type=click.Path(path_type=Path), help="Write a re-run as a run folder, for report and replay."
 )
 @click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
 @click.option("--from", "from_s", type=FiniteRange(0), help="Begin so many seconds after the recording's start.")

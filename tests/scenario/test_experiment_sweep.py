@@ -42,7 +42,7 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings("ignore")
 def test_sweep_command_on_a_local_cluster(tmp_path: Path) -> None:
     arguments = ["experiment", "sweep", "--robots", "2,3", "--strategies", "certified", "--starts", "string"]
-    arguments += ["--seeds", "2", "--workers", "2", "--no-figures", "--out", str(tmp_path)]
+    arguments += ["--seeds", "2", "--workers", "2", "--no-figures", "--output", str(tmp_path)]
     assert run(arguments) == 0
     assert len(list((tmp_path / "tasks").glob("*.json"))) == 4
     first = (tmp_path / "results.csv").read_bytes()

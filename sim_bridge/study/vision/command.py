@@ -143,7 +143,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m sim_bridge.study vision", description=__doc__)
     parser.add_argument("--pictures", type=int, default=60, help="pictures per cell of the tables (default: 60)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, help="folder for vision.json and plots")
+    parser.add_argument("-o", "--output", dest="out", type=Path, help="folder for vision.json and plots")
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
     options = parser.parse_args(arguments)
     if options.pictures < 8:

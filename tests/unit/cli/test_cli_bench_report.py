@@ -42,7 +42,7 @@ def _stand_in(monkeypatch: pytest.MonkeyPatch, reports: dict[int, tuple[dict[str
 
 def test_all_passed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _stand_in(monkeypatch, {1: (GOOD, 0), 2: (GOOD, 0)})
-    assert run(["bench", "demo", "--seeds", "2", "--out", str(tmp_path), "--json"]) == 0
+    assert run(["bench", "demo", "--seeds", "2", "--output", str(tmp_path), "--json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert (content["passed"], content["flown"]) == (2, 2)
     assert content["runs"][1]["seed"] == 2
@@ -53,7 +53,7 @@ def test_one_failure_fails_the_bench(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _stand_in(monkeypatch, {5: (GOOD, 0), 6: (BAD, 1), 7: (None, 4)})
-    assert run(["bench", "demo", "--seeds", "3", "--first", "5", "--out", str(tmp_path)]) == 1
+    assert run(["bench", "demo", "--seeds", "3", "--first", "5", "--output", str(tmp_path)]) == 1
     text = capsys.readouterr().out
     assert "2/3  seed 6: landed" in text
     assert "seed 7: no report (exit code 4)" in text
@@ -64,7 +64,7 @@ def test_a_report_of_an_earlier_bench_does_not_count(monkeypatch: pytest.MonkeyP
     _stand_in(monkeypatch, {1: (None, 0)})
     (tmp_path / "seed-1").mkdir()
     (tmp_path / "seed-1" / "report.json").write_text(json.dumps(GOOD))
-    assert run(["bench", "demo", "--seeds", "1", "--out", str(tmp_path), "--json"]) == 1
+    assert run(["bench", "demo", "--seeds", "1", "--output", str(tmp_path), "--json"]) == 1
 
 
 def test_a_demo_that_never_ends_is_asked_to_land(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

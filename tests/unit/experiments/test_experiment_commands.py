@@ -60,7 +60,7 @@ def test_figure1_repeats_bit_for_bit(tmp_path: Path, capsys: pytest.CaptureFixtu
     texts = []
     for name in ("a", "b"):
         arguments = ["experiment", "figure1", "--robots", "3", "--seeds", "1", "--no-figures", "--json"]
-        assert run([*arguments, "--out", str(tmp_path / name)]) == 0
+        assert run([*arguments, "--output", str(tmp_path / name)]) == 0
         texts.append(((tmp_path / name / "results.csv").read_bytes(), (tmp_path / name / "summary.json").read_bytes()))
         assert json.loads(capsys.readouterr().out)["experiment"] == "figure1"
     assert texts[0] == texts[1]
@@ -135,11 +135,11 @@ def test_without_dask_a_sweep_runs_one_by_one(
 ) -> None:
     monkeypatch.setattr(runner, "dask_is_there", lambda: False)
     arguments = ["experiment", "sweep", "--robots", "2", "--strategies", "fixed-flat", "--seeds", "1", "--no-figures"]
-    assert run([*arguments, "--out", str(tmp_path)]) == 0
+    assert run([*arguments, "--output", str(tmp_path)]) == 0
     captured = capsys.readouterr()
     assert "dask is not installed" in captured.err
     assert (tmp_path / "results.csv").is_file()
-    assert run([*arguments, "--seeds", "2", "--out", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 4
+    assert run([*arguments, "--seeds", "2", "--output", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 4
     assert "needs dask" in capsys.readouterr().err
     with pytest.raises(SweepError):
         run_tasks(TASKS, None, "local")

@@ -72,7 +72,7 @@ def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
     monkeypatch.setattr("groundstation.experiments.faults.fly", flown)
     monkeypatch.setattr("groundstation.experiments.runner._planar_run", lambda: pytest.fail("needs no kernels"))
     options = ["--scheduler", "none", "--kinds", "wind, velocity_stuck", "--set", "safety.min_separation_m=0.7"]
-    arguments = ["faults", "--flights", "3", *options, "--out", str(tmp_path)]
+    arguments = ["faults", "--flights", "3", *options, "--output", str(tmp_path)]
     code = experiment.main(arguments, standalone_mode=False)
     assert code == ExitCode.FAILED
     document = json.loads((tmp_path / "faults.json").read_text())

@@ -97,7 +97,7 @@ def test_too_few_pictures_are_refused():
 def test_the_command_judges(tmp_path):
     command = [sys.executable, "-m", "groundstation.cli.main", "bench", "vision", "--pictures", "8", "--json"]
     result = subprocess.run(
-        [*command, "--out", str(tmp_path)], capture_output=True, text=True, timeout=380, check=False
+        [*command, "--output", str(tmp_path)], capture_output=True, text=True, timeout=380, check=False
     )
     assert result.returncode in (0, 1), result.stderr
     told = json.loads(result.stdout)

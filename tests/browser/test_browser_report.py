@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from accessibility import violations
 
 from groundstation.bus import messages as m
 from groundstation.report.judge import judge
@@ -60,4 +61,6 @@ def test_page_draws_its_charts_from_the_file_alone(browser: Any, tmp_path: Path)
     assert all(page.evaluate(painted))
     assert page.evaluate("document.documentElement.scrollWidth") <= 390  # nothing sticks out of a phone's screen
     page.screenshot(path=tmp_path / "phone.png")
+    found = violations(page)
+    assert not found, "\n".join(found)
     page.close()

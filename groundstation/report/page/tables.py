@@ -18,7 +18,9 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], empty: str) -> 
     if not body:
         return f'<p class="dim">{escape(empty)}</p>'
     heads = "".join(f"<th>{escape(title)}</th>" for title in head)
-    return f'<div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>'
+    # Reached by the Tab key, so that a wide table can be scrolled without a mouse.
+    opening = f'<div class="scroll" tabindex="0" role="group" aria-label="{escape(" and ".join(head[:2]))}">'
+    return f"{opening}<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
 
 
 def number(value: Value, digits: int = 3) -> str:
@@ -38,7 +40,7 @@ def criteria_table(report: RunReport) -> str:
         for item in report.criteria
     ]  # fmt: skip
     empty = "A re-run is no flight: no criterion applies." if report.rerun else "No criterion applies."
-    return table(("", "criterion", "value", "limit", "why"), rows, empty)
+    return table(("verdict", "criterion", "value", "limit", "why"), rows, empty)
 
 
 def accuracy_table(report: RunReport) -> str:
@@ -143,7 +145,7 @@ def events_table(data: RunData) -> str:
     left_out = f'<p class="dim">{len(rows) - _EVENTS_SHOWN} more are in the recording.</p>' * (
         len(rows) > _EVENTS_SHOWN
     )
-    return table(("time [s]", "", "about", "what", "remedy"), shown, "Nothing happened.") + left_out
+    return table(("time [s]", "severity", "about", "what", "remedy"), shown, "Nothing happened.") + left_out
 
 
 def _battery(ends: tuple[float, float] | None) -> str:

@@ -6,12 +6,12 @@ from rich.text import Text
 
 from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
 from groundstation.report.compare import differences, labels
-from groundstation.report.criteria import Criterion, Value
+from groundstation.report.criteria import Criterion
 from groundstation.report.happenings import Happening
 from groundstation.report.judge import RunReport
+from groundstation.report.wording import bound, missed, quantity, title
 
 _HAPPENINGS_SHOWN = 12
-_UNITS = (("_m", "m"), ("_s", "s"), ("_ms", "ms"), ("_percent", "%"), ("_hz", "Hz"), ("_cores", "cores"))
 
 
 def summary(report: RunReport) -> RenderableType:
@@ -33,11 +33,12 @@ def comparison(first: RunReport, second: RunReport) -> RenderableType:
     """Return the figures of two runs beside each other, for rich to print."""
     table = Table(box=None, pad_edge=True, header_style="dim")
     table.add_column("figure", no_wrap=True)
-    for title in (*labels(first, second), "change"):
-        table.add_column(title, justify="right")
+    for head in (*labels(first, second), "change"):
+        table.add_column(head, justify="right")
     for row in differences(first, second):
         table.add_row(
-            row.figure, *(_text(value) if value is not None else "–" for value in (row.first, row.second, row.change))
+            title(row.figure),
+            *("–" if value is None else quantity(row.figure, value) for value in (row.first, row.second, row.change)),
         )
     names = f" first: {first.run_dir.name}, second: {second.run_dir.name}"
     notes = [
@@ -58,19 +59,17 @@ def _verdict(report: RunReport) -> Text:
     if not report.valid:
         return Text("INVALID: the simulator did not keep real time; close other programs and repeat", style="bold red")
     failed = [criterion for criterion in report.criteria if not criterion.ok]
-    names = ", ".join(f"{one.name} ({one.why})" if one.why else one.name for one in failed)
-    return Text(f"FAILED: {names}", style="bold red")
+    return Text(f"FAILED: {'; '.join(missed(one) for one in failed)}", style="bold red")
 
 
 def _criteria(criteria: tuple[Criterion, ...]) -> Table:
     table = Table(box=None, pad_edge=True, header_style="dim")
     columns: dict[str, JustifyMethod] = {"": "left", "criterion": "left", "value": "right", "limit": "left"}
-    for title, justify in columns.items():
-        table.add_column(title, justify=justify)
+    for head, justify in columns.items():
+        table.add_column(head, justify=justify)
     for criterion in criteria:
         mark = Text("ok", style="green") if criterion.ok else Text("NO", style="bold red")
-        limit = f"{criterion.relation} {_text(criterion.limit)}"
-        table.add_row(mark, criterion.name, f"{_text(criterion.value)} {_unit(criterion.name)}".rstrip(), limit)
+        table.add_row(mark, title(criterion.name), quantity(criterion.name, criterion.value), bound(criterion))
     return table
 
 
@@ -97,17 +96,3 @@ def _happenings(found: list[Happening]) -> list[RenderableType]:
     if len(found) > _HAPPENINGS_SHOWN:
         lines.append(Text(f"  {len(found) - _HAPPENINGS_SHOWN} more: {HTML_NAME}, Safety", style="dim"))
     return lines
-
-
-def _text(value: Value) -> str:
-    if value is None:
-        return "not measured"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.3f}".rstrip("0").rstrip(".")
-
-
-def _unit(name: str) -> str:
-    ending = name.split(".")[0]
-    found = [unit for suffix, unit in _UNITS if ending.endswith(suffix)]
-    return "s" if ending == "topology_seconds" else found[0] if found else ""

@@ -16,6 +16,7 @@ from groundstation.report.page.flight_charts import semi_axis_m
 from groundstation.report.page.tables import number, table
 from groundstation.report.plot_style import DRONE_COLORS
 from groundstation.report.tracks import RunData
+from groundstation.report.wording import title
 
 NAME = "comparison.html"
 _PLAN_HOLDS_S = 0.5
@@ -28,7 +29,8 @@ def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunRe
     charts = [chart for chart in (_errors(runs, called), _beliefs(runs, called), _costs(runs, called)) if chart.curves]
     names = [escape(report.run_dir.name) for report in (first, second)]
     rows = [
-        (row.figure, number(row.first), number(row.second), number(row.change)) for row in differences(first, second)
+        (title(row.figure), number(row.first), number(row.second), number(row.change))
+        for row in differences(first, second)
     ]
     sections = [
         ("Figures", table(("figure", *called, "change"), rows, "Neither run has figures.")),

@@ -18,6 +18,7 @@ from groundstation.report.page.health_charts import health_charts
 from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_style import STYLE
 from groundstation.report.tracks import RunData
+from groundstation.report.wording import missed
 
 
 def write_page(data: RunData, report: RunReport, path: Path) -> None:
@@ -27,6 +28,7 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
     flight, health = flight_charts(data, start_s, end_s), health_charts(data, start_s, end_s)
     sections = [
         ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report)),
+        ("What happened", tables.story_table(data)),
         ("Room", f'<div class="map">{_room(data)}</div>'),
         ("Flight", holders(flight, 0)),
         ("Topology", tables.switches_table(findings)),
@@ -85,7 +87,14 @@ def _lead(report: RunReport) -> str:
     if report.rerun:
         words = f"recorded flight: {words}"
     badge = f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
-    return badge + rerun_note(report)
+    return badge + _reasons(report) + rerun_note(report)
+
+
+def _reasons(report: RunReport) -> str:
+    """Return why a run failed, in words, "" where it did not."""
+    if report.rerun or report.passed:
+        return ""
+    return "".join(f"<p>{escape(missed(one))}.</p>" for one in report.criteria if not one.ok)
 
 
 def rerun_note(report: RunReport) -> str:

@@ -7,9 +7,13 @@ from groundstation.report.criteria import Value
 from groundstation.report.findings import Findings
 from groundstation.report.judge import RunReport
 from groundstation.report.load import process_loads
+from groundstation.report.story import story
 from groundstation.report.tracks import RunData
+from groundstation.report.wording import bound, quantity, title
 
 _EVENTS_SHOWN = 500
+_BAD = frozenset({"MISSED", "ERROR", "error", "failsafe"})
+_WARNED = frozenset({"WARNING", "warning", "fault"})
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], empty: str) -> str:
@@ -17,7 +21,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], empty: str) -> 
     body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
     if not body:
         return f'<p class="dim">{escape(empty)}</p>'
-    heads = "".join(f"<th>{escape(title)}</th>" for title in head)
+    heads = "".join(f"<th>{escape(name)}</th>" for name in head)
     # Reached by the Tab key, so that a wide table can be scrolled without a mouse.
     opening = f'<div class="scroll" tabindex="0" role="group" aria-label="{escape(" and ".join(head[:2]))}">'
     return f"{opening}<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
@@ -35,12 +39,11 @@ def number(value: Value, digits: int = 3) -> str:
 def criteria_table(report: RunReport) -> str:
     """Return verdict, value and limit of each criterion."""
     rows = [
-        ("met" if item.ok else "MISSED", item.name, number(item.value), f"{item.relation} {number(item.limit)}",
-         item.why)
+        ("met" if item.ok else "MISSED", title(item.name), quantity(item.name, item.value), bound(item), item.why)
         for item in report.criteria
     ]  # fmt: skip
     empty = "A re-run is no flight: no criterion applies." if report.rerun else "No criterion applies."
-    return table(("verdict", "criterion", "value", "limit", "why"), rows, empty)
+    return table(("verdict", "criterion", "value", "asked for", "why"), rows, empty)
 
 
 def accuracy_table(report: RunReport) -> str:
@@ -92,6 +95,13 @@ def happenings_table(findings: Findings) -> str:
     """Return what a scenario broke and which failsafes reacted, beside each other in order of time."""
     rows = [(f"{item.time_s:.1f}", item.entity, item.cause, item.text) for item in findings.happenings]
     return table(("time [s]", "about", "cause", "what"), rows, "No fault was injected, and no failsafe acted.")
+
+
+def story_table(data: RunData) -> str:
+    """Return the story of the run, a line for each moment."""
+    moments = story(data)
+    rows = [(f"{item.time_s:.1f}", item.kind, item.text) for item in moments[:_EVENTS_SHOWN]]
+    return table(("time [s]", "kind", "what happened"), rows, "Nothing happened.")
 
 
 def links_table(findings: Findings) -> str:
@@ -158,5 +168,5 @@ def _counts(counts: dict[str, int]) -> str:
 
 def _cell(value: object) -> str:
     text = str(value)
-    loud = ' class="bad"' if text in ("MISSED", "ERROR") else ' class="warn"' if text == "WARNING" else ""
+    loud = ' class="bad"' if text in _BAD else ' class="warn"' if text in _WARNED else ""
     return f"<td{loud}>{escape(text)}</td>"

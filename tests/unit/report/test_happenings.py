@@ -1,18 +1,20 @@
-"""What was broken and what reacted, in the report: a flight that a failsafe ended does not pass."""
+"""What happened in a run, in the report: its story, what was broken, what reacted; a failsafe ends no good flight."""
 
 import msgspec
 from rich.console import Console
 
 from groundstation.bus import messages as m
-from groundstation.report.criteria import criteria_of
+from groundstation.report.criteria import Criterion, criteria_of
 from groundstation.report.findings import findings_of
 from groundstation.report.happenings import UNEXPLAINED, happenings, landings
 from groundstation.report.judge import judge
 from groundstation.report.metrics import figures_of
-from groundstation.report.page.tables import criteria_table, happenings_table
+from groundstation.report.page.tables import criteria_table, happenings_table, story_table
 from groundstation.report.run_facts import RunFacts
+from groundstation.report.story import story
 from groundstation.report.summary import summary
 from groundstation.report.tracks import UNKNOWN_FIELD, RunData, TimedMessage
+from groundstation.report.wording import bound, missed, quantity
 
 UP, DOWN, SINKS = m.FlightState.FLYING, m.FlightState.LANDED, m.FlightState.LANDING
 
@@ -124,3 +126,37 @@ def test_only_the_first_of_a_drones_ends_is_counted():
     assert [item.cause for item in landings(happenings(flown))] == ["battery_low"]
     assert figures_of(flown).failsafe_landings == [item.line for item in landings(happenings(flown))]
     assert msgspec.json.decode(judge(flown, None).as_json())["failsafe_landings"]  # type: ignore[arg-type]
+
+
+def test_fault_failsafe_and_landing_stand_in_order():
+    assert [(item.time_s, item.kind) for item in story(LANDED_BY_FAILSAFE)] == [
+        (1.0, "flight"),
+        (11.0, "fault"),
+        (12.0, "failsafe"),
+        (13.0, "warning"),
+        (14.0, "failsafe"),
+        (18.0, "flight"),
+        (30.0, "order"),
+    ]
+
+
+def test_a_repeated_warning_stands_once_and_each_flight_is_told():
+    flown = data(
+        (1, UP, "TRACK", ""), (3, DOWN, "LANDED", ""), (5, UP, "TRACK", ""), (8, DOWN, "LANDED", ""),
+        events=[(2.0, "battery low", False), (2.5, "battery low", False)],
+    )  # fmt: skip
+    texts = [item.text for item in story(flown)]
+    assert texts.count("a: battery low") == 1
+    assert texts.count("a is in the air") == 2
+
+
+def test_the_page_marks_what_was_bad():
+    assert '<td class="bad">failsafe</td>' in story_table(LANDED_BY_FAILSAFE)
+
+
+def test_criteria_are_told_in_words_with_units():
+    criterion = Criterion("min_separation_m", 0.41, ">=", 0.6, False, "a and b")
+    assert missed(criterion) == "least separation 0.41 m, asked for at least 0.6 m (a and b)"
+    assert (quantity("landed", False), quantity("target_rmse_m", None)) == ("no", "not measured")
+    assert bound(Criterion("landed", True, "==", True, True)) == "yes"
+    assert quantity("anything_else", 1.0) == "1"

@@ -303,5 +303,6 @@ def test_the_picture_is_drawn_and_the_summary_names_what_failed(tmp_path: Path) 
     console.print(summary(report))
     text = console.export_text()
     console.file.close()
-    assert "FAILED: target_rmse_m, target_lost_s" in text
+    assert "FAILED: target error (rms) " in text
+    assert "asked for at most 0.2 m; target lost 4.5 s, asked for at most 2 s" in " ".join(text.split())
     assert "battery low" in text

@@ -1,0 +1,56 @@
+"""Figures and criteria of a run in words and units: terminal, page and comparison say the same."""
+
+from groundstation.report.criteria import Criterion, Value
+
+_BOUNDS = {"<=": "at most", "<": "below", ">=": "at least", ">": "more than"}
+# Name of a figure in report.json: what it is called, and its unit.
+_TITLES = {
+    "target_rmse_m": ("target error (rms)", "m"),
+    "target_lost_s": ("target lost", "s"),
+    "max_fence_violation_m": ("beyond the fence", "m"),
+    "min_separation_m": ("least separation", "m"),
+    "landed": ("everybody landed", ""),
+    "tracked_s": ("time tracked", "s"),
+    "command_to_airborne_s": ("from the command to the air", "s"),
+    "failsafe_landings": ("flights ended by a failsafe", ""),
+    "planner_p50_ms": ("planning step, median", "ms"),
+    "planner_p99_ms": ("planning step, 99th percentile", "ms"),
+    "tracker_missed_percent": ("tracker's deadlines missed", "%"),
+    "tracker_rate_hz": ("tracker's rate", "Hz"),
+    "mean_cpu_cores": ("processor used", "cores"),
+    "sim_overrun_percent": ("simulator's ticks too late", "%"),
+    "topology_seconds.flat": ("time in a flat topology", "s"),
+    "topology_seconds.string": ("time in a string topology", "s"),
+    "topology_switches": ("switches of topology", ""),
+}
+
+
+def title(name: str) -> str:
+    """Return what a figure of report.json is called; its own name where it has no other."""
+    return _TITLES.get(name, (name, ""))[0]
+
+
+def unit(name: str) -> str:
+    """Return the unit of a figure, "" where it has none."""
+    return _TITLES.get(name, (name, ""))[1]
+
+
+def quantity(name: str, value: Value) -> str:
+    """Return a value with its unit, at most three decimals."""
+    if value is None:
+        return "not measured"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3f}".rstrip("0").rstrip(".") + (f" {unit(name)}" if unit(name) else "")
+
+
+def bound(criterion: Criterion) -> str:
+    """Return what a criterion asks for: "at most 0.2 m", "0" or "yes"."""
+    limit = quantity(criterion.name, criterion.limit)
+    return f"{_BOUNDS.get(criterion.relation, '')} {limit}".strip()
+
+
+def missed(criterion: Criterion) -> str:
+    """Return why a criterion was missed, in a sentence's part."""
+    found = f"{title(criterion.name)} {quantity(criterion.name, criterion.value)}, asked for {bound(criterion)}"
+    return f"{found} ({criterion.why})" if criterion.why else found

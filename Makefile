@@ -14,7 +14,7 @@ INTEROP := .interop
 STUDIES := .pytest_cache/studies
 COVERAGE := .pytest_cache/coverage.json
 
-.PHONY: install demo test raise-floors test-slow slow-flights slow-studies test-firmware mutants wire-faults soak check format docs sbom audit interop clean
+.PHONY: install demo test raise-floors test-slow slow-flights slow-studies fuzz test-firmware mutants wire-faults soak check format docs sbom audit interop clean
 
 install: $(STAMP)
 
@@ -44,6 +44,10 @@ slow-studies: $(STAMP)-test-slow
 	@mkdir -p $(STUDIES) && code=0; \
 	nice -n 15 $(PYTEST) -m study --timeout 1800 -o cache_dir=$(STUDIES) tests >$(STUDIES)/log 2>&1 || code=$$?; \
 	cat $(STUDIES)/log; exit $$code
+
+# Damaged inputs for every decoder: COUNT of each (test-slow: 100 000). DECODER=navdata, at, pave, ... takes one.
+fuzz: $(STAMP)-test
+	FUZZ_INPUTS=$(or $(COUNT),1000000) nice $(PYTEST) -m fuzz --timeout 7200 -k "many_damaged $(if $(DECODER),and $(DECODER))" tests/property
 
 # Who judges the judges: MODULES names parts of paths in tests/mutation/targets.toml, e.g. make mutants MODULES="watchdog lease".
 mutants: $(STAMP)-test

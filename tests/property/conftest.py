@@ -1,0 +1,6 @@
+"""Tests of decoders share what damages their inputs."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests

@@ -1,0 +1,28 @@
+"""Damaged inputs for every decoder: they are read, or refused by the decoder's own error, and never anything else.
+
+$FUZZ_INPUTS: how many in the long run; `make fuzz` takes a million.
+"""
+
+import os
+
+import pytest
+from fuzzed_decoders import DECODERS, fuzz
+
+LONG = int(os.environ.get("FUZZ_INPUTS", "100000"))
+QUICK = 500
+_SLOW_TO_READ = {"field": 100}
+
+
+@pytest.mark.parametrize("name", DECODERS)
+def test_damaged_inputs_raise_declared_errors_only(name: str) -> None:
+    outcomes = fuzz(DECODERS[name], _SLOW_TO_READ.get(name, QUICK), 1)
+    assert outcomes.pop("read") > 0, "some must get through, or the depth of the decoder is never reached"
+    assert outcomes or name == "pave", "a stream of video is never refused: damage is skipped"
+
+
+@pytest.mark.slow
+@pytest.mark.fuzz
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("name", DECODERS)
+def test_many_damaged_inputs_raise_declared_errors_only(name: str) -> None:
+    assert sum(fuzz(DECODERS[name], LONG, 2).values()) == LONG

@@ -23,6 +23,7 @@ from groundstation.bus.messages import (
     VelocitySetpoint,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
+from groundstation.process.refusals import Refusals
 from groundstation.time_units import NS_PER_S
 
 RATE_HZ = 30.0
@@ -33,6 +34,16 @@ _UNCONFIGURED_NS = 15_000_000_000
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
+# Refusals that nothing of ours causes, as the operator reads them.
+_INTRUSIONS = {
+    "unsigned": "unsigned frames",
+    "signature": "frames signed with another key",
+    "duplicate_system": "frames of a second vehicle with its number",
+    "foreign_address": "datagrams from another address",
+    "setpoint_other_source": "setpoints of another sender",
+    "setpoint_epoch_leap": "setpoints of an epoch far ahead",
+    "lease_held": "operator leases of another sender",
+}
 _LOUD = {DriverMode.CUT: Severity.ERROR, DriverMode.LANDING: Severity.WARNING}
 
 
@@ -60,6 +71,7 @@ class VehicleHost:
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m)
         self._localised_ns: int | None = None
+        self._intrusions = Refusals(_INTRUSIONS)
 
     def call_on_orders(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a setpoint or command arrives."""
@@ -128,7 +140,7 @@ class VehicleHost:
         return cut or now_ns - self._heard_ns > _GIVE_UP_NS
 
     def publish_status(self, now_ns: int) -> None:
-        """Publish the VehicleStatus now."""
+        """Publish the VehicleStatus now, and say what was refused that nobody of the run sends."""
         health, view = self.vehicle.health(now_ns), self.watchdog.vehicle
         lost = self.watchdog.mode is not DriverMode.CONNECTING and not view.fresh
         status = VehicleStatus(
@@ -143,6 +155,8 @@ class VehicleHost:
             detail=health.detail or self.watchdog.reason,
         )
         self._bus.publish(VEHICLE_STATUS, status)
+        if refused := self._intrusions.news(now_ns, status.rejected):
+            self._event(Severity.WARNING, f"{self.vehicle.name} refused {refused}")
 
     def _upstream(self) -> Upstream:
         child = self._child

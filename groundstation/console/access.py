@@ -2,6 +2,7 @@
 
 import hmac
 import os
+from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
@@ -103,24 +104,27 @@ def _cookie(scope: Mapping[str, Any], name: str) -> str:
 
 
 class Gate:
-    """ASGI middleware that answers 403 to everything `refusal` has a reason for; counts them in `refused`."""
+    """ASGI middleware that answers 403 to whom it does not let in.
+
+    refused: how many, as "other_site" (`refusal` has a reason) and "other_user" (the door does not admit them).
+    """
 
     def __init__(self, app: Asgi, door: Door) -> None:
         self._app, self._door = app, door
-        self.refused = 0
+        self.refused: Counter[str] = Counter()
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         """Let a request in, or not."""
         if scope["type"] not in ("http", "websocket"):
             return
-        reason = refusal(scope)
+        kind, reason = "other_site", refusal(scope)
         if not reason and not self._door.admits(scope):
             if scope["type"] == "http" and self._door.shows_code(scope):
                 await _answer(send, 303, [(b"location", b"/"), (b"set-cookie", self._door.cookie(scope))], b"")
                 return
-            reason = self._door.reason
+            kind, reason = "other_user", self._door.reason
         if reason:
-            self.refused += 1
+            self.refused[kind] += 1
             await _answer_403(scope, receive, send, reason)
             return
         host = dict(scope["headers"])[b"host"].decode("latin-1")

@@ -13,9 +13,15 @@ from groundstation.errors import GroundStationError
 from groundstation.monitor.state import cast_from_field
 from groundstation.process.child import Child
 from groundstation.process.ports import holder_of
+from groundstation.process.refusals import Refusals
 
 # The signal to stop may overtake the event that the run ends.
 _OVERTAKEN_NS = 500_000_000
+_INTRUSIONS = {
+    "other_site": "requests of other web sites",
+    "other_user": "requests of other users without the code",
+    "silent": "connections that asked for nothing",
+}
 
 
 def run(child: Child) -> int:
@@ -31,12 +37,14 @@ def run(child: Child) -> int:
     server = ConsoleServer(child.bus, cast, scene, field, listener, run_id(section.run_dir))
     _announce(child, server.url, listener.getsockname()[1], wanted)
 
-    leaves_ns = 0
+    intrusions, leaves_ns = Refusals(_INTRUSIONS), 0
 
     def go_on(turns: int, late: int) -> bool:
         nonlocal leaves_ns
         child.beat()
         child.tick_status(turns, late, server.overflowed)
+        if refused := intrusions.news(now_ns(), server.refused):
+            child.event(Severity.WARNING, f"the console refused {refused}")
         if not child.stop_requested or not child.supervisor_alive:
             return child.supervisor_alive
         leaves_ns = leaves_ns or now_ns() + _OVERTAKEN_NS

@@ -126,6 +126,11 @@ class ConsoleServer:
         return self._end is not None
 
     @property
+    def refused(self) -> dict[str, int]:
+        """How many requests and connections were not let in, by reason."""
+        return {**self.app.asgi.refused, "silent": self.half_open.ended}
+
+    @property
     def overflowed(self) -> int:
         """Messages that came faster than they were taken."""
         return self._each.overflowed

@@ -1,0 +1,27 @@
+"""What was refused, as a line for the operator: counts that rise are told, but not each time."""
+
+from collections.abc import Mapping
+
+_PERIOD_NS = 10_000_000_000
+
+
+class Refusals:
+    """Compares counts of refused things, by reason, with those that were told of.
+
+    words: what the operator reads of a reason; others are nobody's attack and stay untold.
+    """
+
+    def __init__(self, words: Mapping[str, str]) -> None:
+        self._words = words
+        self._told: dict[str, int] = {}
+        self._next_ns = 0
+
+    def news(self, now_ns: int, counts: Mapping[str, int]) -> str:
+        """Return how much was refused since the last time that this said so, "" if nothing; at most once in 10 s."""
+        fresh = {reason: counts.get(reason, 0) - self._told.get(reason, 0) for reason in self._words}
+        fresh = {reason: count for reason, count in fresh.items() if count > 0}
+        if not fresh or now_ns < self._next_ns:
+            return ""
+        self._next_ns = now_ns + _PERIOD_NS
+        self._told |= {reason: counts[reason] for reason in fresh}
+        return ", ".join(f"{count} {self._words[reason]}" for reason, count in fresh.items())

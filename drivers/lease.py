@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass
 
-from groundstation.bus.messages import Command, Lease, Verb
+from groundstation.bus.messages import STOP_LIVES_NS, Command, Lease, Verb
 from groundstation.time_units import NS_PER_S
 
 # Orders that begin or go on with a motion; all others stop, and anyone may stop.
 STARTING_VERBS = frozenset({Verb.TAKEOFF, Verb.TRACK, Verb.RESUME})
 # A lease may not claim to live longer than this after it was heard.
 _LONGEST_NS = 5_000_000_000
-# Whoever repeats a stop gives up before that: an older one is the ghost of a queue that stood still.
-_STOP_LIVES_NS = 30_000_000_000
 # Both ends read the same clock; only the order of reading may differ.
 _FUTURE_NS = 1_000_000_000
 
@@ -61,6 +59,6 @@ class LeaseBook:
 
     def _staleness(self, now_ns: int, stop: Command) -> str:
         age_ns = now_ns - stop.header.stamp_ns
-        if stop.header.clock == self.clock and age_ns > _STOP_LIVES_NS:
+        if stop.header.clock == self.clock and age_ns > STOP_LIVES_NS:
             return f"given {age_ns / NS_PER_S:.0f} s ago"
         return ""

@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import AckStage, Command, CommandAck, Event, Lease, Severity, Verb
+from groundstation.bus.messages import STOP_LIVES_NS, AckStage, Command, CommandAck, Event, Lease, Severity, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.lift_off import Mistake
@@ -160,6 +161,8 @@ class Operator:
     def _hear_command(self, command: Command, now_ns: int) -> None:
         if OPERATOR in command.scope:
             self._serve(command, now_ns)
+        elif self._is_void(command, now_ns):
+            return  # no driver obeys it, and it is theirs to say so
         elif command.verb in _STOPS and not self._is_partial(command):
             if self.phase is not TeamPhase.LANDING:
                 self._abandon()
@@ -169,6 +172,11 @@ class Operator:
             for name in command.scope:
                 self._sequence.drop(name, f"{command.verb} by {command.issuer}", now_ns)
             self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")
+
+    def _is_void(self, stop: Command, now_ns: int) -> bool:
+        if self._bus.run and stop.run != self._bus.run:
+            return True
+        return stop.header.clock == clock.clock_id() and now_ns - stop.header.stamp_ns > STOP_LIVES_NS
 
     def _is_partial(self, command: Command) -> bool:
         return bool(command.scope) and not set(command.scope) >= set(self.team.members)

@@ -15,6 +15,7 @@ from groundstation.bus.messages.belief import (
     Verdict,
 )
 from groundstation.bus.messages.flight import (
+    STOP_LIVES_NS,
     AckStage,
     Command,
     CommandAck,
@@ -39,6 +40,7 @@ from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthSt
 
 __all__ = [
     "RUN",
+    "STOP_LIVES_NS",
     "AckStage",
     "Alternative",
     "Belief",

@@ -81,6 +81,10 @@ class Verb(StrEnum):
     """Stop the motors at once: the drone falls."""
 
 
+STOP_LIVES_NS = 30_000_000_000
+"""Whoever repeats a stop gives up before that: an older one is the ghost of a queue that stood still."""
+
+
 class Command(Message, frozen=True, kw_only=True):
     """A request to the drivers."""
 

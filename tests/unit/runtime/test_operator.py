@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import (
     AckStage,
@@ -124,7 +125,7 @@ class Scene:
         self.bus = MemoryBus(self.exchange, "lab", "supervisor")
         self.operator = Operator(self.bus, ("drone_1", "drone_2"), CAMERAS, LIMITS, self.said.append)
         self.drones: dict[str, Drone] = {}
-        self.now_ns = 10**12
+        self.now_ns = clock.now_ns() // 10**9 * 10**9
 
     def add(self, name: str, **options: object) -> Drone:
         self.drones[name] = Drone(self.exchange, name, **options)  # type: ignore[arg-type]

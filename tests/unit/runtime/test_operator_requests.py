@@ -2,6 +2,7 @@
 
 import pytest
 
+from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import AckStage, Command, CommandAck, FlightState, VehicleStatus, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, VEHICLE_STATUS
@@ -15,13 +16,13 @@ UP, DOWN = FlightState.HOVERING, FlightState.LANDED
 class Desk:
     """An operator over drones that say what they are told to say, and another shell."""
 
-    def __init__(self, **states):
+    def __init__(self, run="", **states):
         exchange = MemoryExchange()
         self.said: list[str] = []
-        self.now_ns = 10**12
+        self.now_ns = clock.now_ns() // S * S
         self.shell = MemoryBus(exchange, "lab", "cli_1")
         self.drones = {name: (MemoryBus(exchange, "lab", name), state) for name, state in states.items()}
-        bus = MemoryBus(exchange, "lab", "supervisor")
+        bus = MemoryBus(exchange, "lab", "supervisor", run)
         self.operator = Operator(bus, tuple(states), {}, TakeOffLimits(), self.said.append)
         self.given = self.shell.subscribe([COMMAND])
         self.answers = self.shell.subscribe([COMMAND_ACK], entity=OPERATOR)
@@ -120,9 +121,10 @@ def test_nothing_else_is_begun_during_a_take_off_and_its_request_is_not_begun_tw
 @pytest.mark.parametrize(("verb", "limit_s"), [(Verb.LAND, 20.0), (Verb.RESUME, 6.0)])
 def test_an_order_that_nobody_answers_is_given_up_after_its_time_and_not_before(verb, limit_s):
     desk = Desk(drone_1=UP)
+    began_ns = desk.now_ns - round(0.1 * S)
     desk.ask(verb, OPERATOR, "drone_1")
     desk.stages()
-    while desk.now_ns < 10**12 + (limit_s - 0.1) * S:
+    while desk.now_ns < began_ns + (limit_s - 0.1) * S:
         desk.turn()
     assert desk.stages() == [] and len(desk.orders()) > 3
     for _ in range(6):
@@ -156,3 +158,18 @@ def test_landing_is_ordered_once_and_drops_what_was_to_start():
     assert desk.orders()[-1].scope == ()
     desk.turn(1.0)
     assert desk.orders()[-1].verb is Verb.LAND and Verb.TRACK not in [o.verb for o in desk.orders()[2:]]
+
+
+@pytest.mark.parametrize(
+    ("run", "age_s", "phase"),
+    [("lab-2", 0, TeamPhase.LANDING), ("lab-1", 0, TeamPhase.GROUND), ("lab-2", 45, TeamPhase.GROUND)],
+    ids=["now", "of another run", "old"],
+)
+def test_a_stop_that_no_driver_obeys_changes_nothing(run, age_s, phase):
+    desk = Desk(run="lab-2", drone_1=UP)
+    header = desk.shell.header("team", desk.now_ns - age_s * S)
+    stop = Command(header=header, id="s", verb=Verb.CUT_MOTORS, scope=(), issuer="cli_1", run=run)
+    desk.shell.publish(COMMAND, stop)
+    desk.turn()
+    assert desk.operator.phase is phase
+    assert bool(desk.said) is (phase is TeamPhase.LANDING)

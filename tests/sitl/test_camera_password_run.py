@@ -1,5 +1,6 @@
 """A real run with cameras that want a password, on loopback, without a take-off: nothing that it leaves holds it."""
 
+import asyncio
 import os
 import signal
 import socket
@@ -13,9 +14,14 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from websockets.asyncio.client import connect
+from websockets.typing import Origin
 
+from groundstation.bus.roles import Role
+from groundstation.bus.topics import TOPICS
 from groundstation.recording.reader import attached_field, open_recording, parts
 from groundstation.supervisor import runtime_file
+from groundstation.supervisor.joining import join
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
 
@@ -92,13 +98,14 @@ def test_a_run_leaves_no_password_behind(
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     login = f"operator:{SECRET}"
+    console = free_port()
     field = (Path(__file__).parents[1] / "fixtures" / "field" / "lab.yaml").read_text()
     for old, new in (
         ("http://192.168.1.50:8080/", f"http://{login}@127.0.0.1:{cameras[0].port}/"),
         ("http://192.168.1.51:8080/", f"rtsp://{login}@127.0.0.1:{cameras[1].port}/"),
         ("http://192.168.1.52:8080/", f"http://127.0.0.1:{free_port()}/"),
         ("address: 192.168.1.", "address: 127.99.77."),
-        ("port: 8765", f"port: {free_port()}\nbus:\n  port: {free_port()}"),
+        ("enabled: false\n  port: 8765", f"enabled: true\n  port: {console}\nbus:\n  port: {free_port()}"),
     ):
         assert old in field
         field = field.replace(old, new)
@@ -117,6 +124,7 @@ def test_a_run_leaves_no_password_behind(
         (record,) = runtime_file.live_records()
         told = b"".join(arguments(process.pid) for process in (record.supervisor, *record.processes))
         runtime = b"".join(path.read_bytes() for path in runtime_file.folder().glob("*.json"))
+        on_bus, on_page = heard(record, 3.0), asyncio.run(shown(f"http://127.0.0.1:{console}", 3.0))
         run.send_signal(signal.SIGINT)
         run.wait(60)
     finally:
@@ -127,13 +135,37 @@ def test_a_run_leaves_no_password_behind(
     basic = b64encode(login.encode())
     assert all(b"Basic " + basic in camera.requests for camera in cameras), "the drivers got it"
     assert b"groundstation.process.entry" in told
+    subprocess.run([*COMMAND, "export", str(run_dir), "--csv"], capture_output=True, timeout=120, check=True)
     evidence = [("arguments", told), ("runtime file", runtime), ("output", output.read_bytes()), *all_bytes(run_dir)]
+    evidence += [("bus", on_bus), ("console", on_page)]
+    assert b"vehicle_status" in on_bus and b'"scene"' in on_page
     assert {f"127.0.0.1:{camera.port}" for camera in cameras} <= set(attached_sources(run_dir))
     assert [name for name, content in evidence if SECRET.encode() in content or basic in content] == []
     for verb in (["report", str(run_dir)], ["replay", str(run_dir), "--rerun", "tracker"]):
         again = subprocess.run([*COMMAND, *verb], capture_output=True, text=True, timeout=120, check=False)
         assert "Traceback" not in again.stderr and SECRET not in again.stdout + again.stderr
         assert again.returncode == 0 or verb[0] == "report", again.stdout + again.stderr
+
+
+def heard(record: runtime_file.RuntimeRecord, seconds: float) -> bytes:
+    """Return all that is said on the bus for a while."""
+    bus = join(record, "view", Role.VIEW)
+    everything = bus.subscribe(TOPICS.values(), capacity=100_000)
+    time.sleep(seconds)
+    samples = everything.drain_samples()
+    bus.close()
+    return b"\n".join(part for s in samples for part in (s.key.encode(), s.payload, s.attachment))
+
+
+async def shown(url: str, seconds: float) -> bytes:
+    """Return all that the console sends to a page for a while."""
+    got: list[bytes] = []
+    async with connect(f"{url.replace('http', 'ws')}/ws", origin=Origin(url), max_size=None) as page:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                async for message in page:
+                    got.append(message.encode() if isinstance(message, str) else message)
+    return b"\n".join(got)
 
 
 def attached_sources(run_dir: Path) -> list[str]:

@@ -1,0 +1,37 @@
+"""What strangers send to a vehicle's link or in the tracker's name moves nothing, and the operator reads of it."""
+
+from groundstation.bus.memory_bus import MemoryBus
+from groundstation.bus.messages import Lease, VelocitySetpoint
+from groundstation.bus.topics import LEASE, SETPOINT
+
+
+def test_frames_that_nothing_vouches_for_are_told(rig_of):
+    rig = rig_of("ardupilot")
+    rig.connect()
+    rig.link.rejected.update(unsigned=20, signature=3, truncated=5)
+    rig.run(1.0)
+    assert "v refused 20 unsigned frames, 3 frames signed with another key" in rig.process.texts
+    rig.link.rejected.update(unsigned=500)
+    rig.run(5.0)
+    assert sum("refused" in text for text in rig.process.texts) == 1, "a flood is told once in 10 s"
+
+
+def test_setpoints_and_leases_in_anothers_place_move_nothing_and_are_told(rig_of):
+    rig = rig_of("px4")
+    rig.track_on()
+    stranger = MemoryBus(rig.other._exchange, "lab", "stranger")
+    begin = (rig.body.x, rig.body.y)
+    for _ in range(50):
+        for bus, epoch in ((stranger, 10**15), (stranger, 1)):
+            forged = VelocitySetpoint(
+                header=bus.header("v"), velocity_m_s=(1.0, 0.0, 0.0), yaw_rate_rad_s=0.0, lifetime_ms=300, epoch=epoch
+            )
+            bus.publish(SETPOINT, forged)
+        stranger.publish(
+            LEASE, Lease(header=stranger.header("team"), holder="stranger", expires_ns=rig.hand.now + 10**9)
+        )
+        rig.run(0.02)
+    assert rig.mode == "TRACK"
+    assert abs(rig.body.x - begin[0]) < 0.3 and abs(rig.body.y - begin[1]) < 0.3
+    (told,) = (text for text in rig.process.texts if "refused" in text)
+    assert "setpoints of another sender" in told and "operator leases of another sender" in told

@@ -164,11 +164,13 @@ def _run(
 ) -> int:
     from groundstation.flight.composition import fly_endpoint, process_table
     from groundstation.flight.loop import Flight, require_outcome
+    from groundstation.flight.retention import make_room
     from groundstation.flight.run_folder import log_to, make_run_dir, write_facts
     from groundstation.settings.resolved import yaml_of
     from groundstation.supervisor.supervisor import Run, Supervisor
     from groundstation.supervisor.terminal import Terminal
 
+    removed = [] if report else make_room(Path(field.recording.directory), field.recording.keep_gb)
     run_dir = make_run_dir(report or Path(field.recording.directory), path.stem)
     (run_dir / "resolved.yaml").write_text(yaml_of(field))
     write_facts(run_dir, facts)
@@ -178,6 +180,10 @@ def _run(
     table = process_table(field, endpoint, run_dir, simulation=simulation, monitor=monitor)
     terminal = Terminal()
     terminal.say(f"{facts.mode} {path}: {len(table)} processes, run folder {run_dir}")
+    if removed:
+        size = sum(run.size for run in removed) / 1e9
+        names = f"{removed[0].folder.name} ... {removed[-1].folder.name}" if removed[1:] else removed[0].folder.name
+        terminal.say(f"recording.keep_gb {field.recording.keep_gb:g}: removed {names} ({size:.1f} GB)")
     real = tuple(simulation.real.drones) if simulation else tuple(field.drones)
     run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones), real)
     outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()

@@ -49,6 +49,7 @@ class RecordingValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     raw_datagrams: bool = True
     rotate_mb: float = 1000.0
     rotate_minutes: float = 60.0
+    keep_gb: float = 0.0
 
 
 class ConsoleValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -109,6 +109,9 @@ class RecordingSettings(SettingsSection):
     """Size [MB] at which a recording starts a new part (state-2.mcap, ...), at most once a second; 0: never."""
     rotate_minutes: Annotated[float, Field(ge=0, le=1440)] = 60.0
     """Time [min] after which a recording starts a new part; 0: never."""
+    keep_gb: Annotated[float, Field(ge=0, le=1_000_000)] = 0.0
+    """Size [GB] of all runs in the folder; beyond it the oldest are removed before the next starts, except those with a
+    file named KEEP in their folder. 0: keep all."""
 
 
 class Console(SettingsSection):

@@ -1,0 +1,54 @@
+"""Which recorded runs make room for the next: the oldest, once they take more than the field allows."""
+
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+KEEP = "KEEP"
+# Folders of `make_run_dir`: nothing else in the folder of runs is ever touched.
+_NAME = re.compile(r"\d{8}T\d{6}Z-.+")
+_SETTLED_S = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """A run folder: its size [bytes], and when its newest file was written [UNIX s]."""
+
+    folder: Path
+    size: int
+    written_s: float
+
+
+def make_room(parent: Path, limit_gb: float, now_s: float | None = None) -> list[RecordedRun]:
+    """Remove the oldest runs until the rest takes at most `limit_gb` [GB]; return those removed. 0: keeps all.
+
+    A run with a file named KEEP stays, and so does one that was written to within two minutes: it may still fly. A
+    folder that cannot be removed stays, and the next older one goes in its place.
+    """
+    runs = sorted(_runs(parent), key=lambda run: run.folder.name) if limit_gb > 0 else []
+    excess = sum(run.size for run in runs) - limit_gb * 1e9
+    now_s = time.time() if now_s is None else now_s
+    removed = []
+    for run in runs:
+        if excess <= 0:
+            break
+        if (run.folder / KEEP).exists() or now_s - run.written_s < _SETTLED_S:
+            continue
+        try:
+            shutil.rmtree(run.folder)
+        except OSError:
+            continue
+        excess -= run.size
+        removed.append(run)
+    return removed
+
+
+def _runs(parent: Path) -> Iterator[RecordedRun]:
+    for folder in parent.iterdir() if parent.is_dir() else ():
+        if _NAME.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
+            status = [path.lstat() for path in folder.rglob("*")]
+            files = sum(one.st_size for one in status)
+            yield RecordedRun(folder, files, max((one.st_mtime for one in status), default=folder.stat().st_mtime))

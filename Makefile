@@ -12,19 +12,34 @@ PYTEST = $(BIN)/python -m pytest $(REPEAT)
 
 INTEROP := .interop
 STUDIES := .pytest_cache/studies
-COVERAGE := .pytest_cache/coverage.json
+COMPUTING := .pytest_cache/computing
+COVERAGE := .pytest_cache/coverage-waiting.json .pytest_cache/coverage-computing.json
+# Fast tests that open fixed ports, start processes or wait for time; all others only compute.
+WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/contract/mavlink_links \
+	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
+	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test raise-floors test-slow slow-flights slow-studies fuzz test-firmware mutants wire-faults soak check format docs sbom audit interop clean
+.PHONY: install demo test test-waiting test-computing raise-floors test-slow slow-flights slow-studies fuzz test-firmware mutants wire-faults soak check format docs sbom audit interop clean
 
 install: $(STAMP)
 
 demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
-# What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors raises them.
+# Tests that wait (for sockets, processes, time) run in one pytest, those that compute beside them in another, printed at
+# the end. What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors raises them.
 test: $(STAMP)-test
-	COVERAGE_DATA=$(COVERAGE) $(PYTEST) -m "not slow" tests
+	$(MAKE) --jobs 2 --keep-going --output-sync=none test-waiting test-computing
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE)
+
+test-waiting: $(STAMP)-test
+	COVERAGE_DATA=$(word 1,$(COVERAGE)) $(PYTEST) -m "not slow" $(WAITING)
+
+test-computing: $(STAMP)-test
+	@mkdir -p $(COMPUTING) && code=0; \
+	COVERAGE_DATA=$(word 2,$(COVERAGE)) REFUSE_FIXED_PORTS=1 nice $(PYTEST) -m "not slow" -o cache_dir=$(COMPUTING) \
+		$(addprefix --ignore=,$(WAITING)) tests >$(COMPUTING)/log 2>&1 || code=$$?; \
+	cat $(COMPUTING)/log; exit $$code
 
 raise-floors: $(STAMP)-test
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise

@@ -1,4 +1,4 @@
-"""Compares the coverage of a run with a floor for each package: `python floors.py DATA [--raise]`.
+"""Compares the coverage of runs with a floor for each package: `python floors.py DATA... [--raise]`.
 
 Counted are the statements of functions that Python runs, in every module of the product, imported or not. `--raise`
 moves the floors up to what was measured; nothing here moves one down.
@@ -82,7 +82,7 @@ def _write(floors: dict[str, int]) -> None:
 
 def main(arguments: list[str]) -> int:
     """Print the counts beside their floors; return 1 if one is below."""
-    measured = Measured.read(Path(arguments[0]))
+    measured = Measured.joined(Measured.read(Path(each)) for each in arguments if each != "--raise")
     found = counts(ROOT, measured)
     floors = tomllib.loads(FLOORS.read_text(encoding="utf-8")) if FLOORS.exists() else {}
     if "--raise" in arguments:

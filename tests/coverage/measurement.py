@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -29,14 +30,29 @@ class Measured(NamedTuple):
         data = json.loads(path.read_text(encoding="utf-8"))
         return cls({name: bytes.fromhex(each) for name, each in data["hits"].items()}, data["skipped"])
 
+    @classmethod
+    def joined(cls, parts: Iterable[Self]) -> Self:
+        """Return what runs of different tests measured together."""
+        hits: dict[str, bytes] = {}
+        skipped = 0
+        for part in parts:
+            hits = _either(hits, part.hits)
+            skipped += part.skipped
+        return cls(hits, skipped)
+
     def with_repeated(self, again: "Measured") -> "Measured":
         """Add a run that repeated some of the tests; a file that has changed since counts as the later run saw it."""
-        hits = dict(self.hits)
-        for name, each in again.hits.items():
-            before = hits.get(name, b"")
-            same = len(before) == len(each)
-            hits[name] = bytes(a | b for a, b in zip(before, each, strict=True)) if same else each
-        return Measured(hits, self.skipped)
+        return Measured(_either(self.hits, again.hits), self.skipped)
+
+
+def _either(first: dict[str, bytes], second: dict[str, bytes]) -> dict[str, bytes]:
+    """Return the probes that one of two runs hit; where a file has changed between them, those of the second."""
+    hits = dict(first)
+    for name, each in second.items():
+        before = hits.get(name, b"")
+        same = len(before) == len(each)
+        hits[name] = bytes(a | b for a, b in zip(before, each, strict=True)) if same else each
+    return hits
 
 
 class Measurement:

@@ -93,6 +93,11 @@ def test_a_repetition_adds_to_what_ran_before():
     assert added == Measured({"a": b"\1\1", "b": b"\0\0", "c": b"\1"}, 3)
 
 
+def test_what_ran_in_one_of_several_processes_counts():
+    parts = [Measured({"a": b"\1\0", "b": b"\1"}, 3), Measured({"a": b"\0\1", "c": b"\0"}, 1)]
+    assert Measured.joined(parts) == Measured({"a": b"\1\1", "b": b"\1", "c": b"\0"}, 4)
+
+
 def test_a_run_writes_what_it_measured(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "meta_path", [*sys.meta_path])
     path = tmp_path / "new" / "data.json"
@@ -113,7 +118,11 @@ def test_the_command_fails_below_a_floor(tmp_path, monkeypatch, capsys):
     (tmp_path / "drivers" / "part.py").write_text(SOURCE, encoding="utf-8")
     data = tmp_path / "data.json"
     Measured({}, 1).write(data)
+    whole = tmp_path / "whole.json"
+    Measured({str(tmp_path / "drivers" / "part.py"): probed(1)[1]}).write(whole)
     monkeypatch.setenv("CI", "true")
+    assert main([str(data), str(whole)]) == 0
+    capsys.readouterr()
     assert main([str(data)]) == 1
     assert "drivers: 0.0 %" in capsys.readouterr().out
     monkeypatch.delenv("CI")

@@ -1,6 +1,6 @@
 """Our driver sets up and flies real ArduCopter and PX4 SITL binaries, without GPS; our emulators by the same steps.
 
-`make test-firmware`; what each binary needs: drivers/mavlink/README.md.
+`make test-firmware`; building the binaries: docs/explanation/mavlink-vehicles.md#tests-with-other-programs.
 """
 
 import importlib.util

@@ -3,13 +3,14 @@
 import logging
 import sys
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Sequence
 
 from pydantic import ValidationError
 
 from drivers.base import HostProcess
 from drivers.host import VehicleHost, run_hosts
+from drivers.mavlink.links.forwarding import with_riders
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.settings import MavlinkDriverSettings
@@ -40,10 +41,13 @@ class Fleet:
         self._child = child
         self._estimates = child.bus.subscribe([ESTIMATE], newest=True)
         self.vehicles: dict[int, MavlinkVehicle] = {}
-        self.link: MavlinkLink = open_link(settings.link, self._sniff)
+        self._news: deque[tuple[str, str]] = deque(maxlen=16)
+        shown = {vehicle.system_id: vehicle for vehicle in settings.vehicles}
+        self.link: MavlinkLink = open_link(
+            settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell_stop)
+        )
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
         self.strangers: Counter[int] = Counter()
-        self._news: list[str] = []
         self._announced: dict[tuple[str, str], int] = {}
         self._closing = threading.Event()
         self._reader = threading.Thread(target=self._read, name="mavlink", daemon=True)
@@ -53,6 +57,9 @@ class Fleet:
         vehicle = self.vehicles.get(system)
         if vehicle is not None:
             (vehicle.log.received if received else vehicle.log.sent)(stamp_ns, data)
+
+    def _tell_stop(self, text: str) -> None:
+        self._news.append((text, "RESUME or TRACK takes the drone back"))
 
     def _read(self) -> None:
         while not self._closing.is_set():
@@ -73,7 +80,8 @@ class Fleet:
             self.strangers[heard.frame.system] += 1
             self.link.rejected["unknown_system"] += 1
             if self.strangers[heard.frame.system] == 1:
-                self._news.append(f"system {heard.frame.system} answers, which is not in the field file")
+                text = f"system {heard.frame.system} answers, which is not in the field file"
+                self._news.append((text, "see system_id in the field file"))
 
     def turn(self, now_ns: int) -> None:
         """Hand the tracker's estimate to the vehicles and tell the operator what they say."""
@@ -83,7 +91,7 @@ class Fleet:
                     vehicle.see(now_ns, received.message)
         self._child.note_addresses(self.link.called_from)
         while self._news:
-            self._child.event(Severity.WARNING, self._news.pop(0), "see system_id in the field file")
+            self._child.event(Severity.WARNING, *self._news.popleft())
         for vehicle in self.vehicles.values():
             while vehicle.orders.events:
                 self._announce(now_ns, vehicle.name, *vehicle.orders.events.popleft())

@@ -80,6 +80,8 @@ class VehicleSettings(DriverSection):
     velocity_std_m_s: Positive = 0.15
     attitude_std_rad: Positive = 0.0053
     parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
+    forward: Annotated[str, Field(pattern=r"^(udp:[0-9.]+:\d+)?$")] = ""
+    forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
 
 
 class MavlinkDriverSettings(DriverSection):

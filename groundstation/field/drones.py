@@ -69,6 +69,8 @@ class MavlinkLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     take_off_m: float = 0.8
     vision_hz: float = 30.0
     parameters: dict[str, float] = {}
+    forward: str = ""
+    forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
 
 
 class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

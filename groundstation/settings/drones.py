@@ -146,6 +146,11 @@ class Mavlink(SettingsSection):
     parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
     """Parameters of the autopilot that this drone needs otherwise than `groundstation mavlink setup` proposes, or
     besides, by name; the driver warns of the former."""
+    forward: Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$")] = ""
+    """A second ground station that sees the vehicle, such as udp:127.0.0.1:14550 for QGroundControl. It may stop the
+    vehicle and ask it questions, never fly it. Empty: none."""
+    forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
+    """What that ground station may read and write besides."""
 
 
 class Drone(SettingsSection):

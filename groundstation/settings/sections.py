@@ -224,6 +224,8 @@ def _mavlink_vehicle(name: str, drone: Drone) -> VehicleSettings:
         ),
         take_off_m=mavlink.take_off_m,
         parameters=mavlink.parameters,
+        forward=mavlink.forward,
+        forward_allows=mavlink.forward_allows,
         velocity_std_m_s=drone.odometry.velocity_std_m_s,
         attitude_std_rad=drone.odometry.attitude_std_rad,
     )

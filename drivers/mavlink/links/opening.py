@@ -1,6 +1,7 @@
 """Opens the link that the settings describe, with its signing key."""
 
 import time
+from collections.abc import Callable
 
 from drivers.mavlink.links.seam import MavlinkLink, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.links.serial import SerialLink
@@ -11,13 +12,21 @@ from drivers.mavlink.wire.signature import stamp_at
 from drivers.mavlink.wire.verification import Signing
 
 
-def open_link(settings: LinkSettings, sniffer: Sniffer = ignore_bytes) -> MavlinkLink:
-    """Return the link that the settings describe; raises DriverError when it cannot be opened."""
+def open_link(
+    settings: LinkSettings,
+    sniffer: Sniffer = ignore_bytes,
+    shown: Callable[[Transport], Transport] = lambda transport: transport,
+) -> MavlinkLink:
+    """Return the link that the settings describe; raises DriverError when it cannot be opened.
+
+    shown: makes of its port one that others see as well.
+    """
     transport: Transport
     if settings.target.startswith("serial"):
         transport = SerialLink(settings, signing_of(settings), sniffer)
     else:
         transport = UdpLink(settings, signing_of(settings), sniffer)
+    transport = shown(transport)
     if settings.kind == "pymavlink":
         return transport
     # Only here: the native library takes its time to load.

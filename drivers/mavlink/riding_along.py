@@ -1,0 +1,80 @@
+"""What a second ground station may say to a vehicle: questions and stops, nothing that flies it. Pure."""
+
+from collections.abc import Collection
+from enum import Enum
+
+from drivers.mavlink.wire import flight
+from drivers.mavlink.wire.frames import IDS, Message
+from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+
+
+class Verdict(Enum):
+    """STOP: pass, at once and always; PASS: pass, if there is room; REFUSE: answer with DENIED; DROP: in silence."""
+
+    STOP = "stop"
+    PASS = "pass"
+    REFUSE = "refuse"
+    DROP = "drop"
+
+
+# Modes in which a vehicle stops by itself: stands, lands, or is a pilot's to hold.
+_STOPPED = {
+    Flavour.PX4: frozenset(
+        (px4_mode(Px4Main.AUTO, Px4Auto.HOLD), px4_mode(Px4Main.AUTO, Px4Auto.LAND), px4_mode(Px4Main.POSITION))
+    ),
+    Flavour.ARDUPILOT: frozenset((CopterMode.LAND, CopterMode.BRAKE, CopterMode.LOITER, CopterMode.POSHOLD)),
+}
+_QUESTIONS = frozenset((MavCmd.REQUEST_MESSAGE, MavCmd.REQUEST_PROTOCOL_VERSION, MavCmd.REQUEST_AUTOPILOT_CAPABILITIES))
+# Kinds of messages by what the field file may allow besides.
+_BY_SETTING = {
+    "parameters": frozenset(number for name, number in IDS.items() if name.startswith(("PARAM_REQUEST", "PARAM_SET"))),
+    "missions": frozenset(number for name, number in IDS.items() if name.startswith("MISSION_")),
+}
+
+
+def verdict(
+    number: int, message: Message | None, system: int, flavour: Flavour, allowed: Collection[str] = ()
+) -> Verdict:
+    """Return what becomes of a verified frame of a second ground station.
+
+    number: of its kind; message: None where its content is not known; system: the vehicle; allowed: "parameters",
+    "missions".
+    """
+    match message:
+        case flight.CommandLong() | flight.CommandInt() if message.target_system in (0, system):
+            return _of_command(message, flavour)
+        case flight.SetMode() if message.target_system == system:
+            return Verdict.STOP if message.custom_mode in _STOPPED[flavour] else Verdict.DROP
+    # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, its clock upset the vehicle's.
+    return Verdict.PASS if any(number in _BY_SETTING[name] for name in allowed) else Verdict.DROP
+
+
+def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> Verdict:
+    match message.command:
+        case MavCmd.NAV_LAND | MavCmd.DO_FLIGHTTERMINATION:
+            return Verdict.STOP
+        case MavCmd.COMPONENT_ARM_DISARM:
+            return Verdict.STOP if message.param1 == 0.0 else Verdict.REFUSE
+        case MavCmd.DO_PAUSE_CONTINUE:
+            return Verdict.STOP if message.param1 == 0.0 else Verdict.REFUSE
+        case MavCmd.DO_SET_MODE:
+            return Verdict.STOP if _mode_of(message, flavour) in _STOPPED[flavour] else Verdict.REFUSE
+        case number if number in _QUESTIONS:
+            return Verdict.PASS
+    return Verdict.REFUSE
+
+
+def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> int:
+    """Return the custom mode that a DO_SET_MODE asks for, -1 for a value that is none."""
+    main, sub = message.param2, message.param3
+    if not (0 <= main < 256 and 0 <= sub < 256):
+        return -1
+    return px4_mode(int(main), int(sub)) if flavour is Flavour.PX4 else int(main)
+
+
+def words_of(message: Message) -> str:
+    """Return a stop in words for the operator."""
+    if isinstance(message, flight.SetMode):
+        return f"mode {message.custom_mode:#x}"
+    number = message.command if isinstance(message, flight.CommandLong | flight.CommandInt) else -1
+    return MavCmd(number).name.lower().replace("_", " ") if number in set(MavCmd) else f"command {number}"

@@ -1,0 +1,143 @@
+"""A second ground station on a forwarded link sees the vehicle, may stop it, and cannot fly it or crowd us out."""
+
+import socket
+import time
+
+import pytest
+
+from drivers.mavlink.links.forwarding import with_riders
+from drivers.mavlink.links.opening import open_link
+from drivers.mavlink.settings import LinkSettings, VehicleSettings
+from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong, SetPositionTargetLocalNed
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
+from drivers.mavlink.wire.names import MavCmd, MavResult
+from drivers.mavlink.wire.service import ParamRequestList
+from drivers.mavlink.wire.telemetry import Heartbeat
+
+HEARTBEAT = Heartbeat(2, 12, 81, 0, 4)
+
+
+class Ground:
+    """A vehicle, our link to it, and a second ground station, all by hand."""
+
+    def __init__(self, allows=()):
+        self.vehicle = udp()
+        self.station = udp()
+        self.told: list[str] = []
+        ours = VehicleSettings(
+            name="drone_2", system_id=11, flavour="px4", forward_allows=allows,
+            forward=f"udp:127.0.0.1:{self.station.getsockname()[1]}",
+        )  # fmt: skip
+        address, port = self.vehicle.getsockname()
+        self.link = open_link(
+            LinkSettings(target=f"udpout:{address}:{port}"),
+            shown=lambda transport: with_riders(transport, {11: ours}, self.told.append),
+        )
+        self.vehicle_says, self.station_says = FrameEncoder(11, 1), FrameEncoder(255, 190)
+        self.link.send(11, HEARTBEAT)
+        _, self._ours = self.vehicle.recvfrom(2048)
+        self.hear()
+        _, self._rider = self.station.recvfrom(2048)
+
+    def hear(self):
+        """Let the vehicle speak, and us listen."""
+        self.vehicle.sendto(self.vehicle_says.encode(HEARTBEAT), self._ours)
+        return eventually(self.link.receive)
+
+    def order(self, *messages):
+        for message in messages:
+            self.station.sendto(self.station_says.encode(message), self._rider)
+
+    def send_raw(self, data):
+        self.station.sendto(data, self._rider)
+
+    def close(self):
+        self.link.close()
+        self.vehicle.close()
+        self.station.close()
+
+
+def udp():
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.bind(("127.0.0.1", 0))
+    made.settimeout(2.0)
+    return made
+
+
+def eventually(ask, within_s=3.0):
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        found = ask()
+        if found:
+            return found
+    pytest.fail("nothing came")
+
+
+def message_of(made):
+    (raw,) = split(made.recvfrom(2048)[0])
+    return FrameDecoder().decode(raw).message
+
+
+def nothing_comes(made):
+    made.settimeout(0.3)
+    with pytest.raises(TimeoutError):
+        made.recvfrom(2048)
+    made.settimeout(2.0)
+
+
+@pytest.fixture
+def ground():
+    made = Ground()
+    yield made
+    made.close()
+
+
+def command(number, *values):
+    return CommandLong(11, 1, number, 0, *values)
+
+
+def test_it_sees_what_the_vehicle_sends(ground):
+    ground.hear()
+    assert message_of(ground.station) == HEARTBEAT
+
+
+def test_its_stop_reaches_the_vehicle_byte_for_byte_and_is_told(ground):
+    ground.order(command(MavCmd.NAV_LAND))
+    assert message_of(ground.vehicle) == command(MavCmd.NAV_LAND)
+    eventually(lambda: ground.told)
+    assert ground.told == ["drone_2: a second ground station stops it (nav land)"]
+
+
+def test_it_cannot_arm_and_is_told_so_by_an_answer(ground):
+    ground.order(command(MavCmd.COMPONENT_ARM_DISARM, 1.0))
+    answer = message_of(ground.station)
+    assert isinstance(answer, CommandAckMessage)
+    assert (answer.command, answer.result) == (MavCmd.COMPONENT_ARM_DISARM, MavResult.DENIED)
+    nothing_comes(ground.vehicle)
+    assert ground.link.rejected["rider_refused"] == 1
+
+
+def test_set_points_heartbeats_parameters_and_garbage_do_not_pass_and_stops_behind_them_do(ground):
+    setpoint = SetPositionTargetLocalNed(0, 11, 1, 8, 0x5C7, *(0.0,) * 11)
+    ground.order(setpoint, HEARTBEAT, ParamRequestList(11, 1))
+    ground.send_raw(b"\xfd\x09garbage")
+    ground.send_raw(bytes(2000))
+    nothing_comes(ground.vehicle)
+    ground.order(command(MavCmd.NAV_LAND))
+    assert message_of(ground.vehicle) == command(MavCmd.NAV_LAND)
+    refused = {reason: count for reason, count in ground.link.rejected.items() if reason.startswith("rider_")}
+    assert sum(refused.values()) == 2, refused
+    assert "rider_internal" not in refused
+
+
+def test_parameters_pass_where_the_field_allows_them_50_a_second_and_stops_beyond(request):
+    ground = Ground(allows=("parameters",))
+    request.addfinalizer(ground.close)
+    for _ in range(80):
+        ground.order(ParamRequestList(11, 1))
+    ground.order(command(MavCmd.NAV_LAND))
+    came = [message_of(ground.vehicle) for _ in range(51)]
+    assert came[-1] == command(MavCmd.NAV_LAND) or isinstance(came[-1], ParamRequestList)
+    assert sum(isinstance(message, ParamRequestList) for message in came) >= 50
+    eventually(lambda: ground.told)
+    assert ground.link.rejected["rider_too_many"] >= 20

@@ -1,0 +1,76 @@
+"""A second ground station may ask and stop; whatever flies, feeds or configures a vehicle does not pass."""
+
+import pytest
+
+from drivers.mavlink.riding_along import Verdict, verdict, words_of
+from drivers.mavlink.wire import flight, service, telemetry
+from drivers.mavlink.wire.frames import CLASSES, IDS, id_of
+from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+
+SYSTEM = 11
+STOPS = (
+    (MavCmd.NAV_LAND,),
+    (MavCmd.DO_FLIGHTTERMINATION, 1.0),
+    (MavCmd.COMPONENT_ARM_DISARM, 0.0),
+    (MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE),
+    (MavCmd.DO_PAUSE_CONTINUE, 0.0),
+)
+
+
+def command(number, *values, system=SYSTEM):
+    return flight.CommandLong(system, 1, number, 0, *(float(value) for value in values))
+
+
+def judged(message, flavour=Flavour.PX4, allowed=()):
+    return verdict(id_of(type(message)), message, SYSTEM, flavour, allowed)
+
+
+@pytest.mark.parametrize("flavour", Flavour)
+@pytest.mark.parametrize("order", STOPS)
+def test_every_way_to_stop_passes(order, flavour):
+    assert judged(command(*order), flavour) is Verdict.STOP
+
+
+def test_modes_that_stop_pass_and_others_are_refused():
+    hold = (1, Px4Main.AUTO, Px4Auto.HOLD)
+    assert judged(command(MavCmd.DO_SET_MODE, *hold)) is Verdict.STOP
+    assert judged(command(MavCmd.DO_SET_MODE, 1, Px4Main.AUTO, Px4Auto.MISSION)) is Verdict.REFUSE
+    assert judged(command(MavCmd.DO_SET_MODE, 1, Px4Main.OFFBOARD)) is Verdict.REFUSE
+    assert judged(command(MavCmd.DO_SET_MODE, 1, CopterMode.BRAKE), Flavour.ARDUPILOT) is Verdict.STOP
+    assert judged(command(MavCmd.DO_SET_MODE, 1, CopterMode.GUIDED), Flavour.ARDUPILOT) is Verdict.REFUSE
+    assert judged(command(MavCmd.DO_SET_MODE, 1, float("nan"))) is Verdict.REFUSE
+    landing = flight.SetMode(SYSTEM, 1, px4_mode(Px4Main.AUTO, Px4Auto.LAND))
+    assert judged(landing) is Verdict.STOP
+    assert judged(landing._replace(custom_mode=px4_mode(Px4Main.OFFBOARD))) is Verdict.DROP
+
+
+@pytest.mark.parametrize("number", [MavCmd.NAV_TAKEOFF, MavCmd.NAV_RETURN_TO_LAUNCH, MavCmd.SET_MESSAGE_INTERVAL, 300])
+def test_other_commands_are_refused(number):
+    assert judged(command(number, 1.0)) is Verdict.REFUSE
+    assert judged(command(MavCmd.COMPONENT_ARM_DISARM, 1.0)) is Verdict.REFUSE
+
+
+def test_a_command_for_another_vehicle_does_not_pass():
+    assert judged(command(MavCmd.NAV_LAND, system=12)) is Verdict.DROP
+    assert judged(command(MavCmd.NAV_LAND, system=0)) is Verdict.STOP
+
+
+def test_no_other_kind_passes_unasked_and_parameters_and_missions_only_where_allowed():
+    own = {id_of(kind) for kind in (flight.CommandLong, flight.CommandInt, flight.SetMode)}
+    for name, number in IDS.items():
+        if number in own:
+            continue
+        assert verdict(number, None, SYSTEM, Flavour.PX4) is Verdict.DROP
+        allowed = verdict(number, None, SYSTEM, Flavour.PX4, ("parameters", "missions"))
+        assert (allowed is Verdict.PASS) == name.startswith(("PARAM_REQUEST", "PARAM_SET", "MISSION_"))
+    assert {"HEARTBEAT", "TIMESYNC", "SET_POSITION_TARGET_LOCAL_NED", "ODOMETRY"} <= CLASSES.keys()
+    asked = service.ParamRequestList(SYSTEM, 1)
+    assert judged(asked) is Verdict.DROP
+    assert judged(asked, allowed=("parameters",)) is Verdict.PASS
+    assert judged(telemetry.Heartbeat(6, 8, 0, 0, 4), allowed=("parameters",)) is Verdict.DROP
+
+
+def test_a_stop_is_told_in_words():
+    assert words_of(command(MavCmd.NAV_LAND)) == "nav land"
+    assert words_of(command(31000)) == "command 31000"
+    assert words_of(flight.SetMode(1, 1, 9)) == "mode 0x9"

@@ -5,7 +5,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-_SETTINGS = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
+_ANYWAY = click.option("--anyway", is_flag=True, help="Take off although a check forbids it; that is recorded.")
+SETTINGS = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
 _HEADLESS = click.option("--headless", is_flag=True, help="Plain lines instead of the live table.")
 _SIMULATED: tuple[Option, ...] = (
     click.option(
@@ -42,7 +43,8 @@ _SIMULATED: tuple[Option, ...] = (
         help="Folder for the run's folder and a copy of the report (default: runs/, no copy).",
     ),
     _HEADLESS,
-    _SETTINGS,
+    _ANYWAY,
+    SETTINGS,
 )
 
 
@@ -83,12 +85,20 @@ def sitl(field: str, **arguments: Any) -> int:
 )
 @click.argument("field")
 @_HEADLESS
-@_SETTINGS
-def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
+@_ANYWAY
+@SETTINGS
+def fly(field: str, headless: bool, anyway: bool, options: tuple[str, ...]) -> int:
     """Fly a field file with the real drones. No drone takes off before Enter, or `groundstation takeoff`.
 
     Ctrl-C lands; a second one stops at once.
     """
+    return run_real("fly", field, options, headless=headless, anyway=anyway)
+
+
+def run_real(
+    mode: str, field: str, options: tuple[str, ...], *, headless: bool, anyway: bool = False, look_only: bool = False
+) -> int:
+    """Fly a field with the real drones, or only look at them, and return the exit code."""
     from groundstation.flight.composition import fly_endpoint
     from groundstation.flight.flight_plan import plan_of
     from groundstation.report.run_facts import RunFacts
@@ -98,22 +108,24 @@ def fly(field: str, headless: bool, options: tuple[str, ...]) -> int:
 
     path = find_field(field)
     loaded = load_field(path, options)
-    plan = plan_of(loaded, None, asks=True)
+    plan = replace(plan_of(loaded, None, asks=not look_only), anyway=anyway, look_only=look_only)
     require_free(fly_endpoint(loaded))
-    return _run(path, loaded, plan, RunFacts(mode="fly", field=str(path)), headless=headless)
+    return _run(path, loaded, plan, RunFacts(mode=mode, field=str(path)), headless=headless)
 
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """What the options of `sitl` and `demo` ask for; real: what is not emulated."""
+    """What the options of `sitl` and `demo` ask for; real: what is not emulated; look_only: nobody takes off."""
 
     scenario: str
     duration: float | None
     seed: int | None
     report: Path | None
     headless: bool
+    anyway: bool
     options: tuple[str, ...]
     real: tuple[str, ...] = ()
+    look_only: bool = False
 
 
 def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
@@ -133,7 +145,8 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     parts = parse_real(loaded, asked.real)
     for line in notes(loaded, parts):
         click.echo(line, err=True)
-    plan = plan_of(loaded, duration, asks=bool(parts.drones))
+    plan = plan_of(loaded, duration, asks=bool(parts.drones) and not asked.look_only)
+    plan = replace(plan, anyway=asked.anyway, look_only=asked.look_only)
     chosen = load_scenario(find_scenario(scenario, path))
     if seed is None:
         seed = int(chosen.get("seed", 1))
@@ -188,6 +201,9 @@ def _run(
     run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones), real)
     outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()
     terminal.flush()
+    if plan.look_only:
+        require_outcome(outcome)
+        return ExitCode.FAILED if outcome.forbidden else ExitCode.OK
     passed = _judge(run_dir, report) if field.recording.enabled else None
     require_outcome(outcome)
     if passed is None:

@@ -76,7 +76,7 @@ def signal_drivers(record: RuntimeRecord) -> list[str]:
     return told
 
 
-def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -> int:
+def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, anyway: bool = False) -> int:
     """Carry out one verb; returns the exit code."""
     record = choose_run(run, stops=verb in _STOPS)
     strangers = [name for name in drones if name not in record.drones]
@@ -87,7 +87,7 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -
     except GroundStationError as error:
         return _without_router(verb, record, as_json, error)
     try:
-        book = _book(bus, verb, drones, record)
+        book = _book(bus, verb, drones, record, anyway)
         say: Callable[[str], None] = (lambda _: None) if as_json else click.echo
         deliver(bus, book, _PATIENCE_S.get(verb, _PATIENCE_DEFAULT_S), say)
     finally:
@@ -95,14 +95,21 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool) -
     return _report(book, as_json)
 
 
-def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord) -> AwaitedAnswers:
+def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, anyway: bool) -> AwaitedAnswers:
     header = bus.header("team" if verb in _STOPS else _OPERATOR)
     # A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease.
     scope = drones if verb in _STOPS else (_OPERATOR, *drones)
     expires_ns = 0 if verb in _STOPS else header.stamp_ns + 5_000_000_000
     identity = f"{bus.source}-{header.stamp_ns}"
     command = Command(
-        header=header, id=identity, verb=verb, scope=scope, issuer=bus.source, expires_ns=expires_ns, run=bus.run
+        header=header,
+        id=identity,
+        verb=verb,
+        scope=scope,
+        issuer=bus.source,
+        expires_ns=expires_ns,
+        run=bus.run,
+        anyway=anyway,
     )
     return AwaitedAnswers(command, (drones or record.drones) if verb in _STOPS else (_OPERATOR,))
 
@@ -142,11 +149,14 @@ def _verb(verb: Verb, text: str) -> click.Command:
     def callback(drones: tuple[str, ...], run: str | None, as_json: bool, **more: Any) -> int:
         if verb is Verb.CUT_MOTORS and not more["yes"]:
             click.confirm("Cut the motors? The drones fall from where they are.", abort=True)
-        return order(verb, drones, run, as_json)
+        return order(verb, drones, run, as_json, anyway=more.get("anyway", False))
 
     name = verb.lower().replace("_", "-")
     if verb is Verb.CUT_MOTORS:
         callback = click.option("--yes", is_flag=True, help="Do not ask for confirmation.")(callback)
+    if verb is Verb.TAKEOFF:
+        insist = click.option("--anyway", is_flag=True, help="Take off although a check forbids it; that is recorded.")
+        callback = insist(callback)
     example = f"\n\n\b\nExample:\n  groundstation {name}\n  groundstation {name} drone_1 --json"
     codes = "\n\nExit codes: 0 confirmed, 3 nothing is running, 4 not confirmed."
     return click.command(name=name, help=text + example + codes)(callback)

@@ -55,6 +55,9 @@ VERBS: dict[str, CommandRow] = {
     "doctor": CommandRow(
         "Prepare", "groundstation.cli.doctor:doctor", "What this machine lacks for flying, and the remedy."
     ),
+    "preflight": CommandRow(
+        "Prepare", "groundstation.cli.preflight:preflight", "What forbids a take-off, and the remedy; nobody flies."
+    ),
     "calibrate": CommandRow(
         "Prepare", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."
     ),

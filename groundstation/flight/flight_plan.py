@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.take_off import TakeOffLimits
@@ -15,7 +16,8 @@ class FlightPlan:
 
     duration_s: tracking time, None = until stopped; asks: take off only when the operator says so at the prompt or
     from another shell; cameras: those fixed in the world; landing_limit_s: how long a landing may take before the
-    processes are stopped anyway.
+    processes are stopped anyway; field: what the checks before the take-off go by (none: no checks); anyway: take off
+    whatever they say; look_only: nobody takes off, the checks are all that is wanted.
     """
 
     duration_s: float | None
@@ -24,6 +26,9 @@ class FlightPlan:
     limits: TakeOffLimits
     start_tracking_limit_s: float = 90.0
     landing_limit_s: float = 15.0
+    field: ResolvedField | None = None
+    anyway: bool = False
+    look_only: bool = False
 
 
 def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan:
@@ -32,4 +37,6 @@ def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan
     for name, camera in field.cameras.items():
         right, down, forward = world_from_downward_optical(camera.rotation_deg)[2].tolist()
         cameras[name] = FixedCamera(camera.position_m[2], (right, down, forward))
-    return FlightPlan(duration_s, asks, cameras, TakeOffLimits(unseen_s=field.safety.unseen_land_after_s))
+    limits = TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
+    resolved = field_from_json(field.model_dump_json().encode())
+    return FlightPlan(duration_s, asks, cameras, limits, field=resolved)

@@ -9,6 +9,8 @@ from groundstation.bus.messages import RUN, Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
+from groundstation.flight.looking import Looking
+from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.operator import Operator, TeamPhase
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor
@@ -21,11 +23,15 @@ _FAILED_LANDING_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class FlightOutcome:
-    """How a flight ended. failure: why it could not go on, or ""; interrupted: by the operator; landed: all said so."""
+    """How a flight ended. failure: why it could not go on, or ""; interrupted: by the operator; landed: all said so.
+
+    forbidden: whether nobody may take off, where that was the question.
+    """
 
     failure: str
     interrupted: bool
     landed: bool
+    forbidden: bool = False
 
 
 class Flight:
@@ -39,6 +45,7 @@ class Flight:
         self._began_ns = time.monotonic_ns()
         self._prompting = False
         self._grounded = False
+        self._forbidden = False
 
     def run(self) -> FlightOutcome:
         """Start, fly, land, stop. Raises GroundStationError when the start failed; everything is stopped then too."""
@@ -60,7 +67,11 @@ class Flight:
             self._announce(Severity.ERROR, f"its start failed: {str(error).splitlines()[0]}")
             raise
         assert supervisor.bus is not None
-        operator = Operator(supervisor.bus, supervisor.run.drones, self._plan.cameras, self._plan.limits, self._say)
+        plan = self._plan
+        checks = None if plan.field is None else BeforeTakeOff(supervisor.bus, plan.field)
+        operator = Operator(supervisor.bus, supervisor.run.drones, plan.cameras, plan.limits, self._say, checks)
+        if checks is not None and self._look(operator, checks):
+            return FlightOutcome("", supervisor.interrupts.stop_requested, landed=True, forbidden=self._forbidden)
         failure = self._fly(operator)
         landed = self._land(operator)
         return FlightOutcome(failure, supervisor.interrupts.stop_requested, landed)
@@ -85,6 +96,19 @@ class Flight:
         unwell = self._supervisor.unwell
         return f"NOT WELL YET (see above): {', '.join(unwell)}" if unwell else "all processes are ready"
 
+    # --- look ----------------------------------------------------------------------------------------------------
+
+    def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
+        """Wait for what the checks before the take-off judge, and say what they find; return whether that is all."""
+        supervisor, looking = self._supervisor, Looking(checks, self._turn(operator))
+        while not supervisor.failure and not supervisor.interrupts.stop_requested:
+            if looking.finished(self._turn(operator)):
+                for line in looking.tell(whole=self._plan.look_only):
+                    self._say(line)
+                self._forbidden = looking.forbidden
+                return self._plan.look_only
+        return False
+
     # --- fly -----------------------------------------------------------------------------------------------------
 
     def _fly(self, operator: Operator) -> str:
@@ -92,12 +116,13 @@ class Flight:
         now_ns = self._turn(operator)
         if self._plan.asks:
             self._prompting = True
-            self._say(
-                f"{self._state()}. Press Enter to take off and track (Ctrl-C ends), or use: groundstation takeoff"
-            )
+            insist = "type anyway and press Enter" if self._forbidden else "press Enter"
+            self._say(f"{self._state()}. To take off and track {insist} (Ctrl-C ends), or use: groundstation takeoff")
         else:
             self._say(f"{self._state()}; taking off")
-            operator.take_off(now_ns)
+            operator.take_off(now_ns, anyway=self._plan.anyway)
+            if operator.forbidden:
+                return f"nobody took off: {operator.forbidden}; to fly all the same: --anyway"
             self._start.show_screen()
         began_ns = now_ns
         while True:
@@ -154,7 +179,10 @@ class Flight:
             if not line:
                 self._say("no keyboard here: waiting for groundstation takeoff")
             elif not self._prompting:
-                operator.take_off(now_ns)
+                operator.take_off(now_ns, anyway=self._plan.anyway or line.strip() == b"anyway")
+                self._prompting = bool(operator.forbidden)
+                if self._prompting:
+                    self._say("mend it and press Enter, or type anyway and press Enter")
         if not self._prompting:
             self._start.show_screen()
 

@@ -9,6 +9,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import STOP_LIVES_NS, AckStage, Command, CommandAck, Event, Lease, Severity, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
+from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
@@ -49,7 +50,7 @@ class _Dialogue:
 class Operator:
     """Call `step` 10 times a second or more. `say` gets lines for the person.
 
-    cameras: those fixed in the world; mistake: why the last take-off was stopped, if it was.
+    cameras: those fixed in the world; mistake, forbidden: why the last take-off was stopped, or did not begin.
     """
 
     def __init__(
@@ -59,10 +60,13 @@ class Operator:
         cameras: Mapping[str, FixedCamera],
         limits: TakeOffLimits,
         say: Callable[[str], None],
+        checks: BeforeTakeOff | None = None,
     ) -> None:
         self._bus = bus
         self._say = say
         self._limits = limits
+        self._checks = checks
+        self.forbidden = ""
         self.team = TeamStatus(bus, drones, cameras)
         self.phase = TeamPhase.GROUND
         self.mistake: Mistake | None = None
@@ -79,8 +83,28 @@ class Operator:
 
     # --- orders --------------------------------------------------------------------------------------------------
 
-    def take_off(self, now_ns: int, drones: tuple[str, ...] = (), then_track: bool = True) -> None:
-        """Begin the take-off sequence of the given drones (none given: all)."""
+    def take_off(
+        self, now_ns: int, drones: tuple[str, ...] = (), then_track: bool = True, anyway: bool = False
+    ) -> None:
+        """Begin the take-off sequence of the given drones (none given: all), unless it is `forbidden`."""
+        self.forbidden = self._forbids(now_ns, drones, OPERATOR if anyway else "")
+        if self.forbidden:
+            self._say(f"TAKE-OFF REFUSED: {self.forbidden}")
+            return
+        self._begin(now_ns, drones, then_track)
+
+    def _forbids(self, now_ns: int, drones: tuple[str, ...], insists: str) -> str:
+        """Return why nobody may take off, or "": nothing is wrong, or somebody insists, which is put on record."""
+        if self._checks is None:
+            return ""
+        musts = self._checks.forbids(now_ns, drones)
+        if musts and insists:
+            self._checks.record_override(insists, musts)
+            self._say(f"taking off although {len(musts)} finding(s) must be mended: {insists} insists")
+            return ""
+        return "; ".join(f"{one.subject}: {one.found} -> {one.remedy}" for one in musts)
+
+    def _begin(self, now_ns: int, drones: tuple[str, ...], then_track: bool) -> None:
         self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns)
         self._then_track = then_track
         self.mistake = None
@@ -136,6 +160,8 @@ class Operator:
             header = self._bus.header(_TEAM)
             self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=header.stamp_ns + _LEASE_LIFE_NS))
         self.team.update(now_ns)
+        if self._checks is not None:
+            self._checks.update(now_ns)
         for received in self._inbox.drain():
             match received.message:
                 case CommandAck() as ack:
@@ -197,14 +223,20 @@ class Operator:
             self._answer(request, AckStage.REFUSED, f"there is no drone {', '.join(strangers)}")
         elif self._sequence is not None:
             self._answer(request, AckStage.REFUSED, f"{self._sequence.current} is taking off")
+        elif request.verb is Verb.TAKEOFF and (why := self._why_not(request, names, now_ns)):
+            self._answer(request, AckStage.REFUSED, why)
         else:
             self._answer(request, AckStage.ACCEPTED)
             self._obey(request, names, now_ns)
 
+    def _why_not(self, request: Command, names: tuple[str, ...], now_ns: int) -> str:
+        why = self._forbids(now_ns, names, request.issuer if request.anyway else "")
+        return f"{why}. Mend it, or insist: groundstation takeoff --anyway" if why else ""
+
     def _obey(self, request: Command, names: tuple[str, ...], now_ns: int) -> None:
         match request.verb:
             case Verb.TAKEOFF:
-                self.take_off(now_ns, names, then_track=False)
+                self._begin(now_ns, names, then_track=False)
                 self._sequence_request = request
             case Verb.TRACK:
                 self.track(now_ns, names, request)

@@ -100,6 +100,8 @@ class Command(Message, frozen=True, kw_only=True):
     """Time after which it is ignored [ns; boot clock]; 0: as for all stops, 30 s after its stamp."""
     run: str = ""
     """Run that it was given for: drivers of another refuse it."""
+    anyway: bool = False
+    """Of a TAKEOFF: it is wanted although the preflight checks forbid it."""
 
 
 class AckStage(StrEnum):

@@ -1,0 +1,24 @@
+"""`groundstation preflight`: everything is started, looked at and stopped again; nobody takes off."""
+
+import click
+
+from groundstation.cli.run import SETTINGS, Rehearsal, run_real, run_simulated
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation preflight lab.yaml\n  groundstation preflight lab --scenario realistic\n\n"
+    "Exit codes: 0 nothing must be mended, 1 something must, 2 wrong settings, 4 a process failed."
+)
+@click.argument("field")
+@click.option("--scenario", metavar="S", help="Look at emulated devices under a scenario, not at the real ones.")
+@click.option("--seed", type=click.IntRange(0), help="Seed of all noise of emulated devices.")
+@SETTINGS
+def preflight(field: str, scenario: str | None, seed: int | None, options: tuple[str, ...]) -> int:
+    """Say what forbids a take-off: links, batteries, cameras, and who stands where by the fixed cameras.
+
+    Drivers and cameras of the field are started and stopped again. MUST forbids a take-off, SHOULD makes flights worse.
+    """
+    if scenario is None:
+        return run_real("preflight", field, options, headless=True, look_only=True)
+    asked = Rehearsal(scenario, None, seed, None, headless=True, anyway=False, options=options, look_only=True)
+    return run_simulated("preflight", field, asked)

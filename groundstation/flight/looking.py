@@ -1,0 +1,38 @@
+"""The checks before a take-off, from the first picture to what the operator reads."""
+
+from collections.abc import Iterator
+
+from groundstation.doctor.finding import Finding, Level
+from groundstation.preflight.judge import lines
+from groundstation.runtime.before_take_off import BeforeTakeOff
+
+# Two pictures a second, which is the least that was met on a busy machine, make a median in this time.
+_LONGEST_NS = 8_000_000_000
+_AGAIN_NS = 200_000_000
+
+
+class Looking:
+    """One look before a take-off. forbidden: whether something must be mended."""
+
+    def __init__(self, checks: BeforeTakeOff, now_ns: int) -> None:
+        self._checks, self._began_ns, self._next_ns = checks, now_ns, now_ns
+        self._findings: list[Finding] = []
+        self.forbidden = False
+
+    def finished(self, now_ns: int) -> bool:
+        """Return whether everything that can be judged has been seen, or it was waited for long enough."""
+        if now_ns < self._next_ns:
+            return False
+        self._next_ns = now_ns + _AGAIN_NS
+        if not self._checks.complete(now_ns) and now_ns - self._began_ns < _LONGEST_NS:
+            return False
+        self._findings = self._checks.findings(now_ns)
+        self.forbidden = any(one.level is Level.MUST for one in self._findings)
+        return True
+
+    def tell(self, *, whole: bool) -> Iterator[str]:
+        """Publish what was found and return it as lines; whole: also what is well."""
+        self._checks.publish(self._findings)
+        yield from lines(one for one in self._findings if whole or one.level is not Level.OK)
+        musts = sum(one.level is Level.MUST for one in self._findings)
+        yield f"before take-off: {musts or 'nothing'} must be mended"

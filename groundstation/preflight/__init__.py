@@ -1,0 +1,1 @@
+"""What is looked at before a take-off: links, cameras, and who stands where."""

@@ -1,0 +1,57 @@
+"""Links, batteries and cameras before a take-off, from what their processes say. Pure."""
+
+from collections.abc import Iterator, Mapping
+
+from groundstation.bus.messages import CameraStatus, FlightState, VehicleStatus
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.drones import camera_name
+from groundstation.field.resolved import ResolvedField
+
+_BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
+_TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
+_PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
+
+
+def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> Iterator[Finding]:
+    """Yield what is told of each drone; one that is not connected is left out by the take-off, and stops nobody."""
+    for name, drone in field.drones.items():
+        status = statuses.get(name)
+        if status is None or status.flight_state in (FlightState.UNKNOWN, FlightState.LOST):
+            why = status.detail if status is not None and status.detail else "nothing is heard of it"
+            yield Finding(Level.SHOULD, name, why, f"check its power, its network and {drone.address}")
+            continue
+        if status.flight_state is FlightState.EMERGENCY:
+            yield Finding(Level.SHOULD, name, "its motors are cut off", "set it upright and start it again")
+        yield _battery(name, status, drone.limits.battery_min)
+        if status.rate_hz < _TELEMETRY_HZ or (status.link_quality or 1.0) < _LINK_SHARE:
+            heard = "" if status.link_quality is None else f", {status.link_quality:.0%} of it arrives"
+            found = f"telemetry {status.rate_hz:.0f} Hz{heard}"
+            yield Finding(Level.SHOULD, name, found, "bring it nearer, or choose another radio channel")
+
+
+def _battery(name: str, status: VehicleStatus, lands_at: float) -> Finding:
+    charge = status.battery
+    if charge is None:
+        return Finding(Level.SHOULD, name, "its battery's charge is not known", "measure it before each flight")
+    found, remedy = f"battery {charge:.0%} (lands at {lands_at:.0%})", "charge or exchange its battery"
+    if charge < lands_at + _BATTERY_MARGIN:
+        return Finding(Level.MUST, name, found, remedy)
+    return Finding(Level.SHOULD, name, found, remedy) if charge < _BATTERY_SHOULD else Finding(Level.OK, name, found)
+
+
+def camera_findings(field: ResolvedField, statuses: Mapping[str, CameraStatus]) -> Iterator[Finding]:
+    """Yield what is told of each camera; statuses: by the camera's name on the bus."""
+    dark = [name for name in field.cameras if name not in statuses or not statuses[name].connected]
+    if len(dark) == len(field.cameras):
+        remedy = "check power, source and network of one at least: without it nobody knows where the drones are"
+        yield Finding(Level.MUST, "cameras", "no fixed camera sends pictures", remedy)
+    for name in (*field.cameras, *map(camera_name, field.drones)):
+        status = statuses.get(name)
+        if status is None or not status.connected:
+            why = status.detail if status is not None and status.detail else "no picture arrives"
+            yield Finding(Level.SHOULD, name, why, "check its power, its source and its network")
+            continue
+        found = f"{status.fps:.0f} pictures/s, {status.age_ms:.0f} ms old, {status.detections} sightings"
+        good = status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS
+        remedy = "" if good else "fewer or smaller pictures, a better link, or a faster machine"
+        yield Finding(Level.OK if good else Level.SHOULD, name, found, remedy)

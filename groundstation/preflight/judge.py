@@ -1,0 +1,59 @@
+"""Everything that is to be said before a take-off, the grave first. Pure."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+
+from groundstation.bus.messages import CameraStatus, VehicleStatus
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.health import camera_findings, drone_findings
+from groundstation.preflight.stand import PadSighting, stand_of
+from groundstation.preflight.suspicions import opinion
+from groundstation.preflight.wording import SUBJECT, finding
+
+_GRAVITY = {Level.MUST: 0, Level.SHOULD: 1, Level.OK: 2}
+
+
+def judge(
+    field: ResolvedField,
+    vehicles: Mapping[str, VehicleStatus],
+    cameras: Mapping[str, CameraStatus],
+    sightings: Sequence[PadSighting],
+    flew: Collection[str] = (),
+) -> list[Finding]:
+    """Return all findings, those that must be mended first; flew: who may stand anywhere by now."""
+    found = [*drone_findings(field, vehicles), *camera_findings(field, cameras)]
+    found += pad_findings(field, sightings, flew)
+    return sorted(found, key=lambda one: _GRAVITY[one.level])
+
+
+def pad_findings(
+    field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
+) -> Iterator[Finding]:
+    """Yield what fixed cameras say of drones on their pads: who is not seen, and what is wrong with who is."""
+    known = [s for s in sightings if s.drone in field.drones and s.camera in field.cameras]
+    seen = {s.drone for s in known}
+    unseen = [name for name in field.drones if name not in seen and name not in flew]
+    remedy = "check light, lens and marker, and that it stands on its pad in view; groundstation camera view shows it"
+    if not known and not flew:
+        yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", remedy)
+        return
+    for name in unseen:
+        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", remedy)
+    if known:
+        yield finding(field, opinion(stand_of(field), known))
+
+
+def open_musts(findings: Iterable[Finding], wanted: Collection[str], team: Collection[str]) -> list[Finding]:
+    """Return what forbids a take-off of the wanted drones (none: all): musts of others of the team do not."""
+    others = set(team) - set(wanted) if wanted else set()
+    return [one for one in findings if one.level is Level.MUST and one.subject not in others]
+
+
+def lines(findings: Iterable[Finding]) -> list[str]:
+    """Return the list as text, a remedy below each finding that has one."""
+    text = []
+    for one in findings:
+        text.append(f"{one.level:6}  {one.subject}: {one.found}")
+        if one.remedy:
+            text.append(f"{'':6}  -> {one.remedy}")
+    return text

@@ -1,0 +1,159 @@
+"""What standing drones say of the cameras, the prints and the pads: one least-squares fit for each suspicion. Pure.
+
+All figures have priors as tight as their surveys; a suspicion loosens those of one part. The evidence of a suspicion is
+Laplace's approximation: how well it explains the sightings, less what its freedom is worth.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array, Vector
+from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, rotation_z
+from groundstation.preflight.stand import LENS_STD, PLACED_M, PLACED_RAD, PRINT_STD, PadSighting, Stand
+
+PER_CAMERA = ("x", "y", "z", "roll", "pitch", "yaw", "focal")
+PER_DRONE = ("aside_x", "aside_y", "turned", "higher", "print")
+TEAM_PRINT = ("", "print")
+_SCATTER_M, _SCATTER_SHARE, _SCATTER_RAD = 0.003, 0.002, math.radians(0.5)
+_STEPS, _DIFFERENCE = 8, 1e-6
+
+Key = tuple[str, str]
+"""A figure: the name of its camera or drone ("": of all), and which of its figures."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """value, std: of each figure, as an error of the field; evidence: log; misfit: chi-square of `rows` rows."""
+
+    value: Mapping[Key, float]
+    std: Mapping[Key, float]
+    evidence: float
+    misfit: float
+    rows: int
+
+
+class PadFit:
+    """Sightings of standing drones, ready to be explained."""
+
+    def __init__(self, stand: Stand, sightings: Sequence[PadSighting]) -> None:
+        self.stand, self.sightings = stand, tuple(sightings)
+        drones = dict.fromkeys(s.drone for s in self.sightings)
+        cameras = dict.fromkeys(s.camera for s in self.sightings)
+        self.keys: tuple[Key, ...] = (
+            TEAM_PRINT,
+            *((c, part) for c in cameras for part in PER_CAMERA),
+            *((d, part) for d in drones for part in PER_DRONE),
+        )
+        self._place = {key: index for index, key in enumerate(self.keys)}
+        self._tight = np.array([self._prior(key) for key in self.keys])
+        self._at_rest: tuple[Vector, Array] | None = None
+        self._seen = np.concatenate([[*s.position_m, s.yaw_rad] for s in self.sightings])
+        self._used = np.isfinite(self._seen)
+        self._weights = np.concatenate([_deviations(s) for s in self.sightings])[self._used]
+
+    def _prior(self, key: Key) -> float:
+        name, part = key
+        match part:
+            case "print":
+                return PRINT_STD
+            case "focal":
+                return LENS_STD
+            case "x" | "y" | "z":
+                return self.stand.cameras[name].position_std_m
+            case "roll" | "pitch" | "yaw":
+                return self.stand.cameras[name].attitude_std_rad
+            case "higher":
+                return self.stand.pads[name].height_std_m
+            case "turned":
+                return PLACED_RAD
+            case _:
+                return PLACED_M
+
+    def promise(self, loose: Mapping[Key, float]) -> float:
+        """Return roughly the evidence that `explain` would find, by derivatives where nothing is off."""
+        sigma = self._sigma(loose)
+        if self._at_rest is None:
+            self._at_rest = self._linearised(np.zeros(len(self.keys)))
+        r, J = self._at_rest
+        scaled = J * sigma
+        spread = np.eye(len(r)) + scaled @ scaled.T
+        return -0.5 * float(r @ np.linalg.solve(spread, r) + np.linalg.slogdet(spread)[1])
+
+    def _sigma(self, loose: Mapping[Key, float]) -> Vector:
+        sigma = self._tight.copy()
+        for key, std in loose.items():
+            sigma[self._place[key]] = std
+        return sigma
+
+    def explain(self, loose: Mapping[Key, float], start: Mapping[Key, float] | None = None) -> Fit:
+        """Return the best fit where the given figures may be off by so much (one sigma), from a start."""
+        sigma, theta = self._sigma(loose), np.zeros(len(self.keys))
+        for key, value in (start or {}).items():
+            theta[self._place[key]] = value
+        prior = np.diag(1.0 / sigma**2)
+        for _ in range(_STEPS):
+            r, J = self._linearised(theta)
+            information = J.T @ J + prior
+            step = np.linalg.solve(information, J.T @ r - prior @ theta)
+            theta = theta + step
+            if float(np.max(np.abs(step) / sigma)) < 1e-4:
+                break
+        r, J = self._linearised(theta)
+        information = J.T @ J + prior
+        misfit = float(r @ r + theta @ prior @ theta)
+        spread = float(np.linalg.slogdet(information)[1]) + 2.0 * float(np.sum(np.log(sigma)))
+        std = np.sqrt(np.diag(np.linalg.inv(information)))
+        return Fit(
+            dict(zip(self.keys, theta.tolist(), strict=True)),
+            dict(zip(self.keys, std.tolist(), strict=True)),
+            -0.5 * (misfit + spread),
+            misfit,
+            len(r),
+        )
+
+    def _linearised(self, theta: Vector) -> tuple[Vector, Array]:
+        """Return the residuals (n) and the derivatives of what is predicted (n, figures), both in deviations."""
+        predicted = self._predicted(theta)
+        J = np.empty((len(predicted), len(theta)))
+        for column in range(len(theta)):
+            moved = theta.copy()
+            moved[column] += _DIFFERENCE
+            J[:, column] = _wrapped(self._predicted(moved) - predicted) / _DIFFERENCE
+        r = _wrapped(np.where(self._used, self._seen, 0.0) - predicted)
+        return r[self._used] / self._weights, J[self._used] / self._weights[:, None]
+
+    def _predicted(self, theta: Vector) -> Vector:
+        """Return (x, y, z [camera_optical], heading) of every sighting under errors of the field."""
+        of = dict(zip(self.keys, theta.tolist(), strict=True))
+        rows = np.empty((len(self.sightings), 4))
+        for row, s in zip(rows, self.sightings, strict=True):
+            pad, camera = self.stand.pads[s.drone], self.stand.cameras[s.camera]
+            turned = of[s.drone, "turned"]
+            aside = np.array([of[s.drone, "aside_x"], of[s.drone, "aside_y"]])
+            centre = pad.centre(aside, turned, of[s.drone, "higher"])
+            x, y, z, roll, pitch, yaw, focal = (of[s.camera, part] for part in PER_CAMERA)
+            error = rotation_from_euler(roll, pitch, yaw)
+            optical = (error @ camera.rotation).T @ (centre - camera.position_m - np.array([x, y, z]))
+            # A larger print looks nearer in all directions, a longer lens along the axis only.
+            optical = optical / ((1.0 + of[TEAM_PRINT]) * (1.0 + of[s.drone, "print"]))
+            optical[2] /= 1.0 + focal
+            heading = euler_from_rotation(error.T @ rotation_z(pad.yaw_rad + turned))[2]
+            row[:3], row[3] = optical, heading
+        return rows.reshape(-1)
+
+
+def _wrapped(rows: Vector) -> Vector:
+    """Return rows (x, y, z, heading, ...) with headings in [-pi, pi]."""
+    rows = rows.copy()
+    rows[3::4] = np.remainder(rows[3::4] + math.pi, math.tau) - math.pi
+    return rows
+
+
+def _deviations(s: PadSighting) -> Vector:
+    """Return the standard deviations of one sighting: its own, and what lasts however long one looks."""
+    far = float(np.linalg.norm(s.position_m))
+    floor = np.array([_SCATTER_M, _SCATTER_M, math.hypot(_SCATTER_M, _SCATTER_SHARE * far), _SCATTER_RAD])
+    return np.asarray(np.hypot(np.sqrt(np.maximum(np.diag(s.covariance), 0.0)), floor))

@@ -1,0 +1,99 @@
+"""Where each drone stands on its pad, and what fixed cameras see of it there. Pure values."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.field.drones import FieldDrone
+from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.rotations import rotation_z, world_from_downward_optical
+
+# Of the base above the floor: an AR.Drone on its feet, and what is usual of vehicles of that size.
+_STANDING_M = {"ardrone": (0.06, 0.015), "mavlink": (0.08, 0.04)}
+# How well a person sets a drone on a cross and a line on the floor.
+PLACED_M, PLACED_RAD = 0.01, math.radians(1.5)
+# Of a lens and of a print that were measured, as shares.
+LENS_STD, PRINT_STD = 0.004, 0.003
+
+
+@dataclass(frozen=True, slots=True)
+class PadSighting:
+    """One camera's median of one standing drone: centre of the marker [m; camera_optical], heading [rad] or NaN.
+
+    covariance: (4, 4) of the median of (centre, heading).
+    """
+
+    camera: str
+    drone: str
+    position_m: Array
+    yaw_rad: float
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Pad:
+    """A place to stand: x, y [m; world], heading [rad]; the drone's standing height and its deviation [m].
+
+    marker_m: centre of the marker [m; base].
+    """
+
+    place_m: tuple[float, float]
+    yaw_rad: float
+    height_m: float
+    height_std_m: float
+    marker_m: tuple[float, float, float]
+
+    def centre(self, aside_m: Array, turned_rad: float, higher_m: float) -> Array:
+        """Return the centre of the marker [m; world] of a drone that stands a little off its pad."""
+        x, y = self.place_m
+        base = np.array([x + aside_m[0], y + aside_m[1], self.height_m + higher_m])
+        return np.asarray(base + rotation_z(self.yaw_rad + turned_rad) @ np.array(self.marker_m))
+
+    def of(self, other: "Pad") -> "Pad":
+        """Return this drone on the pad of another one."""
+        return replace(self, place_m=other.place_m, yaw_rad=other.yaw_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyedCamera:
+    """A fixed camera as the field has it: rotation world_from_optical, position [m; world], deviations [rad], [m]."""
+
+    rotation: Array
+    position_m: Array
+    attitude_std_rad: float
+    position_std_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """All pads and fixed cameras of a field, by the names of drones and cameras."""
+
+    pads: Mapping[str, Pad]
+    cameras: Mapping[str, SurveyedCamera]
+
+    def exchanged(self, pairs: Mapping[str, str]) -> "Stand":
+        """Return the stand in which each named drone is on the pad of another one."""
+        moved = {name: self.pads[name].of(self.pads[other]) for name, other in pairs.items()}
+        return replace(self, pads={**self.pads, **moved})
+
+
+def stand_of(field: ResolvedField) -> Stand:
+    """Return the stand of a resolved field."""
+    cameras = {
+        name: SurveyedCamera(
+            world_from_downward_optical(camera.rotation_deg),
+            np.array(camera.position_m),
+            max(math.radians(camera.attitude_std_deg), 1e-3),
+            max(camera.position_std_m, 2e-3),
+        )
+        for name, camera in field.cameras.items()
+    }
+    return Stand({name: _pad(drone) for name, drone in field.drones.items()}, cameras)
+
+
+def _pad(drone: FieldDrone) -> Pad:
+    height, std = _STANDING_M[drone.kind]
+    return Pad(drone.pad_m, math.radians(drone.pad_yaw_deg), height, std, drone.marker.position_m)

@@ -1,0 +1,155 @@
+"""A verdict in words: what is wrong, by how much, how sure, and what to do about it. Pure."""
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler
+from groundstation.preflight.suspicions import Opinion, Verdict
+
+SUBJECT = "pads"
+# From here on a flight is not worth its risk (docs/explanation/preflight.md#what-standing-drones-tell).
+_MUST_SHARE, _MUST_M, _MUST_TURN, _MUST_TILT = 0.02, 0.08, math.radians(1.5), math.radians(1.2)
+_MUST_PLACED_M, _MUST_HEADING = 0.25, math.radians(10.0)
+_MOST_TOLD = 3
+_Told = tuple[bool, str, str]
+"""Whether it must be mended, what is wrong, and the remedy."""
+
+
+def finding(field: ResolvedField, opinion: Opinion) -> Finding:
+    """Return the one finding that an opinion comes to."""
+    if opinion.all_well:
+        chance = f"chi-square {opinion.nothing_wrong.misfit:.0f} of {opinion.nothing_wrong.rows} rows"
+        return Finding(Level.OK, SUBJECT, f"every drone that is seen stands where the field says ({chance})")
+    if not opinion.verdicts:
+        return _unexplained(opinion)
+    told = [_WORDS[v.suspicion.what](field, v) for v in opinion.verdicts[:_MOST_TOLD]]
+    level = Level.MUST if any(must for must, _, _ in told) else Level.SHOULD
+    if len(told) == 1:
+        return Finding(level, SUBJECT, told[0][1], told[0][2])
+    either = ", or ".join(text for _, text, _ in told)
+    checks = "; or ".join(remedy for _, _, remedy in told)
+    return Finding(level, SUBJECT, f"{either}: which of them cannot be told from here, the first is likeliest", checks)
+
+
+def _unexplained(opinion: Opinion) -> Finding:
+    fit = opinion.nothing_wrong
+    found = (
+        f"no single wrong figure explains where the drones are seen (chi-square {fit.misfit:.0f} of {fit.rows} rows)"
+    )
+    remedy = "check pads, markers and the cameras' mountings (groundstation calibrate extrinsics)"
+    return Finding(Level.MUST if fit.misfit > 10 * fit.rows else Level.SHOULD, SUBJECT, found, remedy)
+
+
+def _longer(value: float, more: str, less: str) -> str:
+    return more if value > 0.0 else less
+
+
+def _prints(field: ResolvedField, v: Verdict) -> _Told:
+    value, std = v.figure("print")
+    text = f"all markers are {100 * abs(value):.1f} +- {100 * std:.1f} % {_longer(value, 'larger', 'smaller')}"
+    squares = {drone.marker.square_mm for drone in field.drones.values() if drone.marker.size_mm is None}
+    told = "".join(f" ({one * (1 + value):.1f} mm for {one:g})" for one in sorted(squares)[:1])
+    remedy = f"measure a printed marker with a ruler{told}: print it without scaling, or set its size in the field"
+    return abs(value) >= _MUST_SHARE, f"{text} than the field says", remedy
+
+
+def _print(field: ResolvedField, v: Verdict) -> _Told:
+    value, std = v.figure("print")
+    size = f"{100 * abs(value):.1f} +- {100 * std:.1f} % {_longer(value, 'larger', 'smaller')}"
+    remedy = f"measure it: print it without scaling, or set drones.{v.suspicion.who}.marker to its size"
+    return abs(value) >= _MUST_SHARE, f"{v.suspicion.who}'s marker is {size} than the field says", remedy
+
+
+def _focal(field: ResolvedField, v: Verdict) -> _Told:
+    value, std = v.figure("focal")
+    longer = _longer(value, "longer", "shorter")
+    text = f"{v.suspicion.who}'s focal length is {100 * abs(value):.1f} +- {100 * std:.1f} % {longer} than calibrated"
+    return abs(value) >= _MUST_SHARE, text, f"calibrate the lens of {v.suspicion.who} (groundstation calibrate camera)"
+
+
+def _moved(field: ResolvedField, v: Verdict, text: str, size_m: float) -> _Told:
+    who = v.suspicion.who
+    place = (p + v.fit.value[who, axis] for p, axis in zip(field.cameras[who].position_m, "xyz", strict=True))
+    x, y, z = place if v.suspicion.what == "aside" else (*field.cameras[who].position_m[:2], tuple(place)[2])
+    remedy = f"set cameras.{who}.position_m: [{x:.2f}, {y:.2f}, {z:.2f}], or groundstation calibrate extrinsics"
+    return abs(size_m) >= _MUST_M, text, remedy
+
+
+def _aside(field: ResolvedField, v: Verdict) -> _Told:
+    size, std = v.size("x", "y")
+    x, y = v.figure("x")[0], v.figure("y")[0]
+    text = f"{v.suspicion.who} hangs {size:.2f} +- {std:.2f} m aside of its place (x {x:+.2f}, y {y:+.2f})"
+    return _moved(field, v, text, size)
+
+
+def _height(field: ResolvedField, v: Verdict) -> _Told:
+    value, std = v.figure("z")
+    higher = _longer(value, "higher", "lower")
+    text = f"{v.suspicion.who} hangs {abs(value):.2f} +- {std:.2f} m {higher} than the field says"
+    return _moved(field, v, text, value)
+
+
+def _rotation(field: ResolvedField, v: Verdict, text: str, must: bool) -> _Told:
+    who = v.suspicion.who
+    error = rotation_from_euler(*(v.fit.value[who, part] for part in ("roll", "pitch", "yaw")))
+    known = rotation_from_euler(*np.radians(field.cameras[who].rotation_deg).tolist())
+    roll, pitch, yaw = np.degrees(euler_from_rotation(error @ known)).tolist()
+    remedy = (
+        f"set cameras.{who}.rotation_deg: [{roll:.1f}, {pitch:.1f}, {yaw:.1f}], or groundstation calibrate extrinsics"
+    )
+    return must, text, remedy
+
+
+def _turned(field: ResolvedField, v: Verdict) -> _Told:
+    value, std = v.figure("yaw")
+    degrees = f"{math.degrees(value):.1f} +- {math.degrees(std):.1f} deg"
+    text = f"{v.suspicion.who} is turned by {degrees} about the vertical"
+    return _rotation(field, v, text, abs(value) >= _MUST_TURN)
+
+
+def _tilted(field: ResolvedField, v: Verdict) -> _Told:
+    size, std = v.size("roll", "pitch")
+    text = f"{v.suspicion.who} is tilted by {math.degrees(size):.1f} +- {math.degrees(std):.1f} deg"
+    return _rotation(field, v, text, size >= _MUST_TILT)
+
+
+def _placed(field: ResolvedField, v: Verdict) -> _Told:
+    who, (size, std), (turn, _) = v.suspicion.who, v.size("aside_x", "aside_y"), v.figure("turned")
+    x, y = (p + v.figure(part)[0] for p, part in zip(field.drones[who].pad_m, ("aside_x", "aside_y"), strict=True))
+    text = f"{who} stands {size:.2f} +- {std:.2f} m from its pad, turned by {math.degrees(turn):.0f} deg"
+    remedy = f"put it on its pad, or set drones.{who}.pad_m: [{x:.2f}, {y:.2f}]"
+    return size >= _MUST_PLACED_M or abs(turn) >= _MUST_HEADING, text, remedy
+
+
+def _heading(field: ResolvedField, v: Verdict) -> _Told:
+    who, (value, std) = v.suspicion.who, v.figure("turned")
+    text = (
+        f"{who}'s marker is turned by {math.degrees(value):.0f} +- {math.degrees(std):.0f} deg from its pad's heading"
+    )
+    remedy = f"turn {who} on its pad; if it stands right, its marker is turned, and it would fly the wrong way"
+    return abs(value) >= _MUST_HEADING, text, remedy
+
+
+def _exchanged(field: ResolvedField, v: Verdict) -> _Told:
+    pairs = [f"{one} stands on the pad of {other}" for one, other in v.suspicion.exchanged.items()]
+    names = " and ".join(dict.fromkeys((*v.suspicion.exchanged, *v.suspicion.exchanged.values())))
+    remedy = f"exchange the drones; if they stand right, the marker codes (or pads) of {names} in the field file do not"
+    return True, ", and ".join(pairs), remedy
+
+
+_WORDS: Mapping[str, Callable[[ResolvedField, Verdict], _Told]] = {
+    "prints": _prints,
+    "print": _print,
+    "focal": _focal,
+    "aside": _aside,
+    "height": _height,
+    "turned": _turned,
+    "tilted": _tilted,
+    "placed": _placed,
+    "heading": _heading,
+    "exchanged": _exchanged,
+}

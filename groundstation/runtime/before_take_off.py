@@ -1,0 +1,84 @@
+"""Collects what the preflight checks judge, from the bus, and answers whether a take-off is open."""
+
+from collections.abc import Collection
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import (
+    CameraStatus,
+    Event,
+    FlightState,
+    RelativeObservation,
+    Severity,
+    VehicleStatus,
+)
+from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, VEHICLE_STATUS
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.judge import judge, open_musts
+from groundstation.preflight.pad_record import PadRecord
+
+_STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+_SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
+
+
+class BeforeTakeOff:
+    """Call `update` often; `findings` takes up to a tenth of a second with a team of two.
+
+    A drone that flew once in this run may stand anywhere: its pad says nothing of it any more.
+    """
+
+    def __init__(self, bus: Bus, field: ResolvedField) -> None:
+        self._bus, self._field = bus, field
+        self._inbox = bus.subscribe([OBSERVATION, VEHICLE_STATUS, CAMERA_STATUS])
+        self._vehicles: dict[str, VehicleStatus] = {}
+        self._cameras: dict[str, CameraStatus] = {}
+        self._flew: set[str] = set()
+        self._record = PadRecord(field.cameras)
+
+    def update(self, now_ns: int) -> None:
+        """Take in what has arrived."""
+        for received in self._inbox.drain():
+            match received.message:
+                case RelativeObservation() as sighting if sighting.subject not in self._flew:
+                    self._record.see(sighting, now_ns)
+                case CameraStatus() as status:
+                    self._cameras[status.header.entity] = status
+                case VehicleStatus() as status:
+                    self._hear(status)
+
+    def _hear(self, status: VehicleStatus) -> None:
+        name = status.header.entity
+        self._vehicles[name] = status
+        if status.flight_state not in _STANDS and status.flight_state not in (FlightState.UNKNOWN, FlightState.LOST):
+            self._flew.add(name)
+            self._record.forget(name)
+
+    def complete(self, now_ns: int) -> bool:
+        """Return whether every process has spoken and every drone that has not flown was seen often enough."""
+        seen = {sighting.drone for sighting in self._record.medians(now_ns)}
+        return set(self._field.drones) <= seen | self._flew and set(self._field.cameras) <= self._cameras.keys()
+
+    def findings(self, now_ns: int) -> list[Finding]:
+        """Return everything that is to be said now, the grave first."""
+        return judge(self._field, self._vehicles, self._cameras, self._record.medians(now_ns), self._flew)
+
+    def forbids(self, now_ns: int, drones: Collection[str]) -> list[Finding]:
+        """Return what forbids a take-off of the given drones (none: all)."""
+        return open_musts(self.findings(now_ns), drones, self._field.drones)
+
+    def publish(self, findings: Collection[Finding]) -> None:
+        """Tell the console and the recording what is not well."""
+        for one in findings:
+            if one.level in _SEVERITIES:
+                entity = one.subject if one.subject in self._field.drones else "team"
+                text = f"before take-off: {one.subject}: {one.found}"
+                header = self._bus.header(entity)
+                event = Event(header=header, severity=_SEVERITIES[one.level], text=text, remedy=one.remedy)
+                self._bus.publish(EVENT, event)
+
+    def record_override(self, who: str, findings: Collection[Finding]) -> None:
+        """Tell everybody, and the recording, that somebody takes off although it was forbidden."""
+        what = "; ".join(f"{one.subject}: {one.found}" for one in findings)
+        text = f"{who} takes off although it must not: {what}"
+        event = Event(header=self._bus.header("team"), severity=Severity.WARNING, text=text, remedy="land")
+        self._bus.publish(EVENT, event)

@@ -1,0 +1,34 @@
+"""A room that is not as the field says: nobody takes off, unless a person insists."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(240)]
+ASIDE = "cameras.ceiling.position_m=[0.2,0.0,4.2]"
+CODES = ("drones.drone_1.marker.code=2", "drones.drone_2.marker.code=1")
+
+
+def room(*changes: str) -> tuple[str, ...]:
+    return (sys.executable, str(Path(__file__).with_name("differing_room.py")), *changes, "--")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [((ASIDE,), "ceiling hangs 0.2"), (CODES, "drone_1 stands on the pad of drone_2")],
+)
+def test_a_wrong_room_is_refused_on_the_floor(sitl: Callable[..., Any], changes: tuple[str, ...], words: str) -> None:
+    run = sitl("--duration", "10", program=room(*changes))
+    assert run.wait(120) == 4, run.text
+    assert words in run.text and "nobody took off" in run.text and "--anyway" in run.text
+    assert max(state.position_m[2] for name in ("drone_1", "drone_2") for _, state in run.truth(name)) < 0.1
+
+
+def test_who_insists_flies_in_a_wrong_room_and_it_is_recorded(sitl: Callable[..., Any]) -> None:
+    run = sitl("--duration", "10", "--anyway", program=room(ASIDE))
+    run.wait(150)
+    assert "takes off although it must not" in run.text or "insists" in run.text, run.text
+    assert max(state.position_m[2] for _, state in run.truth("drone_1")) > 0.5

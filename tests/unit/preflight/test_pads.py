@@ -1,0 +1,132 @@
+"""What fixed cameras see of standing drones tells which one figure of the field is wrong, or that none is."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, rotation_z
+from groundstation.preflight.judge import open_musts, pad_findings
+from groundstation.preflight.stand import PadSighting, stand_of
+from groundstation.preflight.suspicions import opinion
+
+SPREAD = np.array([0.0025, 0.0025, 0.022, 0.0045])  # of one sighting from 4 m, as rendered pictures have it
+SIGHTINGS = 12
+
+
+@dataclass(frozen=True)
+class Truth:
+    """How the room differs from the field: shares of prints ("": all), degrees, metres."""
+
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    prints: dict[str, float] = field(default_factory=dict)
+    focal: float = 0.0
+    on_pad_of: dict[str, str] = field(default_factory=dict)
+    moved: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+
+def seen(site: ResolvedField, truth: Truth, seed: int) -> list[PadSighting]:
+    """Return what the ceiling camera sees: mounted, placed and measured as well as people and pictures do."""
+    rng, stand = np.random.default_rng(seed), stand_of(site)
+    camera = stand.cameras["ceiling"]
+    place = camera.position_m + truth.shift + camera.position_std_m * rng.standard_normal(3)
+    error = rotation_from_euler(*(np.radians(truth.turn_deg) + camera.attitude_std_rad * rng.standard_normal(3)))
+    found = []
+    for name, own in stand.pads.items():
+        pad = own.of(stand.pads[truth.on_pad_of.get(name, name)])
+        x, y, turned_deg = truth.moved.get(name, (0.0, 0.0, 0.0))
+        turn = math.radians(turned_deg + 0.7 * rng.standard_normal())
+        centre = pad.centre(np.array([x, y]) + 0.005 * rng.standard_normal(2), turn, 0.005 * rng.standard_normal())
+        optical = (error @ camera.rotation).T @ (centre - place)
+        optical /= 1.0 + truth.prints.get(name, truth.prints.get("", 0.0))
+        optical[2] /= 1.0 + truth.focal
+        variance = 1.57 * SPREAD**2 / SIGHTINGS
+        noise = np.sqrt(variance) * rng.standard_normal(4)
+        heading = euler_from_rotation(error.T @ rotation_z(pad.yaw_rad + turn))[2] + float(noise[3])
+        found.append(PadSighting("ceiling", name, optical + noise[:3], heading, np.diag(variance)))
+    return found
+
+
+def only(site: ResolvedField, truth: Truth, seed: int = 1) -> Finding:
+    (finding,) = pad_findings(site, seen(site, truth, seed))
+    return finding
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_room_as_the_field_says_is_well(lab_field: ResolvedField, seed: int) -> None:
+    assert only(lab_field, Truth(), seed).level is Level.OK
+
+
+ROWS: list[tuple[Truth, str, str]] = [
+    (Truth(prints={"": 0.05}), "all markers are", "ruler"),
+    (Truth(prints={"drone_1": 0.05}), "drone_1's marker is", "measure it"),
+    (Truth(shift=(0.2, 0.0, 0.0)), "ceiling hangs 0.", "cameras.ceiling.position_m: ["),
+    (Truth(shift=(0.0, 0.0, 0.2)), "ceiling hangs 0.2", "4.4"),
+    (Truth(turn_deg=(0.0, 0.0, 3.0)), "ceiling is turned by", "cameras.ceiling.rotation_deg"),
+    (Truth(turn_deg=(0.0, 0.0, 180.0)), "ceiling is turned by", "cameras.ceiling.rotation_deg"),
+    (Truth(turn_deg=(3.0, 0.0, 0.0)), "ceiling is tilted by", "cameras.ceiling.rotation_deg: [2."),
+    (Truth(focal=0.03), "focal length is", "groundstation calibrate camera"),
+    (Truth(on_pad_of={"drone_1": "drone_2", "drone_2": "drone_1"}), "stands on the pad of", "exchange the drones"),
+    (Truth(moved={"drone_1": (0.4, 0.0, 0.0)}), "drone_1 stands 0.4", "pad_m: [-0.0"),
+    (Truth(moved={"drone_2": (0.0, 0.0, 90.0)}), "drone_2's marker is turned by 9", "the wrong way"),
+]
+
+
+@pytest.mark.parametrize(("truth", "found", "remedy"), ROWS)
+def test_one_wrong_figure_is_named_with_size_and_remedy(
+    lab_field: ResolvedField, truth: Truth, found: str, remedy: str
+) -> None:
+    finding = only(lab_field, truth)
+    assert finding.level is Level.MUST
+    assert found in finding.found and remedy in finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("truth", "what", "part", "value"),
+    [
+        (Truth(prints={"": 0.05}), "prints", "print", 0.05),
+        (Truth(turn_deg=(0.0, 0.0, 4.0)), "turned", "yaw", math.radians(4.0)),
+        (Truth(shift=(0.2, 0.0, 0.0)), "aside", "x", 0.2),
+    ],
+)
+def test_a_size_is_within_its_deviation(
+    lab_field: ResolvedField, truth: Truth, what: str, part: str, value: float
+) -> None:
+    for seed in range(2):
+        said = opinion(stand_of(lab_field), seen(lab_field, truth, seed))
+        (verdict,) = [v for v in said.verdicts if v.suspicion.what == what]
+        found, std = verdict.figure(part)
+        assert abs(found - value) < 3.0 * std and std < 0.3 * value
+
+
+def test_what_cannot_be_told_apart_is_told_together(lab_field: ResolvedField) -> None:
+    finding = only(lab_field, Truth(shift=(0.2, 0.0, 0.0)))
+    assert "cannot be told from here" in finding.found and "tilted" in finding.found
+
+
+def test_two_things_wrong_at_once_are_not_forced_into_one(lab_field: ResolvedField) -> None:
+    truth = Truth(prints={"drone_1": 0.06}, moved={"drone_2": (0.5, 0.3, 40.0)})
+    finding = only(lab_field, truth)
+    assert finding.level is Level.MUST and "no single wrong figure explains" in finding.found
+
+
+def test_nobody_in_view_forbids_and_one_out_of_view_does_not(lab_field: ResolvedField) -> None:
+    (blind,) = pad_findings(lab_field, [])
+    assert blind.level is Level.MUST and "no fixed camera sees any drone" in blind.found
+    one = [s for s in seen(lab_field, Truth(), 1) if s.drone == "drone_1"]
+    unseen, well = pad_findings(lab_field, one)
+    assert (unseen.subject, unseen.level, well.level) == ("drone_2", Level.SHOULD, Level.OK)
+    assert list(pad_findings(lab_field, [], flew=("drone_1", "drone_2"))) == []
+
+
+def test_a_must_of_one_drone_does_not_hold_the_others() -> None:
+    flat: list[Any] = [Finding(Level.MUST, "drone_1", "battery 5 %"), Finding(Level.SHOULD, "pads", "a little off")]
+    assert open_musts(flat, ("drone_2",), ("drone_1", "drone_2")) == []
+    assert open_musts(flat, (), ("drone_1", "drone_2")) == flat[:1]
+    everywhere = [Finding(Level.MUST, "pads", "all markers are larger")]
+    assert open_musts(everywhere, ("drone_2",), ("drone_1", "drone_2")) == everywhere

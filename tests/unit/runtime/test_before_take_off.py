@@ -1,0 +1,177 @@
+"""A take-off with something that must be mended: refused, unless a person insists, which is put on record."""
+
+import numpy as np
+import pytest
+
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import (
+    AckStage,
+    CameraStatus,
+    Command,
+    CommandAck,
+    Event,
+    FlightState,
+    Header,
+    RelativeObservation,
+    VehicleStatus,
+    Verb,
+)
+from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT, OBSERVATION, VEHICLE_STATUS
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.resolved import ResolvedField
+from groundstation.flight.looking import Looking
+from groundstation.preflight.stand import stand_of
+from groundstation.runtime.before_take_off import BeforeTakeOff
+from groundstation.runtime.operator import Operator, TeamPhase
+from groundstation.runtime.take_off import TakeOffLimits
+
+MS = 1_000_000
+
+
+class Lab:
+    """Two drones on their pads and a ceiling camera; higher_m: the camera hangs higher than the field says."""
+
+    def __init__(self, field: ResolvedField, higher_m: float = 0.0) -> None:
+        exchange = MemoryExchange()
+        self.field, self.higher_m, self.now_ns = field, higher_m, 10**12
+        self.bus = MemoryBus(exchange, "lab", "supervisor")
+        self.page = MemoryBus(exchange, "lab", "console")
+        self.devices = MemoryBus(exchange, "lab", "devices")
+        self.heard = self.page.subscribe([EVENT, COMMAND_ACK, COMMAND])
+        self.said: list[str] = []
+        self.checks = BeforeTakeOff(self.bus, field)
+        drones = tuple(field.drones)
+        self.operator = Operator(self.bus, drones, {}, TakeOffLimits(), self.said.append, self.checks)
+        self.states = dict.fromkeys(drones, FlightState.LANDED)
+
+    def turn(self, times: int = 12) -> None:
+        for _ in range(times):
+            self.now_ns += 66 * MS
+            self._speak()
+            self.operator.step(self.now_ns)
+
+    def _speak(self) -> None:
+        stand = stand_of(self.field)
+        camera = stand.cameras["ceiling"]
+        for name, state in self.states.items():
+            header = self.devices.header(name)
+            status = VehicleStatus(header=header, flight_state=state, mode="LANDED", battery=0.9, rate_hz=200.0)
+            self.devices.publish(VEHICLE_STATUS, status)
+            pad = stand.pads[name]
+            centre = pad.centre(np.zeros(2), 0.0, 0.0) - camera.position_m
+            x, y, z = (camera.rotation.T @ centre).tolist()
+            observation = RelativeObservation(
+                header=self.devices.header("ceiling"),
+                observer="ceiling",
+                subject=name,
+                camera="ceiling",
+                position_m=(x, y, z + self.higher_m),
+                yaw_rad=pad.yaw_rad,
+                covariance=tuple(1e-4 if i % 5 == 0 else 0.0 for i in range(16)),
+            )
+            self.devices.publish(OBSERVATION, observation)
+        for name in self.field.calibrations:
+            status_of = CameraStatus(
+                header=self.devices.header(name),
+                connected=True,
+                fps=15.0,
+                age_ms=150.0,
+                frames=99,
+                skipped=0,
+                detections=99,
+            )
+            self.devices.publish(CAMERA_STATUS, status_of)
+
+    def ask(self, *, anyway: bool = False, drones: tuple[str, ...] = ()) -> CommandAck:
+        header = Header(self.now_ns, self.page.header("operator").clock, "operator", "console", 1)
+        command = Command(
+            header=header,
+            id=f"c{self.now_ns}",
+            verb=Verb.TAKEOFF,
+            scope=("operator", *drones),
+            issuer="console",
+            run=self.bus.run,
+            anyway=anyway,
+        )
+        self.page.publish(COMMAND, command)
+        self.turn(1)
+        self.news = [received.message for received in self.heard.drain()]
+        return [one for one in self.news if isinstance(one, CommandAck) and one.command_id == command.id][-1]
+
+    @property
+    def events(self) -> list[Event]:
+        return [one for one in self.news if isinstance(one, Event)]
+
+
+def test_a_well_team_takes_off(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field)
+    lab.turn()
+    assert lab.checks.complete(lab.now_ns)
+    assert lab.ask().stage is AckStage.ACCEPTED
+    assert lab.operator.phase is TeamPhase.TAKING_OFF
+
+
+def test_an_open_must_refuses_the_take_off_with_cause_and_remedy(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field, higher_m=0.3)
+    lab.turn()
+    answer = lab.ask()
+    assert answer.stage is AckStage.REFUSED and lab.operator.phase is TeamPhase.GROUND
+    assert "ceiling" in answer.reason and "cameras.ceiling.position_m" in answer.reason
+    assert "groundstation takeoff --anyway" in answer.reason
+    lab.operator.take_off(lab.now_ns)
+    assert lab.operator.phase is TeamPhase.GROUND and lab.said[-1].startswith("TAKE-OFF REFUSED: pads:")
+
+
+def test_who_insists_takes_off_and_is_named_on_the_record(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field, higher_m=0.3)
+    lab.turn()
+    assert lab.ask(anyway=True).stage is AckStage.ACCEPTED
+    assert lab.operator.phase is TeamPhase.TAKING_OFF
+    (override,) = [event for event in lab.events if "although it must not" in event.text]
+    assert override.text.startswith("console takes off") and "ceiling" in override.text
+
+
+def test_who_flew_in_this_run_may_stand_anywhere(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field, higher_m=0.3)
+    lab.turn()
+    lab.states = dict.fromkeys(lab.states, FlightState.HOVERING)
+    lab.turn()
+    lab.states = dict.fromkeys(lab.states, FlightState.LANDED)
+    lab.turn()
+    assert lab.checks.forbids(lab.now_ns, ()) == []
+
+
+def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field, higher_m=0.3)
+    looking = Looking(lab.checks, lab.now_ns)
+    assert not looking.finished(lab.now_ns), "nothing was seen yet"
+    lab.turn()
+    assert looking.finished(lab.now_ns) and looking.forbidden
+    told = list(looking.tell(whole=False))
+    assert told[0].startswith("MUST") and told[-1] == "before take-off: 1 must be mended"
+    lab.turn(1)
+    events = [r.message for r in lab.heard.drain() if isinstance(r.message, Event)]
+    assert [event.severity for event in events] == ["ERROR"] and events[0].remedy
+
+
+def test_a_look_ends_where_nothing_arrives(lab_field: ResolvedField) -> None:
+    checks = BeforeTakeOff(MemoryBus(MemoryExchange(), "lab", "supervisor"), lab_field)
+    looking = Looking(checks, 0)
+    assert not looking.finished(1000 * MS)
+    assert looking.finished(9000 * MS)
+    told = "\n".join(looking.tell(whole=True))
+    assert "no fixed camera sends pictures" in told and "nothing is heard of it" in told
+
+
+@pytest.mark.parametrize(("battery", "level"), [(0.9, None), (0.3, Level.SHOULD), (0.17, Level.MUST)])
+def test_a_battery_is_judged_by_where_it_lands(lab_field: ResolvedField, battery: float, level: Level | None) -> None:
+    lab = Lab(lab_field)
+    lab.turn()
+    header = lab.devices.header("drone_1")
+    status = VehicleStatus(
+        header=header, flight_state=FlightState.LANDED, mode="LANDED", battery=battery, rate_hz=200.0
+    )
+    lab.devices.publish(VEHICLE_STATUS, status)
+    lab.checks.update(lab.now_ns)
+    found: list[Finding] = [one for one in lab.checks.findings(lab.now_ns) if one.level is not Level.OK]
+    assert [one.level for one in found] == ([] if level is None else [level])

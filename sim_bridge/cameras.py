@@ -1,4 +1,4 @@
-"""The emulated cameras: one render process each, told what to see and where to serve it."""
+"""The emulated cameras: one render process each, with its view and its address."""
 
 import math
 import multiprocessing
@@ -190,7 +190,7 @@ class Cameras:
         return tuple(self._modes)
 
     def set_mode(self, drone: str, mode: VideoMode) -> None:
-        """Tell a drone's camera what the drone's configuration says; what it knows already is not repeated."""
+        """Send a drone's video configuration to its camera, if it has changed."""
         teller, known = self._modes[drone]
         if mode != known:
             self._modes[drone] = teller, mode

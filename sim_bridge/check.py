@@ -16,7 +16,7 @@ from sim_bridge.scenario import Scenario
 
 
 def faults_of(text: bytes) -> list[dict[str, Any]]:
-    """Return what is wrong with a scenario in JSON; empty when nothing is."""
+    """Return the mistakes of a scenario in JSON; empty without any."""
     try:
         Scenario.model_validate_json(text)
     except ValidationError as error:

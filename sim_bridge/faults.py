@@ -1,4 +1,4 @@
-"""Faults of a scenario: what breaks when, and what heals."""
+"""Faults of a scenario, with their begin and end."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,7 @@ class Emulator(Protocol):
 
 
 class FaultSchedule:
-    """Switches what faults do to the world and to links as time passes, and says so of all of them.
+    """Applies faults to the world and to links as time passes, and reports each.
 
     Wrong values are applied by the vehicles' edges, those of cameras by the render processes, at the same times.
     """

@@ -1,4 +1,4 @@
-"""Random bursts without a link, drawn as faults: one table of what breaks, whoever breaks it."""
+"""Random bursts without a link, drawn as faults, so that all faults are in one table."""
 
 from collections.abc import Iterable
 

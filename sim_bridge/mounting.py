@@ -1,4 +1,4 @@
-"""How a camera fixed in the room really hangs: a little off what the field says, as a real one is."""
+"""The true mounting of a fixed camera: a little off the field file, like a real one."""
 
 import math
 
@@ -11,7 +11,7 @@ from sim_bridge.world.noise import generator_of
 
 
 def generator_of_eye(seed: int, name: str) -> np.random.Generator:
-    """Return what a camera draws from: first its mounting, alike at message level and at the wire."""
+    """Return a camera's random generator: it draws the mounting first, so study and SITL have the same."""
     return generator_of(seed, f"{name}/eye")
 
 

@@ -70,7 +70,7 @@ class MarkerOfDrone(MarkerPrint):
 
 
 class EmulatedCamera(_Part):
-    """A drone's camera [base]; source: where its driver looks for the pictures, which says how they travel."""
+    """A drone's camera [base]; source: the address of its pictures, which also determines their transport."""
 
     source: str = ""
     calibration: Lens
@@ -90,7 +90,7 @@ class MavlinkIdentity(_Part):
 
 
 class SiteDrone(_Part):
-    """One drone: kind, place and heading of its pad, what it carries."""
+    """One drone: kind, place and heading of its pad, marker and camera."""
 
     kind: Literal["ardrone", "mavlink"]
     mavlink: MavlinkIdentity | None = None
@@ -105,7 +105,7 @@ class SiteDrone(_Part):
         return math.radians(self.pad_yaw_deg)
 
     def require_mavlink(self) -> MavlinkIdentity:
-        """Return who a MAVLink vehicle is; raises SettingsError where nothing says so."""
+        """Return the identity of a MAVLink vehicle; raises SettingsError if it has none."""
         if self.mavlink is None:
             raise SettingsError([f"kind: {self.kind} has no mavlink section"])
         return self.mavlink

@@ -50,7 +50,7 @@ class Stage:
             self._board.write(stamp_ns, self.world.states())
 
     def tell_cameras(self) -> None:
-        """Hand what the drones' configurations say of their video to the processes that render it."""
+        """Pass the drones' video configurations to the render processes."""
         if self.cameras is None:
             return
         for name in self.cameras.configurable:

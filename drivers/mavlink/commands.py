@@ -29,7 +29,7 @@ _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
 
 
 class Orders:
-    """Keeps what was asked of one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
+    """Keeps the requests to one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
 
     def __init__(self, vehicle: VehicleSettings, flavour: Flavour, requests: Requests) -> None:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
@@ -54,7 +54,7 @@ class Orders:
         return custom_mode == self._guided and not self._taken_over
 
     def last_said(self, now_ns: int) -> str:
-        """Return what the vehicle said last, if that was just now: it explains a change of its mode."""
+        """Return the vehicle's last text, if recent: it explains a change of its mode."""
         if not self.said or now_ns - self.said[-1][0] > _EXPLAINS_NS:
             return ""
         return f" ({self.said[-1][1]})"
@@ -92,7 +92,7 @@ class Orders:
         return None
 
     def _climbed(self, now_ns: int, landed: int, reported_m: float) -> float:
-        """Return the height above the floor [m]: as the tracker knows it, else since lift-off as it says itself."""
+        """Return the height above the floor [m]: from the tracker, else the vehicle's own since lift-off."""
         if landed == Landed.ON_GROUND or self._floor_m is None:
             self._floor_m = reported_m
             self.drift.reset()

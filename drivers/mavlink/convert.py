@@ -1,4 +1,4 @@
-"""Units and frames: what MAVLink's figures mean on the bus, and what our velocities and poses mean to an autopilot.
+"""Units and frames: MAVLink telemetry to bus messages, our velocities and poses to MAVLink messages.
 
 WIRE (docs/reference/mavlink.md 5.1): NED and FRD, yaw clockwise. Since the autopilot's heading comes from our estimate,
 its local NED is the world turned upside down about x: north = world x, east = -y, down = -z.
@@ -86,7 +86,7 @@ def velocity_from_local(message: LocalPositionNed, attitude: BaseAttitude) -> Ve
 def sample_from_local(
     stamp_ns: int, message: LocalPositionNed, attitude: BaseAttitude, inertial: tuple[float, ...]
 ) -> MotionSample:
-    """Return what the plausibility of a velocity is judged by: in the axes in which it is told, where it can stand."""
+    """Return the input of the plausibility check of a velocity, in the axes of the message, where it can stand."""
     tilt = (attitude.roll_rad, attitude.pitch_rad)
     return MotionSample(
         stamp_ns, (message.vx, -message.vy), *tilt, inertial, message.time_boot_ms * 1_000_000, attitude.yaw_rad
@@ -114,7 +114,7 @@ def imu_from_raw(message: RawImu) -> tuple[Vector3, Vector3]:
 
 
 def flight_state_from(flavour: Flavour, base_mode: int, custom_mode: int, status: int, landed: int) -> FlightState:
-    """Return what the vehicle does. status: MAV_STATE; landed: MAV_LANDED_STATE.
+    """Return the vehicle's flight state. status: MAV_STATE; landed: MAV_LANDED_STATE.
 
     In the air means FLYING, also while it still climbs to its take-off height: from there on cameras may see it.
     """

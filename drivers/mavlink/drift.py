@@ -32,7 +32,7 @@ Vector2 = tuple[float, float]
 
 
 class Obedience:
-    """Whether a vehicle moves as it was told by its own word, rather than by that of the cameras.
+    """Whether a vehicle follows its commands by its own report, rather than by the cameras.
 
     An estimator that errs obeys by its own word. Where cameras see what was told, it is the report that is wrong, not
     what the vehicle flies by.
@@ -44,7 +44,7 @@ class Obedience:
         self._reported_off = self._seen_off = 0.0
 
     def tell(self, now_ns: int, velocity: Vector2) -> None:
-        """Note what goes out [m/s; base_stabilized]."""
+        """Note the velocity sent [m/s; base_stabilized]."""
         share = _share(now_ns - self._told_ns, _RESPONSE_S)
         self._expected, self._told_ns = _towards(self._expected, velocity, share), now_ns
 
@@ -97,7 +97,7 @@ class DriftFeedback:
         self._at_ns = now_ns
 
     def drift(self, now_ns: int) -> Vector3:
-        """Return reported less true velocity [m/s; base_stabilized]: what to add to what it is to fly."""
+        """Return reported less true velocity [m/s; base_stabilized], the correction of a commanded velocity."""
         size = math.hypot(*self._drift)
         doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
         if self._at_ns is None or doubted or size > _MOST_M_S:

@@ -84,7 +84,7 @@ class Fleet:
                 self._news.append((text, "see system_id in the field file"))
 
     def turn(self, now_ns: int) -> None:
-        """Hand the tracker's estimate to the vehicles and tell the operator what they say."""
+        """Pass the tracker's estimate to the vehicles and their events to the operator."""
         for received in self._estimates.drain():
             if isinstance(received.message, Estimate):
                 for vehicle in self.vehicles.values():
@@ -127,7 +127,7 @@ def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) 
 
 
 def run(child: HostProcess) -> int:
-    """Fly the vehicles of one link until told to stop; the process entry."""
+    """Fly the vehicles of one link until asked to stop; the process entry."""
     try:
         settings = MavlinkDriverSettings.model_validate_json(child.section)
     except ValidationError as error:

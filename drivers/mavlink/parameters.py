@@ -1,4 +1,4 @@
-"""Parameters that indoor flight on our position needs, and what is wrong with those a vehicle has.
+"""Parameters needed for indoor flight on our position, and a vehicle's differences from them.
 
 Reasons and sources, one by one: docs/reference/mavlink.md 5.4.1. Checked with PX4 1.16 and ArduCopter 4.6.
 """
@@ -19,7 +19,7 @@ _CHECKED: dict[Flavour, tuple[Version, Version]] = {
 
 @dataclass(frozen=True, slots=True)
 class Needed:
-    """One parameter: the value that `setup` writes, how it travels, and what it is for.
+    """One parameter: the value that `setup` writes, its type on the wire, and its purpose.
 
     accepted: lowest and highest value that will do as well; others: single values that will do; aliases: its names in
     other releases.
@@ -46,7 +46,7 @@ class Needed:
 
     @property
     def wish(self) -> str:
-        """Return what it may be, in words."""
+        """Return its permitted values, in words."""
         if self.accepted is not None:
             return f"{self.accepted[0]:g} to {self.accepted[1]:g}"
         return " or ".join(f"{value:g}" for value in (self.value, *self.others))
@@ -89,7 +89,7 @@ _ARDUPILOT = (
 
 
 def needed(flavour: Flavour, our_system: int, overrides: Mapping[str, float] | None = None) -> tuple[Needed, ...]:
-    """Return what a vehicle of a flavour must be set to, when this ground station has a system id.
+    """Return the parameters needed by a vehicle of a flavour, for this ground station's system id.
 
     overrides: values of the field file, by name or alias; a name of its own is checked as well.
     """
@@ -135,7 +135,7 @@ def is_checked(flavour: Flavour, version: Version | None) -> bool:
 
 
 def difference(wanted: Needed, found: Mapping[str, float]) -> str:
-    """Return what is wrong with one parameter, or ""; found: by name or alias."""
+    """Return the fault of one parameter, or ""; found: by name or alias."""
     name = next((n for n in wanted.names if n in found), None)
     if name is None:
         return f"{wanted.name} is missing, needs {wanted.wish} ({wanted.reason})"

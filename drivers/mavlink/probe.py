@@ -1,4 +1,4 @@
-"""Who is on a link: listens, asks each vehicle what it is, and tells what it needs to be flown."""
+"""Lists the vehicles on a link: kind and version of each, and its needs for flight."""
 
 import time
 from dataclasses import dataclass, field

@@ -47,7 +47,7 @@ class GyroHeading:
 
 
 class TelemetryPublisher:
-    """Turns what the reader hears into messages, stamped with their receipt."""
+    """Turns telemetry into bus messages, stamped with its receipt."""
 
     def __init__(self, settings: VehicleSettings, bus: Bus) -> None:
         self._name, self._bus = settings.name, bus

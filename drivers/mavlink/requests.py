@@ -1,4 +1,4 @@
-"""Requests to one vehicle that are acknowledged: asked again until answered, and what the answers were. Pure."""
+"""Acknowledged requests to one vehicle, repeated until answered, with the answers. Pure."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class Requests:
         self.accepted.clear()
 
     def due(self, now_ns: int) -> list[CommandLong]:
-        """Return what to send now."""
+        """Return the requests to send now."""
         messages = []
         for key, request in list(self._open.items()):
             if now_ns < request.due_ns:

@@ -32,7 +32,7 @@ _ALIAS_AFTER = 3
 
 
 def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
-    """Return the messages to ask for and their rates [Hz]; `_STOPPED` for what is sent unasked and not used."""
+    """Return the messages to request and their rates [Hz]; `_STOPPED` for unused ones that are sent unasked."""
     imu = telemetry.HighresImu if flavour is Flavour.PX4 else telemetry.RawImu
     wanted: dict[type[Message], float] = {
         telemetry.ExtendedSysState: 5.0,
@@ -82,7 +82,7 @@ class MavlinkSession:
 
     @property
     def problems(self) -> list[str]:
-        """Return what is wrong with the parameters that were read."""
+        """Return the faults of the parameters read so far."""
         found = self._found
         read = [n for n in self._needed if not found.keys().isdisjoint(n.names)]
         return [text for n in read if (text := parameters.difference(n, found))]
@@ -101,7 +101,7 @@ class MavlinkSession:
         return [name for name in self.unread if self._param_tries[name] >= _PARAM_TRIES]
 
     def detail(self, requests: Requests) -> str:
-        """Return what is still missing, or ""."""
+        """Return the pending step, or ""."""
         if not self._connected:
             return "waiting for its heartbeat"
         missing = [kind for kind in self._rates if self._key(kind) not in requests.accepted]
@@ -139,7 +139,7 @@ class MavlinkSession:
         self._has_origin = True
 
     def step(self, now_ns: int, silence_ns: int, requests: Requests) -> list[Message]:
-        """Return what to send now, commands excepted: those are asked through `requests`."""
+        """Return the messages to send now; commands go through `requests`."""
         messages: list[Message] = []
         if now_ns >= self._next_heartbeat_ns:
             self._next_heartbeat_ns = now_ns + _HEARTBEAT_NS

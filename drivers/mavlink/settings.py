@@ -1,4 +1,4 @@
-"""What the MAVLink driver is told; the composition root fills it from the field file."""
+"""Settings of the MAVLink driver; the composition root fills them from the field file."""
 
 from dataclasses import replace
 from typing import Annotated, Literal, Self
@@ -10,7 +10,7 @@ from drivers.watchdog_types import WatchdogLimits
 
 
 class VisionFeedback(DriverSection):
-    """What of the tracker's estimate is fed back to the autopilot, and what its loss does.
+    """Poses sent to the autopilot from the tracker's estimate, and the effect of their loss.
 
     rate_hz: of the messages; max_std_m: a worse known position is none (what no camera keeps sharp gets there within
     some 5 s); max_age_s: nor is one of a vehicle that itself was not seen for so long; hover_after_s, land_after_s:
@@ -32,7 +32,7 @@ class VisionFeedback(DriverSection):
 
 
 class GlobalOrigin(DriverSection):
-    """Where on Earth the estimator is told to be; any place will do indoors.
+    """Position on Earth given to the estimator; any place will do indoors.
 
     altitude_m: of the floor. Another than 0 shifts the local height of a PX4 by as much.
     """
@@ -65,7 +65,7 @@ class LinkSettings(DriverSection):
 
 
 class VehicleSettings(DriverSection):
-    """One vehicle on the link: who it is, where it stands before take-off [world], what it may do."""
+    """One vehicle on the link: identity, pad [world], limits."""
 
     name: Name
     system_id: Annotated[int, Field(ge=1, le=250)]

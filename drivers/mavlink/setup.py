@@ -1,4 +1,4 @@
-"""Reads the parameters that indoor flight needs, tells each difference, and writes them if asked to."""
+"""Reads the parameters for indoor flight, lists each difference, and writes them on request."""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -29,7 +29,7 @@ class ParameterDifference:
 
 
 class ParameterSetup:
-    """The parameters of one vehicle on an open link that nobody else reads."""
+    """The parameters of one vehicle on an open link without another reader."""
 
     def __init__(
         self, link: MavlinkLink, system: int, flavour: Flavour, our_system: int,
@@ -63,7 +63,7 @@ class ParameterSetup:
         )
 
     def differences(self) -> Iterator[ParameterDifference]:
-        """Yield what is not as needed."""
+        """Yield the differences from the needed values."""
         for wanted in self._needed:
             value = self._read(wanted)
             text = difference(wanted, {} if value is None else {wanted.name: value})

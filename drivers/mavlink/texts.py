@@ -1,4 +1,4 @@
-"""What a vehicle says to its operator, put together from its pieces; and why its clock cannot be believed. Pure."""
+"""Texts of a vehicle for its operator, joined from their pieces; jumps of its clock. Pure."""
 
 from collections import deque
 
@@ -52,7 +52,7 @@ def _age(at_ns: int, now_ns: int | None) -> str:
 
 
 class BootClock:
-    """Compares the time since power-on that a vehicle tells with our own.
+    """Compares a vehicle's time since power-on with our own clock.
 
     Its stamps are used for nothing else: what is measured is stamped when it arrives.
     """

@@ -1,4 +1,4 @@
-"""How much of what a vehicle sends arrives, by the sequence numbers of its frames."""
+"""Share of a vehicle's frames that arrive, from their sequence numbers."""
 
 import threading
 from collections import deque

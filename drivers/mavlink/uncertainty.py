@@ -1,4 +1,4 @@
-"""How far an autopilot's own velocity and attitude are to be trusted: by its own word, and by what cameras see. Pure.
+"""Deviations of an autopilot's velocity and attitude, from its reports and from cameras. Pure.
 
 Its covariances say too little (docs/reference/mavlink.md 2.1), so they can only add to what the field file says; where
 its filter refuses what it is fed (test ratios near 1), its velocity is its accelerometers' alone.
@@ -32,7 +32,7 @@ class StatedUncertainty:
         self._drift_m_s = 0.0
 
     def hear(self, now_ns: int, message: OdometryMessage | EstimatorStatus | EkfStatusReport) -> None:
-        """Take what the autopilot states."""
+        """Take the autopilot's own deviations."""
         match message:
             case OdometryMessage():
                 velocity, pose = message.velocity_covariance, message.pose_covariance
@@ -49,7 +49,7 @@ class StatedUncertainty:
         self._ratio_ns = now_ns
 
     def see_drift(self, now_ns: int, drift_m_s: float) -> None:
-        """Take what its velocity is off by, as cameras see it [m/s]."""
+        """Take the error of its velocity as measured by cameras [m/s]."""
         faded = self._drift_m_s * math.exp(-max(0, now_ns - self._drift_ns) / NS_PER_S / _FADES_S)
         self._drift_m_s, self._drift_ns = max(faded, drift_m_s - _NOISE_M_S), now_ns
 

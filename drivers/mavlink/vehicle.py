@@ -1,4 +1,4 @@
-"""One MAVLink vehicle: what it says, and what a decision of the watchdog means to it; `drivers.base.Vehicle`."""
+"""One MAVLink vehicle behind the interface `drivers.base.Vehicle`: its messages in, decisions of the watchdog out."""
 
 from collections import Counter, deque
 from dataclasses import dataclass, replace
@@ -100,7 +100,7 @@ class MavlinkVehicle:
     # -- reader thread ------------------------------------------------------------------------------------------------
 
     def hear(self, heard: Heard) -> None:
-        """Take a frame of this vehicle; what cannot be used is counted."""
+        """Take a frame of this vehicle; unusable frames are counted."""
         self._traffic.count(heard.stamp_ns, heard.frame.component, heard.frame.sequence)
         if heard.frame.component != 1 or heard.frame.message is None:
             return
@@ -185,7 +185,7 @@ class MavlinkVehicle:
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
 
     def view(self, now_ns: int) -> VehicleView:
-        """Return what the vehicle last said."""
+        """Return the vehicle's last reported state."""
         known = self.telemetry
         fresh = self._is_heard(now_ns, known)
         state = self._state(known)
@@ -237,7 +237,7 @@ class MavlinkVehicle:
         return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
-        """Tell the vehicle what the decision means to it, feed its estimator, and ask what is still unknown."""
+        """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""
         known = self.telemetry
         self._take_answers(now_ns)
         silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else 1 << 62

@@ -1,4 +1,4 @@
-"""What the tracker believes of a vehicle, fed back to its autopilot; and how long it has had nothing to feed. Pure.
+"""Poses from the tracker's estimate for an autopilot, and the time without one. Pure.
 
 Before take-off no camera's word counts (landed robots are not in the belief): the pad of the field file is fed instead.
 A position that observations do not keep sharp is not fed: it would be the autopilot's own dead reckoning. What counts
@@ -22,7 +22,7 @@ _FIRST_SIGHT_NS = 4 * NS_PER_S
 
 
 class VisionFeed:
-    """The poses for one vehicle. resets: rises at each jump, as the autopilots want it told."""
+    """The poses for one vehicle. resets: rises at each jump, as autopilots require."""
 
     def __init__(
         self, name: str, clock: str, vision: VisionFeedback, pad_m: tuple[float, float], pad_yaw_rad: float
@@ -37,7 +37,7 @@ class VisionFeed:
         self._aloft_ns: int | None = None
 
     def hear(self, now_ns: int, estimate: Estimate) -> EntityEstimate | None:
-        """Take the tracker's estimate; return what it says of this vehicle if that is good enough to fly on."""
+        """Take the tracker's estimate; return that of this vehicle if it is good enough to fly on."""
         for entity in estimate.entities:
             if entity.name == self._name:
                 break
@@ -64,7 +64,7 @@ class VisionFeed:
         return entity.converged and worst <= self._vision.max_std_m**2 and entity.age_s <= self._vision.max_age_s
 
     def pose(self, now_ns: int, aloft: bool) -> VisionPose | None:
-        """Return what to feed now, or None; aloft: the vehicle says it flies."""
+        """Return the pose to send now, or None; aloft: the vehicle reports flight."""
         if not aloft:
             self._aloft_ns = None
             pose: VisionPose | None = replace(self._standing, stamp_ns=now_ns)

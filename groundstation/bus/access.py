@@ -1,4 +1,4 @@
-"""The access control of a run's router, from the table of topics: who may publish what, and who may hear it.
+"""The access control of a run's router, from the table of topics: publishers and subscribers by role.
 
 Zenoh's traps: a rule must include the whole expression that is declared or put, `**` does not match a chunk that
 begins with `@`, and a publisher stays mute unless subscriptions may be passed on to it (docs/reference/zenoh.md 10).
@@ -41,7 +41,7 @@ def audible(site: str, role: Role) -> list[str]:
 
 
 def access_control(access: AccessList) -> dict[str, Any]:
-    """Return the section `access_control` of the router's configuration: all is denied but what is listed."""
+    """Return the section `access_control` of the router's configuration; anything not listed is denied."""
     rules, policies, subjects = [], [], []
     for member in access.members:
         granted = {

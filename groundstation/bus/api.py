@@ -33,7 +33,7 @@ class Received:
 
 
 def decode_sample(sample: Sample) -> Received:
-    """Return what a sample holds; raises MessageError naming why it is refused."""
+    """Return the message of a sample; raises MessageError with the reason of a refusal."""
     key = keys.parse(sample.key)
     if key.topic.type is None:
         return Received(key, codec.decode_header(key, sample.attachment), None, sample.payload)

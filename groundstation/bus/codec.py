@@ -1,4 +1,4 @@
-"""Messages to JSON bytes and back, refusing what does not fit its key."""
+"""Messages to JSON bytes and back; refuses a message that does not fit its key."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The size of a JPEG from its head alone: what travels as a picture is judged before anybody decodes it."""
+"""The size of a JPEG from its head alone, so that it can be refused before it is decoded."""
 
 _START = b"\xff\xd8"
 # WIRE: ITU-T T.81 table B.1: start of frame, all kinds but the tables (C4, C8, CC) between them.

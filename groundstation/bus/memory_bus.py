@@ -16,7 +16,7 @@ class MemoryExchange:
         self._subscriptions: list[tuple[str, Subscription]] = []
 
     def attach(self, pattern: str, subscription: Subscription) -> None:
-        """Deliver what matches the key pattern to the subscription."""
+        """Deliver messages that match the key pattern to the subscription."""
         self._subscriptions.append((pattern, subscription))
 
     def deliver(self, sample: Sample) -> None:

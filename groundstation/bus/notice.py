@@ -7,7 +7,7 @@ from groundstation.bus.messages import Severity
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """entity: whom it is about ("" for the process that says it); remedy: what a person can do, if anything."""
+    """entity: its subject ("" for the sending process); remedy: the operator's next step, if any."""
 
     severity: Severity
     text: str

@@ -22,11 +22,11 @@ class Role(StrEnum):
     MONITOR = "monitor"
     """Draws on the operator's terminal."""
     SIM_BRIDGE = "sim_bridge"
-    """Emulates devices and knows the truth."""
+    """Emulates devices and publishes the truth."""
     CLI = "cli"
     """A command in another shell."""
     VIEW = "view"
-    """Listens, and says nothing."""
+    """Listens only."""
 
 
 DEVICES = frozenset({Role.DRIVER, Role.CAMERA})
@@ -39,7 +39,7 @@ PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One certificate of a run and what it stands for.
+    """One certificate of a run, with its role and member.
 
     name: the certificate's common name. sources: the sources that it may speak as, key chunks in which `$*` stands for
     any ending. entities: what a device speaks of.

@@ -64,7 +64,7 @@ ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR, _DRIVER)
 OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: one marker that a camera saw."""
 SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
-"""Camera driver to tracker: a picture that was searched all over, and whose markers it shows, if any."""
+"""Camera driver to tracker: a completely searched picture, and the owners of the markers in it."""
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
 CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA)
@@ -84,7 +84,7 @@ LEASE = Topic("lease", m.Lease, 2, Quality.CONTROL, _SUPERVISOR)
 PLAN = Topic("plan", m.Plan, 10, Quality.STATE, _TRACKER)
 """Tracker: the plan that was adopted, with its alternatives."""
 INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE, _TRACKER)
-"""Tracker: what became of each observation."""
+"""Tracker: the result of each observation."""
 EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)
@@ -92,7 +92,7 @@ PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROC
 CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE, _NOBODY)
 """Offset between the clocks of two hosts. Nothing publishes it yet: all processes run on one host."""
 JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK, _TRACKER)
-"""Tracker: what each tick ingested and adopted."""
+"""Tracker: inputs and adopted plan of each tick."""
 IMAGE = Topic("image", None, 5, Quality.BULK, _CAMERA, encoding="image/jpeg")
 """Camera driver: single images for the console."""
 VIDEO = Topic("video", None, 30, Quality.BULK, _CAMERA, encoding="video/h264")

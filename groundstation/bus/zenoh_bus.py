@@ -72,7 +72,7 @@ def _configuration(mode: str, endpoint: str) -> dict[str, Any]:
 
 
 def _secured(configuration: dict[str, Any], identity: Identity, end: str) -> dict[str, Any]:
-    """Add to a configuration what proves one end of a link ("listen" or "connect"), and refuse all links but TLS."""
+    """Add the certificate of one end of a link ("listen" or "connect") to a configuration; refuse links without TLS."""
     folder = Path(identity.folder)
     configuration["transport"]["link"] |= {
         "protocols": ["tls"],

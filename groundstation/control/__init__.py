@@ -1,1 +1,1 @@
-"""From a plan to what each robot is told: setpoints, the search after a loss, and the output limiter."""
+"""From a plan to each robot's setpoint: setpoints, the search after a loss, and the output limiter."""

@@ -39,7 +39,7 @@ def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """The stands that were chosen, and what they promise: the chance to see the target there, and when [s]."""
+    """The chosen viewpoints, with the chance to see the target there, and the time of arrival [s]."""
 
     stands: Mapping[str, Stand]
     chance: float
@@ -55,7 +55,7 @@ def choose_stands(
     held: Mapping[str, Stand],
     parameters: SearchParameters,
 ) -> Outlook:
-    """Return a stand for each robot that has a footprint: one after the other takes what promises most, soonest.
+    """Return a viewpoint for each robot that has a footprint: in turn, the best chance at the earliest time.
 
     poses: x, y, z, yaw; allowed_s: by stand, within how long a robot may be there (negative: not at all); held: the
     stands so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
@@ -102,7 +102,7 @@ def _nearest(stand: Stand, lattice: Lattice) -> tuple[int, int]:
 
 
 def _take(left: Array, lattice: Lattice, footprint: Footprint, stand: int, heading: int) -> None:
-    """Count what a robot will see from its stand as seen, for those that choose after it."""
+    """Mark the view of a robot's viewpoint as seen, for the robots that choose after it."""
     part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
     rows = lattice.rows[stand] + footprint.rows[part]
     columns = lattice.columns[stand] + footprint.columns[part]

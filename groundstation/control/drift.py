@@ -1,4 +1,4 @@
-"""How a robot moves besides what it is told: the control error that the output limiter allows for. Pure."""
+"""Motion of a robot beyond its commands: the control error that the output limiter allows for. Pure."""
 
 from collections import deque
 
@@ -42,5 +42,5 @@ class DriftWatch:
         return drift
 
     def tell(self, command_m_s: Array) -> None:
-        """Note what the robot is told from now on [m/s; world]."""
+        """Note the command of the robot from now on [m/s; world]."""
         self._command = command_m_s

@@ -1,4 +1,4 @@
-"""The tracker's flight-mode table: what one robot is flown by, decided anew on every tick."""
+"""The tracker's table of flight modes, evaluated for each robot on every tick."""
 
 from dataclasses import dataclass
 from enum import StrEnum

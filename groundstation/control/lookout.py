@@ -1,4 +1,4 @@
-"""What pictures do not show: targets that are searched for, robots that are missed, and what a person should know."""
+"""Targets and robots that pictures do not show: searches, missed robots, events for the operator."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -77,7 +77,7 @@ class Lookout:
         return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
 
     def take_notices(self) -> list[Notice]:
-        """Return and forget what the operator should know."""
+        """Return and clear the events for the operator."""
         notices, self._notices = self._notices, []
         return notices
 

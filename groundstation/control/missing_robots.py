@@ -1,4 +1,4 @@
-"""Robots that a world-fixed camera should see and does not: what is believed of them is doubted."""
+"""Robots that a world-fixed camera should see and does not: their estimate is doubted."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""The last step before a setpoint is sent: it shrinks a velocity, or hovers; it adds only what holds a drift off.
+"""The last step before a setpoint is sent: shrinks a velocity or hovers; adds velocity only against a drift.
 
 Why its half-spaces keep fence and separation whatever is asked: docs/explanation/safety.md#why-it-holds.
 """
@@ -24,7 +24,7 @@ _NO_SIDE_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Limited:
-    """A setpoint that may be sent, the names of what changed it, and the velocity that was wanted, if finite."""
+    """A setpoint that may be sent, the names of the limits that changed it, and the wanted velocity, if finite."""
 
     setpoint: Setpoint
     limited_by: tuple[str, ...] = ()
@@ -49,7 +49,7 @@ def limit_setpoint(
     velocities: Mapping[str, Array] | None = None,
     drifts: Mapping[str, Array] | None = None,
 ) -> Limited:
-    """Return what of a setpoint is safe to send.
+    """Return the part of a setpoint that is safe to send.
 
     velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. drifts: motion
     besides what is told [m/s; world], by robot: one that has any is allowed `drift_m_s` more of it in any direction,
@@ -77,7 +77,7 @@ def limit_setpoint(
 
 
 def _held_off(wall: _Wall, drift: Array, parameters: SafetyParameters) -> _Wall:
-    """Return the wall for a robot that drifts: nearer by what it may drift into it, never asking for more than that."""
+    """Return the wall for a robot that drifts: nearer by the possible drift, never demanding more than that."""
     allowed = min(parameters.drift_m_s + max(0.0, float(drift @ wall.normal)), parameters.most_drift_m_s)
     return _Wall(wall.name, wall.normal, wall.most - allowed)
 

@@ -1,4 +1,4 @@
-"""What setpoints and safety are told once."""
+"""Parameters of setpoints and safety."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

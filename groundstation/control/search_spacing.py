@@ -37,7 +37,7 @@ def apart(
 def _free_point(
     wanted: Point, place: Point, taken: Collection[Point], view: Rectangle | None, distance_m: float
 ) -> Point:
-    """Return the point nearest to the one wanted that keeps off what is taken, or the one that keeps off best."""
+    """Return the point nearest to the wanted one far enough from the taken ones, else the farthest from them."""
     options = [wanted, *(point for other in taken for point in _ring(other, wanted, distance_m))]
     if view is not None:
         options = [point for point in options if math.dist(view.nearest(*point), point) <= _ROUNDING_M]

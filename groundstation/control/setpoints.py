@@ -104,7 +104,7 @@ def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sens
 
 
 def _scout(belief: JointBelief, tracking: Sequence[str], missing: Collection[str]) -> str | None:
-    """Return the robot that can be spared: the farthest from what is tracked; None where it would be the only one."""
+    """Return the robot that can be spared: the farthest from the tracked targets; None if it is the only one."""
     seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in missing]
     if len(tracking) < 2 or not seen:
         return None

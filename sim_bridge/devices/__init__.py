@@ -1,1 +1,1 @@
-"""Emulated hardware: what a driver finds at the other end of the wire."""
+"""Emulated hardware at the other end of a driver's link."""

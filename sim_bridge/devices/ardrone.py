@@ -69,12 +69,12 @@ class ArDroneEmulator:
         return self._selector.fileno()
 
     def receive(self) -> None:
-        """Take what waits at all ports, without waiting for any."""
+        """Take the waiting input of all ports, without blocking."""
         for key, mask in self._selector.select(0):
             key.data(mask)
 
     def send(self) -> None:
-        """End a tick: watch the link, and send what is due."""
+        """End a tick: watch the link, and send due output."""
         self._ticks += 1
         control = self.control
         control.watch(self._now_ns)

@@ -43,7 +43,7 @@ class Configuration:
 
     @property
     def values(self) -> dict[str, Scalar]:
-        """Return what is in force, in the order of a dump."""
+        """Return the settings in force, in the order of a dump."""
         return {name: self._value(key) for name, key in self._keys.items()}
 
     @property

@@ -50,7 +50,7 @@ class FlightControl:
                 self._obey(command, now_ns)
 
     def watch(self, now_ns: int) -> None:
-        """Do what silence, and an empty battery, ask for: hover at 2 s, land half a second later, forget the client."""
+        """React to silence and to an empty battery: hover at 2 s, land half a second later, drop the client."""
         autopilot, session = self._drone.autopilot, self.session
         if self._drone.battery <= BATTERY_LANDS:
             autopilot.land()

@@ -1,4 +1,4 @@
-"""The edge of an emulated AR.Drone: what its navdata would honestly say, and what they say under a fault."""
+"""The output edge of an emulated AR.Drone: correct navdata, and navdata under a fault."""
 
 import math
 
@@ -15,7 +15,7 @@ from sim_bridge.wrong_values import WrongValues
 
 
 def pwm_of(drone: Quadrotor) -> tuple[int, int, int, int]:
-    """Return what the four motors are told."""
+    """Return the commands of the four motors."""
     autopilot, body = drone.autopilot, drone.airframe
     if not autopilot.motors_on:
         return 0, 0, 0, 0
@@ -27,7 +27,7 @@ def pwm_of(drone: Quadrotor) -> tuple[int, int, int, int]:
 
 
 def readings_of(onboard: Onboard, ticks: int, state: NavdataState) -> Readings:
-    """Return what the sensors say now, and the state beside them, as a value."""
+    """Return the present sensor readings and state, as a value."""
     status = (state.word, state.control_state, state.pwm, state.pcmd_sequence, state.at_sequence, state.at_gap_ms)
     return Readings(
         ticks, (onboard.vx, onboard.vy, onboard.vz), onboard.roll, onboard.pitch, onboard.yaw, onboard.gyros,

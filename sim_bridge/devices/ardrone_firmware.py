@@ -1,4 +1,4 @@
-"""Firmwares that an emulated AR.Drone can have: what differs between them on the wire."""
+"""Firmwares of emulated AR.Drones, and their differences on the wire."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

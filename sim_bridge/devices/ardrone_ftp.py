@@ -125,7 +125,7 @@ class _Dialogue:
         return "150 here it comes"
 
     def _transfer(self) -> None:
-        """Send what was asked for once the client has connected for it."""
+        """Send the requested file once the client has connected for it."""
         if self._outgoing is None or self._data is None:
             return
         content, self._outgoing = self._outgoing, None

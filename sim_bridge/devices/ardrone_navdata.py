@@ -45,7 +45,7 @@ _PICTURES_PER_SECOND = 30
 
 @dataclass(slots=True)
 class NavdataState:
-    """What the packet says besides the sensor readings.
+    """The packet's contents besides the sensor readings.
 
     pcmd_sequence: of the last PCMD obeyed; pwm: of the four motors; at_gap_ms: between the last two AT datagrams.
     """

@@ -47,20 +47,20 @@ class ControlPort:
 
 
 class _Deaf:
-    """The control port listens to nobody: what to send is asked for by AT commands."""
+    """The control port ignores its input: AT commands request its output."""
 
     def __init__(self, connection: Connection) -> None:
         pass
 
     def hear(self, data: bytes) -> None:
-        """Ignore what is said."""
+        """Ignore the input."""
 
     def end(self) -> None:
         """Nothing belongs to it."""
 
 
 class Pairing:
-    """UDP 5552: says yes to whoever wants to be paired. WIRE: `PARROT AUTH`, answered by `PARROT AUTH OK`."""
+    """UDP 5552: accepts every request to pair. WIRE: `PARROT AUTH`, answered by `PARROT AUTH OK`."""
 
     def __init__(self, name: str, address: str, selector: Selector) -> None:
         self._selector = selector

@@ -73,7 +73,7 @@ class CommandSession:
         self._settle_ack()
 
     def drop_ack(self) -> None:
-        """Clear the command bit at once: nobody is left to see it."""
+        """Clear the command bit at once: there is no client left."""
         self.ack = self._ack_cleared = False
 
     def sent(self) -> None:

@@ -19,10 +19,10 @@ class Conversation(Protocol):
     """What one connection talks about."""
 
     def hear(self, data: bytes) -> None:
-        """Take what the client said."""
+        """Take the client's bytes."""
 
     def end(self) -> None:
-        """Release what belongs to it; the connection is gone."""
+        """Release its resources; the connection is closed."""
 
 
 class Connection:

@@ -32,7 +32,7 @@ _LIMITED = np.rint(16 + np.arange(256) * (219 / 255)).astype(np.uint8)
 
 
 class VideoMode(NamedTuple):
-    """What the drone's configuration says of its live video; bit rates [kbit/s] are of codec_fps pictures a second."""
+    """The video settings of the drone's configuration; bit rates [kbit/s] are of codec_fps pictures a second."""
 
     codec: int = 0x81
     channel: int = 0

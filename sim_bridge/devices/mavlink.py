@@ -94,7 +94,7 @@ class MavlinkEmulator:
                 self.hear(data, source)
 
     def hear(self, data: bytes, source: Address) -> None:
-        """Take one datagram; what is no frame, or not signed as it must be, is counted."""
+        """Take one datagram; bytes that are no frame, or not signed correctly, are counted."""
         try:
             for raw in split(data):
                 try:
@@ -129,7 +129,7 @@ class MavlinkEmulator:
         return mine is None or system == int(mine)
 
     def send(self) -> None:
-        """End a tick: let the firmware watch, and send what is due."""
+        """End a tick: run the firmware's watchdogs, and send due output."""
         self._ticks += 1
         now_ns = self.now_ns
         self.speaker.boot_us = now_ns // 1000

@@ -39,7 +39,7 @@ class ArduCopter(AutopilotFirmware):
         return mode in list(Mode)
 
     def prearm_fault(self) -> str:
-        """Return what forbids arming in any mode, or ""."""
+        """Return the reason against arming in any mode, or ""."""
         fault = self.health_fault()
         return f"PreArm: {fault.capitalize()}" if fault else ""
 
@@ -95,12 +95,12 @@ class ArduCopter(AutopilotFirmware):
 
     @property
     def landed(self) -> Landed:
-        """Return what the landing detector says; WIRE (docs/reference/mavlink.md 1): 3 until the height is reached."""
+        """Return the landing state; WIRE (docs/reference/mavlink.md 1): 3 until the height is reached."""
         climbing = self._climb_to_m is not None and self.armed and self.now_s - self._take_off_s >= _SPOOL_S
         return Landed.TAKE_OFF if climbing else super().landed
 
     def steering_of(self, mode: int) -> Steering:
-        """Return what the motors do in a mode, in the air."""
+        """Return the motors' action for a mode, in the air."""
         return Steering.LEVEL if mode in _LEVEL else Steering.HOLD
 
     def watch(self, ground_silence_s: float) -> None:

@@ -1,4 +1,4 @@
-"""What both emulated autopilots share: armed or not, mode, set-points, landing, what the ground hears. No sockets.
+"""Shared parts of both emulated autopilots: arming, mode, setpoints, landing, telemetry. No sockets.
 
 Times are seconds of the world. Set-points arrive in MAVLink's frames and are turned into the world's here, by this
 file's own signs.
@@ -30,7 +30,7 @@ _OK: Answer = (MavResult.ACCEPTED, "")
 
 
 class AutopilotFirmware:
-    """One autopilot around a body of the world; flavours override what differs. texts: (severity, line) to send."""
+    """One autopilot around a body of the world, with overrides by flavour. texts: (severity, line) to send."""
 
     flavour: Flavour
     guided: int
@@ -107,7 +107,7 @@ class AutopilotFirmware:
             self.obey(self._velocity(setpoint), self._turn(setpoint))
 
     def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Say what is wrong with a set-point."""
+        """Report the fault of a setpoint."""
         raise NotImplementedError
 
     def _velocity(self, setpoint: SetPositionTargetLocalNed) -> tuple[float, float, float]:
@@ -159,7 +159,7 @@ class AutopilotFirmware:
 
     @property
     def landed(self) -> Landed:
-        """Return what the landing detector says."""
+        """Return the state of the landing detector."""
         if not self.copter.airborne:
             return Landed.ON_GROUND
         return Landed.LANDING if self.mode == self.landing else Landed.IN_AIR
@@ -176,7 +176,7 @@ class AutopilotFirmware:
 
     @property
     def located(self) -> bool:
-        """Whether the estimator knows where it is, now."""
+        """Whether the estimator has a position now."""
         return self.copter.estimate.has_position and self.copter.estimate.aided_s < _AIDED_S
 
     @property
@@ -191,7 +191,7 @@ class AutopilotFirmware:
             self.origin = satellites.origin
 
     def health_fault(self) -> str:
-        """Return what forbids arming in any mode, or ""."""
+        """Return the reason against arming in any mode, or ""."""
         if not self.parameters.indoor and self.satellites is None:
             return "no GPS"
         if not self.located:
@@ -212,11 +212,11 @@ class AutopilotFirmware:
         raise NotImplementedError
 
     def steering_of(self, mode: int) -> Steering:
-        """Return what the motors do in a mode, in the air."""
+        """Return the motors' action for a mode, in the air."""
         raise NotImplementedError
 
     def watch(self, ground_silence_s: float) -> None:
-        """Do what silence of the set-points, the ground or the cameras asks for."""
+        """React to silence of setpoints, ground station or cameras."""
         raise NotImplementedError
 
     def disarm_after_s(self) -> float:

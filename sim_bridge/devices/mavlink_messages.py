@@ -1,4 +1,4 @@
-"""What an emulated autopilot says: its telemetry in MAVLink's own units and frames, by this file's own signs.
+"""Telemetry of an emulated autopilot in MAVLink's units and frames, with signs of this file's own.
 
 World and body are x forward, y left, z up; MAVLink wants north-east-down and forward-right-down, yaw clockwise.
 """
@@ -25,7 +25,7 @@ _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
 
 
 class Speaker:
-    """Builds the messages of one vehicle; reported: what it says instead of what it believes, under a fault."""
+    """Builds the messages of one vehicle; reported: values under a fault, instead of its estimate."""
 
     def __init__(self, firmware: AutopilotFirmware) -> None:
         self._firmware = firmware
@@ -54,7 +54,7 @@ class Speaker:
             self.builders[t.EkfStatusReport] = self.ekf
 
     def honest(self) -> Readings:
-        """Return what the vehicle believes now, as a value."""
+        """Return the vehicle's present estimate, as a value."""
         e, ticks = self._honest, self.boot_us * 1000 // TICK_NS
         readings = (e.velocity, e.roll, e.pitch, e.yaw, e.gyros, e.accelerometers, self._copter.battery)
         return Readings(ticks, *readings, position=e.position, status=self._status)
@@ -118,7 +118,7 @@ class Speaker:
         return t.ExtendedSysState(0, self._status[2])
 
     def local_position(self) -> Message | None:
-        """Return where it believes to be, if it does."""
+        """Return its estimated position, if it has one."""
         if not self._honest.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
@@ -162,7 +162,7 @@ class Speaker:
         return t.RawImu(self.boot_us, *force, _whole(wx * 1000), _whole(wy * 1000), _whole(wz * 1000))
 
     def odometry(self) -> Message | None:
-        """WIRE (docs/reference/mavlink.md 2): PX4 sends its velocity in NED and says so by child frame 1."""
+        """WIRE (docs/reference/mavlink.md 2): PX4 sends its velocity in NED, marked by child frame 1."""
         if not self._honest.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
@@ -178,7 +178,7 @@ class Speaker:
         return t.BatteryStatus(0, 0, 3, 32767, cells, 500, -1, -1, self._percent)
 
     def ekf(self) -> Message:
-        """Return what its estimator can deliver (ArduPilot)."""
+        """Return the flags of its estimator (ArduPilot)."""
         flags = EkfFlag.ATTITUDE | EkfFlag.VELOCITY_VERT | EkfFlag.POS_VERT_ABS
         if self._firmware.located:
             flags |= EkfFlag.VELOCITY_HORIZ | EkfFlag.POS_HORIZ_REL | EkfFlag.POS_HORIZ_ABS
@@ -198,7 +198,7 @@ class Speaker:
         return origin and t.GpsGlobalOrigin(*origin, self.boot_us)
 
     def gps(self) -> Message:
-        """Return what its receiver says: that there is none, or a fix."""
+        """Return the state of its satellite receiver: none, or a fix."""
         satellites = self._firmware.satellites
         if satellites is None:
             return GpsRawInt(self.boot_us, 0, 0, 0, 0, _UNKNOWN, _UNKNOWN, _UNKNOWN, _UNKNOWN, 255)
@@ -208,7 +208,7 @@ class Speaker:
         return GpsRawInt(self.boot_us, 3, *place, 90, 120, round(100 * speed), _UNKNOWN, 12)
 
     def global_position(self) -> Message | None:
-        """Return where on Earth it believes to be, if it flies by satellites."""
+        """Return its estimated position on Earth, if it flies by satellites."""
         satellites = self._firmware.satellites
         if satellites is None or not self._firmware.global_position:
             return None
@@ -220,7 +220,7 @@ class Speaker:
         )
 
     def version(self) -> Message:
-        """Return what it is and can: MISSION_INT, COMMAND_INT, SET_POSITION_TARGET, MAVLINK2, parameter encoding."""
+        """Return its capabilities: MISSION_INT, COMMAND_INT, SET_POSITION_TARGET, MAVLINK2, parameter encoding."""
         px4 = self._firmware.flavour is Flavour.PX4
         capabilities = 4 | 8 | 128 | 8192 | (16 if px4 else 131072)
         version = 0x011000FF if px4 else 0x040602FF

@@ -18,7 +18,7 @@ _TCP_MPEG, _UNKNOWN_ENCODING, _RUNNING = 2, 0, 1
 
 
 def announced(name: str, lens: Lens, fps: float, uri: str) -> VideoStreamInformation:
-    """Return what a vehicle says of its camera: where the pictures are, how many, how large, how wide [deg]."""
+    """Return a vehicle's description of its camera: address, rate, size and angle of view [deg] of its pictures."""
     hfov = round(math.degrees(2.0 * math.atan(lens.width_px / (2.0 * lens.fx_px))))
     size = lens.width_px, lens.height_px
     return VideoStreamInformation(1, 1, _TCP_MPEG, _RUNNING, fps, *size, 0, 0, hfov, name, uri, _UNKNOWN_ENCODING)

@@ -1,4 +1,4 @@
-"""Parameters of the emulated autopilots: the factory's values, and what indoor flight has them changed to.
+"""Parameters of the emulated autopilots: factory values, and those for indoor flight.
 
 Written from docs/reference/mavlink.md 1, 2, not taken from the driver, so that its omissions show.
 """

@@ -79,7 +79,7 @@ class Px4(AutopilotFirmware):
             self.enter(HOLD)
 
     def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Say what is wrong with a set-point."""
+        """Report the fault of a setpoint."""
         self.say(2, f"SET_POSITION_TARGET_LOCAL_NED invalid coordinate frame {setpoint.coordinate_frame}")
 
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
@@ -90,7 +90,7 @@ class Px4(AutopilotFirmware):
             super().obey(velocity_m_s, turn)
 
     def steering_of(self, mode: int) -> Steering:
-        """Return what the motors do in a mode, in the air."""
+        """Return the motors' action for a mode, in the air."""
         if mode == OFFBOARD:
             return Steering.VELOCITY
         return Steering.LEVEL if mode in _LEVEL else Steering.HOLD

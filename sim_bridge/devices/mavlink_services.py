@@ -36,7 +36,7 @@ _FRESH_S = 0.5
 
 
 class Services:
-    """Handles one frame after the other; `take` returns what to answer to its sender."""
+    """Handles one frame after the other; `take` returns the answers for its sender."""
 
     def __init__(
         self, system: int, firmware: AutopilotFirmware, speaker: Speaker, stream: t.VideoStreamInformation | None
@@ -54,7 +54,7 @@ class Services:
         self.intervals |= {kind: max(1, round(TICK_HZ / hz)) for kind, hz in rates.items()}
 
     def stream_global_position(self) -> None:
-        """Send what a PX4 that flies by satellites sends unasked."""
+        """Send the messages that a PX4 with satellites sends unasked."""
         if self._firmware.flavour is Flavour.PX4 and self._firmware.global_position:
             self._send_unasked(_GLOBAL_RATES)
 

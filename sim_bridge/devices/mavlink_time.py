@@ -6,7 +6,7 @@ _SHARE = 0.1
 
 
 class SenderClock:
-    """PX4 asks for TIMESYNC answers and follows them; ArduPilot learns the least lag of what arrives (`learns`).
+    """PX4 requests TIMESYNC answers and follows them; ArduPilot learns the least lag of arrivals (`learns`).
 
     Without either a time means: now.
     """

@@ -82,7 +82,7 @@ class StreamServer:
         raise NotImplementedError
 
     def _hear(self, client: Client, data: bytes) -> bool:
-        """Take in what a client says; False when it is to be dropped."""
+        """Take a client's bytes; False: drop the client."""
         raise NotImplementedError
 
     def _hand_over(self, release_ns: int, payload: bytes, stands_alone: bool) -> None:

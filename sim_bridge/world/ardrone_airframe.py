@@ -1,4 +1,4 @@
-"""The airframe of an AR.Drone: what tilt, climb and turn references do to its motion.
+"""The airframe of an AR.Drone: its response to tilt, climb and turn references.
 
 Figures of real flights (docs/reference/ardrone.md 7): 10 / 63 / 90 % of the tilt peak 90 / 180 / 270 ms after a
 command, 8 % overshoot; 12 degrees of tilt bring 2.7 m/s after 2 s.
@@ -53,7 +53,7 @@ class Airframe:
         )
 
     def specific_force(self) -> tuple[float, float, float]:
-        """Return what ideal accelerometers measure [m/s^2; base]."""
+        """Return the reading of ideal accelerometers [m/s^2; base]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         forward, left, up = c * self.ax + s * self.ay, c * self.ay - s * self.ax, self.az + GRAVITY_M_S2
         sr, cr, sp, cp = math.sin(self.roll), math.cos(self.roll), math.sin(self.pitch), math.cos(self.pitch)

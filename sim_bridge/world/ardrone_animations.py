@@ -1,4 +1,4 @@
-"""Flight animations of an AR.Drone: what each does to attitude, climb and heading. Pure.
+"""Flight animations of an AR.Drone: attitude, climb and heading of each. Pure.
 
 WIRE: numbers and default durations of the SDK 2.0.1 (docs/reference/ardrone.md 2.4). How far each goes is not
 documented: the names say the angles, the rest is made up to look alike.
@@ -48,7 +48,7 @@ FLIP_TURN_S = 0.4
 
 
 def default_duration_s(animation: Animation) -> float:
-    """Return how long an animation lasts when nobody says."""
+    """Return the default duration of an animation."""
     if animation < Animation.TURNAROUND:
         return 1.0
     return 2.0 if animation is Animation.YAW_SHAKE else 5.0

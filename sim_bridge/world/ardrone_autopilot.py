@@ -128,7 +128,7 @@ class Autopilot:
             self._enter(Phase.LANDED)
 
     def move(self, motion: MotionReferences) -> None:
-        """Fly with these references (clamped to the limits) until told otherwise."""
+        """Fly with these references (clamped to the limits) until the next command."""
         limits = self.limits
         self._wanted = MotionReferences(
             _clamp(motion.roll_rad, limits.tilt_rad),

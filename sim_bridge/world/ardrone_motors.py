@@ -1,4 +1,4 @@
-"""What an AR.Drone's motors are told while it flies. Pure.
+"""Motor commands of an AR.Drone in flight. Pure.
 
 Mass, thrust curve and the ramp of a recorded take-off: docs/reference/ardrone.md 7.
 """

@@ -1,4 +1,4 @@
-"""What an AR.Drone believes about its own motion: true state in, navdata-like readings out.
+"""The motion sensors of an AR.Drone: true state in, navdata-like readings out.
 
 Figures of a real flight against motion capture (docs/explanation/estimation.md 9.2). Units and frames are SI and FLU;
 the emulator turns them into what stands on the wire.

@@ -1,4 +1,4 @@
-"""How a target is driven along its path: what it asks of its wheels at each tick."""
+"""Drives a target along its path: wheel speeds for each tick."""
 
 import math
 from typing import Protocol, assert_never

@@ -1,4 +1,4 @@
-"""A quadrotor with a velocity-controlled autopilot (PX4- or ArduPilot-like): how it moves when told a velocity.
+"""A quadrotor with a velocity-controlled autopilot (PX4- or ArduPilot-like): its response to velocity setpoints.
 
 Step responses as measured on real firmwares (docs/reference/mavlink.md 1, 2): ArduCopter t10 0.31, t63 0.74, t90
 1.23-1.41 s, all of the speed; PX4 t10 0.22, t63 0.67, t90 1.35 s, 14-20 % under the command for seconds. Frames are FLU
@@ -89,7 +89,7 @@ class MavlinkCopter:
 
     @property
     def autopilot(self) -> "MavlinkCopter":
-        """Return itself: what asks whether motors turn need not know which firmware it is."""
+        """Return itself, so that callers can ask for the motors of any firmware."""
         return self
 
     @property
@@ -103,7 +103,7 @@ class MavlinkCopter:
         return not self.airframe.on_ground
 
     def steer(self, steering: Steering) -> None:
-        """Change what the motors do."""
+        """Change the state of the motors."""
         if steering is not self.steering:
             self.steering, self.since_s, self._held = steering, 0.0, None
             self._wanted = (_STILL, 0.0)
@@ -111,7 +111,7 @@ class MavlinkCopter:
                 self._acceleration = [0.0, 0.0, 0.0]
 
     def fly(self, velocity_m_s: Vector3, yaw_rate_rad_s: float) -> None:
-        """Fly a velocity [heading frame, FLU] until told otherwise."""
+        """Fly a velocity [heading frame, FLU] until the next command."""
         self.steer(Steering.VELOCITY)
         self._wanted = (velocity_m_s, yaw_rate_rad_s)
 
@@ -183,7 +183,7 @@ class MavlinkCopter:
         self._acceleration[2] = a + (_CLIMB_RATE**2 * error - 2 * _CLIMB_DAMPING * _CLIMB_RATE * a) * self._tick_s
 
     def _move(self, acceleration: tuple[float, ...], turn: float, push: Vector3) -> None:
-        """Integrate an acceleration [heading frame]; tilt is what that acceleration takes."""
+        """Integrate an acceleration [heading frame]; the tilt follows from it."""
         body, dt = self.airframe, self._tick_s
         c, s = math.cos(body.yaw), math.sin(body.yaw)
         forward, left, up = acceleration

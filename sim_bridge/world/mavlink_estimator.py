@@ -1,4 +1,4 @@
-"""What a modern autopilot believes of its own motion: inertial sensors, aided by poses that are fed from outside.
+"""The state estimated by a modern autopilot: inertial sensors, aided by poses from outside.
 
 Without them it knows nothing of its position; when they stop, it coasts on its accelerometers and drifts. The frame is
 that of the poses. Gains stand for those of the firmwares' filters: 1-3 cm of error for 1 cm of noise

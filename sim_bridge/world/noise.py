@@ -46,7 +46,7 @@ class GaussMarkov:
 
 
 class DelayLine(Generic[T]):
-    """Returns what was pushed `delay` ago, rounded up to whole ticks; before that, what was pushed first."""
+    """Returns the value pushed `delay` ago, rounded up to whole ticks; before that, the first one."""
 
     __slots__ = ("_line",)
 

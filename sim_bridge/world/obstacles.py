@@ -1,4 +1,4 @@
-"""Boxes that stand or move in the room, and what they hide."""
+"""Boxes that stand or move in the room, and hide markers."""
 
 import math
 from collections.abc import Iterable
@@ -58,7 +58,7 @@ def boxes_of(
 
 
 def floor_below(x: float, y: float, z: float, tops: Iterable[tuple[float, float, float, float]]) -> float:
-    """Return the height [m] of what an ultrasound at a place hears: the highest of the tops under it, else the floor.
+    """Return the height [m] of the surface under an ultrasound sensor: the highest top below it, else the floor.
 
     tops: x, y, radius and height of what stands about [m]; an echo within 15 degrees of straight down counts.
     """

@@ -48,7 +48,7 @@ class Puppet:
         self.poses += 1
 
     def step(self) -> None:
-        """Advance by one tick, as the last pose says."""
+        """Advance by one tick towards the last pose."""
         self.age_s += self._tick_s
         if self.stale or self._waits:
             return
@@ -69,7 +69,7 @@ class Puppet:
 
     @property
     def nowhere(self) -> str:
-        """Return why nobody can see it, or ""."""
+        """Return why it is not visible, or ""."""
         if self.stale:
             return f"no pose of the real one for {STALE_S:g} s" if self.poses else "no pose of the real one yet"
         return "the pose of the real one lies outside of the room" if self.outside else ""
@@ -80,7 +80,7 @@ class Puppet:
         return self.poses > 0 and not self.stale and not self.airframe.on_ground
 
     def row(self) -> tuple[float, ...]:
-        """Return the 13 numbers of the truth board; NaN where nobody knows where it is."""
+        """Return the 13 numbers of the truth board; NaN while its place is unknown."""
         if self.nowhere:
             return _NOWHERE
         return (*self.airframe.row()[:9], *self._rates, float(self.airframe.on_ground))

@@ -64,7 +64,7 @@ class Unicycle:
         self.parked = scenario.departs_after_team_s is not None
 
     def drive(self, speed_m_s: float, turn_rate_rad_s: float) -> None:
-        """Leave the path and drive so (within the limits) until told otherwise."""
+        """Leave the path and drive at these speeds (within the limits) until the next command."""
         self._steered = (speed_m_s, turn_rate_rad_s)
 
     def follow_path(self) -> None:

@@ -1,4 +1,4 @@
-"""The same seam with MAVSDK 4 (a native library) between the port and us: it knows the vehicles and carries messages.
+"""Links through MAVSDK 4, a native library that discovers the vehicles and carries messages.
 
 The port itself stays ours (`raw://`): what a vehicle sent and was sent is recorded to the byte, refusals have the same
 names as on the other links, and each vehicle has a Mavsdk object of its own. With one object for all, messages that
@@ -58,7 +58,7 @@ def _value(value: Any) -> Any:
 
 
 def json_from_message(message: Message) -> str:
-    """Return all fields of a message as JSON; raises WireError for what MAVSDK refuses (not finite)."""
+    """Return all fields of a message as JSON; raises WireError for values that MAVSDK refuses (not finite)."""
     try:
         return json.dumps(dict(zip(fields_of(type(message)), message, strict=True)), allow_nan=False)
     except ValueError as error:
@@ -141,7 +141,7 @@ class _System:
 
 
 class MavsdkLink:
-    """One port, a thread that hands what comes there to the library, and the vehicles behind it."""
+    """One port, a thread that passes its datagrams to the library, and the vehicles behind it."""
 
     def __init__(self, settings: LinkSettings, transport: Transport) -> None:
         self.rejected: Counter[str] = transport.rejected
@@ -180,7 +180,7 @@ class MavsdkLink:
         return self._transport.called_from
 
     def receive(self) -> list[Heard]:
-        """Wait up to 0.1 s; return what came."""
+        """Wait up to 0.1 s; return the messages received."""
         try:
             heard = [self._heard.get(timeout=_POLL_S)]
             while not self._heard.empty():
@@ -190,7 +190,7 @@ class MavsdkLink:
         return heard
 
     def send(self, system: int, message: Message) -> None:
-        """Send to a vehicle; one that was never heard is only greeted, where the link speaks first."""
+        """Send to a vehicle; before its first message only a greeting, if the link has to send first."""
         if self._closing.is_set():
             return
         known = self._systems.get(system)

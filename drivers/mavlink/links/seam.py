@@ -27,7 +27,7 @@ class MavlinkLink(Protocol):
         """Where the vehicles were heard last, on a link that they call themselves; empty on others."""
 
     def receive(self) -> list[Heard]:
-        """Wait up to 0.1 s; return what came."""
+        """Wait up to 0.1 s; return the messages received."""
 
     def send(self, system: int, message: Message) -> None:
         """Send to one vehicle; never blocks, a message to a vehicle that was never heard may be lost."""
@@ -40,7 +40,7 @@ class Transport(MavlinkLink, Protocol):
     """A link that can also be used for frames that somebody else takes apart and makes."""
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
-        """Wait up to 0.1 s; return what came, and the bytes of each frame."""
+        """Wait up to 0.1 s; return the messages received, and the bytes of each frame."""
 
     def send_raw(self, system: int, data: bytes) -> None:
         """Send whole frames to one vehicle; never blocks."""

@@ -119,6 +119,6 @@ class SerialLink:
 
 
 def raise_if_closed(error: Exception) -> None:
-    """Raise again what means that we closed the line ourselves (ValueError); other errors may pass."""
+    """Raise the error of a line that we closed ourselves (ValueError) again; ignore others."""
     if isinstance(error, ValueError):
         raise error

@@ -33,7 +33,7 @@ def _bind_as_ever(sock: socket.socket, target: str) -> None:
 
 
 class UdpLink:
-    """Datagrams. `udpout` speaks to one address; `udpin` waits for vehicles and remembers where each one is.
+    """Datagrams. `udpout` sends to one address; `udpin` waits for vehicles and keeps the address of each.
 
     WIRE (docs/reference/mavlink.md 5.6): one socket for many vehicles needs an address per system id.
     """
@@ -102,7 +102,7 @@ class UdpLink:
         return heard
 
     def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
-        """Show a vehicle that speaks MAVLink 1 a frame of version 2, which is when it changes to that.
+        """Send a vehicle that uses MAVLink 1 a frame of version 2, after which it uses version 2.
 
         WIRE (docs/reference/mavlink.md 5.10): PX4 with MAV_PROTO_VER 0. Nothing is learnt from it: no address is bound.
         """

@@ -95,7 +95,7 @@ class FrameDecoder:
         self._mav = dialect.MAVLink(None)
 
     def decode(self, frame: bytes) -> ReceivedFrame:
-        """Return what a verified frame says; raises WireError (those of Verifier.verify, malformed)."""
+        """Return the message of a verified frame; raises WireError (those of Verifier.verify, malformed)."""
         self._verifier.verify(frame)
         number = number_of(frame)
         system, component, sequence = frame[5], frame[6], frame[4]
@@ -111,7 +111,7 @@ class FrameDecoder:
 
 
 class FrameEncoder:
-    """Numbers, and with a key signs, what one component sends; one per sender, used by one thread at a time."""
+    """Numbers, and with a key signs, the frames of one sending component; used by one thread at a time."""
 
     def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
         self._mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)

@@ -14,7 +14,7 @@ _INTEGERS = range(1, 9)  # MAV_PARAM_TYPE UINT8 .. INT64
 
 
 def carried_from_value(flavour: Flavour, value: float, kind: int) -> float:
-    """Return what to put into param_value."""
+    """Return the number for param_value."""
     if flavour is Flavour.PX4 and kind in _INTEGERS:
         carried: float = struct.unpack("<f", struct.pack("<i", round(value)))[0]
         return carried

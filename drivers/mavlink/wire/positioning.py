@@ -1,10 +1,10 @@
-"""Position by satellites, in the order of the dialect: what programs for outdoor flight wait for."""
+"""Position by satellites, in the order of the dialect; programs for outdoor flight wait for it."""
 
 from typing import NamedTuple
 
 
 class GpsRawInt(NamedTuple):
-    """What the receiver says: fix 0 no receiver, 1 none, 3 in space; degrees x 1e7, mm, cm/s, cdeg; 65535 unknown."""
+    """State of the receiver: fix 0 no receiver, 1 none, 3 in space; degrees x 1e7, mm, cm/s, cdeg; 65535 unknown."""
 
     time_usec: int
     fix_type: int
@@ -25,7 +25,7 @@ class GpsRawInt(NamedTuple):
 
 
 class GlobalPositionInt(NamedTuple):
-    """Where it believes to be: degrees x 1e7, mm, cm/s in north-east-down, cdeg."""
+    """Its estimated position: degrees x 1e7, mm, cm/s in north-east-down, cdeg."""
 
     time_boot_ms: int
     lat: int

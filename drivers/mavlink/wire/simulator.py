@@ -1,4 +1,4 @@
-"""What the simulator behind a firmware says of the true state of its vehicle, in the order of the dialect.
+"""True state of a vehicle from the simulator behind its firmware, in the order of the dialect.
 
 No driver uses these: they are for programs that show where a simulated vehicle really is.
 """

@@ -1,4 +1,4 @@
-"""What a vehicle says, field by field in the order of the dialect; units are MAVLink's, frames NED and FRD."""
+"""Telemetry messages, field by field in the order of the dialect; units are MAVLink's, frames NED and FRD."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ Floats = tuple[float, ...]
 
 
 class Heartbeat(NamedTuple):
-    """Who is there, in which mode; custom_mode means what the autopilot says it means (modes.py)."""
+    """A vehicle's presence and mode; the meaning of custom_mode depends on the autopilot (modes.py)."""
 
     type: int
     autopilot: int
@@ -140,7 +140,7 @@ class BatteryStatus(NamedTuple):
 
 
 class EkfStatusReport(NamedTuple):
-    """ArduPilot: flags say what the estimator can deliver."""
+    """ArduPilot: flags of the quantities that the estimator delivers."""
 
     flags: int
     velocity_variance: float

@@ -45,7 +45,7 @@ def _is_whole(value: int) -> bool:
 
 
 class Header(msgspec.Struct, frozen=True, gc=False):
-    """When something was measured, about whom, and who says so."""
+    """Time, subject and source of a message."""
 
     stamp_ns: Whole
     """Time of the measurement [ns] on the boot clock named by `clock`."""

@@ -1,4 +1,4 @@
-"""The tracker's belief, and what it made of each measurement."""
+"""The tracker's belief, and its verdict on each measurement."""
 
 from enum import StrEnum
 
@@ -42,7 +42,7 @@ class TargetSearch(msgspec.Struct, frozen=True):
     searched: float
     """Share of the room that was searched."""
     expected_s: float | None
-    """About how much longer it takes [s]; none: nobody can search now."""
+    """Estimated remaining time [s]; none: no robot can search now."""
     text: str
     """The same in words."""
 
@@ -133,7 +133,7 @@ class Innovation(Message, frozen=True, kw_only=True):
 
 
 class JournalEntry(Message, frozen=True, kw_only=True):
-    """One tick of the tracker: what it ingested in which order, and which plan it adopted. Replay follows it."""
+    """One tick of the tracker: its inputs in order, and the plan it adopted. Replay follows it."""
 
     tick: int
     """Number of the tick."""
@@ -142,7 +142,7 @@ class JournalEntry(Message, frozen=True, kw_only=True):
     ingested: tuple[tuple[str, int], ...]
     """(key, seq) of each message, in the order of ingestion."""
     plan_tick: int = -1
-    """Tick on whose belief the plan adopted now was made; -1: none was adopted."""
+    """Tick whose belief the plan adopted now started from; -1: no plan was adopted."""
     evaluations: int = 0
     """Cost evaluations of that plan."""
     stop_reason: str = ""

@@ -112,7 +112,7 @@ class AckStage(StrEnum):
     ACCEPTED = "ACCEPTED"
     """The driver acts on it."""
     EFFECTIVE = "EFFECTIVE"
-    """The vehicle does what was asked."""
+    """The vehicle carries the command out."""
     REFUSED = "REFUSED"
     """The driver will not do it."""
 

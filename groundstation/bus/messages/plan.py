@@ -17,7 +17,7 @@ class Alternative(msgspec.Struct, frozen=True):
 
 
 class Control(msgspec.Struct, frozen=True):
-    """Commanded velocity of one robot, and what the safety limits changed of it."""
+    """Commanded velocity of one robot, and the changes by safety limits."""
 
     robot: str
     """The robot."""

@@ -42,7 +42,7 @@ class Lifecycle(StrEnum):
     DEGRADED = "DEGRADED"
     """Works, with something missing."""
     STOPPING = "STOPPING"
-    """Finishes what it has begun and exits."""
+    """Finishes its work and exits."""
 
 
 class ProcessStatus(Message, frozen=True, kw_only=True):

@@ -36,7 +36,7 @@ class Odometry(Message, frozen=True, kw_only=True):
     reset: int = 0
     """Rises by one when yaw or position jump: differences across a reset mean nothing."""
     attitude_std_rad: float = 0.0
-    """Standard deviation of roll and of pitch [rad]; 0: as the field file says."""
+    """Standard deviation of roll and of pitch [rad]; 0: that of the field file."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -1,4 +1,4 @@
-"""The true mounting of a fixed camera: a little off the field file, like a real one."""
+"""The true mounting of a camera: a little off the field file, like a real one, and turned by a bump."""
 
 import math
 
@@ -21,3 +21,14 @@ def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple
     error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
     known, place = world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m, dtype=np.float64)
     return (rotation_from_euler(*error) @ known, place + off) if errors else (known, place)
+
+
+def turned_about(angle_deg: float, axis_deg: float) -> Array:
+    """Return old_optical_from_new_optical (3, 3) for a turn about an axis in the image plane.
+
+    axis_deg: counter-clockwise in the image from its right; 0 tilts the camera up for a positive angle.
+    """
+    angle, at = math.radians(angle_deg), math.radians(axis_deg)
+    x, y = math.cos(at), -math.sin(at)
+    cross = np.array([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)

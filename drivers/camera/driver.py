@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from drivers.base import HostProcess
-from drivers.camera import convert, jpeg
+from drivers.camera import convert
 from drivers.camera.context import Surroundings
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
@@ -18,6 +18,7 @@ from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
 from groundstation.arrays import Image
 from groundstation.bus import clock
+from groundstation.bus.jpeg import whole_size
 from groundstation.bus.messages import CameraStatus, SearchedPicture, Severity
 from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, SEARCHED_PICTURE, VIDEO
 from groundstation.errors import SettingsError, without_password
@@ -127,7 +128,7 @@ class CameraDriver:
         if packet.picture is not None:
             picture = packet.picture.grey()
             return picture if self._has_size(picture.shape[1], picture.shape[0], packet) else None
-        size = jpeg.size_of(packet.data)
+        size = whole_size(packet.data)
         if size is not None and not self._has_size(*size, packet):
             return None
         decoded = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if size else None

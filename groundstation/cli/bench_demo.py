@@ -90,7 +90,7 @@ def demo(seeds: int, first: int, duration: float | None, out: Path | None, as_js
     if as_json:
         click.echo(json.dumps(as_builtins(outcomes), indent=2))
     else:
-        from groundstation.cli.show import show
+        from groundstation.cli.terminal import show
 
         show(table(outcomes))
     return ExitCode.OK if len(outcomes) == seeds and all(outcome.passed for outcome in outcomes) else ExitCode.FAILED

@@ -12,7 +12,7 @@ from groundstation.cli.experiment_faults import faults
 from groundstation.cli.experiment_mrclam import mrclam
 from groundstation.cli.experiment_scenarios import scenarios
 from groundstation.cli.numbers import FiniteRange
-from groundstation.cli.progress import progress
+from groundstation.cli.terminal import progress
 from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:

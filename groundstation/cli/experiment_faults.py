@@ -8,9 +8,8 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
 from groundstation.cli.numbers import FiniteRange
-from groundstation.cli.progress import progress
-from groundstation.errors import GroundStationError
 
 
 @click.command(
@@ -29,68 +28,38 @@ from groundstation.errors import GroundStationError
 @click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
 @click.option("--scenario", default="realistic", show_default=True, help="Scenario without faults: sensor errors.")
 @click.option("--kinds", default="", help="Only these kinds of faults, by commas (default: all that are drawn).")
-@click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting of the field; repeatable.")
-@click.option(
-    "--scheduler", default="local", show_default=True, help="tcp://host:8786 of a dask cluster, `local`, or `none`."
-)
-@click.option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    type=click.Path(path_type=Path),
-    default=None,
-    help="Folder; default runs/experiment-faults.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output.")
-def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path | None, as_json: bool, **flown: Any) -> int:
+@campaign_options("faults")
+def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any) -> int:
     """Fly random fields with one or two random faults; the drivers, watchdogs and tracker are those that fly.
 
     Message level: no processes, no pictures. Each seed is one flight and gives the same end again. Unsafe is a
     separation below 0.6 m, a broken fence, 0.3 m/s above the drone's limit, more than a second of motion with a belief
     that is 0.5 m off, and after a vehicle's words became useless a hover later than 1 s, or rest later than 3.5 s.
     """
-    from groundstation.experiments.faults import batches, by_kind, flights_of, fly, table, totals
-    from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks, write_atomically
+    from groundstation.experiments.faults import batches, by_kind, flights_of, table, totals
+    from groundstation.experiments.runner import write_atomically
 
-    order = _order(**flown)
-    if scheduler == "local" and (flights == 1 or not dask_is_there()):
-        scheduler = "none"
-    folder = Path(out or Path("runs") / "experiment-faults")
     began = time.monotonic()
-    try:
-        planned = batches(order, seed, flights, size=max(1, min(20, flights // max(1, 2 * workers or 4))))
-        rows = run_tasks(planned, None, "" if scheduler == "none" else scheduler, workers, progress, fly)
-    except (SweepError, RuntimeError) as error:
-        raise GroundStationError(str(error)) from error
-    found, timing = flights_of(rows)
+    planned = batches(_order(**flown), seed, flights, size=max(1, min(20, flights // max(1, 2 * workers or 4))))
+    found, timing = flights_of(fly_all(planned, scheduler, workers, single=flights == 1))
     summary = totals(found, timing) | {"elapsed_s": round(time.monotonic() - began, 1)}
     by_kinds = by_kind(found)
     document = {"experiment": "faults", **summary, "kinds": by_kinds, "flights_flown": found}
-    write_atomically(folder / "faults.json", json.dumps(document, indent=1) + "\n")
+    write_atomically(out / "faults.json", json.dumps(document, indent=1) + "\n")
     if as_json:
         click.echo(json.dumps(document, indent=1))
     else:
-        _tell(table(by_kinds), summary, folder)
+        _tell(table(by_kinds), summary, out)
     return ExitCode.FAILED if summary["unsafe"] else ExitCode.OK
 
 
 def _order(name: str, scenario: str, options: tuple[str, ...], seconds: float, kinds: str) -> str:
     """Return the simulator's order besides the seeds."""
-    import msgspec
-
     from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.load import load_field
-    from groundstation.settings.resolved import resolved_field
     from groundstation.settings.scenario import load_scenario
-    from groundstation.settings.sections import DriverKind, driver_sections
 
     path = find_field(name)
-    field = load_field(path, (*options, "recording.raw_datagrams=false"))
-    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
-    order: dict[str, Any] = {
-        "field": msgspec.to_builtins(resolved_field(field)),
-        "sections": sections,
+    order = flown_field(path, options) | {
         "scenario": load_scenario(find_scenario(scenario, path)),
         "seconds": seconds,
         "kinds": [kind.strip() for kind in kinds.split(",") if kind.strip()],

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
 from groundstation.cli.numbers import FiniteRange
-from groundstation.cli.progress import progress
-from groundstation.errors import GroundStationError, SettingsError
+from groundstation.errors import SettingsError
 
 if TYPE_CHECKING:
     from groundstation.experiments.faults import FlightBatch
@@ -37,22 +37,9 @@ _BATCH = 5
 @click.option(
     "--field", default=None, help="Field file, or a shipped one's name; default: as the scenario's file says."
 )
-@click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting of the field; repeatable.")
-@click.option(
-    "--scheduler", default="local", show_default=True, help="tcp://host:8786 of a dask cluster, `local`, or `none`."
-)
-@click.option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    type=click.Path(path_type=Path),
-    default=None,
-    help="Folder; default runs/experiment-scenarios.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output.")
+@campaign_options("scenarios")
 def scenarios(
-    names: tuple[str, ...], strategies: str, scheduler: str, workers: int, out: Path | None, as_json: bool, **flown: Any
+    names: tuple[str, ...], strategies: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:
     """Fly scenario files at message level and compare what comes of them with what each file expects.
 
@@ -62,19 +49,12 @@ def scenarios(
     look at it from there) and the chase (the nearest drone goes there from its own side). Figures count from when the
     target was found; lost is an error above 0.5 m.
     """
-    from groundstation.experiments.faults import flights_of, fly
-    from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks, write_atomically
+    from groundstation.experiments.faults import flights_of
+    from groundstation.experiments.runner import write_atomically
     from groundstation.experiments.scenarios import rows_of, table
 
-    planned = _planned(names, _known(strategies), **flown)
-    if scheduler == "local" and (len(planned) == 1 or not dask_is_there()):
-        scheduler = "none"
-    folder, began = Path(out or Path("runs") / "experiment-scenarios"), time.monotonic()
-    batches = [batch for _, batch in planned]
-    try:
-        found = run_tasks(batches, None, "" if scheduler == "none" else scheduler, workers, progress, fly)
-    except (SweepError, RuntimeError) as error:
-        raise GroundStationError(str(error)) from error
+    planned, began = _planned(names, _known(strategies), **flown), time.monotonic()
+    found = fly_all([batch for _, batch in planned], scheduler, workers, single=len(planned) == 1)
     flights = [
         {"scenario": name, **one} for (name, _), row in zip(planned, found, strict=True) for one in flights_of([row])[0]
     ]
@@ -85,11 +65,11 @@ def scenarios(
         "rows": rows,
         "flights": flights,
     }
-    write_atomically(folder / "scenarios.json", json.dumps(document, indent=1) + "\n")
+    write_atomically(out / "scenarios.json", json.dumps(document, indent=1) + "\n")
     if as_json:
         click.echo(json.dumps(document, indent=1))
     else:
-        _tell(table(rows), rows, folder)
+        _tell(table(rows), rows, out)
     return ExitCode.FAILED if any(row["missed"] for row in rows) else ExitCode.OK
 
 
@@ -132,21 +112,13 @@ def _shipped() -> list[str]:
 
 def _order(name: str, seconds: float | None, field: str | None, options: tuple[str, ...]) -> dict[str, Any]:
     """Return what the simulator is told besides strategy and seeds."""
-    import msgspec
-
     from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.load import load_field
-    from groundstation.settings.resolved import resolved_field
     from groundstation.settings.scenario import load_scenario
-    from groundstation.settings.sections import DriverKind, driver_sections
 
     scenario = load_scenario(find_scenario(name, find_field(field or "lab")))
     expected = scenario.get("expected") or {}
     path = find_field(field or expected.get("field", "lab"))
-    loaded = load_field(path, (*expected.get("set", ()), *options, "recording.raw_datagrams=false"))
-    return {
-        "field": msgspec.to_builtins(resolved_field(loaded)),
-        "sections": [(str(s.kind), s.section) for s in driver_sections(loaded) if s.kind is not DriverKind.CAMERA],
+    return flown_field(path, (*expected.get("set", ()), *options)) | {
         "scenario": scenario,
         "seconds": seconds or expected.get("seconds", 45.0),
     }

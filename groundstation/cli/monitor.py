@@ -84,7 +84,7 @@ def _print_once(bus: "Bus", cast: "Cast", as_json: bool) -> None:
     if as_json:
         click.echo(screen.state.as_json(time.monotonic_ns()))
         return
-    from groundstation.cli.show import show
+    from groundstation.cli.terminal import show
     from groundstation.monitor.table import render
 
     show(render(screen.state, time.monotonic_ns()))

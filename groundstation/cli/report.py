@@ -52,7 +52,7 @@ def _show(built: "RunReport", as_json: bool) -> None:
     if as_json:
         click.echo(built.as_json())
         return
-    from groundstation.cli.show import show
+    from groundstation.cli.terminal import show
     from groundstation.report.summary import summary
 
     show(summary(built))
@@ -73,7 +73,7 @@ def _compare(first: Path, second: Path, as_json: bool) -> None:
         write_comparison(((left, reports[0]), (right, reports[1])), first / NAME)
     except OSError as error:
         raise GroundStationError(f"{first / NAME}: {error.strerror}") from error
-    from groundstation.cli.show import show
+    from groundstation.cli.terminal import show
     from groundstation.report.summary import comparison
 
     show(comparison(*reports))

@@ -241,7 +241,7 @@ def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
         with suppress(OSError):
             shutil.copy(run_dir / name, copy_to or run_dir)
     try:
-        from groundstation.cli.show import show
+        from groundstation.cli.terminal import show
         from groundstation.report.summary import summary
 
         show(summary(built))

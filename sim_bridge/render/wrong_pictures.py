@@ -8,9 +8,9 @@ import numpy as np
 from groundstation.arrays import Array, Image
 from groundstation.geometry.pose import Pose
 from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.mounting import turned_about
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import BoardSpec, RenderSpec
-from sim_bridge.turned import turned_about
 
 _SCENE = frozenset({FaultKind.CAMERA_BUMPED, FaultKind.WRONG_BOARD})
 

@@ -14,10 +14,9 @@ from groundstation.geometry.rotations import (
     rotation_from_euler,
 )
 from groundstation.geometry.tag import SquareTag
-from sim_bridge.mounting import generator_of_eye, mounted
+from sim_bridge.mounting import generator_of_eye, mounted, turned_about
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
-from sim_bridge.turned import turned_about
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0

@@ -8,7 +8,7 @@ from rich.console import Console
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.cli.show import show
+from groundstation.cli.terminal import show
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.screen import DRAW_PERIOD_NS, Screen, line

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera import jpeg
 from drivers.camera.settings import SourceAddress, SourceKind, parse_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
+from groundstation.bus.jpeg import whole_size
 
 
 def test_stream_watch():
@@ -26,9 +26,9 @@ def test_stream_watch():
 @pytest.mark.parametrize("shape", [(1, 1), (48, 64), (720, 1280, 3)])
 def test_the_size_of_a_jpeg_is_in_its_head(shape, progressive):
     data = cv2.imencode(".jpg", np.zeros(shape, np.uint8), (cv2.IMWRITE_JPEG_PROGRESSIVE, progressive))[1].tobytes()
-    assert jpeg.size_of(data) == (shape[1], shape[0])
-    assert jpeg.size_of(data + b"\r\n") == (shape[1], shape[0])
-    assert jpeg.size_of(data[:-2]) is None
+    assert whole_size(data) == (shape[1], shape[0])
+    assert whole_size(data + b"\r\n") == (shape[1], shape[0])
+    assert whole_size(data[:-2]) is None
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_the_size_of_a_jpeg_is_in_its_head(shape, progressive):
     ],
 )
 def test_what_is_no_whole_jpeg_has_no_size(data):
-    assert jpeg.size_of(data) is None
+    assert whole_size(data) is None
 
 
 def test_any_bytes_have_a_size_or_none():
@@ -52,7 +52,7 @@ def test_any_bytes_have_a_size_or_none():
     for _ in range(2000):
         data = whole.copy()
         data[random.integers(2, len(data) - 2, 6)] = random.integers(0, 256, 6)
-        size = jpeg.size_of(data.tobytes())
+        size = whole_size(data.tobytes())
         assert size is None or (0 < size[0] < 65536 and 0 < size[1] < 65536)
 
 

@@ -1,0 +1,75 @@
+"""The shared part of experiments that fly batches of message-level flights: options, field, and the runs."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from groundstation.cli.terminal import progress
+from groundstation.errors import GroundStationError
+
+if TYPE_CHECKING:
+    from groundstation.experiments.faults import FlightBatch
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def campaign_options(name: str) -> Callable[[Command], Command]:
+    """Return a decorator with the options of a campaign; its results go to runs/experiment-NAME."""
+    options = (
+        click.option(
+            "--set", "options", multiple=True, metavar="A.B=C", help="Override one setting of the field; repeatable."
+        ),
+        click.option(
+            "--scheduler",
+            default="local",
+            show_default=True,
+            help="tcp://host:8786 of a dask cluster, `local`, or `none`.",
+        ),
+        click.option(
+            "--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core."
+        ),
+        click.option(
+            "-o",
+            "--output",
+            "out",
+            type=click.Path(path_type=Path),
+            default=Path("runs") / f"experiment-{name}",
+            show_default=True,
+            help="Folder of the results.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output."),
+    )
+
+    def decorated(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorated
+
+
+def flown_field(path: Path, options: Sequence[str]) -> dict[str, Any]:
+    """Return the simulator's order for a field: its resolved values, and the sections of its vehicle drivers."""
+    import msgspec
+
+    from groundstation.settings.load import load_field
+    from groundstation.settings.resolved import resolved_field
+    from groundstation.settings.sections import DriverKind, driver_sections
+
+    field = load_field(path, (*options, "recording.raw_datagrams=false"))
+    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    return {"field": msgspec.to_builtins(resolved_field(field)), "sections": sections}
+
+
+def fly_all(batches: "Sequence[FlightBatch]", scheduler: str, workers: int, single: bool) -> list[dict[str, Any]]:
+    """Return the row of each batch; single: too little work for a local cluster. Raises GroundStationError."""
+    from groundstation.experiments.faults import fly
+    from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks
+
+    serial = scheduler == "none" or (scheduler == "local" and (single or not dask_is_there()))
+    try:
+        return run_tasks(batches, None, "" if serial else scheduler, workers, progress, fly)
+    except (SweepError, RuntimeError) as error:
+        raise GroundStationError(str(error)) from error

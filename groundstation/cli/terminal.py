@@ -1,0 +1,26 @@
+"""Output on a terminal: tables and drawings of rich, and a bar for long work."""
+
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+_WHOLE = 10_000
+
+
+def show(picture: "RenderableType") -> None:
+    """Print a table or drawing of rich; in a pipe or a file nothing is shortened or wrapped."""
+    from rich.console import Console
+
+    terminal = Console()
+    (terminal if terminal.is_terminal else Console(width=_WHOLE)).print(picture)
+
+
+def progress(done: int, total: int) -> None:
+    """Draw a bar of the work done, if standard error is a terminal."""
+    if sys.stderr.isatty():
+        bar = "#" * (40 * done // max(total, 1))
+        click.echo(f"\r\033[K[{bar:40}] {done}/{total}{chr(10) if done == total else ''}", err=True, nl=False)

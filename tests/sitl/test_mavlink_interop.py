@@ -4,10 +4,17 @@ import asyncio
 import importlib.util
 import os
 import subprocess
+import threading
 import time
 from pathlib import Path
 
 import pytest
+
+from drivers.mavlink.links.forwarding import with_riders
+from drivers.mavlink.links.opening import open_link
+from drivers.mavlink.settings import LinkSettings, VehicleSettings
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.names import MavCmd
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
 _INTEROP = Path(__file__).parents[2] / ".interop"
@@ -101,38 +108,102 @@ def mavproxy(absent):
     return program
 
 
-def test_mavproxy_flies_our_ardupilot(mavproxy, hangar, tmp_path):
+class Proxy:
+    """A MAVProxy with a prompt; `until` waits for what it brings about."""
+
+    def __init__(self, program, master, folder):
+        command = [str(Path(program).parent / "python"), program, f"--master={master}", "--target-system=5"]
+        command += ["--state-basedir", str(folder)]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=folder
+        )
+
+    def say(self, line):
+        assert self._process.stdin is not None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
+
+    def close(self):
+        self._process.terminate()
+        print(self._process.communicate(timeout=10)[0])
+
+
+def until(condition, seconds=20.0):
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    return condition()
+
+
+@pytest.fixture
+def proxy_at(mavproxy, tmp_path):
+    made = []
+
+    def start(master):
+        made.append(Proxy(mavproxy, master, tmp_path))
+        return made[0]
+
+    yield start
+    for one in made:
+        one.close()
+
+
+def test_mavproxy_flies_our_ardupilot(proxy_at, hangar):
     emulator, copter, (address, port) = hangar.add("ardupilot", 5, aided=True)
-    interpreter = Path(mavproxy).parent / "python"
-    command = [str(interpreter), mavproxy, f"--master=udpout:{address}:{port}", "--target-system=5"]
-    command += ["--state-basedir", str(tmp_path)]
-    pipe = subprocess.PIPE
-    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=tmp_path)
+    proxy = proxy_at(f"udpout:{address}:{port}")
+    assert until(lambda: emulator._ground_ns is not None), "no heartbeat from MAVProxy"
+    time.sleep(2.0)
+    proxy.say("mode GUIDED")
+    assert until(lambda: emulator.firmware.mode == 4)
+    proxy.say("arm throttle")
+    assert until(lambda: emulator.firmware.armed)
+    proxy.say("takeoff 1")
+    assert until(lambda: copter.airframe.z > 0.8)
+    proxy.say("param set GUID_TIMEOUT 0.75")
+    assert until(lambda: emulator.firmware.parameters["GUID_TIMEOUT"] == 0.75)
+    proxy.say("mode LAND")
+    assert until(lambda: not emulator.firmware.armed)
 
-    def say(line):
-        assert process.stdin is not None
-        process.stdin.write(line + "\n")
-        process.stdin.flush()
 
-    def until(condition, seconds=20.0):
-        deadline = time.monotonic() + seconds
-        while not condition() and time.monotonic() < deadline:
-            time.sleep(0.1)
-        return condition()
+def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port):
+    """Our link flies the vehicle; MAVProxy sees it, cannot change what it flies by, and lands it."""
+    emulator, copter, (address, own) = hangar.add("ardupilot", 5, aided=True)
+    told: list[str] = []
+    seen = VehicleSettings(name="drone", system_id=5, flavour="ardupilot", forward=f"udp:127.0.0.1:{port}")
+    link = open_link(
+        LinkSettings(target=f"udpout:{address}:{own}"), shown=lambda bare: with_riders(bare, {5: seen}, told.append)
+    )
+    ended = threading.Event()
+    reader = threading.Thread(target=lambda: [link.receive() for _ in iter(ended.is_set, True)])
+    reader.start()
+
+    def ask(done, number, *values):
+        def asked():
+            link.send(5, CommandLong(5, 1, number, 0, *values))
+            time.sleep(0.3)
+            return done()
+
+        assert until(asked), number
 
     try:
-        assert until(lambda: emulator._ground_ns is not None), "no heartbeat from MAVProxy"
         time.sleep(2.0)
-        say("mode GUIDED")
-        assert until(lambda: emulator.firmware.mode == 4)
-        say("arm throttle")
-        assert until(lambda: emulator.firmware.armed)
-        say("takeoff 1")
+        ask(lambda: emulator.firmware.mode == 4, MavCmd.DO_SET_MODE, 1.0, 4.0)
+        ask(lambda: emulator.firmware.armed, MavCmd.COMPONENT_ARM_DISARM, 1.0)
+        link.send(5, CommandLong(5, 1, MavCmd.NAV_TAKEOFF, 0, param7=1.0))
         assert until(lambda: copter.airframe.z > 0.8)
-        say("param set GUID_TIMEOUT 0.75")
-        assert until(lambda: emulator.firmware.parameters["GUID_TIMEOUT"] == 0.75)
-        say("mode LAND")
+        proxy = proxy_at(f"udpin:127.0.0.1:{port}")
+        time.sleep(4.0)
+        proxy.say("mode RTL")
+        proxy.say("param set GUID_TIMEOUT 0.75")
+        time.sleep(2.0)
+        assert emulator.firmware.mode == 4
+        assert emulator.firmware.parameters["GUID_TIMEOUT"] != 0.75
+        assert not told
+        proxy.say("mode LAND")
         assert until(lambda: not emulator.firmware.armed)
+        assert until(lambda: told)
     finally:
-        process.terminate()
-        print(process.communicate(timeout=10)[0])
+        ended.set()
+        reader.join(3.0)
+        link.close()

@@ -163,12 +163,14 @@ class Tracker:
         """Return whether an entity's position is known well enough to fly on."""
         if name not in self._belief.layout:
             return False
-        variances = np.diag(self._belief.covariance_of(name))[:2]
-        return bool(variances.max() <= self.parameters.safety.max_position_std_m**2)
+        P = self._belief.covariance_of(name)
+        return bool(max(P[0, 0], P[1, 1]) <= self.parameters.safety.max_position_std_m**2)
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""
-        return tuple(self._estimate(name) for name in self._belief.layout.robots + self._belief.layout.targets)
+        unlocalised_s = self.unlocalised_s()
+        names = self._belief.layout.robots + self._belief.layout.targets
+        return tuple(self._estimate(name, unlocalised_s.get(name, 0.0)) for name in names)
 
     def target_age_s(self) -> float | None:
         """Return the time since any target was last observed; None if none is believed anywhere."""
@@ -299,7 +301,7 @@ class Tracker:
         text = f"{correction.subject} {'re-initialised' if again else 'localised'} by {correction.observer}"
         self._notices.append(Notice(severity, text, entity=correction.subject))
 
-    def _estimate(self, name: str) -> EntityEstimate:
+    def _estimate(self, name: str, unlocalised_s: float) -> EntityEstimate:
         block = self._belief.layout.block(name)
         mean, covariance = self._belief.mean_of(name), self._belief.covariance_of(name)
         if block.kind is EntityKind.ROBOT:
@@ -316,5 +318,5 @@ class Tracker:
             velocity_m_s=velocity,
             converged=self.converged(name),
             age_s=self.filter.age_s(name),
-            unlocalised_s=self.unlocalised_s().get(name, 0.0),
+            unlocalised_s=unlocalised_s,
         )

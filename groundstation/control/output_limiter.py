@@ -20,6 +20,7 @@ from groundstation.planning.parameters import MotionLimits
 
 # No two bodies are this near: a belief that has them there does not say on which side the other one is.
 _NO_SIDE_M = 0.1
+_AXES = np.eye(3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +95,10 @@ def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:
     A vehicle that holds its velocity v in its own frame carries it along when it turns: it flies v + T rate (z x v),
     for as long as its reaction T lags behind.
     """
-    tilted = wall.normal + reaction_s * rate * np.array([wall.normal[1], -wall.normal[0], 0.0])
-    size = float(np.linalg.norm(tilted))
+    x, y, z = wall.normal.tolist()
+    turn = reaction_s * rate
+    tilted = np.array([x + turn * y, y - turn * x, z])
+    size = math.sqrt(float(tilted @ tilted))
     return _Wall(wall.name, tilted / size, wall.most / size)
 
 
@@ -166,7 +169,7 @@ def _fence(
     walls = []
     for axis, (low, high) in enumerate(parameters.fence):
         keep = parameters.margin_m + parameters.sigmas * float(spread[axis])
-        normal = np.eye(3)[axis]
+        normal = _AXES[axis]
         walls.append(_Wall("fence", normal, max(0.0, high - keep - float(rest[axis])) / time))
         walls.append(_Wall("fence", -normal, max(0.0, float(rest[axis]) - low - keep) / time))
     return walls

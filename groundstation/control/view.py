@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from groundstation.control.parameters import ControlParameters
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
@@ -21,7 +19,9 @@ def view_of(x: float, y: float, name: str, parameters: ControlParameters, sensor
 
 def spread_m(belief: JointBelief, name: str) -> float:
     """Return the standard deviation of a position along the axis on which it is known worst [m]."""
-    return math.sqrt(float(np.linalg.eigvalsh(belief.covariance_of(name)[:2, :2])[-1]))
+    P = belief.covariance_of(name)
+    xx, xy, yy = float(P[0, 0]), float(P[0, 1]), float(P[1, 1])
+    return math.sqrt(0.5 * (xx + yy + math.hypot(xx - yy, 2.0 * xy)))
 
 
 def way_back_m(x: float, y: float, view: Rectangle) -> float:

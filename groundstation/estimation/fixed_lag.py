@@ -50,10 +50,10 @@ class FixedLagFilter:
         self._last: int
         self._step_ns = round(parameters.step_s * NS_PER_S)
         self._lag_ns = round(parameters.max_lateness_s * NS_PER_S)
+        self._driven = {i: model for i, model in enumerate(self._models) if isinstance(model, DrivenModel)}
         self._delays = {
             i: (round(model.velocity_delay_s * NS_PER_S), round(model.height_delay_s * NS_PER_S))
-            for i, model in enumerate(self._models)
-            if isinstance(model, DrivenModel)
+            for i, model in self._driven.items()
         }
         delays = [delay for pair in self._delays.values() for delay in pair]
         # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
@@ -184,9 +184,8 @@ class FixedLagFilter:
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
         """Return a joined robot's velocity [m/s; world] from its last odometry and what is known of its errors."""
         index = self._index[robot]
-        model = self._models[index]
-        assert isinstance(model, DrivenModel)
-        return model.velocity_m_s(self._moments.mean[self._tables.part(index)], self._state.memory[index])
+        own = self._moments.mean[self._tables.part(index)]
+        return self._driven[index].velocity_m_s(own, self._state.memory[index])
 
     def mode_probabilities(self) -> tuple[float, ...]:
         """Return how likely each combination of modes is; one number where no target switches."""

@@ -168,9 +168,8 @@ class Tracker:
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""
-        unlocalised_s = self.unlocalised_s()
-        names = self._belief.layout.robots + self._belief.layout.targets
-        return tuple(self._estimate(name, unlocalised_s.get(name, 0.0)) for name in names)
+        layout, unlocalised_s = self._belief.layout, self.unlocalised_s()
+        return tuple(self._estimate(name, unlocalised_s.get(name, 0.0)) for name in layout.robots + layout.targets)
 
     def target_age_s(self) -> float | None:
         """Return the time since any target was last observed; None if none is believed anywhere."""
@@ -242,8 +241,7 @@ class Tracker:
         airborne = self.airborne
         if self.holding or self._is_plan_stale(now_ns):
             return {name: Limited(HOVER, ("hold" if self.holding else "stale plan",)) for name in airborne}
-        belief = self._belief.core()
-        lookout = self.lookout
+        belief, lookout = self._belief.core(), self.lookout
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
         sight = Sight(

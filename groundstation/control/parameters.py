@@ -18,7 +18,8 @@ class ControlParameters:
     worse than this flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
     that would then have been unseen for return_within_s (odometry may be worse than it says), each with return_margin_s
     to turn round and be found, but never before return_soonest_s: so long a gap between sightings is usual; drift_m_s:
-    how fast a place becomes uncertain out of sight at least, seen_std_m: from where; hint_std_m: no plan goes by a
+    how fast a place becomes uncertain out of sight at least, seen_std_m: from where; regain_after_s: nobody has seen a
+    target for so long, those that track it turn to it and back off; hint_std_m: no plan goes by a
     target that is known worse; max_plan_age_s: held controls of an older plan are not flown any more.
     """
 
@@ -37,6 +38,7 @@ class ControlParameters:
     return_speed_m_s: float = 0.5
     drift_m_s: float = 0.03
     seen_std_m: float = 0.05
+    regain_after_s: float = 0.35
     search_speed_m_s: float = 0.5
     search_yaw_rate_rad_s: float = 0.8
     hint_std_m: float = 1.5

@@ -9,6 +9,7 @@ import numpy as np
 from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import ControlParameters
+from groundstation.control.regaining import regaining
 from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.search_spacing import apart
 from groundstation.control.stand import Stand
@@ -92,11 +93,32 @@ def setpoints_from_plan(
         if phase is FlightMode.UNKNOWN:
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
-            vx, vy, rate = (float(value) for value in plan.controls[name])
+            vx, vy, rate = _regained(name, plan, belief, parameters, sensors, sight)
             wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
         else:
             wanted[name] = _towards(name, stands[name], phase, belief, robots, parameters)
     return wanted
+
+
+def _regained(
+    name: str, plan: PlanResult, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight
+) -> tuple[float, float, float]:
+    """Return what the plan holds for a robot, or, if it should look at a target that is not seen, what brings it back.
+
+    PAPER (docs/explanation/method.md 7): plans assume level robots; one that brakes before a target tips it out of its
+    picture, and no plan of it mends that.
+    """
+    vx, vy, rate = (float(value) for value in plan.controls[name])
+    age_s = sight.target_age_s
+    if age_s is None or age_s <= parameters.regain_after_s or name not in plan.topology.levels[-1]:
+        return vx, vy, rate
+    place = belief.mean_of(name)[:2]
+    target = min(belief.layout.targets, key=lambda one: math.dist(belief.mean_of(one)[:2], place))
+    found = regaining(name, target, belief, sensors)
+    if found is None:
+        return vx, vy, rate
+    (vx, vy), rate = found[0].tolist(), found[1]
+    return vx, vy, rate
 
 
 def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight) -> bool:

@@ -25,6 +25,7 @@ _HISTORY = 50  # beliefs that pictures may be as old as: a second at 50 Hz
 _SHOWN_NS = 1_500_000_000  # pictures are searched all over twice a second
 _STEP_NS = 100_000_000  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
+_TIPPED_M = 0.08  # what a robot's picture is off at the distance of a target, since it is not level as it is believed
 
 
 class SearchMode(StrEnum):
@@ -206,7 +207,7 @@ class Search:
         if observer not in belief.layout:
             return None, 0.0
         variance = float(np.diag(belief.covariance_of(observer))[:2].max())
-        return np.array(belief.mean_of(observer)[:4]), variance**0.5
+        return np.array(belief.mean_of(observer)[:4]), variance**0.5 + _TIPPED_M
 
     def _judge(self, now_ns: int) -> None:
         """Say how each search stands, and which has become hopeless."""

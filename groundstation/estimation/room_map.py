@@ -17,7 +17,7 @@ STANDS_SHARE = 0.6
 """Prior of a target that is not seen: it stands."""
 
 # Of a target that was seen just now and is not where it was predicted: it is there all the same, near, anywhere.
-_THERE, _NEAR, _ANYWHERE = 0.75, 0.2, 0.05
+_THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
 _HINTED = 0.5
 

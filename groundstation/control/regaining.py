@@ -1,0 +1,44 @@
+"""How a robot that tracks gets a target back into its picture: it turns to it and backs off, before any search."""
+
+import math
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.control.view import spread_m
+from groundstation.estimation.belief import JointBelief
+from groundstation.geometry.angles import difference
+from groundstation.geometry.stabilized_frame import stabilized_from_world
+from groundstation.sensing.models import SensorSuite
+
+_WAY_GAIN, _TURN_GAIN = 1.5, 2.0  # of what a robot is off its distance and heading [1/s]
+_FASTEST_M_S = 0.5
+_ABOVE_RAD = 0.12  # a target is kept so much above the middle of the picture: who backs off tips it up
+_MOST_SPREAD_M = 0.6  # a belief that is wider says too little of how far to back off
+_NEAREST_M = 0.3
+
+
+def regaining(robot: str, target: str, belief: JointBelief, sensors: SensorSuite) -> tuple[Array, float] | None:
+    """Return velocity (2) [m/s; base_stabilized] and yaw rate [rad/s] that bring a target into the picture.
+
+    The robot faces the target, at the distance from which its camera has it above the middle of the picture, farther by
+    one standard deviation of its place, and moves along with it. None for a robot whose camera does not look down.
+    """
+    eye = sensors.onboard.get(robot)
+    if eye is None:
+        return None
+    mean, at = belief.mean_of(robot), belief.mean_of(target)
+    down_rad = eye.tilt_down_rad - _ABOVE_RAD
+    height = float(mean[2]) + eye.position_m[2] - sensors.marker_height_m[target]
+    if down_rad <= 0.0 or height <= 0.0:
+        return None
+    way = at[:2] - mean[:2]
+    distance = max(float(np.hypot(*way)), 1e-6)
+    reach = min(height / math.tan(down_rad), 0.8 * math.sqrt(max(eye.view.range_m**2 - height**2, _NEAREST_M**2)))
+    wanted = reach + min(spread_m(belief, target), _MOST_SPREAD_M)
+    velocity = at[2:4] + _WAY_GAIN * (distance - wanted) * way / distance
+    velocity = velocity * min(1.0, _FASTEST_M_S / max(float(np.hypot(*velocity)), 1e-9))
+    yaw = float(mean[3])
+    bearing = math.atan2(float(way[1]), float(way[0]))
+    body = stabilized_from_world(np.append(velocity, 0.0), yaw)
+    return np.asarray(body[:2]), _TURN_GAIN * difference(bearing, yaw)

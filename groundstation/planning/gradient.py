@@ -6,49 +6,81 @@ import numpy as np
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.kernel import kernel
-from groundstation.planning.covariance import correct_adjoint, predict_adjoint
-from groundstation.planning.records import ROBOT_STATES, TARGET_STATES, YAW, CostProblem, Tape, X, Y
-from groundstation.planning.rollout import combinations, empty_tape, roll_out
+from groundstation.planning.covariance import between, predict_adjoint
+from groundstation.planning.records import COS, ROBOT_CONTROLS, SIN, TARGET_STATES, YAW, CostProblem, Tape, X, Y
+from groundstation.planning.rollout import empty_tape, roll_out
 
 
 @kernel(inlined=True)
-def undo_edges(A: Matrix, problem: CostProblem, tape: Tape, i: int, state: Matrix, work: Vector) -> None:
-    """Take the covariance adjoint A back over step i's corrections; adds to dc/d(x, y, yaw) `state` (n, 3)."""
-    edges, sightings, gains, yaw_rows = problem.edges, tape.sightings, tape.gains, tape.yaw_rows
-    n, m = state.shape[0], edges.shape[0]
-    for e in range(m - 1, -1, -1):
-        edge, seen, row = edges[e], sightings[i * m + e], 3 * e
-        a, b = edge.observer, edge.subject
-        along_x, along_y, heading = combinations(edge, n, seen.x, seen.y)
-        v = 0.0
-        if b < n:
-            v, _ = correct_adjoint(A, heading, seen.v, gains[i, row + 2], yaw_rows[i, row + 2], work)
-        w1, lever1 = correct_adjoint(A, along_y, seen.w, gains[i, row + 1], yaw_rows[i, row + 1], work)
-        w0, lever0 = correct_adjoint(A, along_x, seen.w, gains[i, row], yaw_rows[i, row], work)
-        w = w0 + w1
-        gx = w * seen.w_x + v * seen.v_x
-        gy = w * seen.w_y + v * seen.v_y
+def lever(problem: CostProblem, tape: Tape, i: int, e: int) -> tuple[float, float]:
+    """Return the vector from an edge's camera to its subject (x, y) [world]."""
+    edge, seen = problem.edges[e], tape.sightings[i * problem.edges.shape[0] + e]
+    camera, x, y = problem.cameras[edge.camera], seen.x, seen.y
+    px, py = camera.position[0], camera.position[1]
+    if edge.observer < 0:
+        return x - px, y - py
+    c, s = tape.path[i + 1, edge.observer, COS], tape.path[i + 1, edge.observer, SIN]
+    return x - (c * px - s * py), y - (s * px + c * py)
+
+
+@kernel(inlined=True)
+def undo_weights(
+    M: Matrix, problem: CostProblem, tape: Tape, i: int, state: Matrix, yaws: Vector, work: Vector
+) -> None:
+    """Take M = -dc/d(information) and dc/d(variance of yaw) back over one step's sightings.
+
+    Adds to dc/d(x, y, yaw) `state` (n, 3). yaws (n): by the variances after the step, then before it; work (n).
+    """
+    edges, cameras, sightings, readings = problem.edges, problem.cameras, tape.sightings, problem.options.readings
+    before, after = tape.yaws_before[i], tape.yaws_after[i]
+    n, m = before.shape[0], edges.shape[0]
+    for e in range(m):
+        edge, seen = edges[e], sightings[i * m + e]
+        a, b = edge.observer, edge.subject if edge.subject < n else n + TARGET_STATES * (edge.subject - n)
+        by_w = -M[b, b] if a < 0 else 2.0 * M[a, b] - M[a, a] - M[b, b]
+        # From here on v is dc/da, w dc/d(square) / 2, variance the information of the heading.
+        by_variance = -by_w * seen.w / seen.variance
+        camera = cameras[edge.camera]
+        lasting = camera.per_m * camera.per_m
         if a >= 0:
-            gx -= lever1
-            gy += lever0
+            lasting += after[a]
+            yaws[a] += by_variance * seen.square
+        by_square = lasting + 2.0 * camera.per_m2 * camera.per_m2 * seen.square / readings
+        seen.w, seen.variance, seen.v = by_variance * by_square, seen.v, by_w / seen.variance
+    for r in range(n):
+        work[r] = -yaws[r] * after[r] * after[r]
+        yaws[r] = -work[r] / (before[r] * before[r])
+    for e in range(m):
+        edge, seen = edges[e], sightings[i * m + e]
+        a, b = edge.observer, edge.subject
+        if seen.a <= 0.0:
+            continue
+        if b < n:
+            per_a = seen.variance / seen.a
+            seen.v += work[b] * per_a
+            if a >= 0:
+                yaws[a] -= work[b] * seen.variance * per_a
+        spread_x, spread_y = lever(problem, tape, i, e)
+        gx, gy = seen.v * seen.a_x + 2.0 * seen.w * spread_x, seen.v * seen.a_y + 2.0 * seen.w * spread_y
+        if a >= 0:
             state[a, X] -= gx
             state[a, Y] -= gy
-            state[a, YAW] += w * seen.w_yaw + v * seen.v_yaw
+            state[a, YAW] += seen.v * seen.a_yaw + 2.0 * seen.w * (spread_x * seen.y - spread_y * seen.x)
         if b < n:
             state[b, X] += gx
             state[b, Y] += gy
 
 
 @kernel(inlined=True)
-def undo_move(state: Matrix, motion: Matrix, motion_adjoint: Matrix, dt: float, gradient: Vector) -> None:
+def undo_move(state: Matrix, motion: Matrix, dt: float, gradient: Vector) -> None:
     """Take dc/d(x, y, yaw) back over one motion step; adds to dc/du."""
     for r in range(state.shape[0]):
-        ax, ay = state[r, X] + motion_adjoint[r, X], state[r, Y] + motion_adjoint[r, Y]
+        ax, ay = state[r, X], state[r, Y]
         c, s = math.cos(motion[r, YAW]), math.sin(motion[r, YAW])
         turn = motion[r, X] * ay - motion[r, Y] * ax
-        gradient[ROBOT_STATES * r + X] += dt * (c * ax + s * ay)
-        gradient[ROBOT_STATES * r + Y] += dt * (c * ay - s * ax)
-        gradient[ROBOT_STATES * r + YAW] += dt * (state[r, YAW] + 0.5 * turn)
+        gradient[ROBOT_CONTROLS * r + X] += dt * (c * ax + s * ay)
+        gradient[ROBOT_CONTROLS * r + Y] += dt * (c * ay - s * ax)
+        gradient[ROBOT_CONTROLS * r + YAW] += dt * (state[r, YAW] + 0.5 * turn)
         state[r, YAW] += turn
 
 
@@ -56,22 +88,23 @@ def undo_move(state: Matrix, motion: Matrix, motion_adjoint: Matrix, dt: float, 
 def go_back(problem: CostProblem, tape: Tape, gradient: Vector) -> None:
     """Add the derivatives of uncertainty and penalties to dc/du, step by step backwards."""
     n, h, d, options = problem.poses.shape[0], problem.heights.shape[0], problem.prior.shape[0], problem.options
-    A, state, back, work = np.zeros((d, d)), np.zeros((n, ROBOT_STATES)), np.empty((n, 2)), np.empty(d)
+    W, M, product = np.zeros((d, d)), np.empty((d, d)), np.empty((d, d))
+    state, yaws, work = np.zeros((n, 3)), np.zeros(n), np.empty(n)
     for i in range(h - 1, -1, -1):
         discount = options.discount ** (i + 1)
         for t in range(problem.targets.shape[0]):
-            x, weight = ROBOT_STATES * n + TARGET_STATES * t, discount * problem.target_weights[t]
-            A[x, x] += weight
-            A[x + 1, x + 1] += weight
+            x = n + TARGET_STATES * t
+            W[x, x] += 2.0 * discount * problem.target_weights[t]
         for r in range(n):
-            x = ROBOT_STATES * r
-            A[x, x] += discount * options.robot_weight
-            A[x + 1, x + 1] += discount * options.robot_weight
+            W[r, r] += 2.0 * discount * options.robot_weight
             for axis in range(2):
                 state[r, axis] += discount * tape.penalties[i, r, axis]
-        undo_edges(A, problem, tape, i, state, work)
-        predict_adjoint(A, tape.motion[i], tape.yaw_columns[i], options.step_s, back)
-        undo_move(state, tape.motion[i], back, options.step_s, gradient)
+        between(tape.covariances[i], W, M, product)
+        undo_weights(M, problem, tape, i, state, yaws, work)
+        undo_move(state, tape.motion[i], options.step_s, gradient)
+        if i > 0:
+            between(tape.informations[i], M, W, product)
+            predict_adjoint(W, n, options.step_s)
 
 
 @kernel()
@@ -90,7 +123,7 @@ def evaluate(u: Vector, problem: CostProblem, wants_gradient: bool, gradient: Ve
         for i in range(h):
             report[1 + e] += tape.sightings[i * m + e].w / h
     effort = 0.0
-    for j in range(ROBOT_STATES * n):
+    for j in range(ROBOT_CONTROLS * n):
         effort += weight * (u[j] / scale[j]) ** 2
         gradient[j] = 2.0 * weight * u[j] / (scale[j] * scale[j])
     if wants_gradient:

@@ -1,5 +1,7 @@
 """Compiled projected L-BFGS on the box of admissible controls."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from groundstation.arrays import BoolVector, Matrix, Vector
@@ -103,49 +105,86 @@ def advance(x: Vector, g: Vector, out: Vector, step: float, trial: Vector) -> fl
     return expected
 
 
-@kernel()
-def solve(x: Vector, problem: CostProblem, budget: int, tolerance: float, report: Vector) -> tuple[float, int]:
-    """Minimise from x in [-1, 1]^(3 n), u = x * scale, in place; returns (cost, evaluations).
+class SearchState(NamedTuple):
+    """A local search that can be continued: best point x with gradient g, next point `trial`, and its history.
 
-    Stops when the projected gradient of cost / first cost is below the tolerance, when no step improves, or after
-    `budget` evaluations; x is always the best point seen. A first cost that is not finite has no direction to go in:
-    x stays, and the cost returned is infinite. report: see gradient.evaluate.
+    numbers: cost at x, first cost, expected change, step, rows of history, evaluations, whether it is over.
     """
-    n, m = x.shape[0], report.shape[0]
-    g, g_new, out, trial, u, latest = np.empty(n), np.empty(n), np.empty(n), x.copy(), np.empty(n), np.empty(m)
-    free, S, Y = np.empty(n, np.bool_), np.zeros((MEMORY, n)), np.zeros((MEMORY, n))
-    f, size, expected, step, stored, used = np.inf, 1.0, 0.0, 1.0, 0, 0
-    while True:
+
+    x: Vector
+    g: Vector
+    g_new: Vector
+    out: Vector
+    trial: Vector
+    u: Vector
+    latest: Vector
+    report: Vector
+    free: BoolVector
+    S: Matrix
+    Y: Matrix
+    numbers: Vector
+
+
+def search_state(start: Vector, report_size: int) -> SearchState:
+    """Return the state of a search that begins at a start in [-1, 1]^(3 n)."""
+    x: Vector = np.clip(start, -1.0, 1.0)
+    n = x.size
+    g, g_new, out, u = (np.empty(n) for _ in range(4))
+    numbers = np.array([np.inf, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return SearchState(
+        x, g, g_new, out, x.copy(), u, np.empty(report_size), np.empty(report_size),
+        np.empty(n, np.bool_), np.zeros((MEMORY, n)), np.zeros((MEMORY, n)), numbers,
+    )  # fmt: skip
+
+
+@kernel()
+def solve(state: SearchState, problem: CostProblem, budget: int, limit: int, tolerance: float) -> bool:
+    """Minimise over x in [-1, 1]^(3 n), u = x * scale, for `budget` further evaluations; returns whether it is over.
+
+    It is over when the projected gradient of cost / first cost is below the tolerance, when no step improves, or after
+    `limit` evaluations in all; x is always the best point seen. A first cost that is not finite has no direction to go
+    in: x stays, and the cost is infinite. report: see gradient.evaluate.
+    """
+    x, g, g_new, out, trial, numbers = state.x, state.g, state.g_new, state.out, state.trial, state.numbers
+    n, free, S, Y = x.shape[0], state.free, state.S, state.Y
+    f, size, expected, step, stored, used = numbers[0], numbers[1], numbers[2], numbers[3], int(numbers[4]), 0
+    before, over = int(numbers[5]), bool(numbers[6] > 0.0)
+    while used < budget and not over:
         for j in range(n):
-            u[j] = trial[j] * problem.scale[j]
-        f_new = evaluate(u, problem, True, g_new, latest)
+            state.u[j] = trial[j] * problem.scale[j]
+        f_new = evaluate(state.u, problem, True, g_new, state.latest)
         used += 1
-        if used == 1:
+        first = before + used == 1
+        if first:
             size = max(f_new, 1e-12)
             if not np.isfinite(f_new):
-                copy_into(report, latest)
+                copy_into(state.report, state.latest)
+                over = True
                 break
         for j in range(n):
             g_new[j] *= problem.scale[j] / size
-        if f_new < f and (used == 1 or f_new <= f + 1e-4 * size * expected):
-            if used > 1:
+        if f_new < f and (first or f_new <= f + 1e-4 * size * expected):
+            if not first:
                 push(S, trial, x)
                 push(Y, g_new, g)
                 stored = min(stored + 1, MEMORY)
             gain, f, step = (f - f_new) / size, f_new, 1.0
             copy_into(x, trial)
             copy_into(g, g_new)
-            copy_into(report, latest)
+            copy_into(state.report, state.latest)
             if gain < 1e-2 * tolerance or projected_gradient(x, g) <= tolerance:
+                over = True
                 break
             stored = head(x, g, S, Y, stored, free, out)
         else:
             step *= 0.3
             if step < 1e-4 and stored == 0:
+                over = True
                 break
             if step < 1e-4:
                 stored, step = head(x, g, S, Y, 0, free, out), 1.0
-        if used >= budget:
-            break
+        over = bool(before + used >= limit)
         expected = advance(x, g, out, step, trial)
-    return f, used
+    numbers[0], numbers[1], numbers[2], numbers[3], numbers[4] = f, size, expected, step, stored
+    numbers[5], numbers[6] = before + used, 1.0 if over else 0.0
+    return over

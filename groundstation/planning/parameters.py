@@ -54,7 +54,8 @@ class PlannerParameters:
     level_heights_m: row n-1 holds the height slots of a topology with n levels, top first; more levels than rows are
     not considered. hysteresis: relative gain a new topology must bring; within min_dwell_s of the last switch it must
     bring urgent_gain. fence: drones' box in the floor plan, kept fence_margin_m away from (softly).
-    evaluation_budget and tolerance: of one solve. starts: how many starts of each topology are optimised.
+    evaluation_budget and tolerance: of one solve. Of the starts of all topologies, at most `starts` of each, the
+    `solves` cheapest get first_look evaluations, and the `finals` best of those go on to the end.
     target_weights: what a target's uncertainty counts in the cost beside the others', 1 where nothing is said.
     """
 
@@ -76,6 +77,9 @@ class PlannerParameters:
     evaluation_budget: int = 60
     tolerance: float = 2e-3
     starts: int = 2
+    solves: int = 8
+    first_look: int = 8
+    finals: int = 2
 
     @property
     def horizon_s(self) -> float:

@@ -11,8 +11,15 @@ from groundstation.bus.messages import Alternative, Edge, SolverReport
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.planning.parameters import PlannerParameters
-from groundstation.planning.problem import PlanningProblem, PlanningScene, ProblemBuilder, Solution, scene_from_belief
-from groundstation.planning.starts import starts
+from groundstation.planning.problem import (
+    LocalSearch,
+    PlanningProblem,
+    PlanningScene,
+    ProblemBuilder,
+    Solution,
+    scene_from_belief,
+)
+from groundstation.planning.starts import Starts
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
@@ -23,8 +30,8 @@ class PlanResult:
 
     cost [m^2]: with penalties; uncertainty [m^2]: the discounted trace alone. controls: (vx, vy, yaw rate) per robot
     [m/s, m/s, rad/s; base_stabilized]; heights: slot of each robot [m]. solver.status: complete | stopped (out of
-    time or evaluations: the best so far) | idle (no robot or no target). solver.seconds is left 0: the core has no
-    clock.
+    time or evaluations: the best so far) | idle (no robot or no target). solver.gap: against a bound of all topologies
+    and controls. solver.seconds is left 0: the core has no clock.
     """
 
     topology: Topology
@@ -45,20 +52,48 @@ class _Search:
 
     should_stop: Callable[[], bool]
     max_evaluations: int | None
+    parameters: PlannerParameters
     evaluations: int = 0
     stopped: bool = False
+    least: float = 0.0
     solutions: dict[Topology, Solution] = field(default_factory=dict)
+    problems: dict[Topology, PlanningProblem] = field(default_factory=dict)
 
     def must_stop(self) -> bool:
         spent = self.max_evaluations is not None and self.evaluations >= self.max_evaluations
         self.stopped = self.stopped or spent or self.should_stop()
         return self.stopped
 
-    def add(self, solution: Solution) -> None:
-        self.evaluations += solution.evaluations
-        known = self.solutions.get(solution.topology)
+    def value(self, problem: PlanningProblem, start: Array) -> float:
+        self.evaluations += 1
+        return problem.value(start)
+
+    def solve(self, problem: PlanningProblem, start: Array) -> None:
+        """Look for a local minimum until it is found, or the time is over: the best point so far counts."""
+        p = self.parameters
+        self.go_on(LocalSearch(problem, start, p.evaluation_budget, p.tolerance), p.evaluation_budget)
+
+    def go_on(self, search: LocalSearch, until: int) -> None:
+        """Go on with a local search until it is over, had so many evaluations, or the time is over."""
+        while True:
+            before = search.evaluations
+            over = search.advance(until)
+            self.evaluations += search.evaluations - before
+            if self.must_stop() or over or search.evaluations >= until:
+                break
+        solution, problem = search.solution(), search.problem
+        known = self.solutions.get(problem.topology)
         if known is None or solution.cost < known.cost:
-            self.solutions[solution.topology] = solution
+            self.solutions[problem.topology], self.problems[problem.topology] = solution, problem
+
+
+@dataclass(frozen=True, slots=True)
+class _Ranked:
+    """A start with its cost."""
+
+    cost: float
+    problem: PlanningProblem
+    start: Array
 
 
 def choose(current: Topology, costs: Mapping[Topology, float], required_gain: float) -> Topology:
@@ -92,22 +127,19 @@ class Planner:
     ) -> PlanResult:
         """Return the best of the current topology and its neighbours; raises EstimatorFault for a broken belief.
 
-        current: over the robots to plan for (those missing in the belief are ignored). The first solve is always
-        finished; then `should_stop` is asked before each further one. A plan that was stopped is repeated exactly
-        by giving its number of evaluations as `max_evaluations`.
+        current: over the robots to plan for (those missing in the belief are ignored). `should_stop` is asked after
+        every few evaluations, some 0.3 ms. A plan that was stopped is repeated exactly by giving its number of
+        evaluations as `max_evaluations`.
         """
         current = current.reconciled(current.robots & frozenset(belief.layout.robots))
         scene = scene_from_belief(belief, current.robots)
         if not scene.robots or not scene.targets:
             return self._idle(current, belief.stamp_ns)
-        search = _Search(should_stop, max_evaluations)
-        candidates = [t for t in (current, *self.options(current)) if self.parameters.slots(len(t.levels))]
-        if current not in candidates:
-            candidates.insert(0, Topology.flat(current.robots))
-        problems = {t: self._builder.build(scene, t) for t in dict.fromkeys(candidates)}
-        warm = self._warm(scene, warm_start)
-        self._optimise(search, scene, problems, warm)
-        return self._result(belief.stamp_ns, scene, current, search, problems)
+        search = _Search(should_stop, max_evaluations, self.parameters)
+        first = current if self.parameters.slots(len(current.levels)) else Topology.flat(current.robots)
+        others = [t for t in self.options(current) if self.parameters.slots(len(t.levels)) and t != first]
+        self._optimise(search, scene, first, others, self._warm(scene, warm_start))
+        return self._result(belief.stamp_ns, scene, current, search, 1 + len(others))
 
     def options(self, current: Topology) -> tuple[Topology, ...]:
         """Return the other topologies that a step looks at."""
@@ -120,47 +152,62 @@ class Planner:
         return np.where(np.isfinite(x), np.clip(x, -1.0, 1.0), 0.0)
 
     def _optimise(
-        self, search: _Search, scene: PlanningScene, problems: dict[Topology, PlanningProblem], warm: Array
+        self, search: _Search, scene: PlanningScene, first: Topology, others: list[Topology], warm: Array
     ) -> None:
-        first, *others = problems
-        p = self.parameters
-        search.add(problems[first].solve(warm, p.evaluation_budget, p.tolerance))
-        best = search.solutions[first].controls / problems[first].scale
-        queue = [(problems[first], start) for start in self._extra_starts(search, scene, problems[first], [best])]
-        ranked = []
-        for topology in others:
+        """Solve the first topology, then the starts of all in the order of their costs, the likeliest first."""
+        problem = self._builder.build(scene, first)
+        search.least = self._builder.lower_bound(scene, problem)
+        search.solve(problem, warm)
+        best = search.solutions[first].controls / problem.scale
+        starts = Starts(scene, self.parameters, self.sensors, problem.scale)
+        ranked: list[_Ranked] = []
+        for topology in (first, *others):
             if search.must_stop():
                 return
-            begin = [] if p.mode == "paper" else [best]
-            chosen = self._extra_starts(search, scene, problems[topology], begin)
-            ranked += [(problems[topology].value(start), problems[topology], start) for start in chosen]
-        ranked.sort(key=lambda entry: entry[0])
-        for problem, start in [*queue, *((problem, start) for _, problem, start in ranked)]:
-            if search.must_stop():
-                return
-            search.add(problem.solve(start, p.evaluation_budget, p.tolerance))
+            problem = self._builder.build(scene, topology)
+            if self.parameters.mode == "paper":
+                ranked += [] if topology == first else [_Ranked(0.0, problem, np.zeros_like(best))]
+                continue
+            moved = {name for name in scene.robots if topology.level_of(name) != first.level_of(name)}
+            own = starts.of(topology, None if topology == first else best, moved)
+            ranked += self._ranked(search, problem, own)
+        self._race(search, ranked)
 
-    def _extra_starts(
-        self, search: _Search, scene: PlanningScene, problem: PlanningProblem, known: list[Array]
-    ) -> list[Array]:
-        """Return the most promising starts of a topology; `known` ones of the current topology are not repeated."""
+    def _race(self, search: _Search, ranked: list["_Ranked"]) -> None:
+        """Solve the likeliest starts for a few evaluations each, and the best of those to the end."""
         p = self.parameters
         if p.mode == "paper":
-            return [] if known else [np.zeros(problem.scale.size)]
-        own = starts(scene, problem.topology, p, self.sensors, problem.scale)
-        solved = problem.topology in search.solutions
-        options = own if solved else known + own
-        search.evaluations += len(options)
-        options = sorted(options, key=problem.value)
-        return options[: max(p.starts - solved, 0)]
+            for entry in ranked:
+                if search.must_stop():
+                    return
+                search.solve(entry.problem, entry.start)
+            return
+        ranked.sort(key=lambda entry: entry.cost)
+        runs: list[LocalSearch] = []
+        for entry in ranked[: p.solves]:
+            if search.must_stop():
+                return
+            runs.append(LocalSearch(entry.problem, entry.start, p.evaluation_budget, p.tolerance))
+            search.go_on(runs[-1], p.first_look)
+        runs.sort(key=lambda run: run.cost)
+        for run in [run for run in runs if not run.over][: p.finals]:
+            if search.must_stop():
+                return
+            search.go_on(run, p.evaluation_budget)
+
+    def _ranked(self, search: _Search, problem: PlanningProblem, starts: list[Array]) -> list["_Ranked"]:
+        """Return the most promising starts of a topology with their costs."""
+        found = []
+        for start in starts:
+            found.append(_Ranked(search.value(problem, start), problem, start))
+            if search.must_stop():
+                break
+        found.sort(key=lambda entry: entry.cost)
+        left = self.parameters.starts - (problem.topology in search.solutions)
+        return found[:left]
 
     def _result(
-        self,
-        stamp_ns: int,
-        scene: PlanningScene,
-        current: Topology,
-        search: _Search,
-        problems: dict[Topology, PlanningProblem],
+        self, stamp_ns: int, scene: PlanningScene, current: Topology, search: _Search, considered: int
     ) -> PlanResult:
         costs = {topology: solution.cost for topology, solution in search.solutions.items()}
         best = search.solutions[choose(current, costs, self._required_gain(current, stamp_ns))]
@@ -168,15 +215,16 @@ class Planner:
             raise EstimatorFault("the expected uncertainty is not finite")
         slots = self.parameters.slots(len(best.topology.levels)) or ()
         status = "stopped" if search.stopped else "complete"
-        report = SolverReport(status, search.evaluations, 0.0, len(problems), len(costs))
-        names = problems[best.topology].edge_names
+        gap = max(0.0, 1.0 - search.least / best.cost)
+        report = SolverReport(status, search.evaluations, 0.0, considered, len(costs), gap)
+        names = self._builder.edge_names(scene, search.problems[best.topology])
         return PlanResult(
             topology=best.topology,
             cost=best.cost,
             uncertainty=float(best.report[0]),
             controls={name: best.controls[3 * i : 3 * i + 3] for i, name in enumerate(scene.robots)},
             heights={name: slots[best.topology.level_of(name)] for name in scene.robots},
-            edges=tuple(Edge(a, b, float(w)) for (a, b), w in zip(names, best.report[1:], strict=True)),
+            edges=tuple(Edge(a, b, float(w)) for (a, b), w in zip(names, best.report[1:], strict=False)),
             alternatives=tuple(Alternative(str(t), cost) for t, cost in costs.items() if t != best.topology),
             solver=report,
             mode=self.parameters.mode,

@@ -1,27 +1,34 @@
 """Arrays for the kernels, from a belief and a topology."""
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
-from groundstation.arrays import Array
+from groundstation.arrays import Array, IntArray
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.kernel import Rows
+from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
-from groundstation.planning.lbfgs import solve
+from groundstation.planning.lbfgs import search_state, solve
 from groundstation.planning.parameters import PlannerParameters
-from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
+from groundstation.planning.records import TARGET_STATES, CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import SensorSuite
-from groundstation.sensing.topology import LEAF, ROOT, Topology
+from groundstation.sensing.topology import Topology
 from groundstation.sensing.visibility import camera_rows
+
+_BELOW_M = 0.1  # what is not so far below a robot's camera is never in its picture
+_FLOPS_PER_CHECK = 1.5e6  # some 0.3 ms: how much is computed between two questions for the time
+_FLOPS_PER_EDGE = 300.0
 
 
 @dataclass(frozen=True, slots=True)
 class PlanningScene:
     """What all topologies of one planning step share: robots and targets of the belief, in state order.
 
-    poses (n, 4) x, y, z, yaw; moving (k, 4) x, y, vx, vy; prior (3 n + 4 k square): x, y, yaw per robot, targets.
+    poses (n, 4) x, y, z, yaw; moving (k, 4) x, y, vx, vy; prior (n + 2 k square): positions of robots, then position
+    and velocity of each target, per axis; yaw_variances (n) [rad^2].
     """
 
     robots: tuple[str, ...]
@@ -29,55 +36,95 @@ class PlanningScene:
     poses: Array
     moving: Array
     prior: Array
+    yaw_variances: Array
 
 
 def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> PlanningScene:
     """Return the scene of the given robots and all targets; raises EstimatorFault for an indefinite covariance.
 
-    Heights and any calibration entries are marginalised: the planner's noise is isotropic, so that they inform neither
-    position nor heading.
+    Both axes get the mean of their covariances, which is one as well. Heights and any calibration entries are
+    marginalised: the planner's noise is isotropic, so that they inform neither position nor heading.
     """
     names = tuple(name for name in belief.layout.robots if name in robots)
-    targets = belief.layout.targets
-    chosen: list[int] = []
-    for name in names:
-        start = belief.layout.block(name).start
-        chosen += [start, start + 1, start + 3]
-    for name in targets:
-        start = belief.layout.block(name).start
-        chosen += range(start, start + 4)
-    prior = np.ascontiguousarray(belief.covariance[np.ix_(chosen, chosen)])
-    prior = 0.5 * (prior + prior.T)
-    if chosen and np.linalg.eigvalsh(prior)[0] < -1e-9 * max(1.0, float(prior.max())):
+    targets, block = belief.layout.targets, belief.layout.block
+    first = [block(name).start for name in names]
+    x = [*first, *(block(name).start + part for name in targets for part in (0, 2))]
+    chosen = np.array([*x, *(at + 1 for at in x), *(at + 3 for at in first)], dtype=np.int64)
+    full = belief.covariance[np.ix_(chosen, chosen)]
+    full = 0.5 * (full + full.T)
+    if not np.isfinite(full).all():
+        raise EstimatorFault("the belief's covariance is not finite")
+    if chosen.size and np.linalg.eigvalsh(full)[0] < -1e-9 * max(1.0, float(full.max())):
         raise EstimatorFault("the belief's covariance is not positive semidefinite")
+    d = len(x)
+    prior: Array = np.ascontiguousarray(0.5 * (full[:d, :d] + full[d : 2 * d, d : 2 * d]))
+    yaws: Array = np.diag(full)[2 * d :].copy()
     poses = np.array([belief.mean_of(name)[:4] for name in names]).reshape(-1, 4)
     moving = np.array([belief.mean_of(name)[:4] for name in targets]).reshape(-1, 4)
-    return PlanningScene(names, targets, poses, moving, prior)
+    return PlanningScene(names, targets, poses, moving, prior, yaws)
 
 
 @dataclass(frozen=True, slots=True)
 class PlanningProblem:
-    """One topology's optimisation: minimise over x in [-1, 1]^(3 n), u = x * scale."""
+    """One topology's optimisation: minimise over x in [-1, 1]^(3 n), u = x * scale.
+
+    wanted: how many of the edges, which come first, are the topology's.
+    """
 
     topology: Topology
     cost: CostProblem
-    edge_names: tuple[tuple[str, str], ...]
+    wanted: int
 
     @property
     def scale(self) -> Array:
         """Return the bounds of the controls (3 n)."""
         return self.cost.scale
 
+    @property
+    def evaluations_at_once(self) -> int:
+        """Return how many evaluations may pass between two questions for the time."""
+        steps, d = self.cost.heights.shape[0], self.cost.prior.shape[0]
+        flops = steps * (12.0 * d**3 + _FLOPS_PER_EDGE * len(self.cost.edges))
+        return max(1, min(10, int(_FLOPS_PER_CHECK / flops)))
+
     def value(self, x: Array) -> float:
         """Return the cost at x."""
-        scratch, report = np.empty(x.size), np.empty(1 + len(self.edge_names))
+        scratch, report = np.empty(x.size), np.empty(1 + len(self.cost.edges))
         return float(evaluate(x * self.scale, self.cost, False, scratch, report))
 
-    def solve(self, start: Array, budget: int, tolerance: float) -> "Solution":
-        """Return the local minimum that is reached from a start."""
-        x, report = np.clip(start, -1.0, 1.0), np.empty(1 + len(self.edge_names))
-        cost, evaluations = solve(x, self.cost, budget, tolerance, report)
-        return Solution(self.topology, float(cost), x * self.scale, int(evaluations), report)
+
+class LocalSearch:
+    """The search for one topology's local minimum from a start, a few evaluations at a time."""
+
+    def __init__(self, problem: PlanningProblem, start: Array, limit: int, tolerance: float) -> None:
+        self.problem = problem
+        self._state = search_state(start, 1 + len(problem.cost.edges))
+        self._limit, self._tolerance = limit, tolerance
+
+    def advance(self, until: int) -> bool:
+        """Go on as far as may be without asking for the time, or to so many evaluations; returns whether it is over."""
+        budget = min(self.problem.evaluations_at_once, until - self.evaluations)
+        return bool(solve(self._state, self.problem.cost, budget, self._limit, self._tolerance))
+
+    @property
+    def over(self) -> bool:
+        """Return whether it has ended."""
+        return bool(self._state.numbers[6])
+
+    @property
+    def cost(self) -> float:
+        """Return the least cost so far."""
+        return float(self._state.numbers[0])
+
+    @property
+    def evaluations(self) -> int:
+        """Return how many there were."""
+        return int(self._state.numbers[5])
+
+    def solution(self) -> "Solution":
+        """Return the best point so far."""
+        state, problem = self._state, self.problem
+        return Solution(problem.topology, float(state.numbers[0]), state.x * problem.scale, state.report)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +134,16 @@ class Solution:
     topology: Topology
     cost: float
     controls: Array
-    evaluations: int
     report: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """All ordered pairs of a camera and a subject that it may see: rows of a table, and its columns."""
+
+    rows: Rows[EdgeRow]
+    observer: IntArray
+    subject: IntArray
 
 
 class ProblemBuilder:
@@ -99,58 +154,102 @@ class ProblemBuilder:
         self._sensors = sensors
         self._world = {name: row for row, name in enumerate(sensors.world)}
         self._onboard = {name: row for row, name in enumerate(sensors.onboard, start=len(self._world))}
+        self.eyes = (*sensors.world, *sensors.onboard)
         self._cameras = camera_rows([*sensors.world.values(), *sensors.onboard.values()], sensors.softness)
         p, low, high = parameters, parameters.fence_margin_m, -parameters.fence_margin_m
         self._options = CostOptions(
             p.step_s, p.discount, p.noise.robot_position, p.noise.robot_yaw, p.noise.target_acceleration,
             p.weights.repulsion, p.separation_m, p.weights.fence,
             np.array([[p.fence.x_m[0] + low, p.fence.x_m[1] + high], [p.fence.y_m[0] + low, p.fence.y_m[1] + high]]),
-            p.weights.effort, p.weights.robots,
+            p.weights.effort, p.weights.robots, max(1.0, sensors.sightings_per_s * p.step_s),
         )  # fmt: skip
+        self._of: PlanningScene | None = None
 
     def build(self, scene: PlanningScene, topology: Topology) -> PlanningProblem:
         """Return the topology's problem; it must have height slots."""
-        edges, names = self._edges(scene, topology)
+        if scene is not self._of:
+            self._share(scene)
+        heights = self._heights(scene, topology)
+        edges, wanted = self._edges(scene, topology, heights)
         cost = CostProblem(
-            scale=self.scale(scene), poses=scene.poses, targets=scene.moving, heights=self._heights(scene, topology),
-            prior=scene.prior, edges=edges, cameras=self._cameras,
-            markers=np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets]),
-            target_weights=np.array([self._parameters.target_weights.get(name, 1.0) for name in scene.targets]),
-            options=self._options,
+            scale=self._scale, poses=scene.poses, targets=scene.moving, heights=heights, prior=scene.prior,
+            yaw_variances=scene.yaw_variances, edges=edges, cameras=self._cameras, markers=self._markers,
+            target_weights=self._target_weights, options=self._options,
         )  # fmt: skip
-        return PlanningProblem(topology, cost, names)
+        return PlanningProblem(topology, cost, wanted)
+
+    def lower_bound(self, scene: PlanningScene, problem: PlanningProblem) -> float:
+        """Return what no topology and no controls can get below on this scene."""
+        reach = self._parameters.step_s * np.hypot(problem.scale[0::3], problem.scale[1::3])
+        slots = [height for row in self._parameters.level_heights_m for height in row]
+        low, high = np.minimum(scene.poses[:, 2], min(slots)), np.maximum(scene.poses[:, 2], max(slots))
+        return float(lower_bound(problem.cost._replace(edges=self._pairs.rows), reach, low, high))
 
     def scale(self, scene: PlanningScene) -> Array:
         """Return the bounds of the controls: any corner of the box respects the speed limit."""
         limits = [self._parameters.limits_of(name) for name in scene.robots]
         return np.array([v for m in limits for v in (m.max_speed_m_s / 2**0.5,) * 2 + (m.max_yaw_rate_rad_s,)])
 
+    def edge_names(self, scene: PlanningScene, problem: PlanningProblem) -> list[tuple[str, str]]:
+        """Return observer and subject of each edge of the topology."""
+        names, edges = scene.robots + scene.targets, problem.cost.edges
+        rows = zip(edges["camera"].tolist(), edges["subject"].tolist(), strict=True)
+        return [(self.eyes[camera], names[subject]) for camera, subject in list(rows)[: problem.wanted]]
+
+    def _share(self, scene: PlanningScene) -> None:
+        """Prepare what all topologies of a scene have in common."""
+        self._of, self._scale = scene, self.scale(scene)
+        self._markers = np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets])
+        self._target_weights = np.array([self._parameters.target_weights.get(name, 1.0) for name in scene.targets])
+        self._climb = np.array([self._parameters.limits_of(name).max_climb_m_s for name in scene.robots])
+        self._ahead = self._parameters.step_s * np.arange(1, self._parameters.horizon_steps + 1)[:, None]
+        self._pairs = self._all_pairs(scene)
+
+    def _all_pairs(self, scene: PlanningScene) -> _Pairs:
+        n, everyone = len(scene.robots), range(len(scene.robots) + len(scene.targets))
+        triples = [
+            (row, -1, subject)
+            for name, row in self._world.items()
+            for subject in everyone
+            if subject < n or self._sensors.world[name].observes_targets
+        ]
+        for index, name in enumerate(scene.robots):
+            if (row := self._onboard.get(name)) is not None:
+                triples += [(row, index, subject) for subject in everyone if subject != index]
+        camera, observer, subject = np.array(triples, dtype=np.int64).reshape(-1, 3).T
+        rows = EdgeRow.rows(len(triples))
+        rows["camera"], rows["observer"], rows["subject"] = camera, observer, subject
+        at = np.where(subject < n, subject, n + TARGET_STATES * (subject - n))
+        fixed, P, q = observer < 0, scene.prior, np.diag(scene.prior)
+        rows["blur_m2"] = q[at] + np.where(fixed, 0.0, q[observer] - 2.0 * P[observer, at])
+        rows["turn_rad2"] = np.where(fixed, 0.0, scene.yaw_variances[observer]) + self._cameras["per_m"][camera] ** 2
+        return _Pairs(rows, observer, subject)
+
     def _heights(self, scene: PlanningScene, topology: Topology) -> Array:
         slots = self._parameters.slots(len(topology.levels))
         if slots is None:
             raise ValueError(f"no height slots for {topology}")
-        goal = np.array([slots[topology.level_of(name)] for name in scene.robots])
-        climb = np.array([self._parameters.limits_of(name).max_climb_m_s for name in scene.robots])
-        ahead = self._parameters.step_s * np.arange(1, self._parameters.horizon_steps + 1)[:, None]
+        goal = np.array(slots)[self._levels(scene, topology)]
         way = goal - scene.poses[:, 2]
-        heights: Array = scene.poses[:, 2] + np.clip(way, -climb * ahead, climb * ahead)
+        heights: Array = scene.poses[:, 2] + np.clip(way, -self._climb * self._ahead, self._climb * self._ahead)
         return heights
 
-    def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Rows[EdgeRow], tuple[tuple[str, str], ...]]:
-        number = {name: index for index, name in enumerate(scene.robots + scene.targets)}
-        rows: list[tuple[int, int, int]] = []
-        names: list[tuple[str, str]] = []
-        for observer, subject in topology.edges():
-            subjects = scene.targets if subject == LEAF else (subject,)
-            for row, index, name in self._eyes(observer, number):
-                rows += [(row, index, number[s]) for s in subjects]
-                names += [(name, s) for s in subjects]
-        edges = EdgeRow.rows(len(rows))
-        for column, values in zip(("camera", "observer", "subject"), zip(*rows, strict=True), strict=False):
-            edges[column] = values
-        return edges, tuple(names)
+    def _levels(self, scene: PlanningScene, topology: Topology) -> IntArray:
+        level = {name: index for index, names in enumerate(topology.levels) for name in names}
+        return np.array([level[name] for name in scene.robots], dtype=np.int64)
 
-    def _eyes(self, observer: str, number: dict[str, int]) -> list[tuple[int, int, str]]:
-        if observer == ROOT:
-            return [(row, -1, name) for name, row in self._world.items()]
-        return [(self._onboard[observer], number[observer], observer)] if observer in self._onboard else []
+    def _edges(self, scene: PlanningScene, topology: Topology, heights: Array) -> tuple[Rows[EdgeRow], int]:
+        """Return all edges that may be seen on the way to these heights, those of the topology first; and how many."""
+        n, last, level = len(scene.robots), len(topology.levels) - 1, self._levels(scene, topology)
+        a, b, pairs = self._pairs.observer, self._pairs.subject, self._pairs.rows
+        fixed, robot = a < 0, b < n
+        above = np.where(fixed, -1, level[a])
+        below = np.where(robot, level[np.minimum(b, n - 1)], last + 1)
+        wanted = above + 1 == below
+        marker = np.where(robot, heights[:, np.minimum(b, n - 1)], 0.0) + self._markers[b]
+        seen = fixed | ((heights[:, a] - marker).max(axis=0) > _BELOW_M)
+        order = np.concatenate((np.flatnonzero(wanted), np.flatnonzero(seen & ~wanted)))
+        edges: Any = cast(Any, pairs)[order]
+        count = int(wanted.sum())
+        edges["wanted"][:count] = 1
+        return edges, count

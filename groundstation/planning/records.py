@@ -1,6 +1,7 @@
 """What the planner's kernels share: one topology's problem, and the tape of a rollout.
 
-State of the planner: x, y, yaw of each robot (3 each), then x, y, vx, vy of each target (4 each); d entries.
+State of the planner, the same for both axes of the floor plan: a position of each robot, then position and velocity of
+each target (2 each); d entries. Headings are variances of their own, beside it (docs/explanation/planning.md 1).
 n robots, k targets, m edges, h steps.
 """
 
@@ -10,26 +11,33 @@ from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.kernel import Record, Rows
 from groundstation.sensing.visibility import CameraRow
 
-# Columns of robots' states and of targets', and of a robot's pose.
-X, Y, YAW = 0, 1, 2
+# Columns of a robot's controls and path, of a target's mean, and of a robot's pose.
+X, Y, YAW, COS, SIN = 0, 1, 2, 3, 4
 VX, VY = 2, 3
 POSE_YAW = 3
-ROBOT_STATES, TARGET_STATES = 3, 4
+ROBOT_CONTROLS, TARGET_STATES = 3, 2
 
 
 class EdgeRow(Record):
-    """An edge: row of its camera, number of its observer (-1: fixed in the world) and of its subject, robots first."""
+    """An edge: row of its camera, number of its observer (-1: fixed in the world) and of its subject, robots first.
+
+    wanted: 1 for an edge of the topology, whose tail attracts; 0 for what may be seen besides. blur_m2, turn_rad2:
+    variances, as believed now, of the relative position per axis and of the observer's direction of view.
+    """
 
     camera: int
     observer: int
     subject: int
+    wanted: int
+    blur_m2: float
+    turn_rad2: float
 
 
 class CostOptions(NamedTuple):
     """Settings of the cost that all topologies share.
 
     Noise densities: robot_position [m^2/s], robot_yaw [rad^2/s], target_acceleration [m^2/s^3]. The fence is where the
-    soft wall begins [m; world].
+    soft wall begins [m; world]. readings: sightings per step of what is in view.
     """
 
     step_s: float
@@ -43,14 +51,15 @@ class CostOptions(NamedTuple):
     fence: Matrix  # (2, 2): low and high of x, then of y
     effort_weight: float
     robot_weight: float
+    readings: float
 
 
 class CostProblem(NamedTuple):
     """One topology's cost as a function of the held controls.
 
     scale (3 n): bounds of the controls, for the effort; poses (n, 4): x, y, z, yaw; targets (k, 4): x, y, vx, vy;
-    heights (h, n): predicted z [m]; prior (d, d); markers (n + k): heights above the robot's centre or the floor [m];
-    target_weights (k), in state order.
+    heights (h, n): predicted z [m]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k): heights above
+    the robot's centre or the floor [m]; target_weights (k), in state order.
     """
 
     scale: Vector
@@ -58,6 +67,7 @@ class CostProblem(NamedTuple):
     targets: Matrix
     heights: Matrix
     prior: Matrix
+    yaw_variances: Vector
     edges: Rows[EdgeRow]
     cameras: Rows[CameraRow]
     markers: Vector
@@ -66,44 +76,37 @@ class CostProblem(NamedTuple):
 
 
 class EdgeTape(Record):
-    """What one edge saw in one step: informations of position and heading, their derivatives, the relative position.
+    """What one edge saw in one step: availability, its derivatives by relative position [world] and observer's yaw.
 
-    Derivatives are by the relative position (x, y) [world] and by the observer's yaw.
+    x, y, square: relative position [m] and its squared length; variance of a position per axis and w, the information;
+    v: information of the heading.
     """
 
-    w: float
-    w_x: float
-    w_y: float
-    w_yaw: float
-    v: float
-    v_x: float
-    v_y: float
-    v_yaw: float
+    a: float
+    a_x: float
+    a_y: float
+    a_yaw: float
     x: float
     y: float
+    square: float
+    variance: float
+    w: float
+    v: float
 
 
 class Tape(NamedTuple):
     """Everything that the adjoint needs of a rollout.
 
-    path (h + 1, n, 3): x, y, yaw; motion (h, n, 3): displacement and direction; yaw_columns (h, n, d): F P e_yaw;
-    sightings (h m): by step, then edge; gains and yaw_rows (h, 3 m, d): of each scalar correction;
-    penalties (h, n, 3): their derivatives by x, y.
+    path (h + 1, n, 5): x, y, yaw, its cosine and sine; motion (h, n, 3): displacement and direction; sightings (h m):
+    by step, then edge; informations (h, d, d) before and covariances (h, d, d) after each correction; yaws_before,
+    yaws_after (h, n): variances; penalties (h, n, 3): their derivatives by x, y.
     """
 
     path: MatrixStack
     motion: MatrixStack
-    yaw_columns: MatrixStack
     sightings: Rows[EdgeTape]
-    gains: MatrixStack
-    yaw_rows: MatrixStack
+    informations: MatrixStack
+    covariances: MatrixStack
+    yaws_before: Matrix
+    yaws_after: Matrix
     penalties: MatrixStack
-
-
-class Combination(NamedTuple):
-    """The scalar a^T x that a correction measures: a = e_to - e_origin + lever e_yaw; an index < 0 is left out."""
-
-    to: int
-    origin: int
-    yaw: int
-    lever: float

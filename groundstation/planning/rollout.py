@@ -7,15 +7,16 @@ import numpy as np
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.kernel import kernel
-from groundstation.planning.covariance import correct, predict
+from groundstation.planning.covariance import invert, predict
 from groundstation.planning.records import (
+    COS,
     POSE_YAW,
-    ROBOT_STATES,
+    ROBOT_CONTROLS,
+    SIN,
     TARGET_STATES,
     VX,
     VY,
     YAW,
-    Combination,
     CostOptions,
     CostProblem,
     EdgeRow,
@@ -24,9 +25,10 @@ from groundstation.planning.records import (
     X,
     Y,
 )
-from groundstation.sensing.visibility import CameraRow, observe
+from groundstation.sensing.visibility import SPREAD, CameraRow, available
 
 _EDGE_TAPE = EdgeTape.dtype
+_BEYOND = 12.0  # so many widths of its edge beyond a range, what is no edge of the topology is not counted
 
 
 @kernel(inlined=True)
@@ -34,8 +36,8 @@ def empty_tape(n: int, h: int, m: int, d: int) -> Tape:
     """Return a tape for n robots, h steps, m edges and d entries of the state."""
     sightings: Any = np.empty(h * m, _EDGE_TAPE)
     return Tape(
-        np.empty((h + 1, n, ROBOT_STATES)), np.empty((h, n, ROBOT_STATES)), np.empty((h, n, d)), sightings,
-        np.empty((h, 3 * m, d)), np.empty((h, 3 * m, d)), np.empty((h, n, ROBOT_STATES)),
+        np.empty((h + 1, n, 5)), np.empty((h, n, 3)), sightings, np.empty((h, d, d)), np.empty((h, d, d)),
+        np.empty((h, n)), np.empty((h, n)), np.empty((h, n, 3)),
     )  # fmt: skip
 
 
@@ -43,7 +45,7 @@ def empty_tape(n: int, h: int, m: int, d: int) -> Tape:
 def move(u: Vector, before: Matrix, dt: float, after: Matrix, motion: Matrix) -> None:
     """Advance (x, y, yaw) of all robots by held body velocities; motion: displacement x, y and its direction."""
     for r in range(before.shape[0]):
-        vx, vy, rate = u[ROBOT_STATES * r + X], u[ROBOT_STATES * r + Y], u[ROBOT_STATES * r + YAW]
+        vx, vy, rate = u[ROBOT_CONTROLS * r + X], u[ROBOT_CONTROLS * r + Y], u[ROBOT_CONTROLS * r + YAW]
         yaw = before[r, YAW] + 0.5 * dt * rate
         c, s = math.cos(yaw), math.sin(yaw)
         motion[r, X] = dt * (c * vx - s * vy)
@@ -52,53 +54,37 @@ def move(u: Vector, before: Matrix, dt: float, after: Matrix, motion: Matrix) ->
         after[r, X] = before[r, X] + motion[r, X]
         after[r, Y] = before[r, Y] + motion[r, Y]
         after[r, YAW] = before[r, YAW] + dt * rate
+        after[r, COS], after[r, SIN] = math.cos(after[r, YAW]), math.sin(after[r, YAW])
 
 
-@kernel(inlined=True)
-def look(camera: CameraRow, onboard: bool, x: float, y: float, z: float, yaw: float, tape: EdgeTape) -> None:
-    """Record what a camera sees of a subject at (x, y, z) from its observer (or from the world's origin if fixed)."""
-    c, s = 1.0, 0.0
-    if onboard:
-        c, s = math.cos(yaw), math.sin(yaw)
+@kernel()
+def look(camera: CameraRow, edge: EdgeRow, x: float, y: float, z: float, c: float, s: float, tape: EdgeTape) -> None:
+    """Record how likely a camera sees a subject at (x, y, z) from its observer (or from the world's origin if fixed).
+
+    c, s: cosine and sine of the observer's heading.
+    """
+    tape.x, tape.y = x, y
     bx, by = c * x + s * y, -s * x + c * y
     rx, ry, rz = bx - camera.position[0], by - camera.position[1], z - camera.position[2]
+    tape.square = rx * rx + ry * ry + rz * rz
+    if edge.wanted == 0 and tape.square > camera.range_m * camera.range_m:
+        width2 = camera.width_m * camera.width_m + SPREAD * (edge.blur_m2 + edge.turn_rad2 * tape.square)
+        beyond = camera.range_m + _BEYOND * math.sqrt(width2)
+        if tape.square > beyond * beyond:
+            tape.a = tape.a_x = tape.a_y = tape.a_yaw = 0.0
+            return
     R = camera.rotation
-    seen = observe(
+    seen = available(
         camera,
         R[0, 0] * rx + R[0, 1] * ry + R[0, 2] * rz,
         R[1, 0] * rx + R[1, 1] * ry + R[1, 2] * rz,
         R[2, 0] * rx + R[2, 1] * ry + R[2, 2] * rz,
-    )
-    gx = R[0, 0] * seen.w_x + R[1, 0] * seen.w_y + R[2, 0] * seen.w_z
-    gy = R[0, 1] * seen.w_x + R[1, 1] * seen.w_y + R[2, 1] * seen.w_z
-    tape.w, tape.w_x, tape.w_y = seen.w, c * gx - s * gy, s * gx + c * gy
-    tape.w_yaw = gx * by - gy * bx if onboard else 0.0
-    gx = R[0, 0] * seen.v_x + R[1, 0] * seen.v_y + R[2, 0] * seen.v_z
-    gy = R[0, 1] * seen.v_x + R[1, 1] * seen.v_y + R[2, 1] * seen.v_z
-    tape.v, tape.v_x, tape.v_y = seen.v, c * gx - s * gy, s * gx + c * gy
-    tape.v_yaw = gx * by - gy * bx if onboard else 0.0
-    tape.x, tape.y = x, y
-
-
-@kernel(inlined=True)
-def first_index(entity: int, n: int) -> int:
-    """Return where an entity's x stands in the planner's state."""
-    return ROBOT_STATES * entity if entity < n else ROBOT_STATES * n + TARGET_STATES * (entity - n)
-
-
-@kernel(inlined=True)
-def combinations(edge: EdgeRow, n: int, x: float, y: float) -> tuple[Combination, Combination, Combination]:
-    """Return what an edge measures: the subject's x and y in the observer's turned frame, and its heading.
-
-    (x, y): relative position [world]; the heading is measured of robots alone.
-    """
-    a, to = edge.observer, first_index(edge.subject, n)
-    origin, below, turn = -1, -1, -1
-    if a >= 0:
-        origin, below, turn = ROBOT_STATES * a + X, ROBOT_STATES * a + Y, ROBOT_STATES * a + YAW
-    return (
-        Combination(to + X, origin, turn, y), Combination(to + Y, below, turn, -x), Combination(to + YAW, turn, -1, 0.0)
+        edge.blur_m2, edge.turn_rad2, camera.tail_share if edge.wanted > 0 else 0.0,
     )  # fmt: skip
+    gx = R[0, 0] * seen.a_x + R[1, 0] * seen.a_y + R[2, 0] * seen.a_z
+    gy = R[0, 1] * seen.a_x + R[1, 1] * seen.a_y + R[2, 1] * seen.a_z
+    tape.a, tape.a_x, tape.a_y = seen.a, c * gx - s * gy, s * gx + c * gy
+    tape.a_yaw = gx * by - gy * bx if edge.observer >= 0 else 0.0
 
 
 @kernel()
@@ -110,8 +96,8 @@ def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
         for b in range(a):
             dx, dy = path[a, X] - path[b, X], path[a, Y] - path[b, Y]
             d2 = dx * dx + dy * dy + 1e-3
-            d = math.sqrt(d2)
-            if d < reach:
+            if d2 < reach * reach:
+                d = math.sqrt(d2)
                 over = reach / d - 1.0
                 cost += weight * over * over
                 slope = -2.0 * weight * over * reach / (d2 * d)
@@ -129,41 +115,83 @@ def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
 
 
 @kernel(inlined=True)
-def fuse(P: Matrix, problem: CostProblem, tape: Tape, i: int, work: Vector) -> None:
-    """Look along all edges in one step, and correct P by what they see.
-
-    Arrays are taken out of their tuples once: doing so for every edge counts references for a tenth of the time.
-    """
-    edges, cameras, targets, heights, markers = (
-        problem.edges, problem.cameras, problem.targets, problem.heights, problem.markers
+def look_around(problem: CostProblem, tape: Tape, i: int) -> None:
+    """Record in the tape what all edges see in one step."""
+    edges, cameras, targets, heights, markers, path, sightings = (
+        problem.edges, problem.cameras, problem.targets, problem.heights, problem.markers, tape.path, tape.sightings
     )  # fmt: skip
-    path, sightings, gains, yaw_rows = tape.path, tape.sightings, tape.gains, tape.yaw_rows
     n, m, ahead = path.shape[1], edges.shape[0], (i + 1) * problem.options.step_s
     for e in range(m):
-        edge, seen, row = edges[e], sightings[i * m + e], 3 * e
-        a, b, yaw = edge.observer, edge.subject, 0.0
+        edge, seen = edges[e], sightings[i * m + e]
+        a, b, c, s = edge.observer, edge.subject, 1.0, 0.0
         if b < n:
             x, y, z = path[i + 1, b, X], path[i + 1, b, Y], heights[i, b] + markers[b]
         else:
             t = b - n
             x, y, z = targets[t, X] + ahead * targets[t, VX], targets[t, Y] + ahead * targets[t, VY], markers[b]
         if a >= 0:
-            x, y, z, yaw = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - heights[i, a], path[i + 1, a, YAW]
-        look(cameras[edge.camera], a >= 0, x, y, z, yaw, seen)
-        along_x, along_y, heading = combinations(edge, n, x, y)
-        correct(P, along_x, seen.w, gains[i, row], yaw_rows[i, row], work)
-        correct(P, along_y, seen.w, gains[i, row + 1], yaw_rows[i, row + 1], work)
-        if b < n:
-            correct(P, heading, seen.v, gains[i, row + 2], yaw_rows[i, row + 2], work)
+            x, y, z = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - heights[i, a]
+            c, s = path[i + 1, a, COS], path[i + 1, a, SIN]
+        look(cameras[edge.camera], edge, x, y, z, c, s, seen)
+
+
+@kernel(inlined=True)
+def weigh(problem: CostProblem, tape: Tape, i: int) -> None:
+    """Turn availabilities into informations, headings first: who knows its heading well measures positions well."""
+    edges, cameras, sightings, readings = problem.edges, problem.cameras, tape.sightings, problem.options.readings
+    before, after = tape.yaws_before[i], tape.yaws_after[i]
+    n, m = before.shape[0], edges.shape[0]
+    for r in range(n):
+        before[r] = problem.options.robot_yaw_noise * problem.options.step_s
+        before[r] += problem.yaw_variances[r] if i == 0 else tape.yaws_after[i - 1, r]
+        after[r] = 1.0 / before[r]
+    for e in range(m):
+        edge, seen = edges[e], sightings[i * m + e]
+        seen.v = 0.0
+        if edge.subject < n and seen.a > 0.0:
+            yaw = cameras[edge.camera].yaw_rad
+            seen.v = seen.a / (yaw * yaw / readings + (before[edge.observer] if edge.observer >= 0 else 0.0))
+            after[edge.subject] += seen.v
+    for r in range(n):
+        after[r] = 1.0 / after[r]
+    for e in range(m):
+        edge, seen = edges[e], sightings[i * m + e]
+        camera, turn = cameras[edge.camera], after[edge.observer] if edge.observer >= 0 else 0.0
+        lasting = camera.per_m * camera.per_m + turn
+        single = camera.base_m * camera.base_m + camera.per_m2 * camera.per_m2 * seen.square * seen.square
+        seen.variance = single / readings + lasting * seen.square
+        seen.w = seen.a / seen.variance
+
+
+@kernel(inlined=True)
+def fuse(P: Matrix, problem: CostProblem, tape: Tape, i: int) -> None:
+    """P <- (P^-1 + sum w a a^T)^-1 over all edges of one step; keeps P^-1 and the result."""
+    edges, sightings, before, after = problem.edges, tape.sightings, tape.informations[i], tape.covariances[i]
+    n, m, d = problem.poses.shape[0], edges.shape[0], P.shape[0]
+    invert(P)
+    for j in range(d):
+        for k in range(d):
+            before[j, k] = after[j, k] = P[j, k]
+    for e in range(m):
+        a, b, w = edges[e].observer, edges[e].subject, sightings[i * m + e].w
+        b = b if b < n else n + TARGET_STATES * (b - n)
+        after[b, b] += w
+        if a >= 0:
+            after[a, a] += w
+            after[a, b] -= w
+            after[b, a] -= w
+    invert(after)
+    for j in range(d):
+        for k in range(d):
+            P[j, k] = after[j, k]
 
 
 @kernel()
 def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]:
     """Return (expected uncertainty of the targets, all other costs) of held controls u (3 n) and fill the tape."""
     n, k, h = problem.poses.shape[0], problem.targets.shape[0], problem.heights.shape[0]
-    options, P = problem.options, problem.prior.copy()
-    work, path, motion, penalties = np.empty(P.shape[0]), tape.path, tape.motion, tape.penalties
-    yaw_columns, weights = tape.yaw_columns, problem.target_weights
+    options, P, weights = problem.options, problem.prior.copy(), problem.target_weights
+    path, motion, penalties = tape.path, tape.motion, tape.penalties
     for r in range(n):
         path[0, r, X], path[0, r, Y] = problem.poses[r, X], problem.poses[r, Y]
         path[0, r, YAW] = problem.poses[r, POSE_YAW]
@@ -171,14 +199,16 @@ def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]
     discount = 1.0
     for i in range(h):
         move(u, path[i], options.step_s, path[i + 1], motion[i])
-        predict(P, motion[i], yaw_columns[i], options)
-        fuse(P, problem, tape, i, work)
+        predict(P, n, options)
+        look_around(problem, tape, i)
+        weigh(problem, tape, i)
+        fuse(P, problem, tape, i)
         discount *= options.discount
         for t in range(k):
-            x = ROBOT_STATES * n + TARGET_STATES * t
-            uncertainty += discount * weights[t] * (P[x, x] + P[x + 1, x + 1])
-        for x in range(0, ROBOT_STATES * n, ROBOT_STATES):
-            extra += discount * options.robot_weight * (P[x, x] + P[x + 1, x + 1])
+            x = n + TARGET_STATES * t
+            uncertainty += 2.0 * discount * weights[t] * P[x, x]
+        for r in range(n):
+            extra += 2.0 * discount * options.robot_weight * P[r, r]
         penalties[i, :, :] = 0.0
         extra += discount * penalty(path[i + 1], options, penalties[i])
     return uncertainty, extra

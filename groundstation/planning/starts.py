@@ -1,6 +1,7 @@
 """Deterministic starts for the local search: the cost has several minima and is flat where nothing is seen."""
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
@@ -12,47 +13,71 @@ from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
 Point = tuple[float, float, float]
+SMALL_TEAM = 4
+"""Up to so many robots, all of them may start towards other places at once."""
 
 
-def starts(
-    scene: PlanningScene, topology: Topology, parameters: PlannerParameters, sensors: SensorSuite, scale: Array
-) -> list[Array]:
-    """Return starts in [-1, 1]^(3 n): stand still, go to the best stand (in the root's view, or not), only turn."""
-    found = [np.zeros(scale.size)]
-    for keep_root in (True, False):
-        poses = _stands(scene, topology, parameters, sensors, keep_root)
-        found.append(_controls(scene, poses, parameters.horizon_s, scale))
-    turn = found[1].copy().reshape(-1, 3)
-    turn[:, :2] = 0.0
-    return [*found, turn.ravel()]
+class Starts:
+    """Starts in [-1, 1]^(3 n) on one scene."""
+
+    def __init__(self, scene: PlanningScene, parameters: PlannerParameters, sensors: SensorSuite, scale: Array) -> None:
+        self._scene, self._parameters, self._sensors, self._scale = scene, parameters, sensors, scale
+        self._index = {name: i for i, name in enumerate(scene.robots)}
+
+    def of(self, topology: Topology, known: Array | None, moved: Collection[str]) -> list[Array]:
+        """Return starts of a topology: the known optimum of another one, which differs by the robots `moved`.
+
+        Small teams: all stand still, go to the best stand (in the root's view, or not), or only turn. Larger ones:
+        those that were moved go to their stand, the others do what they did.
+        """
+        found = [] if known is None else [known]
+        if len(self._scene.robots) > SMALL_TEAM:
+            base = np.zeros(self._scale.size) if known is None else known
+            return [*found, self._towards(topology, base, moved or self._scene.robots, keep_root=True)]
+        rest = np.zeros(self._scale.size)
+        going = [self._towards(topology, rest, self._scene.robots, keep_root) for keep_root in (True, False)]
+        turn = going[0].copy().reshape(-1, 3)
+        turn[:, :2] = 0.0
+        return [*found, rest, *going, turn.ravel()]
+
+    def _towards(self, topology: Topology, base: Array, robots: Collection[str], keep_root: bool) -> Array:
+        """Return controls with which the robots go where each would look at the middle of the level below."""
+        p, sensors, scene = self._parameters, self._sensors, self._scene
+        slots, ahead, x = p.slots(len(topology.levels)) or (), p.horizon_s, base.copy()
+        subjects: list[Point] = [
+            (float(m[0] + ahead * m[2]), float(m[1] + ahead * m[3]), sensors.marker_height_m[name])
+            for name, m in zip(scene.targets, scene.moving, strict=True)
+        ]
+        for level in range(len(topology.levels) - 1, -1, -1):
+            middle = np.mean(subjects, axis=0).tolist()
+            height, subjects = slots[level], []
+            for name in sorted(topology.levels[level]):
+                pose = scene.poses[self._index[name]]
+                px, py = float(pose[0]), float(pose[1])
+                if name in robots:
+                    px, py = _stand(pose, middle, height, name, sensors)
+                    above = height + sensors.marker_height_m[name]
+                    views = sensors.root_views(above) if level == 0 and keep_root else ()
+                    if views:
+                        px, py = views[0].shrunk(0.2).nearest(px, py)
+                    self._steer(x, self._index[name], (px, py, math.atan2(middle[1] - py, middle[0] - px)))
+                subjects.append((px, py, height + sensors.marker_height_m[name]))
+        return x
+
+    def _steer(self, x: Array, i: int, goal: Point) -> None:
+        """Write the controls with which a robot gets to (x, y, yaw) within the horizon, or as near as it can."""
+        px, py, yaw = goal
+        pose, scale, horizon_s = self._scene.poses[i], self._scale[3 * i : 3 * i + 3], self._parameters.horizon_s
+        rate = max(-1.0, min(1.0, difference(yaw, float(pose[3])) / horizon_s / scale[2]))
+        middle = float(pose[3]) + 0.5 * rate * scale[2] * horizon_s
+        vx, vy = (px - float(pose[0])) / horizon_s, (py - float(pose[1])) / horizon_s
+        c, s = math.cos(middle), math.sin(middle)
+        body = np.array([c * vx + s * vy, c * vy - s * vx]) / scale[:2]
+        x[3 * i : 3 * i + 2] = body / max(1.0, float(np.abs(body).max()))
+        x[3 * i + 2] = rate
 
 
-def _stands(
-    scene: PlanningScene, topology: Topology, parameters: PlannerParameters, sensors: SensorSuite, keep_root: bool
-) -> dict[str, tuple[float, float, float]]:
-    """Return (x, y, yaw) from which each robot would look at the middle of the level below, from the bottom up."""
-    slots = parameters.slots(len(topology.levels)) or ()
-    ahead = parameters.horizon_s
-    subjects: list[Point] = [
-        (float(m[0] + ahead * m[2]), float(m[1] + ahead * m[3]), sensors.marker_height_m[name])
-        for name, m in zip(scene.targets, scene.moving, strict=True)
-    ]
-    index = {name: i for i, name in enumerate(scene.robots)}
-    stands: dict[str, tuple[float, float, float]] = {}
-    for level in range(len(topology.levels) - 1, -1, -1):
-        x, y, z = (sum(values) / len(subjects) for values in zip(*subjects, strict=True))
-        height, subjects = slots[level], []
-        for name in sorted(topology.levels[level]):
-            px, py = _stand(scene.poses[index[name]], (x, y, z), height, name, sensors)
-            views = sensors.root_views(height + sensors.marker_height_m[name]) if level == 0 and keep_root else ()
-            if views:
-                px, py = views[0].shrunk(0.2).nearest(px, py)
-            stands[name] = (px, py, math.atan2(y - py, x - px))
-            subjects.append((px, py, height + sensors.marker_height_m[name]))
-    return stands
-
-
-def _stand(pose: Array, subject: Point, height: float, name: str, sensors: SensorSuite) -> tuple[float, float]:
+def _stand(pose: Array, subject: list[float], height: float, name: str, sensors: SensorSuite) -> tuple[float, float]:
     camera = sensors.onboard.get(name)
     tilt = camera.tilt_down_rad if camera else math.pi / 4
     reach = camera.view.range_m if camera else 1.0
@@ -62,20 +87,3 @@ def _stand(pose: Array, subject: Point, height: float, name: str, sensors: Senso
         dx, dy = -math.cos(float(pose[3])), -math.sin(float(pose[3]))
     d = math.hypot(dx, dy)
     return subject[0] + behind * dx / d, subject[1] + behind * dy / d
-
-
-def _controls(
-    scene: PlanningScene, stands: dict[str, tuple[float, float, float]], horizon_s: float, scale: Array
-) -> Array:
-    x = np.zeros(scale.size)
-    for i, name in enumerate(scene.robots):
-        px, py, yaw = stands[name]
-        pose = scene.poses[i]
-        rate = max(-1.0, min(1.0, difference(yaw, float(pose[3])) / horizon_s / scale[3 * i + 2]))
-        middle = float(pose[3]) + 0.5 * rate * scale[3 * i + 2] * horizon_s
-        vx, vy = (px - float(pose[0])) / horizon_s, (py - float(pose[1])) / horizon_s
-        c, s = math.cos(middle), math.sin(middle)
-        body = np.array([c * vx + s * vy, c * vy - s * vx]) / scale[3 * i : 3 * i + 2]
-        x[3 * i : 3 * i + 2] = body / max(1.0, float(np.abs(body).max()))
-        x[3 * i + 2] = rate
-    return x

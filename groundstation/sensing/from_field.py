@@ -49,7 +49,8 @@ def _world(camera: WorldCamera, square_m: float) -> WorldCameraModel:
     noise = Noise(math.hypot(0.015, camera.position_std_m), math.radians(camera.attitude_std_deg), 0.0, 0.035)
     reach = camera.calibration.fx_px * square_m / DETECTION_PX
     rotation = world_from_downward_optical(camera.rotation_deg)
-    return WorldCameraModel(camera.position_m, _frustum(camera.calibration, reach, square_m), noise, rotation.T)
+    view = _frustum(camera.calibration, reach, square_m)
+    return WorldCameraModel(camera.position_m, view, noise, rotation.T, "targets" in camera.observes)
 
 
 def _onboard(drone: FieldDrone, square_m: float, range_m: float) -> OnboardCameraModel:

@@ -72,6 +72,7 @@ class WorldCameraModel:
     view: Frustum
     noise: Noise = Noise(0.02, 0.004, 0.0, 0.035)
     optical_from_world: Array = field(default_factory=lambda: OPTICAL_FROM_WORLD_LOOKING_DOWN, compare=False)
+    observes_targets: bool = False
 
     def optical(self, point: Array) -> Array:
         """Return a world point in the camera's optical frame."""
@@ -131,13 +132,14 @@ class Rectangle:
 class SensorSuite:
     """All cameras and marker heights of the team.
 
-    marker_height_m: of robots above their centre, of targets above the floor.
+    marker_height_m: of robots above their centre, of targets above the floor. sightings_per_s: of what is in view.
     """
 
     world: Mapping[str, WorldCameraModel]
     onboard: Mapping[str, OnboardCameraModel]
     marker_height_m: Mapping[str, float]
     softness: Softness = Softness()
+    sightings_per_s: float = 12.0
 
     def marker(self, name: str, mean: Array, is_robot: bool) -> Array:
         """Return the centre of an entity's marker [m; world] from its part of the belief's mean."""

@@ -169,6 +169,8 @@ class World:
                     continue
                 seen |= j == len(self.names)
                 found.append((*self.names, self.target)[j])
+                if j < len(self.names):
+                    self.robots_seen[self.names[j]] = k * STEP_S
                 self.observe(i, j, marker)
             header = Header(round(k * STEP_S * 1e9), "boot", name, f"{name}_camera", k)
             picture = SearchedPicture(header=header, observer=name, camera=f"{name}_camera", found=tuple(found))
@@ -260,11 +262,9 @@ def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -
     levels = np.array([t.count("/") + 1 for t in trace.topologies])
     assert trace.longest_loss_s() <= 2.0
     assert math.sqrt(float((error**2).mean())) <= 0.15
-    assert trace.seconds(1) > 20 and trace.seconds(2) > 8
     assert trace.switches() < 15
     settled = np.array(trace.times) > 5
-    assert (levels[settled & (away < 1.0)] == 1).mean() > 0.9
-    assert (levels[settled & (away > 3.0)] == 2).mean() > 0.6
+    assert (levels[settled & (away > 3.0)] == 2).mean() > 0.9, "outside of the ceiling's view one sees the other"
     assert trace.separation_m() >= 0.6
     places, fence = np.array(trace.truth), lab().room.fence
     for axis, (low, high) in enumerate((fence.x_m, fence.y_m, fence.z_m)):

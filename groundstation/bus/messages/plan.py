@@ -55,6 +55,8 @@ class SolverReport(msgspec.Struct, frozen=True):
     """Topologies that were considered."""
     survivors: int
     """Those of them that were optimised."""
+    gap: float | None = None
+    """By how large a share of its cost the plan may be dearer than the best of all plans; it is mostly much less."""
 
 
 class Plan(Message, frozen=True, kw_only=True):

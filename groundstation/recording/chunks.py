@@ -20,7 +20,7 @@ from groundstation.bus import keys
 from groundstation.bus.keys import Key
 from groundstation.bus.topics import Topic
 from groundstation.errors import MessageError
-from groundstation.recording.viewers import VIEWER_CHANNELS
+from groundstation.recording.viewers import is_for_viewers
 
 RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -186,7 +186,7 @@ def _learn_channel(body: bytes, channels: Channels, wanted: Wanted, damage: list
     if channel.id in channels:
         return
     channels[channel.id] = None
-    if channel.topic in VIEWER_CHANNELS:
+    if is_for_viewers(channel.topic):
         return  # said once more for viewers; the messages themselves are on their own channels
     try:
         key = keys.parse(channel.topic)

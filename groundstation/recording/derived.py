@@ -1,14 +1,16 @@
-"""Derived channels for viewers: where every frame is (`/tf`), and events as log lines (`/log`)."""
+"""Derived channels for viewers: frames (`/tf`), events as log lines (`/log`), lenses and marks in pictures."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import msgspec
 
-from groundstation.bus.messages import Severity
-from groundstation.bus.topics import ESTIMATE, EVENT
+from groundstation.bus.messages import Header, Severity
+from groundstation.bus.messages.base import Vector3
+from groundstation.bus.topics import CAMERA_STATUS, ESTIMATE, EVENT, OBSERVATION
 from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import LensCalibration
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
@@ -17,7 +19,8 @@ from groundstation.geometry.rotations import (
 )
 from groundstation.recording.capture import Entry
 from groundstation.recording.schemas import well_known
-from groundstation.recording.viewers import LOG_CHANNEL, TF_CHANNEL, Transform, frame_transforms, log_line
+from groundstation.recording.viewer_pictures import ANNOTATIONS_PREFIX, CALIBRATION_PREFIX, annotations, calibration
+from groundstation.recording.viewers import LOG_CHANNEL, TF_CHANNEL, Transform, frame_transforms, log_line, stamp
 from groundstation.time_units import NS_PER_MS
 
 WORLD = "world"
@@ -41,8 +44,16 @@ class _Event(msgspec.Struct):
     remedy: str = ""
 
 
+class _Sighting(msgspec.Struct):
+    header: Header
+    subject: str
+    camera: str
+    position_m: Vector3
+
+
 _estimate = msgspec.json.Decoder(_Estimate)
 _event = msgspec.json.Decoder(_Event)
+_sighting = msgspec.json.Decoder(_Sighting)
 
 
 def camera_frames(field: ResolvedField) -> tuple[Transform, ...]:
@@ -60,15 +71,27 @@ def camera_frames(field: ResolvedField) -> tuple[Transform, ...]:
     return (*fixed, *carried)
 
 
-class ViewerChannels:
-    """Makes the entries of `/tf` and `/log` from entries that are recorded anyway."""
+def lenses(field: ResolvedField) -> dict[str, LensCalibration]:
+    """Return the lens of every camera of a resolved field, by its name on the bus."""
+    carried = {camera_name(name): drone.camera.calibration for name, drone in field.drones.items()}
+    return {name: camera.calibration for name, camera in field.cameras.items()} | carried
 
-    def __init__(self, cameras: tuple[Transform, ...] = ()) -> None:
-        self._cameras = cameras
+
+class ViewerChannels:
+    """Makes the entries of viewers' channels from entries that are recorded anyway."""
+
+    def __init__(
+        self, cameras: tuple[Transform, ...] = (), by_camera: Mapping[str, LensCalibration] | None = None
+    ) -> None:
+        self._cameras, self._lenses = cameras, by_camera or {}
+        # Of the newest picture of each camera: its time, and the places of what it shows.
+        self._seen: dict[str, tuple[int, dict[str, Vector3]]] = {}
         self._next_ns = 0
         self._makers: dict[str, Callable[[Entry], Entry | None]] = {
             ESTIMATE.name: self._transforms,
             EVENT.name: self._log,
+            CAMERA_STATUS.name: self._calibration,
+            OBSERVATION.name: self._annotations,
         }
 
     def derived(self, entry: Entry) -> Entry | None:
@@ -94,6 +117,27 @@ class ViewerChannels:
         text = f"{event.text} ({event.remedy})" if event.remedy else event.text
         line = log_line(entry.publish_time_ns, event.severity, entry.facts["entity"], text)
         return self._entry(entry, LOG_CHANNEL, "Log", line)
+
+    def _calibration(self, entry: Entry) -> Entry | None:
+        camera = entry.facts["entity"]
+        lens = self._lenses.get(camera)
+        if lens is None:
+            return None
+        data = calibration(stamp(entry.log_time_ns), camera, lens)
+        return self._entry(entry, CALIBRATION_PREFIX + camera, "CameraCalibration", data)
+
+    def _annotations(self, entry: Entry) -> Entry | None:
+        sighting = _sighting.decode(entry.data)
+        lens = self._lenses.get(sighting.camera)
+        if lens is None:
+            return None
+        taken_ns, seen = self._seen.get(sighting.camera, (0, {}))
+        if taken_ns != sighting.header.stamp_ns:
+            seen = {}
+        seen[sighting.subject] = sighting.position_m
+        self._seen[sighting.camera] = (sighting.header.stamp_ns, seen)
+        data = annotations(stamp(entry.log_time_ns), lens, seen)
+        return self._entry(entry, ANNOTATIONS_PREFIX + sighting.camera, "ImageAnnotations", data)
 
     def _entry(self, source: Entry, channel: str, kind: str, data: bytes) -> Entry:
         times = source.log_time_ns, source.publish_time_ns

@@ -68,6 +68,11 @@ def double(number: int, value: float) -> bytes:
     return varint(number << 3 | _FIXED64) + _DOUBLE.pack(value)
 
 
+def fixed32(number: int, value: int) -> bytes:
+    """Return a field of a 32-bit number of fixed size."""
+    return varint(number << 3 | _FIXED32) + value.to_bytes(4, "little")
+
+
 def blob(number: int, value: bytes) -> bytes:
     """Return a field of bytes, text in UTF-8, or an inner message."""
     return varint(number << 3 | _LENGTH) + varint(len(value)) + value

@@ -8,13 +8,14 @@ from functools import cache
 from itertools import starmap
 
 from groundstation.recording.protobuf import Kind, ProtobufField, Type, blob, descriptor_set, double, fields, integer
+from groundstation.recording.viewer_pictures import ANNOTATIONS, CALIBRATION, PICTURE_PREFIXES
 from groundstation.time_units import NS_PER_S
 
 TF_CHANNEL = "/tf"
 LOG_CHANNEL = "/log"
 SCENE_CHANNEL = "/scene"
 # Derived from messages that are recorded on their own channels too; our reader passes them over.
-VIEWER_CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL, SCENE_CHANNEL))
+_CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL, SCENE_CHANNEL))
 
 _HEADER_FIELD = 1000
 _STAMP = ".google.protobuf.Timestamp"
@@ -70,6 +71,8 @@ _TRANSFORMS = Type(
     (ProtobufField("transforms", 1, Kind.MESSAGE, ".foxglove.FrameTransform", repeated=True),),
 )
 _TYPES: dict[str, tuple[Type, ...]] = {
+    "foxglove.CameraCalibration": (_TIMESTAMP, *CALIBRATION),
+    "foxglove.ImageAnnotations": (_TIMESTAMP, *ANNOTATIONS),
     "foxglove.CompressedImage": (_TIMESTAMP, _IMAGE),
     "foxglove.CompressedVideo": (_TIMESTAMP, _VIDEO),
     "foxglove.Log": (_TIMESTAMP, _LOG),
@@ -91,6 +94,11 @@ class Transform:
     child: str
     position_m: tuple[float, float, float]
     rotation_wxyz: tuple[float, float, float, float]
+
+
+def is_for_viewers(channel: str) -> bool:
+    """Return whether a channel says for viewers what another one says already."""
+    return channel in _CHANNELS or channel.startswith(PICTURE_PREFIXES)
 
 
 @cache

@@ -12,14 +12,16 @@ from click.testing import CliRunner
 from mcap.reader import make_reader
 
 from groundstation.bus import messages as m
+from groundstation.bus.topics import CAMERA_STATUS, OBSERVATION, Topic
 from groundstation.cli.bench import bench
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.recording.capture import Entry
-from groundstation.recording.derived import ViewerChannels, camera_frames
+from groundstation.recording.derived import ViewerChannels, camera_frames, lenses
 from groundstation.recording.protobuf import fields
 from groundstation.recording.schemas import description_of
 from groundstation.recording.synthetic import write_run
+from groundstation.recording.viewers import is_for_viewers
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 
@@ -79,6 +81,40 @@ def test_every_frame_has_its_place_ten_times_a_second(field: bytes, tmp_path: Pa
     tilted = base_from_tilted_optical(math.radians(45.0))
     assert _rotation(*frames["drone_1_camera"][2]) == pytest.approx(tilted, abs=1e-12)
     assert _rotation(*frames["drone_2"][2]) @ [1.0, 0.0, 0.0] == pytest.approx([math.cos(0.3), math.sin(0.3), 0.0])
+
+
+def test_pictures_have_their_lens_and_a_mark_for_each_body(lab_field: ResolvedField) -> None:
+    channels = ViewerChannels(camera_frames(lab_field), lenses(lab_field))
+    lens = lab_field.cameras["ceiling"].calibration
+    header = m.Header(5_000, "here", "ceiling", "ceiling", 0)
+
+    def sighting(subject: str, place: tuple[float, float, float], stamp_ns: int) -> list[float]:
+        message = m.RelativeObservation(
+            header=msgspec.structs.replace(header, stamp_ns=stamp_ns), observer="ceiling", subject=subject,
+            camera="ceiling", position_m=place, yaw_rad=None, covariance=(0.0,) * 9,
+        )  # fmt: skip
+        entry = entry_of(OBSERVATION, msgspec.json.encode(message))
+        found = channels.derived(entry)
+        assert found is not None and (found.channel, found.derived) == ("/annotations/ceiling", True)
+        circles = [dict(fields(body)) for number, body in fields(found.data) if number == 1 and isinstance(body, bytes)]
+        return [value for circle in circles for value in _numbers(circle, 2)]
+
+    def entry_of(topic: Topic, data: bytes) -> Entry:
+        return Entry("gs/x", 7, 7, 0, data, description_of(topic), {"topic": topic.name, "entity": "ceiling"})
+
+    assert sighting("drone_1", (0.0, 0.0, 3.0), 1) == pytest.approx([lens.cx_px, lens.cy_px])
+    assert len(sighting("drone_2", (0.5, 0.0, 3.0), 1)) == 4, "two bodies of one picture"
+    assert len(sighting("drone_2", (0.5, 0.0, 3.0), 2)) == 2, "another picture"
+    assert sighting("drone_2", (0.5, 0.0, -3.0), 3) == [], "behind the camera"
+    found = channels.derived(entry_of(CAMERA_STATUS, b"{}"))
+    assert found is not None and found.channel == "/calibration/ceiling"
+    by_number: dict[int, list[float]] = {}
+    for number, value in fields(found.data):
+        if number in (5, 6, 8) and isinstance(value, bytes):
+            by_number.setdefault(number, []).append(struct.unpack("<d", value)[0])
+    assert by_number[6] == [lens.fx_px, 0, lens.cx_px, 0, lens.fy_px, lens.cy_px, 0, 0, 1]
+    assert (len(by_number[5]), len(by_number[8])) == (5, 12)
+    assert not any(is_for_viewers(name) for name in ("gs/lab/state/ceiling/observation/ceiling", "/other"))
 
 
 def test_events_are_log_lines_with_their_remedy(field: bytes, tmp_path: Path) -> None:

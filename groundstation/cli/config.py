@@ -26,21 +26,31 @@ def config() -> None:
 @click.argument("field")
 @_OPTION
 @click.option("--scenario", metavar="S", help="Check a scenario (a name or a path) as well.")
-@click.option("--json", "as_json", is_flag=True, help='Print {"ok": ..., "problems": [...]}.')
+@click.option(
+    "--json", "as_json", is_flag=True, help='Print {"ok", "problems", "findings": [{file, line, path, level, text}]}.'
+)
 def check(field: str, options: tuple[str, ...], scenario: str | None, as_json: bool) -> int:
-    """Name every mistake in a field file (a path, or `lab`), each with its line.
+    """Name every mistake in a field file (a path, or `lab`), each with its line, and what is legal but foolish.
 
-    Exit code 0 when there is none, 2 otherwise.
+    Exit code 0 when there is no mistake, 2 otherwise; a WARNING is none.
     """
+    from groundstation.settings.wording import told
+
     problems: list[str] = []
+    warnings: list[str] = []
     try:
-        _check(field, options, scenario)
+        warnings = _check(field, options, scenario)
     except SettingsError as error:
         if not as_json:
             raise
         problems = error.problems
     if as_json:
-        click.echo(json.dumps({"ok": not problems, "problems": problems}))
+        findings = [told(line, "ERROR")._asdict() for line in problems]
+        findings += [told(line, "WARNING")._asdict() for line in warnings]
+        click.echo(json.dumps({"ok": not problems, "problems": problems, "findings": findings}))
+    else:
+        for line in warnings:
+            click.echo(f"WARNING: {line}")
     return ExitCode.SETTINGS if problems else ExitCode.OK
 
 
@@ -48,10 +58,11 @@ def _targets(names: tuple[str, ...]) -> str:
     return f"{'target' if len(names) == 1 else 'targets'} {', '.join(names)}"
 
 
-def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
+def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[str]:
+    """Return the warnings about a sound field; raises SettingsError with all mistakes."""
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.load import load_field
+    from groundstation.settings.load import cautions_of, load_field
     from groundstation.settings.scenario import load_scenario
 
     path = find_field(name)
@@ -73,6 +84,7 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> None:
     if problems:
         raise SettingsError(problems)
     click.echo(f"{path}: good ({team})", err=True)
+    return cautions_of(path, options)
 
 
 @config.command(

@@ -8,6 +8,7 @@ from typing import Any, get_args
 from pydantic import TypeAdapter, ValidationError
 
 from groundstation.errors import SettingsError
+from groundstation.settings.cautions import cautions
 from groundstation.settings.checks import Parts, findings
 from groundstation.settings.document import KeyPath, Node, SourceLine, read
 from groundstation.settings.drones import Drone
@@ -41,6 +42,15 @@ def field_of_tree(tree: Node, options: Sequence[str], path: Path) -> Field:
     field = Field.model_validate_json(json.dumps(levels.tree.plain()))
     flying = {name: drone for name, drone in field.drones.items() if drone.enabled}
     return field.model_copy(update={"drones": flying})
+
+
+def cautions_of(path: Path | str, options: Sequence[str] = ()) -> list[str]:
+    """Return a line for each thing in a sound field file that is legal and foolish; raises SettingsError as above."""
+    path = Path(path)
+    field = load_field(path, options)
+    tree, _ = _with_options(read(path), options)
+    origins = Levels(tree, Calibrations(path.parent, str(path))).tree
+    return ordered([problem(origins.origin_of(at), text) for at, text in cautions(field)])
 
 
 def _with_options(tree: Node, options: Iterable[str]) -> tuple[Node, list[str]]:

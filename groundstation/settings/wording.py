@@ -1,9 +1,10 @@
 """What validation found, in the operator's words: place, path, allowed range, and what was probably meant."""
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from pydantic import BaseModel
 
@@ -144,6 +145,27 @@ def _descendants(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         for inner in _models_in(info.annotation):
             yield from (f"{prefix}{name}.{key}" for key in inner.model_fields)
             yield from _descendants(inner, f"{prefix}{name}.")
+
+
+_LINE = re.compile(r"(?:--set \S+|(?P<file>.+?):(?P<line>\d+)): (?:(?P<path>[\w.\[\]-]+): )?(?P<text>.*)", re.DOTALL)
+
+
+class Told(NamedTuple):
+    """A problem taken apart: where it was written, at which key ("": of the whole), how grave, and what is wrong."""
+
+    file: str
+    line: int
+    path: str
+    level: str
+    text: str
+
+
+def told(line: str, level: str) -> Told:
+    """Return the parts of one line of `problem`; what has no file and line is all text."""
+    match = _LINE.fullmatch(line)
+    if match is None:
+        return Told("", 0, "", level, line)
+    return Told(match["file"] or "", int(match["line"] or 0), match["path"] or "", level, match["text"])
 
 
 def ordered(problems: list[str]) -> list[str]:

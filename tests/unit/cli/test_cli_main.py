@@ -194,7 +194,12 @@ def test_config_check(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.usefixtures("lab")
 def test_config_check_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["config", "check", "lab.yaml", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"ok": True, "problems": []}
+    assert json.loads(capsys.readouterr().out) == {"ok": True, "problems": [], "findings": []}
+    foolish = ["config", "check", "lab.yaml", "--json", "--set", "safety.max_position_std_m=0.01"]
+    assert cli.run(foolish) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["ok"] is True and answer["problems"] == []
+    assert [(one["path"], one["level"]) for one in answer["findings"]] == [("safety.max_position_std_m", "WARNING")]
     assert cli.run(["config", "check", "lab.yaml", "--json", "--scenario", "nosuch"]) == 2
     answer = json.loads(capsys.readouterr().out)
     assert answer["ok"] is False

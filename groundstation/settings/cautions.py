@@ -1,0 +1,139 @@
+"""What is legal in a field and foolish all the same: each check yields the path and what is likely to come of it."""
+
+import ipaddress
+import math
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from drivers.camera.settings import SourceKind, parse_source
+from groundstation.arrays import Array
+from groundstation.geometry.rotations import world_from_downward_optical
+from groundstation.settings.checks import Finding
+from groundstation.settings.document import KeyPath
+from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
+from groundstation.settings.schema import Field
+
+_STANDING_MARKER_M = 0.14
+_FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
+_LEAST_STD_M = 0.1
+_LEAST_TILT_DEG = 5.0
+# Cosine of the angle between the optical axis and straight down from which on a camera looks at walls.
+_AT_WALLS = math.cos(math.radians(75.0))
+
+
+def cautions(field: Field) -> Iterator[Finding]:
+    """Yield everything about a sound field that somebody should think over."""
+    for check in _CHECKS:
+        yield from check(field)
+
+
+def _views(field: Field) -> Iterator[Finding]:
+    pads = {name: np.array([*drone.pad_m, _STANDING_MARKER_M]) for name, drone in field.drones.items()}
+    unseen = set(pads)
+    for name, camera in field.cameras.items():
+        path = ("cameras", name, "rotation_deg")
+        if world_from_downward_optical(camera.rotation_deg)[2, 2] > -_AT_WALLS:
+            yield path, "lets it look at the walls or the ceiling: drones below it are not seen"
+        seen = {pad for pad, centre in pads.items() if _in_picture(camera, centre)}
+        unseen -= seen
+        if not seen:
+            yield path, "and its place leave no pad in its view: it knows of a drone only after that has flown there"
+    for name in sorted(unseen):
+        yield ("drones", name, "pad_m"), "is in view of no fixed camera: nobody knows where it is when it takes off"
+
+
+def _in_picture(camera: WorldCameraSettings, centre: Array) -> bool:
+    x, y, z = world_from_downward_optical(camera.rotation_deg).T @ (centre - np.array(camera.position_m))
+    lens = camera.calibration
+    if z <= 0.0:
+        return False
+    column, row = lens.cx_px + lens.fx_px * x / z, lens.cy_px + lens.fy_px * y / z
+    return bool(0.0 < column < lens.width_px and 0.0 < row < lens.height_px)
+
+
+def _carried_cameras(field: Field) -> Iterator[Finding]:
+    for name, drone in field.drones.items():
+        tilt = drone.camera.tilt_down_deg
+        if tilt < _LEAST_TILT_DEG:
+            path = ("drones", name, "camera", "tilt_down_deg")
+            yield path, f"lets it look level or up (got {tilt:g}): markers lie flat and are seen from above only"
+
+
+def _fence(field: Field) -> Iterator[Finding]:
+    fence = field.room.fence
+    for axis, (low, high) in (("x_m", fence.x_m), ("y_m", fence.y_m), ("z_m", fence.z_m)):
+        if high - low < _FENCE_LEAST_M:
+            yield ("room", "fence", axis), f"leaves {high - low:.2f} m: a drone brakes within 0.3 m of each side"
+    for name, drone in field.drones.items():
+        (x, y), xs, ys = drone.pad_m, fence.x_m, fence.y_m
+        inside = (x - xs[0], xs[1] - x, y - ys[0], ys[1] - y)
+        if min(inside) < _FENCE_MARGIN_M:
+            text = f"is {max(0.0, min(inside)):.2f} m from the fence: a take-off drifts farther than that"
+            yield ("drones", name, "pad_m"), text
+
+
+def _uncertainty(field: Field) -> Iterator[Finding]:
+    limit = field.safety.max_position_std_m
+    if limit < _LEAST_STD_M:
+        text = f"is less than what flights have (0.02 to 0.1 m; got {limit:g}): drones would hover all the time"
+        yield ("safety", "max_position_std_m"), text
+
+
+def _addresses(field: Field) -> Iterator[Finding]:
+    for name, drone in field.drones.items():
+        try:
+            address = ipaddress.IPv4Address(drone.address)
+        except ValueError:
+            continue
+        if address.is_multicast or address.is_unspecified or int(address) & 0xFF == 0xFF:
+            text = f"is no address of one vehicle (got {drone.address}): orders would go to all, or to nobody"
+            yield ("drones", name, "address"), text
+
+
+def _lenses(field: Field) -> Iterator[Finding]:
+    for name, camera in field.cameras.items():
+        if _folds(camera.calibration):
+            yield ("cameras", name, "calibration", "distortion"), _FOLDED
+    for name, drone in field.drones.items():
+        if _folds(drone.camera.calibration):
+            yield ("drones", name, "camera", "calibration", "distortion"), _FOLDED
+
+
+_FOLDED = "folds the picture before its corners: no lens does that; calibrate it again"
+
+
+def _folds(lens: CalibrationSettings) -> bool:
+    """Return whether the distorted radius falls anywhere out to half the way from the middle to a corner, or beyond."""
+    corner = math.hypot(lens.width_px / (2 * lens.fx_px), lens.height_px / (2 * lens.fy_px))
+    r2 = np.linspace(0.0, 0.9 * corner, 40) ** 2
+    k1, k2, _, _, k3 = lens.distortion
+    return bool(np.any(1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2**2 + 7.0 * k3 * r2**3 <= 0.0))
+
+
+def _places(field: Field) -> Iterator[Finding]:
+    folder = Path(field.recording.directory).absolute()
+    nearest = next(place for place in (folder, *folder.parents) if place.exists())
+    if field.recording.enabled and not (nearest.is_dir() and os.access(nearest, os.W_OK)):
+        yield ("recording", "directory"), f"cannot be written: {nearest} is not a folder of yours"
+    sources: list[tuple[KeyPath, str]] = [
+        (("cameras", name, "source"), camera.source) for name, camera in field.cameras.items()
+    ]
+    sources += [(("drones", name, "camera", "source"), drone.camera.source) for name, drone in field.drones.items()]
+    for path, source in sources:
+        address = parse_source(source)
+        if address.kind in (SourceKind.DEVICE, SourceKind.FILE) and not Path(address.path).exists():
+            yield path, f"is not there on this machine (got {address.path})"
+
+
+_CHECKS: tuple[Callable[[Field], Iterator[Finding]], ...] = (
+    _views,
+    _carried_cameras,
+    _fence,
+    _uncertainty,
+    _addresses,
+    _lenses,
+    _places,
+)

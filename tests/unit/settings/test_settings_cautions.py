@@ -1,0 +1,68 @@
+"""What is legal and foolish in a field is told, with its place, and refuses nothing."""
+
+from pathlib import Path
+
+import pytest
+
+from groundstation.settings.files import SHIPPED
+from groundstation.settings.load import cautions_of, load_field
+from groundstation.settings.wording import told
+
+LAB = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
+
+
+@pytest.mark.parametrize("name", ["lab", "mixed-team"])
+def test_shipped_fields_are_no_cause_for_caution(name: str) -> None:
+    assert cautions_of(SHIPPED / f"{name}.yaml") == []
+
+
+FOOLISH = [
+    ("cameras.ceiling.rotation_deg=[80,0,0]", "cameras.ceiling.rotation_deg", "at the walls or the ceiling"),
+    ("cameras.ceiling.rotation_deg=[45,0,0]", "cameras.ceiling.rotation_deg", "leave no pad in its view"),
+    ("drones.drone_1.pad_m=[-3.0,2.0]", "drones.drone_1.pad_m", "in view of no fixed camera"),
+    ("drones.drone_1.camera.tilt_down_deg=-45", "drones.drone_1.camera.tilt_down_deg", "seen from above only"),
+    ("room.fence.x_m=[-0.95,3.7]", "drones.drone_1.pad_m", "0.05 m from the fence"),
+    ("room.fence.x_m=[-1.6,-0.7]", "room.fence.x_m", "leaves 0.90 m"),
+    ("safety.max_position_std_m=0.01", "safety.max_position_std_m", "would hover all the time"),
+    ("drones.drone_1.address=192.168.1.255", "drones.drone_1.address", "no address of one vehicle"),
+    ("drones.drone_1.address=224.0.0.1", "drones.drone_1.address", "no address of one vehicle"),
+    ("recording.directory=/dev/null/runs", "recording.directory", "cannot be written"),
+    ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
+]
+
+
+@pytest.mark.parametrize(("option", "path", "words"), FOOLISH)
+def test_a_foolish_setting_is_named_with_its_path(option: str, path: str, words: str) -> None:
+    options = [option]
+    if "address" in option:
+        options.append("drones.drone_1.camera.source=http://192.168.1.11/video.mjpg")
+    load_field(LAB, options)
+    found = cautions_of(LAB, options)
+    assert any(path in line and words in line for line in found), found
+
+
+def test_a_lens_that_folds_the_picture_is_named_where_it_is_written(tmp_path: Path) -> None:
+    text = (LAB.parent / "cameras" / "ceiling.yaml").read_text()
+    start = text.index("distortion:")
+    end = text.index("\n", start)
+    (tmp_path / "cameras").mkdir()
+    for lens in (LAB.parent / "cameras").glob("*.yaml"):
+        (tmp_path / "cameras" / lens.name).write_text(lens.read_text())
+    folded = text[:start] + "distortion: [0.2, -2.0, 0.0, 0.0, -3.0]" + text[end:]
+    (tmp_path / "cameras" / "ceiling.yaml").write_text(folded)
+    (tmp_path / "lab.yaml").write_text(LAB.read_text())
+    (line,) = cautions_of(tmp_path / "lab.yaml")
+    one = told(line, "WARNING")
+    assert one.file.endswith("cameras/ceiling.yaml") and one.line == text[:start].count("\n") + 1
+    assert one.path == "distortion" and "folds the picture" in one.text
+
+
+def test_a_finding_is_taken_apart_for_programs() -> None:
+    assert told("/a/lab.yaml:37: drones.drone_1.pad_m[0]: must be so", "ERROR") == (
+        "/a/lab.yaml",
+        37,
+        "drones.drone_1.pad_m[0]",
+        "ERROR",
+        "must be so",
+    )
+    assert told("there is no scenario 'x'", "ERROR") == ("", 0, "", "ERROR", "there is no scenario 'x'")

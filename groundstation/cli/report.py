@@ -17,13 +17,15 @@ _RUNS = Path("runs")
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation report\n  groundstation report runs/20261120T101500Z-lab --json\n"
-    "  groundstation report runs/20261120T101500Z-lab --compare runs/20261120T103000Z-lab"
+    "  groundstation report runs/20261120T101500Z-lab --compare runs/20261120T103000Z-lab\n"
+    "  groundstation report runs --trend"
 )
 @click.argument("recording", required=False, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print report.json (or the comparison) instead of the summary.")
 @click.option("--no-plot", is_flag=True, help="Leave trajectories.png and report.html as they are.")
 @click.option("--compare", "other", type=click.Path(path_type=Path), help="Another run: write comparison.html.")
-def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None) -> int:
+@click.option("--trend", is_flag=True, help="RECORDING is a folder of runs: write its trend.html.")
+def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None, trend: bool) -> int:
     """Rebuild report.html, report.json and trajectories.png of a run folder (default: the newest in ./runs).
 
     Exit code 0 when the run passed, 1 when it did not. A comparison, and the report of a re-run (`replay --output`),
@@ -31,6 +33,9 @@ def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | N
     """
     from groundstation.report.build import build_report
 
+    if trend:
+        _trend(recording or _RUNS, as_json)
+        return ExitCode.OK
     run_dir = _run_dir(recording) if recording else newest_run(_RUNS)
     if other is not None:
         _compare(run_dir, _run_dir(other), as_json)
@@ -78,6 +83,28 @@ def _compare(first: Path, second: Path, as_json: bool) -> None:
 
     show(comparison(*reports))
     click.echo(f"  {first / NAME}")
+
+
+def _trend(folder: Path, as_json: bool) -> None:
+    import msgspec
+
+    from groundstation.report.page.trend import NAME, write_trend
+    from groundstation.report.trend import judged_runs
+
+    runs, damage = judged_runs(folder)
+    if not runs:
+        raise OperatorMistake(f"{folder}: no run in it has a report.json; `groundstation report RUN` writes one")
+    if as_json:
+        click.echo(msgspec.json.format(msgspec.json.encode(runs), indent=2))
+        return
+    try:
+        write_trend(runs, damage, folder / NAME)
+    except OSError as error:
+        raise GroundStationError(f"{folder / NAME}: {error.strerror}") from error
+    for line in damage:
+        click.echo(f"cannot be read: {line}", err=True)
+    passed = sum(run.verdict == "passed" for run in runs)
+    click.echo(f"{folder / NAME}: {len(runs)} runs, {passed} passed")
 
 
 def _run_dir(path: Path) -> Path:

@@ -230,7 +230,8 @@ def _build(run_dir: Path) -> "RunReport":
 def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
     """Write and print the report; None when there is nothing to judge. Never lets a closed terminal hide it."""
     from groundstation.errors import GroundStationError
-    from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
+    from groundstation.report.build import HTML_NAME, PLOT_NAME
+    from groundstation.report.judge import JSON_NAME
 
     try:
         built = _build(run_dir)

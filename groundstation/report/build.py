@@ -3,9 +3,8 @@
 from pathlib import Path
 
 from groundstation.report.gather import gather
-from groundstation.report.judge import RunReport, judge
+from groundstation.report.judge import JSON_NAME, RunReport, judge
 
-JSON_NAME = "report.json"
 HTML_NAME = "report.html"
 PLOT_NAME = "trajectories.png"
 

@@ -14,6 +14,7 @@ from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import RunData
 
 SCHEMA_VERSION = 1
+JSON_NAME = "report.json"
 _DAMAGE_LINES = 20
 
 

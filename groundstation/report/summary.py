@@ -4,11 +4,11 @@ from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from groundstation.report.build import HTML_NAME, JSON_NAME, PLOT_NAME
+from groundstation.report.build import HTML_NAME, PLOT_NAME
 from groundstation.report.compare import differences, labels
 from groundstation.report.criteria import Criterion
 from groundstation.report.happenings import Happening
-from groundstation.report.judge import RunReport
+from groundstation.report.judge import JSON_NAME, RunReport
 from groundstation.report.wording import bound, missed, quantity, title
 
 _HAPPENINGS_SHOWN = 12

@@ -29,7 +29,10 @@ class Span(msgspec.Struct, frozen=True):
 
 
 class Chart(msgspec.Struct, frozen=True):
-    """Curves over one time axis [s]; `log` draws the values on a logarithmic axis."""
+    """Curves over one time axis [s]; `log` draws the values on a logarithmic axis.
+
+    axis: unit of the horizontal axis; "" for numbers of runs, whose values are drawn as points.
+    """
 
     title: str
     unit: str
@@ -38,6 +41,7 @@ class Chart(msgspec.Struct, frozen=True):
     curves: list[Curve]
     spans: list[Span] = []
     log: bool = False
+    axis: str = "s"
 
 
 def thin(count: int) -> slice:

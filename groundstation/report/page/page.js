@@ -13,10 +13,10 @@
     return {
       width, height: HEIGHT, cursor: { sync: { key: "run" }, focus: { prox: 24 } },
       scales: { x: { time: false }, y: chart.log ? { distr: 3 } : {} },
-      axes: [{ ...axis, size: 24, values: (_plot, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 56 }],
+      axes: [{ ...axis, size: 24, values: (_plot, ticks) => ticks.map((tick) => (chart.axis ? `${tick} ${chart.axis}` : Number.isInteger(tick) ? `${tick}` : "")) }, { ...axis, size: 56 }],
       series: [
-        { label: "time", value: (_plot, value) => (value === null ? "–" : `${value.toFixed(1)} s`) },
-        ...chart.curves.map((curve) => ({ label: curve.label || "upper", stroke: curve.color, width: curve.dashed ? 1.2 : 1.8, dash: curve.dashed ? [5, 4] : undefined, points: { show: false }, value: (_plot, value) => shown(value), spanGaps: false })),
+        { label: chart.axis ? "time" : "run", value: (_plot, value) => (value === null ? "–" : chart.axis ? `${value.toFixed(1)} ${chart.axis}` : `${value}`) },
+        ...chart.curves.map((curve) => ({ label: curve.label || "upper", stroke: curve.color, width: curve.dashed ? 1.2 : 1.8, dash: curve.dashed ? [5, 4] : undefined, points: { show: !chart.axis }, value: (_plot, value) => shown(value), spanGaps: false })),
       ],
       hooks: { drawClear: [(plot) => drawSpans(plot, chart.spans)], setScale: [follow] },
     };

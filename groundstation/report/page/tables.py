@@ -12,7 +12,7 @@ from groundstation.report.tracks import RunData
 from groundstation.report.wording import bound, quantity, title
 
 _EVENTS_SHOWN = 500
-_BAD = frozenset({"MISSED", "ERROR", "error", "failsafe"})
+_BAD = frozenset({"MISSED", "ERROR", "error", "failsafe", "failed", "invalid"})
 _WARNED = frozenset({"WARNING", "warning", "fault"})
 
 

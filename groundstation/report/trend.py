@@ -1,0 +1,65 @@
+"""Many runs of a folder beside each other, by time: what each reached, from its report.json."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from groundstation.report.criteria import Criterion
+from groundstation.report.judge import JSON_NAME
+from groundstation.report.run_facts import RunFacts
+
+# Figures that a lab watches from flight to flight, in the order of the page.
+FIGURES = (
+    "target_rmse_m",
+    "target_lost_s",
+    "min_separation_m",
+    "max_fence_violation_m",
+    "topology_switches",
+    "planner_p99_ms",
+    "tracker_missed_percent",
+    "mean_cpu_cores",
+)
+
+
+class JudgedRun(msgspec.Struct, frozen=True):
+    """A run with its verdict, its figures by name, and the criteria that it missed."""
+
+    name: str
+    facts: RunFacts
+    verdict: str
+    figures: dict[str, float | None]
+    missed: tuple[Criterion, ...] = ()
+
+
+class _Report(msgspec.Struct):
+    passed: bool | None
+    valid: bool
+    rerun: Any = None
+    criteria: tuple[Criterion, ...] = ()
+    run: RunFacts = RunFacts()
+
+
+def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
+    """Return the runs of a folder in order of their names, which begin with their times, and what cannot be read.
+
+    Re-runs are left out: they are no flights.
+    """
+    runs, damage = [], []
+    for path in sorted(folder.glob(f"*/{JSON_NAME}")):
+        try:
+            data = path.read_bytes()
+            report, figures = msgspec.json.decode(data, type=_Report), msgspec.json.decode(data)
+        except (OSError, msgspec.DecodeError) as error:
+            damage.append(f"{path}: {error}")
+            continue
+        if report.rerun is None:
+            runs.append(_run(path.parent.name, report, figures))
+    return runs, damage
+
+
+def _run(name: str, report: _Report, figures: dict[str, Any]) -> JudgedRun:
+    verdict = "passed" if report.passed else "failed" if report.valid else "invalid"
+    known = {figure: float(value) for figure in FIGURES if isinstance(value := figures.get(figure), int | float)}
+    missed = tuple(one for one in report.criteria if not one.ok)
+    return JudgedRun(name, report.run, verdict, {figure: known.get(figure) for figure in FIGURES}, missed)

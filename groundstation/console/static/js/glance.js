@@ -40,8 +40,13 @@ export function worstBattery() {
   const unknown = known.find(([, value]) => value === null);
   if (unknown) return { name: unknown[0], value: null, level: "warn" };
   const [name, value] = known.reduce((least, one) => (one[1] < least[1] ? one : least));
+  return { name, value, level: batteryLevel(name, value) };
+}
+
+// Thresholds of the bar and of the cards: docs/explanation/console.md#thresholds.
+export function batteryLevel(name, value) {
   const limit = store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15;
-  return { name, value, level: value < limit + 0.05 ? "bad" : value < limit + 0.15 ? "warn" : "good" };
+  return value < limit + 0.05 ? "bad" : value < limit + 0.15 ? "warn" : "good";
 }
 
 export const oldestS = () => Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));

@@ -3,6 +3,7 @@
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
+import { batteryLevel } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, seenBy, store } from "./store.js";
 
@@ -71,7 +72,7 @@ function showVehicle(name, { root, values, mode, detail }) {
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
   if (!status) return;
-  showBattery(values.battery, status.battery, store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15);
+  showBattery(values.battery, name, status.battery);
   text(values.rate, `${status.rate_hz.toFixed(0)} Hz`);
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
   showLink(values.link, status.link);
@@ -87,9 +88,9 @@ function showLink(node, share) {
   node.dataset.link = level;
 }
 
-function showBattery(node, value, least) {
+function showBattery(node, name, value) {
   if (value === null || value === undefined) return text(node, "?");
-  const level = value < least + 0.05 ? "empty" : value < least + 0.15 ? "low" : "full";
+  const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)];
   const words = `${(100 * value).toFixed(0)} %${level === "empty" ? " land!" : level === "low" ? " low" : ""}`;
   if (node.dataset.words === words) return;
   node.dataset.words = words;

@@ -1,1 +1,1 @@
-"""Adapters between vehicles or cameras and the bus: one package per protocol, and what all of them share."""
+"""Adapters between vehicles or cameras and the bus: one package per protocol, and their shared parts."""

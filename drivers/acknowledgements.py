@@ -14,7 +14,7 @@ class AckBook:
         self._pending: Command | None = None
 
     def answered(self, command: Command) -> Ack | None:
-        """Return what was answered to this command before."""
+        """Return the earlier answer to this command."""
         return self._answers.get(command.id)
 
     def answer(self, command: Command, refusal: str) -> Ack:
@@ -29,7 +29,7 @@ class AckBook:
         return answer
 
     def enter(self, mode: DriverMode) -> None:
-        """Give up what cannot become effective in a mode any more."""
+        """Drop the commands that can no longer become effective in a mode."""
         if mode not in ALOFT and self._pending is not None and self._pending.verb not in (Verb.LAND, Verb.CUT_MOTORS):
             self._pending = None
 

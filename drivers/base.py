@@ -11,7 +11,7 @@ from groundstation.bus.messages import Severity
 
 @dataclass(frozen=True, slots=True)
 class LinkHealth:
-    """What a driver knows of its link; rejected: datagrams dropped, by reason."""
+    """State of a driver's link; rejected: datagrams dropped, by reason."""
 
     link_quality: float | None = None
     rate_hz: float = 0.0
@@ -29,7 +29,7 @@ class Vehicle(Protocol):
     address: str
 
     def view(self, now_ns: int) -> VehicleView:
-        """Return what the vehicle last said, and whether that is fresh."""
+        """Return the vehicle's last report, and whether it is fresh."""
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the vehicle its command; called at the sender's rate, also while it is silent."""
@@ -38,7 +38,7 @@ class Vehicle(Protocol):
         """Return the state of the link for the status message."""
 
     def flush(self) -> None:
-        """Publish what is sent in batches (raw datagrams); called 10 times a second."""
+        """Publish batched data (raw datagrams); called 10 times a second."""
 
     def close(self) -> None:
         """Stop the reader and close the link."""

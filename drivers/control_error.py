@@ -1,4 +1,4 @@
-"""Whether a vehicle follows its commands: commanded against reported velocity, and against what cameras see. Pure.
+"""Whether a vehicle follows its commands: commanded velocity against the reported one, and against cameras. Pure.
 
 Half of it holds for every kind of vehicle: whatever lags without overshoot stays between the command and where it was.
 """
@@ -22,7 +22,7 @@ _FIRST_M_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """deviation_m_s: what noise, gusts and overshoot explain; excess_m: way flown beyond that before it counts.
+    """deviation_m_s: explained by noise, gusts and overshoot; excess_m: distance beyond that before it counts.
 
     forgets_m_s: how fast the excess shrinks while there is none; over_s: a vehicle that obeys for so long strays no
     more.
@@ -57,7 +57,7 @@ class Envelope:
 
 
 class Excess:
-    """Cumulative sum (CUSUM) of what a velocity deviates more than tolerated."""
+    """Cumulative sum (CUSUM) of a velocity's deviation beyond the tolerance."""
 
     def __init__(self, tolerance: Tolerance) -> None:
         self._tolerance = tolerance
@@ -78,7 +78,7 @@ class Excess:
 
 
 class ControlErrorMonitor:
-    """Judges one vehicle while its watchdog may move it and nobody else does."""
+    """Judges one vehicle while its watchdog alone moves it."""
 
     def __init__(self) -> None:
         self._last_ns: int | None = None

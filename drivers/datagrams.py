@@ -37,7 +37,7 @@ def unpack(payload: bytes) -> list[tuple[int, bytes]]:
 
 
 class DatagramLog:
-    """Collects what went over one vehicle's link, from any thread, and publishes it in batches."""
+    """Collects the datagrams of one vehicle's link, from any thread, and publishes them in batches."""
 
     def __init__(self, bus: Bus, entity: str, enabled: bool = True) -> None:
         self._bus = bus
@@ -59,7 +59,7 @@ class DatagramLog:
                 self._waiting[RAW_TX].append((stamp_ns, datagram))
 
     def flush(self) -> None:
-        """Publish what waits, one message per direction, stamped as its first datagram."""
+        """Publish the collected datagrams, one message per direction, stamped as its first datagram."""
         with self._lock:
             batches = [(topic, batch) for topic, batch in self._waiting.items() if batch]
             for topic, _ in batches:

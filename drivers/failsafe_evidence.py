@@ -17,7 +17,7 @@ NAMELESS = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What the watchdog knows at one moment; times in ns, gap_s: how long its own loop stood still.
+    """The watchdog's inputs at one moment; times in ns, gap_s: time for which its own loop stood still.
 
     clearing: an emergency is being cleared by a take-off, in time. paused_ns: last setpoint before a pause that needs
     RESUME, None without.
@@ -67,7 +67,7 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
 
 
 def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
-    """Note what the vehicle says, and what it does against its orders."""
+    """Note the vehicle's report, and its actions against its commands."""
     vehicle, state = at.vehicle, at.vehicle.flight_state
     if state in NAMELESS:
         holding[Condition.STATE_UNKNOWN] = ""
@@ -106,7 +106,7 @@ def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[
 
 
 def timed(at: Situation) -> dict[Condition, float]:
-    """Return for how long what has a beginning of its own has lasted [s]."""
+    """Return the duration of a condition that has its own time of begin [s]."""
     if at.mode is DriverMode.TAKING_OFF:
         return {Condition.TAKE_OFF_OVERDUE: at.since_s(at.entered_ns)}
     heard_ns = at.gate.last_heard_ns
@@ -129,7 +129,7 @@ def timed(at: Situation) -> dict[Condition, float]:
 
 
 class Evidence:
-    """Remembers for how long conditions have lasted; what is over is forgotten as the table says."""
+    """Keeps the duration of conditions; ended ones are forgotten by the rules of the table."""
 
     def __init__(self, table: tuple[Failsafe, ...]) -> None:
         self._forgets = {row.condition: row.forgets for row in table if row.forgets is not None}

@@ -102,7 +102,7 @@ class VehicleHost:
         return decision
 
     def _judge(self, now_ns: int, view: VehicleView) -> VehicleView:
-        """Add to a view how the vehicle does what it was told, and what the tracker knows of it and of the others."""
+        """Add to a view the vehicle's control error, and the tracker's estimates of it and of the others."""
         for received in self._estimates.drain():
             if isinstance(received.message, Estimate):
                 self._hear_estimate(now_ns, received.message)
@@ -140,7 +140,7 @@ class VehicleHost:
         return cut or now_ns - self._heard_ns > _GIVE_UP_NS
 
     def publish_status(self, now_ns: int) -> None:
-        """Publish the VehicleStatus now, and say what was refused that nobody of the run sends."""
+        """Publish the VehicleStatus now, and report refused messages from outside of the run."""
         health, view = self.vehicle.health(now_ns), self.watchdog.vehicle
         lost = self.watchdog.mode is not DriverMode.CONNECTING and not view.fresh
         status = VehicleStatus(
@@ -180,7 +180,7 @@ class VehicleHost:
             self._answer(ack)
 
     def _announce_refusal(self, now_ns: int, command: Command) -> None:
-        """Say which order nobody had the right to give; once a second, and once for each."""
+        """Report a command without the right to give it; once a second, and once for each."""
         reason = self.watchdog.lease.refusal(now_ns, command)
         if not reason or command.id == self._refused_id:
             return

@@ -12,7 +12,7 @@ _SIGMAS = 2.0
 
 
 class Neighbours:
-    """What a vehicle knows of the others; pad_m: where it climbs [x, y; world], None: unknown, then nobody is near."""
+    """The other vehicles; pad_m: place of the own climb [x, y; world], None: unknown, then none is near."""
 
     def __init__(self, name: str, pad_m: tuple[float, float] | None, separation_m: float) -> None:
         self._name, self._pad_m, self._separation_m = name, pad_m, separation_m
@@ -28,7 +28,7 @@ class Neighbours:
             self._aloft.discard(name)
 
     def see(self, now_ns: int, entities: Iterable[EntityEstimate]) -> None:
-        """Take what the tracker believes of all."""
+        """Take the tracker's estimates of all."""
         self._believed |= {entity.name: (now_ns, entity) for entity in entities}
 
     def obstacle(self, now_ns: int) -> str:

@@ -70,7 +70,7 @@ class SetpointGate:
 
     @property
     def foreign(self) -> bool:
-        """Whether a newer epoch than the authorised one speaks."""
+        """Whether setpoints of a newer epoch than the authorised one arrive."""
         return self.newest is not None and self.epoch is not None and self.newest.epoch != self.epoch
 
     def adopt(self, now_ns: int) -> bool:
@@ -82,5 +82,5 @@ class SetpointGate:
         return True
 
     def forget_epoch(self) -> None:
-        """Authorise nobody yet (a new take-off); sequence and epoch order are still remembered."""
+        """Withdraw the authorisation (a new take-off); sequence and epoch order are kept."""
         self.epoch = self.last_heard_ns = None

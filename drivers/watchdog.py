@@ -1,4 +1,4 @@
-"""Who may move a vehicle, and what it is to do now: one state machine for all kinds of vehicles.
+"""Who may move a vehicle, and its present action: one state machine for all kinds of vehicles.
 
 Pure: `now_ns` and inputs in, a decision out. Priority: CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF. LAND latches
 until a new TAKEOFF. What stops a vehicle without an order is the table of `failsafe_table.py`.
@@ -162,7 +162,7 @@ class Watchdog:
     # -- step ---------------------------------------------------------------------------------------------------------
 
     def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> WatchdogDecision:
-        """Return what to do now; call it at the sender's rate."""
+        """Return the present decision; call it at the sender's rate."""
         self.see(vehicle, upstream)
         gap_s = 0.0 if self._last_step_ns is None else (now_ns - self._last_step_ns) / NS_PER_S
         self._last_step_ns = now_ns

@@ -113,7 +113,7 @@ class VehicleView:
 
     @property
     def believed(self) -> "VehicleView":
-        """Return the view that may be acted upon: what cannot be true did not arrive."""
+        """Return the view that may be acted upon: values that cannot be true are left out."""
         return replace(self, fresh=False) if self.unsound and self.fresh else self
 
     @property
@@ -124,7 +124,7 @@ class VehicleView:
 
 @dataclass(frozen=True, slots=True)
 class Upstream:
-    """What the process knows of those above it."""
+    """State of tracker and supervisor, as the process sees it."""
 
     supervisor_alive: bool = True
     supervisor_fresh: bool = True

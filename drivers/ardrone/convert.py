@@ -1,4 +1,4 @@
-"""Units and frames: what the drone's figures mean on the bus, and what our velocities mean to the drone.
+"""Units and frames: navdata to bus messages, our velocities to AT commands.
 
 WIRE (docs/reference/ardrone.md 4.5): body x forward, y right, z down; theta nose up, phi right side down, psi
 clockwise; mdeg, mm/s, mg, deg/s. Ours: x forward, y left, z up; roll right side down, pitch nose down, yaw
@@ -42,7 +42,7 @@ _PHASES = {
 
 @dataclass(frozen=True, slots=True)
 class NavdataMotion:
-    """What one packet says of the vehicle's motion, in our frames.
+    """The vehicle's motion by one packet, in our frames.
 
     velocity_m_s [base_stabilized], as reported (no scale applied); rates and specific force [base], None in demo mode.
     """
@@ -110,7 +110,7 @@ def _imu_from_phys(phys: PhysMeasures) -> tuple[Vector3, Vector3]:
 
 
 def sample_from_motion(stamp_ns: int, packet: Navdata, motion: NavdataMotion) -> MotionSample:
-    """Return what of a packet its plausibility is judged by; raises WireError (option_size)."""
+    """Return the input of the plausibility check from a packet; raises WireError (option_size)."""
     time = packet.read(TIME)
     return MotionSample(
         stamp_ns,
@@ -123,7 +123,7 @@ def sample_from_motion(stamp_ns: int, packet: Navdata, motion: NavdataMotion) ->
 
 
 def flight_state_from_navdata(state: int, control_state: int | None) -> FlightState:
-    """Return what the drone does: EMERGENCY and FLY bits decide, the control state names the phase.
+    """Return the drone's flight state: EMERGENCY and FLY bits decide, the control state names the phase.
 
     WIRE: the two are not consistent within a packet. FLY with the phase LANDED is about to leave the ground.
     """

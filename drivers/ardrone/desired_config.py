@@ -39,7 +39,7 @@ class Scale:
 
 
 def scale_from_settings(settings: ArDroneDriverSettings) -> Scale:
-    """Return the limits to configure: the settings', within what the drone accepts."""
+    """Return the limits to configure: those of the settings, within the drone's range."""
     limits = settings.limits
     return Scale(
         _within("control:euler_angle_max", limits.max_tilt_rad),
@@ -65,7 +65,7 @@ FULL_NAVDATA = Wish("general:navdata_demo", format_value(False))
 
 
 def wishes(settings: ArDroneDriverSettings, identity: Identity, with_ids: bool) -> tuple[Wish, ...]:
-    """Return what to write after `FULL_NAVDATA`.
+    """Return the keys to write after `FULL_NAVDATA`.
 
     WIRE: ids come first, since what is written before them goes to another set; `outdoor` copies one of two triples of
     limits over the active ones, so it goes before those.

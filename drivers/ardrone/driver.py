@@ -137,7 +137,7 @@ class ArDrone:
     # -- sender loop --------------------------------------------------------------------------------------------------
 
     def view(self, now_ns: int) -> VehicleView:
-        """Return what the drone last said."""
+        """Return the drone's last report."""
         heard = self.telemetry
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         configured = self._session.phase is SessionPhase.READY
@@ -163,7 +163,7 @@ class ArDrone:
         return f"the drone reports {', '.join(faults)}" if faults else ""
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
-        """Send one datagram with what the decision means to an AR.Drone, and what the session needs."""
+        """Send one datagram with the commands for the decision, and those of the session."""
         heard = self.telemetry
         silence_ns = now_ns - heard.heard_ns
         if self._session.request_due(now_ns, silence_ns):
@@ -187,7 +187,7 @@ class ArDrone:
                 self._session.news.append(notice)
 
     def news(self) -> list[Notice]:
-        """Return what the operator should hear, once."""
+        """Return the events for the operator, once."""
         news = self._session.news
         told = [news.popleft() for _ in range(len(news))]
         if self._settings.video is not None and self._session.identity.model is Model.AR1 and not self._video_refused:

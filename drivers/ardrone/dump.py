@@ -1,4 +1,4 @@
-"""The configuration dump of the control port read back, and whether it says what was written. Pure."""
+"""The configuration dump of the control port, compared with the written values. Pure."""
 
 import math
 from collections.abc import Iterable

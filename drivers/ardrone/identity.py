@@ -55,13 +55,13 @@ def _model(major: int | None) -> Model:
 
 
 def identity_from_version(text: str) -> Identity:
-    """Return what version.txt says, such as "2.3.3"; nothing is known from anything else."""
+    """Return the version in version.txt, such as "2.3.3"; unknown from any other text."""
     version = _parse(text)
     return Identity() if version is None else Identity(_model(version[0]), ".".join(map(str, version)))
 
 
 def identity_from_dump(values: Mapping[str, str]) -> Identity:
-    """Return what a configuration dump (key -> text) says."""
+    """Return the identity in a configuration dump (key -> text)."""
     firmware = values.get("general:num_version_soft", "")
     version = _parse(firmware)
     major = version[0] if version else _BOARDS.get(values.get("general:num_version_mb", ""))

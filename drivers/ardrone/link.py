@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 class SequenceFilter:
-    """Accepts rising navdata sequence numbers; counts what was missed in between.
+    """Accepts rising navdata sequence numbers; counts the missed ones.
 
     WIRE: the drone restarts at 1 for a new session, which always begins with a pause; a lower number amid the stream is
     a replay or a late duplicate.

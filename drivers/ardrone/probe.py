@@ -37,7 +37,7 @@ _UNPAIRED = "00:00:00:00:00:00"
 
 @dataclass(slots=True)
 class NavdataStretch:
-    """A stretch of navdata: what was heard in how many seconds; mode: bootstrap, demo or full."""
+    """A stretch of navdata: its packets and duration; mode: bootstrap, demo or full."""
 
     mode: str
     rate_hz: float
@@ -131,7 +131,7 @@ class _Line:
         return self.packet is not None and bool(self.packet.state & bit)
 
     def stream(self, seconds: float) -> NavdataStretch:
-        """Listen for some seconds and report what the drone sent."""
+        """Listen for some seconds and report the received navdata."""
         self.listen(seconds)
         mode = "demo" if self.is_set(StateBit.NAVDATA_DEMO) else "full"
         numbers = self._numbers
@@ -143,7 +143,7 @@ class _Line:
 
 
 def probe(address: str) -> ProbeReport:
-    """Return what can be found out about the drone at an IPv4 address.
+    """Return the facts of the drone at an IPv4 address.
 
     Raises DriverError when it does not answer within 1.5 s or cannot be reached.
     """
@@ -167,7 +167,7 @@ def probe(address: str) -> ProbeReport:
 
 
 def _look(line: _Line, report: ProbeReport) -> None:
-    """Watch without a word; a standing drone that nobody uses is then asked for both kinds of navdata."""
+    """Watch without sending; an idle drone on the ground is then asked for both kinds of navdata."""
     first = line.stream(_LOOK_S)
     if first.mode != "bootstrap" or line.is_set(StateBit.FLY):
         report.streams.append(first)

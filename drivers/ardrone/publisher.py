@@ -50,7 +50,7 @@ class NavdataPublisher:
         }
 
     def publish(self, stamp_ns: int, motion: NavdataMotion, health: HealthReport = ALL_GOOD) -> None:
-        """Publish what is due and not BAD; every motion counts for the heading's jumps."""
+        """Publish due data that is not BAD; every motion counts for the heading's jumps."""
         reset = self._heading.update(stamp_ns, motion)
         sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
         all_values = health.of(Sensor.TELEMETRY, Sensor.CLOCK)

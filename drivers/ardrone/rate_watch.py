@@ -30,7 +30,7 @@ class RateWatch:
         self._best_hz, self._slow_since_ns, self._told = 0.0, None, False
 
     def step(self, now_ns: int, rate_hz: float) -> Notice | None:
-        """Take the rate over the last second; returns what the operator should hear."""
+        """Take the rate over the last second; returns an event for the operator."""
         self._best_hz = max(self._best_hz, rate_hz)
         if self._best_hz < _LEAST_HZ:
             return None

@@ -1,4 +1,4 @@
-"""Bootstrap and configuration of the drone: what to send beside REF and PCMD. Pure but for the inquirer handed in.
+"""Bootstrap and configuration of the drone: commands beside REF and PCMD. Pure but for the given inquirer.
 
 WIRE (docs/reference/ardrone.md 3, 5.1): CONFIG until state bit 6 rises, CTRL 5 until it falls, then the next key. A
 CONFIG sent while bit 6 is still up is lost, therefore each key waits for the whole cycle of the one before. A late
@@ -35,7 +35,7 @@ _FORGOTTEN_NS = 1_000_000_000
 
 
 class SessionPhase(StrEnum):
-    """Where the session stands; FAILED: what is required was not confirmed, another attempt follows."""
+    """State of the session; FAILED: a required setting was not confirmed, another attempt follows."""
 
     SEARCHING = "SEARCHING"
     CONFIGURING = "CONFIGURING"
@@ -107,7 +107,7 @@ class ArdroneSession:
 
     @property
     def detail(self) -> str:
-        """Return what the session waits for or misses, or ""."""
+        """Return the awaited or missing step, or ""."""
         match self.phase:
             case SessionPhase.SEARCHING:
                 return "waiting for navdata"
@@ -253,7 +253,7 @@ class ArdroneSession:
         return []
 
     def _judge(self, now_ns: int, stored: dict[str, str]) -> None:
-        """Write again what is missing, give up, or leave it at that."""
+        """Write missing settings again, give up, or accept the result."""
         if stored:
             told = identity_from_dump(stored)
             self.identity = told if told.firmware or self.identity.model is Model.UNKNOWN else self.identity

@@ -48,7 +48,7 @@ class Video(DriverSection):
 
 
 class ArDroneDriverSettings(DriverSection):
-    """One AR.Drone: where it is, what it may do, what is published of it.
+    """One AR.Drone: address, limits, published data.
 
     local_address: address to bind (empty: any); local_navdata_port, local_at_port: ports to bind there, 0: any free
     one, so that many drones fit on one host. video None: the drone's own setting is left alone. pad_m: where it takes

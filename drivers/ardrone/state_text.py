@@ -1,4 +1,4 @@
-"""The state word in words, and what an operator should do about it. Pure."""
+"""The state word as text, with the operator's remedy. Pure."""
 
 from drivers.ardrone.wire.state import StateBit
 
@@ -50,10 +50,10 @@ _REMEDIES: dict[StateBit, str] = {
 
 
 def state_in_words(word: int) -> tuple[str, ...]:
-    """Return what each set bit means, lowest bit first; what stops a flight is in capitals."""
+    """Return the meaning of each set bit, lowest bit first; bits that stop a flight are in capitals."""
     return tuple(text for bit, text in _WORDS.items() if word & bit)
 
 
 def state_remedies(word: int) -> tuple[str, ...]:
-    """Return what to do about the bits that are set."""
+    """Return the remedies for the bits that are set."""
     return tuple(text for bit, text in _REMEDIES.items() if word & bit)

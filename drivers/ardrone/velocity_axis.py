@@ -1,4 +1,4 @@
-"""One horizontal axis of the velocity loop: wanted response, observer of the speed, and what tilt is under way. Pure.
+"""One horizontal axis of the velocity loop: wanted response, observer of the speed, pending tilt. Pure.
 
 The odometry's speed is noisy over half a second, too slow and off by a constant factor; what the accelerometers say of
 drag and wind, and what the tilts that were asked for must have done, is sharp at once but drifts. The observer follows
@@ -76,14 +76,14 @@ class Axis:
         return self._unexplained_m > self._gains.doubt_m
 
     def stand(self, force_m_s2: float, dt_s: float) -> None:
-        """Learn from a drone that stands: after the flat trim, this is what its accelerometers show when level."""
+        """Learn from a standing drone: after the flat trim these are its accelerometer readings when level."""
         share = min(1.0, dt_s / self._gains.standing_s)
         rest = -_clamp(force_m_s2 / self._gains.accelerometer_gain, self._gains.bias_m_s2)
         self.bias_m_s2 += (rest - self.bias_m_s2) * share
         self._rest_m_s2 = self.bias_m_s2
 
     def distrust(self) -> None:
-        """Forget what was concluded from measured speeds that contradict what was asked for."""
+        """Forget conclusions from measured speeds that contradict the commanded ones."""
         self.speed_m_s, self.bias_m_s2, self._unexplained_m = self.flown_m_s, self._rest_m_s2, 0.0
 
     def observe(self, measured_m_s: float | None, force_m_s2: float | None, turn_m_s2: float, dt_s: float) -> float:
@@ -110,7 +110,7 @@ class Axis:
         return outside
 
     def _answer(self, dt_s: float) -> float:
-        """Advance the model of the tilt by what was asked a dead time ago; returns its mean acceleration."""
+        """Advance the model of the tilt by the command of a dead time ago; returns its mean acceleration."""
         gains, asked, mean = self._gains, self._under_way.popleft(), 0.0
         step_s = dt_s / _SUBSTEPS
         for _ in range(_SUBSTEPS):
@@ -139,7 +139,7 @@ class Axis:
         return self._reference_rate + gains.proportional * error - outside_m_s2
 
     def bounded(self, acceleration_m_s2: float, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
-        """Return of an acceleration what may be asked: no more than drag explains of the wanted speed.
+        """Return the permitted part of an acceleration: no more than the drag at the wanted speed.
 
         What is asked makes a drone in still air fly `flown_m_s`, whatever is measured. It may exceed the wanted speed
         by a little only, so that a measured speed of 0 does not wind up tilt.
@@ -157,7 +157,7 @@ class Axis:
         return asked
 
     def ask(self, acceleration_m_s2: float) -> None:
-        """Note what was asked of the vehicle in the end."""
+        """Note the command that was finally sent."""
         self._under_way.append(acceleration_m_s2)
 
     def drag(self, speed_m_s: float) -> float:

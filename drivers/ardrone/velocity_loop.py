@@ -46,16 +46,16 @@ class VelocityLoop:
 
     @property
     def contradicted(self) -> bool:
-        """Whether the measured velocity contradicts what was asked for."""
+        """Whether the measured velocity contradicts the commanded one."""
         return self._flying and any(axis.contradicted for axis in self._axes)
 
     def reset(self) -> None:
-        """Forget the motion, not what was learned of the vehicle; for every time it was not flown by this loop."""
+        """Forget the motion, not the learned figures of the vehicle; for times without this loop."""
         self._flying = False
         self._still_s = 0.0
 
     def stand(self, force_m_s2: tuple[float, float], dt_s: float) -> None:
-        """Learn what the accelerometers (forward, left) of a standing drone show."""
+        """Learn the accelerometer readings (forward, left) of a standing drone."""
         for axis, force in zip(self._axes, force_m_s2, strict=True):
             axis.stand(force, dt_s)
 
@@ -83,7 +83,7 @@ class VelocityLoop:
         return self._request(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
 
     def brake(self, dt_s: float, force_m_s2: tuple[float, float] | None = None) -> AttitudeRequest:
-        """Return the attitude that stops a drone whose velocity is wrong, by the speed that was right before it was.
+        """Return the attitude that stops a drone whose velocity is wrong, from its last correct speed.
 
         Its own hover is no brake then: the firmware stops by the same optical flow.
         """

@@ -1,4 +1,4 @@
-"""Which entry of the joint state means what."""
+"""The meaning of each entry of the joint state."""
 
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""What the filter takes in and what it answers, as values without headers."""
+"""Inputs and results of the filter, as values without headers."""
 
 from dataclasses import dataclass
 

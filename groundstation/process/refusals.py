@@ -1,4 +1,4 @@
-"""What was refused, as a line for the operator: counts that rise are told, but not each time."""
+"""Refused input, as a line for the operator: rising counts are reported, but not each time."""
 
 from collections.abc import Mapping
 

@@ -85,7 +85,7 @@ class ConsistencyWatch:
                 edge.take(min(c.nis / len(c.residual), _MOST), now_ns)
 
     def notices(self, now_ns: int) -> list[Notice]:
-        """Return what has become worth telling, or is over."""
+        """Return new and ended warnings."""
         return self._contradictions(now_ns) + self._freezes(now_ns)
 
     def _contradictions(self, now_ns: int) -> list[Notice]:

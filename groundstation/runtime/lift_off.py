@@ -1,4 +1,4 @@
-"""Whether the drone that says it flies is the one whose marker rose. Pure.
+"""Whether the drone that reports flight is the one whose marker rose. Pure.
 
 What a drone reports comes from its address, what cameras see from its marker: where the two disagree, the addresses or
 the markers of two drones are exchanged, and the tracker would move one by what it sees of the other.
@@ -61,7 +61,7 @@ class LiftOffWatch:
         self._since: dict[str, int] = {}
 
     def step(self, now_ns: int, name: str, members: Mapping[str, Member]) -> Mistake | None:
-        """Return what is probably wrong if the drone of that name flies and its marker does not."""
+        """Return the likely mistake if the drone of that name flies and its marker does not."""
         member = members[name]
         if not _has_lifted(member, now_ns) or _has_risen(member, now_ns):
             self._since.clear()

@@ -1,4 +1,4 @@
-"""Speaks to a drone whose driver is dead or hangs: hover, and after a while land, in the drone's own protocol."""
+"""Sends to a drone whose driver is dead or hangs: hover, and later land, in the drone's own protocol."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 
 class Speaker(IntEnum):
-    """Who speaks for a driver; the driver itself is 1."""
+    """The sender for a driver; the driver itself is 1."""
 
     SUPERVISOR = 2
     GUARDIAN = 3
@@ -39,7 +39,7 @@ class FailsafeSender:
         self._next_ns = 0
 
     def prepare(self, name: str, words: FailsafeDatagrams) -> str:
-        """Open what carries the words of a driver, before they are needed; returns "" or why it cannot be."""
+        """Open the transport to a driver's drone before it is needed; returns "" or the reason of a failure."""
         if name in self._voices:
             return ""
         try:
@@ -70,7 +70,7 @@ class FailsafeSender:
         return self._speaking.pop(name, None) is not None
 
     def send_due(self, now_ns: int) -> None:
-        """Send what is due; a lost link is no error, the words are repeated anyway."""
+        """Send due datagrams; a lost link is no error, they are repeated anyway."""
         if now_ns < self._next_ns or not self._speaking:
             return
         self._next_ns = now_ns + _PERIOD_NS

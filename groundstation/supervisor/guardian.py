@@ -1,4 +1,4 @@
-"""The guardian process: speaks to drones that have lost both their driver and the supervisor.
+"""The guardian process: stops and lands drones that have lost both their driver and the supervisor.
 
 It holds the prepared datagrams, reads the heartbeat block, and needs neither bus nor router. It starts first and stops
 last; without a supervisor it ends by itself once every drone was told to land for long enough.
@@ -36,7 +36,7 @@ class GuardedDriver:
         self._pid, self._pidfd = 0, -1
 
     def signs(self) -> DriverSigns:
-        """Return what block and kernel say now."""
+        """Return the present signs of life from block and kernel."""
         slot, block = self.post.slot, self._block
         if block.pid(slot) != self._pid:
             self._follow(block.pid(slot))
@@ -65,7 +65,7 @@ class GuardedDriver:
 
 
 class Guardian:
-    """Watches all drivers and speaks where nobody else does."""
+    """Watches all drivers and sends where no other process does."""
 
     def __init__(self, order: GuardOrder, block: HeartbeatBlock) -> None:
         self._block = block

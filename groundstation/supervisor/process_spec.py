@@ -1,4 +1,4 @@
-"""One line per process: what to start, how long to trust its silence, and when it stops in the shut-down."""
+"""One row per process: its entry, its permitted silence, and its place in the shut-down."""
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum

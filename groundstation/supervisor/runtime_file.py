@@ -58,7 +58,7 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
         return any(process.alive for process in (self.supervisor, *self.processes))
 
     def identity(self, role: Role) -> Identity | None:
-        """Return what a program of another shell joins the bus with."""
+        """Return the identity with which a program of another shell joins the bus."""
         return Identity(self.identities, shell(role), Path(self.run_dir).name) if self.identities else None
 
     @property
@@ -111,7 +111,7 @@ def write(record: RuntimeRecord) -> Path:
 
 
 def live_records() -> list[RuntimeRecord]:
-    """Return the runs that still have a process, and remove what dead ones left behind."""
+    """Return the runs that still have a process, and remove files of dead ones."""
     records = []
     for path in sorted(folder().glob("*.json")):
         try:

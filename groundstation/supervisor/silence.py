@@ -1,4 +1,4 @@
-"""Who speaks to a drone, and what, when its driver is silent. Pure: signs of life in, words out.
+"""Who sends to a drone whose driver is silent, and which command. Pure: signs of life in, commands out.
 
 Precedence: the driver; the supervisor; the guardian. Both substitutes derive their words from one time alone, the
 last beat of the driver, so that they agree whenever they overlap. Proof: tests/property/test_somebody_speaks.py.
@@ -46,7 +46,7 @@ class SupervisorSigns:
     stops: bool = False
 
     def state(self, now_ns: int) -> SupervisorState:
-        """Return what it does now."""
+        """Return its present state."""
         if not self.alive:
             return SupervisorState.DEAD
         if now_ns - self.beat_ns >= SILENCE_NS:
@@ -78,7 +78,7 @@ class DriverSigns:
 
 
 def signs_of(block: HeartbeatBlock, slot: int, *, gone: bool = False) -> DriverSigns:
-    """Return what a slot says of its holder; gone: the kernel's word."""
+    """Return the sign of life in a slot; gone: the holder is dead by the kernel."""
     return DriverSigns(block.state(slot), block.beat_ns(slot), block.has_worked(slot), block.has_ended(slot), gone)
 
 
@@ -132,7 +132,7 @@ class Guard:
     def step(
         self, now_ns: int, signs: DriverSigns, before_ns: int, supervisor: SupervisorSigns, awake_since_ns: int
     ) -> GuardDecision:
-        """Return what to do now; before_ns: since when others speak for the driver, as recorded."""
+        """Return the action now; before_ns: recorded time since which others send for the driver."""
         state = supervisor.state(now_ns)
         heard_silent_ns = signs.heard_silent_ns(now_ns, awake_since_ns)
         overdue = signs.driving and not before_ns and heard_silent_ns >= OVERDUE_NS

@@ -25,7 +25,7 @@ class StatusPublisher:
         self._cpu_marks: dict[int, tuple[int, float]] = {}
 
     def publish_due(self, now_ns: int, processes: Iterable[ManagedProcess]) -> None:
-        """Publish what is due."""
+        """Publish due statuses."""
         if now_ns < self._next_ns:
             return
         self._next_ns = now_ns + _PERIOD_NS

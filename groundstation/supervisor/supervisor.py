@@ -1,4 +1,4 @@
-"""Watches the processes of a run, restarts what dies or hangs, and stops them in order."""
+"""Watches the processes of a run, restarts dead and hanging ones, and stops them in order."""
 
 import logging
 import os
@@ -89,7 +89,7 @@ class Supervisor:
         self._block.set_state(SUPERVISOR_SLOT, SlotState.READY)
 
     def _find_words(self) -> None:
-        """Open what the fail-safe datagrams need; a link whose driver cannot use it either fails its start."""
+        """Open the transports of fail-safe datagrams; a link whose driver cannot use it either fails its start."""
         for process in self.processes:
             words = process.spec.failsafe_datagrams
             why = "" if words is None else self._last_words.prepare(process.spec.name, words)

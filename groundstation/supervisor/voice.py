@@ -1,4 +1,4 @@
-"""What carries fail-safe datagrams to a drone: plain UDP, or what the drone's driver package offers for its links."""
+"""Transports of fail-safe datagrams: plain UDP, or that of the drone's driver package for its links."""
 
 import importlib
 import socket
@@ -17,7 +17,7 @@ class Voice(Protocol):
         """Send a datagram to each address."""
 
     def close(self) -> None:
-        """Release what it holds; idempotent."""
+        """Release its resources; idempotent."""
 
 
 class UdpVoice:
@@ -38,7 +38,7 @@ class UdpVoice:
 
 
 def open_voice(words: FailsafeDatagrams, speaker: int) -> Voice:
-    """Return what carries the words of one link; raises what a driver package raises for a link that it cannot use."""
+    """Return the transport of one link; raises the driver package's error for an unusable link."""
     if not words.voice:
         return UdpVoice()
     # By name, as drivers are started: the supervisor knows no protocol.

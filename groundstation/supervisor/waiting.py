@@ -1,4 +1,4 @@
-"""Whom a start waits for, how long, and what the operator reads meanwhile."""
+"""The processes that a start waits for, the time limits, and the operator's messages meanwhile."""
 
 from groundstation.process.heartbeat import SlotState
 from groundstation.supervisor.managed_process import ManagedProcess

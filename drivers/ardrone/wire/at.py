@@ -183,7 +183,7 @@ def mtrim(pitch: float, roll: float, yaw: float) -> AtCommand:
 
 
 def pmode(mode: int) -> AtCommand:
-    """Send what Parrot's programs begin with; its meaning is not documented."""
+    """Send the first command of Parrot's programs; its meaning is not documented."""
     return AtCommand("PMODE", (mode,))
 
 

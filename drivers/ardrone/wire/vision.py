@@ -103,7 +103,7 @@ class VideoStream(NamedTuple):
 
 
 class VideoStreamRate(NamedTuple):
-    """AR.Drone 2: bit rates, and what waits in the queues."""
+    """AR.Drone 2: bit rates, and lengths of the queues."""
 
     bitrate: int = 0
     wanted_bitrate: int = 0

@@ -24,7 +24,7 @@ class MotionModel(Protocol):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Entries of the block, which begins as layout.py says."""
+        """Entries of the block, which begins with the entries of layout.py."""
 
     @property
     def kernels(self) -> MotionKernels:
@@ -110,7 +110,7 @@ class ObservationModel(Protocol):
 
 
 class SensorDefaults:
-    """What most sensors have in common; a model that is different says so."""
+    """Defaults shared by most sensors; a different model overrides them."""
 
     @property
     def observes_targets(self) -> bool:

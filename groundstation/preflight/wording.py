@@ -11,7 +11,7 @@ from groundstation.geometry.rotations import euler_from_rotation, rotation_from_
 from groundstation.preflight.suspicions import Opinion, Verdict
 
 SUBJECT = "pads"
-# From here on a flight is not worth its risk (docs/explanation/preflight.md#what-standing-drones-tell).
+# From here on a flight is not worth its risk (docs/explanation/preflight.md#checks-of-standing-drones).
 _MUST_SHARE, _MUST_M, _MUST_TURN, _MUST_TILT = 0.02, 0.08, math.radians(1.5), math.radians(1.2)
 _MUST_PLACED_M, _MUST_HEADING = 0.25, math.radians(10.0)
 _MOST_TOLD = 3

@@ -14,7 +14,7 @@ INTEROP := .interop
 STUDIES := .pytest_cache/studies
 COMPUTING := .pytest_cache/computing
 COVERAGE := .pytest_cache/coverage-waiting.json .pytest_cache/coverage-computing.json
-# Fast tests that open fixed ports, start processes or wait for time; all others only compute.
+# Fast tests that wait for sockets, processes or time; all others compute. Each file has loopback addresses of its own.
 WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/contract/mavlink_links \
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
@@ -37,7 +37,7 @@ test-waiting: $(STAMP)-test
 
 test-computing: $(STAMP)-test
 	@mkdir -p $(COMPUTING) && code=0; \
-	COVERAGE_DATA=$(word 2,$(COVERAGE)) REFUSE_FIXED_PORTS=1 nice $(PYTEST) -m "not slow" -o cache_dir=$(COMPUTING) \
+	COVERAGE_DATA=$(word 2,$(COVERAGE)) nice $(PYTEST) -m "not slow" -o cache_dir=$(COMPUTING) \
 		$(addprefix --ignore=,$(WAITING)) tests >$(COMPUTING)/log 2>&1 || code=$$?; \
 	cat $(COMPUTING)/log; exit $$code
 

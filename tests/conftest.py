@@ -1,25 +1,15 @@
 """Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded evidence."""
 
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import pytest
 
 from measurement import Measurement
 
 MEASUREMENT = Measurement()
-
-
-def _refuse_fixed_ports(event: str, arguments: tuple[Any, ...]) -> None:
-    if event == "socket.bind" and isinstance(arguments[1], tuple) and arguments[1][1]:
-        raise RuntimeError("two runs of pytest could meet at this port: add the test to WAITING in the Makefile")
-
-
-if "REFUSE_FIXED_PORTS" in os.environ:
-    sys.addaudithook(_refuse_fixed_ports)
 
 from groundstation.field.resolved import ResolvedField
 from groundstation.process import numba_cache

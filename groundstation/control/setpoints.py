@@ -113,7 +113,8 @@ def _regained(
     if age_s is None or age_s <= parameters.regain_after_s or name not in plan.topology.levels[-1]:
         return vx, vy, rate
     place = belief.mean_of(name)[:2]
-    target = min(belief.layout.targets, key=lambda one: math.dist(belief.mean_of(one)[:2], place))
+    tracked = (one for one in belief.layout.targets if one not in sight.missing)
+    target = min(tracked, key=lambda one: math.dist(belief.mean_of(one)[:2], place))
     found = regaining(name, target, belief, sensors)
     if found is None:
         return vx, vy, rate

@@ -1,6 +1,7 @@
 """A robot that has lost its target from the picture gets it back by itself: it turns to it and backs off."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
 LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
-SENSORS, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
+IN_LAB, CONTROL = sensors_from_field(LAB), control_from_field(LAB)
+SENSORS = replace(IN_LAB, marker_height_m={**IN_LAB.marker_height_m, "gone": 0.4})
 HELD = {"drone_1": np.array([0.2, -0.1, 0.3]), "drone_2": np.array([0.0, 0.1, -0.2])}
 
 
@@ -31,11 +33,11 @@ def belief(first: np.ndarray, target: np.ndarray, target_std: float = 0.05) -> J
     return JointBelief(mean, np.diag([0.03**2] * 8 + [target_std**2] * 4), layout, 0)
 
 
-def wanted(now: JointBelief, age_s: float | None, topology: str) -> dict[str, Setpoint]:
+def wanted(now: JointBelief, age_s: float | None, topology: str, missing: tuple[str, ...] = ()) -> dict[str, Setpoint]:
     report = SolverReport("complete", 1, 0.0, 1, 1)
     heights = {"drone_1": 1.6, "drone_2": 1.6}
     plan = PlanResult(Topology.parse(topology), 0.1, 0.1, HELD, heights, (), (), report, "certified", 0)
-    return setpoints_from_plan(plan, now, ("drone_1", "drone_2"), CONTROL, SENSORS, Sight(age_s))
+    return setpoints_from_plan(plan, now, ("drone_1", "drone_2"), CONTROL, SENSORS, Sight(age_s, missing=missing))
 
 
 @pytest.mark.parametrize("start", [(-0.2, 0.0, 1.6, 0.3), (0.6, 0.1, 1.6, 2.0), (-1.3, 0.5, 1.6, -1.0)])
@@ -83,3 +85,13 @@ def test_a_place_that_is_known_badly_is_looked_at_from_farther_away() -> None:
     assert sharp is not None
     assert vague is not None
     assert vague[0][0] < sharp[0][0]
+
+
+def test_a_target_that_is_searched_for_is_not_taken_for_the_one_that_left_the_picture() -> None:
+    with_one = belief(np.array([0.0, 0.0, 1.6, 0.0]), np.array([0.5, 0.0, 0.0, 0.0]))
+    layout = with_one.layout.with_entity("gone", EntityKind.TARGET, TARGET_CORE)
+    P = np.eye(layout.dim) * 1e-3
+    both = JointBelief(np.append(with_one.mean, (0.0, 0.4, 0.0, 0.0)), P, layout, 0)
+    tracked, nearest = (wanted(both, 0.5, "drone_2/drone_1", missing) for missing in (("gone",), ()))
+    assert abs(tracked["drone_1"].yaw_rate_rad_s) < 0.01
+    assert nearest["drone_1"].yaw_rate_rad_s > 1.0

@@ -9,6 +9,7 @@ from collections import deque
 
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.drift import DriftFeedback
+from drivers.mavlink.lift_off import LiftOff
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
@@ -35,6 +36,7 @@ class Orders:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
         self.said: deque[tuple[int, str]] = deque(maxlen=8)
         self.starting = False
+        self.lift = LiftOff()
         self.drift = DriftFeedback()
         self._vehicle, self._flavour, self._requests = vehicle, flavour, requests
         self._guided, self._landing = guided_mode(flavour), land_mode(flavour)
@@ -42,7 +44,6 @@ class Orders:
         self._action = Action.WAIT
         self._since_ns = 0
         self._climb_until_ns = 0
-        self._floor_m: float | None = None
         self._fresh_start = False
         self._due_ns = 0
         self._told_ns = -1
@@ -60,11 +61,12 @@ class Orders:
         return f" ({self.said[-1][1]})"
 
     def step(
-        self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float
+        self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float,
+        climb_m_s: float = 0.0,
     ) -> SetPositionTargetLocalNed | None:  # fmt: skip
         """Return the set-point to send now, if any; commands are asked through the requests."""
         armed, guided = bool(base_mode & ARMED), custom_mode == self._guided
-        climbed_m = self._climbed(now_ns, landed, height_m)
+        climbed_m = self._climbed(now_ns, landed, height_m, climb_m_s)
         action = decision.action
         if action is not self._action:
             self._enter(now_ns, action)
@@ -91,13 +93,13 @@ class Orders:
                 pass
         return None
 
-    def _climbed(self, now_ns: int, landed: int, reported_m: float) -> float:
+    def _climbed(self, now_ns: int, landed: int, reported_m: float, climb_m_s: float) -> float:
         """Return the height above the floor [m]: from the tracker, else the vehicle's own since lift-off."""
-        if landed == Landed.ON_GROUND or self._floor_m is None:
-            self._floor_m = reported_m
+        risen_m = self.lift.hear(now_ns, self.starting, landed, reported_m, climb_m_s)
+        if not self.lift.lifted:
             self.drift.reset()
         believed = self.drift.place(now_ns)
-        return reported_m - self._floor_m if believed is None else believed[2]
+        return risen_m if believed is None else believed[2]
 
     def _enter(self, now_ns: int, action: Action) -> None:
         self.drift.let_go()

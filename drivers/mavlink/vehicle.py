@@ -18,7 +18,7 @@ from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, Landed, SensorBits
+from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.limits import MAVLINK
 from drivers.plausibility.motion import MotionMonitor
@@ -180,7 +180,7 @@ class MavlinkVehicle:
     def see(self, now_ns: int, estimate: Estimate) -> None:
         """Take the tracker's estimate."""
         good, known = self.vision.hear(now_ns, estimate), self.telemetry
-        if good is not None and known.landed != Landed.ON_GROUND and now_ns - known.moved_ns < _FRESH_NS:
+        if good is not None and self.orders.lift.lifted and now_ns - known.moved_ns < _FRESH_NS:
             self.orders.drift.hear(now_ns, good, known.velocity_m_s)
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
 
@@ -192,6 +192,8 @@ class MavlinkVehicle:
         unsound = self._plausibility.report.reason(Health.BAD, MAVLINK.essential)
         if not known.heartbeat_ns or not known.landed:
             state = FlightState.UNKNOWN
+        elif state is FlightState.FLYING and self.orders.starting and not self.orders.lift.lifted:
+            state = FlightState.TAKING_OFF
         elif state is FlightState.FLYING and convert.is_still(known.velocity_m_s):
             state = FlightState.HOVERING
         elif state is FlightState.LANDED and self.orders.starting:
@@ -243,8 +245,8 @@ class MavlinkVehicle:
         silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else 1 << 62
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
-        height = known.position_m[2] if known.position_m else 0.0
-        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, known.landed, height)
+        up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
+        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, known.landed, *up)
         messages += self._requests.due(now_ns)
         if setpoint is not None:
             messages.append(setpoint)
@@ -290,9 +292,7 @@ class MavlinkVehicle:
         if now_ns < self._next_vision_ns or known.attitude is None:
             return []
         self._next_vision_ns = max(self._next_vision_ns + self._vision_period_ns, now_ns)
-        aloft = bool(known.base_mode & ARMED) and known.landed != 1
-        pose = self.vision.pose(now_ns, aloft)
-        if pose is None:
+        if (pose := self.vision.pose(now_ns, bool(known.base_mode & ARMED) and self.orders.lift.lifted)) is None:
             return []
         if self.flavour is Flavour.PX4:
             return [convert.odometry_from_pose(pose, known.attitude, self.vision.resets)]

@@ -1,0 +1,53 @@
+"""When a vehicle has left the floor: by its height or climb, not by its word that it flies."""
+
+from drivers.mavlink.lift_off import LiftOff
+from drivers.mavlink.wire.names import Landed
+
+MS = 1_000_000
+
+
+def hear(lift, seconds, landed, climb_m_s=0.0, begin_m=0.0, starting=True, from_s=0.0):
+    """Tell it 50 times a second what a vehicle that climbs steadily says; returns when it had lifted first [s]."""
+    for turn in range(round(seconds * 50)):
+        elapsed_s = turn / 50
+        lift.hear(round((from_s + elapsed_s) * 1000) * MS, starting, landed, begin_m + climb_m_s * elapsed_s, climb_m_s)
+        if lift.lifted:
+            return elapsed_s
+    return None
+
+
+def test_a_word_alone_is_no_lift_off():
+    lift = LiftOff()
+    assert hear(lift, 2.0, Landed.ON_GROUND, begin_m=0.3) is None
+    assert hear(lift, 5.0, Landed.IN_AIR, climb_m_s=0.01, begin_m=0.3, from_s=2.0) is None
+    assert hear(lift, 2.0, Landed.IN_AIR, climb_m_s=0.2, begin_m=0.35, from_s=7.0) is not None
+
+
+def test_a_climb_counts_sooner_than_the_height_that_it_brings():
+    lift = LiftOff()
+    hear(lift, 1.0, Landed.ON_GROUND)
+    assert 0.25 < hear(lift, 2.0, Landed.IN_AIR, climb_m_s=0.12, from_s=1.0) < 0.4
+
+
+def test_a_jolt_is_no_climb():
+    lift = LiftOff()
+    hear(lift, 1.0, Landed.ON_GROUND)
+    for turn in range(20):
+        climb_m_s = 0.4 if turn % 10 < 5 else -0.4  # 0.1 s each
+        lift.hear(10_000 * MS + turn * 20 * MS, True, Landed.IN_AIR, 0.0, climb_m_s)
+    assert not lift.lifted
+
+
+def test_who_was_not_asked_to_take_off_flies_when_it_says_so():
+    lift = LiftOff()  # a driver that was started again in flight
+    assert hear(lift, 0.1, Landed.IN_AIR, begin_m=1.2, starting=False) == 0.0
+
+
+def test_it_stays_lifted_until_it_stands_again():
+    lift = LiftOff()
+    hear(lift, 1.0, Landed.ON_GROUND)
+    hear(lift, 1.0, Landed.TAKE_OFF, climb_m_s=0.4, from_s=1.0)
+    lift.hear(3_000 * MS, False, Landed.LANDING, 0.02, -0.1)
+    assert lift.lifted
+    assert lift.hear(4_000 * MS, False, Landed.ON_GROUND, 0.04, 0.0) == 0.0
+    assert not lift.lifted

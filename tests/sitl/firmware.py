@@ -77,6 +77,8 @@ class Firmware:
     def wait_saved(self, limit_s: float = 20.0) -> None:
         """Wait until its file of parameters has not changed for a while: PX4 writes it some time after a change."""
         names = ("parameters.bson", "parameters_backup.bson") if self.flavour == "px4" else ("eeprom.bin",)
+        # What was set a moment ago is not in a file that is older: the first look comes once it would be.
+        time.sleep(_SAVED_S)
         deadline = time.monotonic() + limit_s
         while time.monotonic() < deadline:
             ages = [

@@ -11,13 +11,14 @@ from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_S
 
 # Velocities of the belief are noisy by 0.05 m/s.
-_SMOOTHING_S = 0.25
+_SMOOTHING_S = 0.12
 # Without the tracker an estimator's error of the velocity lasts for about that long.
 _FORGETS_S = 2.0
 _FRESH_NS = 300_000_000
-# Larger ones are no error of an estimator that still works, nor are sudden ones (its tilt would be wrong by 5 degrees
-# and more): what is told is not corrected then, and the limits of the control error act.
-_MOST_M_S = 0.8
+# Sudden ones are no error of an estimator that still works: what is told is not corrected then, and the limits of the
+# control error act. A large one is corrected as far as this, which 7 degrees of tilt explain: a correction that ended
+# there would itself be a step of that size.
+_MOST_M_S = 1.5
 _SUDDEN_M_S, _SUDDEN_M_S2 = 0.45, 0.8
 _TRUSTED_AGAIN_NS = NS_PER_S
 # Up to here it does not matter whose word is wrong.
@@ -100,9 +101,10 @@ class DriftFeedback:
         """Return reported less true velocity [m/s; base_stabilized], the correction of a commanded velocity."""
         size = math.hypot(*self._drift)
         doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
-        if self._at_ns is None or doubted or size > _MOST_M_S:
+        if self._at_ns is None or doubted:
             return _STILL
         left_over = math.exp(-max(0.0, (now_ns - self._at_ns) / NS_PER_S - _SEEN_S) / _FORGETS_S)
+        left_over *= min(1.0, _MOST_M_S / max(size, _MOST_M_S))
         return self._in_heading(left_over * self._drift[0], left_over * self._drift[1], 0.0)
 
     @property

@@ -1,5 +1,6 @@
 """Velocity errors of autopilots: estimated from the belief, corrected, and not where it is the report that is wrong."""
 
+import itertools
 import math
 
 import pytest
@@ -89,6 +90,20 @@ def test_a_sudden_error_is_no_drift():
     vehicle.error = (0.7, 0.0)
     vehicle.step()
     assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0)
+
+
+def test_an_error_beyond_what_is_corrected_is_corrected_as_far():
+    """Nothing is as far off as the whole error: a correction that ends at a limit is a step of that size."""
+    vehicle = Vehicle()
+    vehicle.fly(1.0)
+    corrected = []
+    for _ in range(200):  # 2 m/s within four seconds
+        vehicle.error = (vehicle.error[0] + 0.01, 0.0)
+        vehicle.step()
+        corrected.append(math.hypot(*vehicle.feedback.drift(vehicle.now_ns)[:2]))
+    assert max(corrected) == pytest.approx(1.5)
+    assert max(abs(b - a) for a, b in itertools.pairwise(corrected)) < 0.05
+    assert math.hypot(*vehicle.velocity) < 0.7
 
 
 def test_without_the_tracker_the_correction_fades_and_no_place_is_held():

@@ -84,11 +84,11 @@ class ConsistencyWatch:
                 edge = self._edges.setdefault((c.observer, c.subject), _Edge())
                 edge.take(min(c.nis / len(c.residual), _MOST), now_ns)
 
-    def notices(self, now_ns: int) -> list[Notice]:
-        """Return new and ended warnings."""
-        return self._contradictions(now_ns) + self._freezes(now_ns)
+    def notices(self, now_ns: int, cause: str = "") -> list[Notice]:
+        """Return new and ended warnings; cause: what explains contradictions, if known."""
+        return self._contradictions(now_ns, cause) + self._freezes(now_ns)
 
-    def _contradictions(self, now_ns: int) -> list[Notice]:
+    def _contradictions(self, now_ns: int, cause: str) -> list[Notice]:
         live = {
             pair: edge.mean
             for pair, edge in self._edges.items()
@@ -108,7 +108,7 @@ class ConsistencyWatch:
                 found.append(Notice(Severity.INFO, "sightings agree with the belief again", entity=name))
                 continue
             pairs = sorted(blamed[name])
-            found.append(_warning(name, pairs, max(live[pair] for pair in pairs)))
+            found.append(_warning(name, pairs, max(live[pair] for pair in pairs), cause))
         return found
 
     def _freezes(self, now_ns: int) -> list[Notice]:
@@ -141,11 +141,13 @@ def _culprit(pair: tuple[str, str], far: Collection[tuple[str, str]], live: Coll
     return subject
 
 
-def _warning(name: str, pairs: list[tuple[str, str]], worst: float) -> Notice:
+def _warning(name: str, pairs: list[tuple[str, str]], worst: float, cause: str) -> Notice:
     if all(observer == name for observer, _ in pairs):
         what, remedy = f"what its camera sees of {', '.join(subject for _, subject in pairs)}", _SENSOR_REMEDY
     else:
         sees = "see" if len(pairs) > 1 else "sees"
         what, remedy = f"what {' and '.join(observer for observer, _ in pairs)} {sees} of it", _SUBJECT_REMEDY
+    if cause:
+        remedy = f"probably not its fault: {cause}"
     lasting = f"{_LASTING_NS // 10**9} s: NIS {worst:.0f} per degree of freedom, not 1"
     return Notice(Severity.WARNING, f"{what} contradicts the belief for {lasting}", remedy, name)

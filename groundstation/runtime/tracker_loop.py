@@ -15,6 +15,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner
 from groundstation.runtime.announcer import TEAM, Announcer
 from groundstation.runtime.consistency_watch import ConsistencyWatch
+from groundstation.runtime.figure_watch import FigureWatch
 from groundstation.runtime.health import UnseenWatch
 from groundstation.runtime.inbox import Inbox
 from groundstation.runtime.journal import FAULT, Adoption, entry_of
@@ -98,6 +99,7 @@ class Tracking:
         self._contradictions = ConsistencyWatch(self.tracker.parameters.estimator.entities)
         self._rejoining = RejoinWatch(self.tracker.robots)
         self._picture_age = PictureAge(field, feed.clock)
+        self._figures = FigureWatch(field, feed.clock)
         self._unseen = UnseenWatch(field.safety.unseen_land_after_s)
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
@@ -113,6 +115,7 @@ class Tracking:
             verdict = tracker.ingest(key, message, now_ns)
             if verdict is None:
                 self._picture_age.take(message)
+                self._figures.take(message)
             else:
                 self._contradictions.refused(message, verdict, now_ns)
         tracker.advance(now_ns)
@@ -149,7 +152,8 @@ class Tracking:
             text = "flies, and nobody knows well enough where it is: its driver lands it"
             self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
         if self._tick % self.rate_hz == 0:
-            self.notices += self._contradictions.notices(now_ns) + self._picture_age.notices()
+            self.notices += self._figures.notices(now_ns)
+            self.notices += self._contradictions.notices(now_ns, self._figures.cause) + self._picture_age.notices()
             self._report_refusals()
 
     def _report_refusals(self) -> None:

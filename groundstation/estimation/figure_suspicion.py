@@ -1,0 +1,132 @@
+"""Which one figure of the field, if it were wrong, explains why the loops of sightings do not close? Pure.
+
+Normal equations over all figures, fed with one mean a second for each loop, because what disturbs a loop (how a vehicle
+leans, by its own account) lasts for seconds. Each suspicion frees the figures of one thing and holds all others at
+their surveys; its evidence is that of a linear Gaussian model.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Vector
+from groundstation.estimation.sight_loops import Gap, Key
+
+# How well each figure is known (one sigma), and how wrong a suspect may be: shares, [rad], [s].
+_SURVEYED = {
+    "print": 0.003,
+    "focal": 0.004,
+    "pan": math.radians(0.5),
+    "tilt": math.radians(0.8),
+    "delay": 0.012,
+}
+_WRONG = {"print": 0.08, "focal": 0.08, "pan": math.radians(5.0), "tilt": math.radians(5.0), "delay": 0.08}
+# What is told only from so far on: less does not harm.
+_WORTH_TELLING = {
+    "print": 0.02,
+    "focal": 0.02,
+    "pan": math.radians(1.2),
+    "tilt": math.radians(1.5),
+    "delay": 0.03,
+}
+_BLOCK_S, _FORGETTING_S = 1.0, 40.0
+_LEAST_IN_BLOCK = 3
+# Of a block's mean: a detector's own bias, and a lean that is another one than told, for as many blocks as it lasts.
+_BIAS_M, _LEAN_RAD, _LASTS = 0.015, math.radians(0.8), 2.0
+_SURE, _REFUTED, _RULED_OUT = math.log(100.0), math.log(3.0), math.log(20.0)
+_PATIENCE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """One thing that may be wrong: the figure of one entity, or of all ("")."""
+
+    who: str
+    part: str
+
+
+@dataclass(frozen=True, slots=True)
+class Charge:
+    """A suspect with the size of its error, one sigma, and by how much (log) it explains more than nothing does."""
+
+    suspect: Suspect
+    size: float
+    std: float
+    lead: float
+
+
+class FigureSuspicion:
+    """Fed with gaps; `judge` once a second."""
+
+    def __init__(self, keys: Sequence[Key]) -> None:
+        self._keys = tuple(keys)
+        n = len(self._keys)
+        self._information, self._pull = np.zeros((n, n)), np.zeros(n)
+        self._block: dict[str, list[Gap]] = {}
+        self._block_ends_s = -math.inf
+        self._held = 0
+        self._surveyed = np.array([_SURVEYED[part] for _, part in self._keys])
+        self.charges: tuple[Charge, ...] = ()
+
+    def take(self, gap: Gap) -> None:
+        """Take a loop that has closed."""
+        if gap.at_s >= self._block_ends_s:
+            self._end_block()
+            self._block_ends_s = gap.at_s + _BLOCK_S
+        self._block.setdefault(gap.name, []).append(gap)
+
+    def _end_block(self) -> None:
+        keep = 0.5 ** (_BLOCK_S / _FORGETTING_S)
+        self._information *= keep
+        self._pull *= keep
+        for gaps in self._block.values():
+            if len(gaps) >= _LEAST_IN_BLOCK:
+                gap = np.median([one.gap_m for one in gaps], axis=0)
+                slope = np.mean([one.by_figure for one in gaps], axis=0)
+                far = float(np.mean([one.far_m for one in gaps]))
+                variance = _LASTS * (_BIAS_M**2 + (_LEAN_RAD * far) ** 2)
+                self._information += slope.T @ slope / variance
+                self._pull -= slope.T @ gap / variance
+        self._block.clear()
+
+    def judge(self) -> tuple[Charge, ...]:
+        """Return who is to be named now: nobody, one, or several that cannot be told apart; likeliest first."""
+        nothing = self._evidence(())[0]
+        charges = sorted(self._charges(nothing), key=lambda charge: -charge.lead)
+        best = charges[0]
+        wanted = bool(self.charges)
+        if best.lead > _SURE and abs(best.size) > _WORTH_TELLING[best.suspect.part]:
+            wanted = True
+        elif best.lead < _REFUTED:
+            wanted = False
+        self._held = self._held + 1 if wanted else 0
+        named = tuple(one for one in charges if one.lead > best.lead - _RULED_OUT)
+        self.charges = named if self._held >= _PATIENCE else ()
+        return self.charges
+
+    def _charges(self, nothing: float) -> Iterator[Charge]:
+        for suspect, places in self._suspects().items():
+            evidence, sizes, stds = self._evidence(places)
+            most = places[int(np.argmax(np.abs(sizes[list(places)])))]
+            yield Charge(suspect, float(sizes[most]), float(stds[most]), evidence - nothing)
+
+    def _suspects(self) -> Mapping[Suspect, tuple[int, ...]]:
+        found: dict[Suspect, tuple[int, ...]] = {
+            Suspect(who, part): (place,) for place, (who, part) in enumerate(self._keys)
+        }
+        for part in ("pan", "tilt"):
+            places = tuple(place for place, key in enumerate(self._keys) if key[1] == part)
+            if len(places) > 1:
+                found[Suspect("", part)] = places
+        return found
+
+    def _evidence(self, places: tuple[int, ...]) -> tuple[float, Vector, Vector]:
+        sigma = self._surveyed.copy()
+        for place in places:
+            sigma[place] = _WRONG[self._keys[place][1]]
+        posterior = np.linalg.inv(self._information + np.diag(1.0 / sigma**2))
+        sizes = posterior @ self._pull
+        spread = float(np.linalg.slogdet(posterior)[1]) - 2.0 * float(np.sum(np.log(sigma)))
+        return 0.5 * (float(self._pull @ sizes) + spread), sizes, np.sqrt(np.diag(posterior))

@@ -1,0 +1,120 @@
+"""Loops of sightings name the figure that is wrong, with its size, and nothing where all are right."""
+
+import math
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import Header, RelativeObservation, Severity
+from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
+from groundstation.runtime.figure_watch import FigureWatch
+
+LEAN = math.radians(0.6)  # deviation of how a drone leans from what it tells, for five seconds at a time
+TARGET_M = 0.4
+
+
+class Room:
+    """Two drones that look at a target in the middle from both sides, and the ceiling camera over them.
+
+    prints: shares by name ("": all); pan_deg, tilt_deg: of drone_1's camera.
+    """
+
+    def __init__(self, field: ResolvedField, seed: int, **wrong: float) -> None:
+        self.field, self.rng, self.wrong = field, np.random.default_rng(seed), wrong
+        self.lean = {name: np.zeros(2) for name in field.drones}
+
+    def place(self, name: str, at_s: float) -> tuple[np.ndarray, float]:
+        side = -1.0 if name == "drone_1" else 1.0
+        swing = 0.3 * math.sin(0.4 * at_s + side)
+        at = np.array([side * 1.0 + 0.2 * swing, swing, 1.6])
+        return at, math.atan2(-at[1], -at[0]) + 0.1 * math.sin(0.5 * at_s)
+
+    def sight(self, observer: str, subject: str, at_s: float, optical: np.ndarray, yaw: float) -> RelativeObservation:
+        scale = (1.0 + self.wrong.get("all", 0.0)) * (1.0 + self.wrong.get(subject, 0.0))
+        seen = optical / scale + 0.004 * self.rng.standard_normal(3)
+        return RelativeObservation(
+            header=Header(round(at_s * 1e9), "c", observer, observer, 1),
+            observer=observer,
+            subject=subject,
+            camera=observer,
+            position_m=tuple(seen.tolist()),
+            yaw_rad=yaw,
+            covariance=tuple((1e-4 * np.eye(4)).ravel().tolist()),
+        )
+
+    def pictures(self, at_s: float) -> list[RelativeObservation]:
+        found = []
+        ceiling = self.field.cameras["ceiling"]
+        down = world_from_downward_optical(ceiling.rotation_deg)
+        for name, drone in self.field.drones.items():
+            if self.rng.random() < 1.0 / 75.0 or at_s < 0.1:
+                self.lean[name] = LEAN * self.rng.standard_normal(2)
+            base, yaw = self.place(name, at_s)
+            marker = base + rotation_z(yaw) @ np.array(drone.marker.position_m)
+            found.append(self.sight("ceiling", name, at_s, down.T @ (marker - np.array(ceiling.position_m)), yaw))
+            off = self.wrong.get("pan_deg", 0.0), self.wrong.get("tilt_deg", 0.0)
+            pan, tilt = off if name == "drone_1" else (0.0, 0.0)
+            eye = drone.camera
+            pan_rad = math.radians(eye.pan_left_deg + pan) + self.lean[name][0]
+            tilt_rad = math.radians(eye.tilt_down_deg + tilt) + self.lean[name][1]
+            relative = rotation_z(yaw).T @ (np.array([0.0, 0.0, TARGET_M]) - base) - np.array(eye.position_m)
+            optical = base_from_tilted_optical(tilt_rad, pan_rad).T @ relative
+            found.append(self.sight(name, "turtlebot", at_s + 0.02, optical, 0.0))
+        return found
+
+    def told(self, seconds: float) -> list[tuple[Severity, str, str]]:
+        watch, said = FigureWatch(self.field, "c"), []
+        for picture in range(round(seconds * 15)):
+            at_s = 100.0 + picture / 15.0
+            for sighting in self.pictures(at_s - 100.0):
+                shifted = sighting.header.stamp_ns + 100 * 10**9
+                watch.take(
+                    RelativeObservation(
+                        **{f: getattr(sighting, f) for f in sighting.__struct_fields__ if f != "header"},
+                        header=Header(shifted, "c", sighting.observer, sighting.observer, 1),
+                    )
+                )
+            if picture % 15 == 14:
+                notices = watch.notices(round((at_s + 0.05) * 1e9))
+                said += [(one.severity, one.text, one.remedy) for one in notices]
+        return said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_is_told_where_all_figures_are_right(lab_field: ResolvedField, seed: int) -> None:
+    assert Room(lab_field, seed).told(20.0) == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words", "remedy"),
+    [
+        ({"all": 0.06}, "all markers are", "ruler"),
+        ({"turtlebot": 0.08}, "turtlebot's marker is", "ruler"),
+        ({"tilt_deg": 6.0}, "drone_1's camera looks", "drones.drone_1.camera.tilt_down_deg: 5"),
+    ],
+)
+def test_one_wrong_figure_is_told_with_size_and_remedy(
+    lab_field: ResolvedField, wrong: dict[str, float], words: str, remedy: str
+) -> None:
+    said = Room(lab_field, 1, **wrong).told(14.0)
+    assert said and said[-1][0] is Severity.WARNING
+    assert words in said[-1][1] and "+-" in said[-1][1]
+    assert remedy in said[-1][2]
+
+
+@pytest.mark.slow
+def test_figures_that_are_right_again_are_refuted(lab_field: ResolvedField) -> None:
+    room = Room(lab_field, 2, all=0.06)
+    watch = FigureWatch(lab_field, "c")
+    states = []
+    for picture in range(15 * 150):
+        if picture == 15 * 20:
+            room.wrong = {}
+        for sighting in room.pictures(picture / 15.0):
+            watch.take(sighting)
+        if picture % 15 == 14:
+            states += [notice.severity for notice in watch.notices(round((picture / 15.0 + 0.05) * 1e9))]
+    assert states[0] is Severity.WARNING and states[-1] is Severity.INFO
+    assert watch.cause == ""

@@ -43,11 +43,11 @@ REFUSED_BY = "zenoh_link_tls"
 _LOGGED = f"error,{REFUSED_BY}=warn"
 
 
-def _configuration(mode: str, endpoint: str) -> dict[str, Any]:
+def _configuration(mode: str, endpoint: str, also: tuple[str, ...] = ()) -> dict[str, Any]:
     listens = mode == "router"
     return {
         "mode": mode,
-        "listen": {"endpoints": [endpoint] if listens else [], "exit_on_failure": True},
+        "listen": {"endpoints": [endpoint, *also] if listens else [], "exit_on_failure": True},
         "connect": {
             "endpoints": [] if listens else [endpoint],
             "timeout_ms": 500,
@@ -91,20 +91,23 @@ def _opened(configuration: dict[str, Any]) -> Any:
     return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration)))
 
 
-def open_router(endpoint: str, identity: Identity | None = None, access: AccessList | None = None) -> Any:
+def open_router(
+    endpoint: str, identity: Identity | None = None, access: AccessList | None = None, also: tuple[str, ...] = ()
+) -> Any:
     """Return a listening router session, guarded if there are an identity and an access list.
 
-    A guarded one writes a line with REFUSED_BY to standard output for each stranger. Raises GroundStationError when the
-    port is taken.
+    also: further endpoints that it listens on. A guarded one writes a line with REFUSED_BY to standard output for each
+    stranger. Raises GroundStationError when the port is taken.
     """
-    configuration = _configuration("router", endpoint)
+    configuration = _configuration("router", endpoint, also)
     if identity is not None and access is not None:
         zenoh.init_log_from_env_or(_LOGGED)
         configuration = _secured(configuration, identity, "listen") | {"access_control": access_control(access)}
     try:
         return _opened(configuration)
     except zenoh.ZError as error:
-        raise GroundStationError(f"cannot listen on {endpoint}: is another run using this port? ({error})") from error
+        places = " and ".join((endpoint, *also))
+        raise GroundStationError(f"cannot listen on {places}: is another run using this port? ({error})") from error
 
 
 class ZenohBus(Sender):

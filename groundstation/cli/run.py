@@ -198,7 +198,7 @@ def _run(
         names = f"{removed[0].folder.name} ... {removed[-1].folder.name}" if removed[1:] else removed[0].folder.name
         terminal.say(f"recording.keep_gb {field.recording.keep_gb:g}: removed {names} ({size:.1f} GB)")
     real = tuple(simulation.real.drones) if simulation else tuple(field.drones)
-    run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones), real)
+    run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones), real, field.bus.listen)
     outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()
     terminal.flush()
     if plan.look_only:

@@ -35,12 +35,12 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
 
     stops: without a name the real drones are meant, whatever is rehearsed beside them.
     """
-    records = runtime_file.live_records()
+    records = runtime_file.live_records() or _elsewhere()
     if name is not None:
         records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
     if not records:
         which = f" called {name}" if name else ""
-        raise UnreachableError(f"no ground station{which} is running here (start one with: groundstation fly FIELD)")
+        raise UnreachableError(f"no ground station{which} is running (start one with: groundstation fly FIELD)")
     if len(records) > 1 and stops and name is None:
         # In an emergency nobody reads a list of runs.
         records = [record for record in records if not record.simulated] or records
@@ -48,6 +48,13 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
         lines = "\n".join(f"  --run {r.name}  {r.field}, {', '.join(r.drones)}" for r in records)
         raise UnreachableError(f"several ground stations are running, choose one:\n{lines}")
     return records[0]
+
+
+def _elsewhere() -> list[RuntimeRecord]:
+    """Return the runs on other hosts, where this one has joined a site."""
+    from groundstation.supervisor import site
+
+    return list(site.runs())
 
 
 def deliver(bus: ZenohBus, book: AwaitedAnswers, patience_s: float, on_news: Callable[[str], None]) -> None:

@@ -15,6 +15,7 @@ from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
 from groundstation.flight.real_parts import ALL_EMULATED, RealParts
+from groundstation.process.ports import port_of
 from groundstation.runtime.router import RouterSection
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverKind, DriverSection, core_section, driver_sections, rerouted
@@ -22,6 +23,7 @@ from groundstation.supervisor import process_table as rows
 from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
 from groundstation.supervisor.process_spec import ProcessSpec
+from groundstation.supervisor.site import hosts
 from groundstation.supervisor.supervisor import SOURCE
 
 
@@ -78,17 +80,22 @@ def process_table(
         table.append(replace(rows.CONSOLE, section=page))
     if monitor:
         table.append(replace(rows.MONITOR, section=core))
-    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table))
+    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table, field.bus.listen))
     return guarded(tuple(table))
 
 
-def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec]) -> str:
-    """Return what a router is handed: where it listens, and whom it lets speak as whom."""
+def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec], listen: str = "") -> str:
+    """Return what a router is handed: where it listens, and whom it lets speak as whom.
+
+    listen: address at which other hosts of the site find it too, "" for none.
+    """
     members = [
         Member(spec.name, Role(spec.role), (spec.name,), spec.entities or (spec.name,)) for spec in table if spec.on_bus
     ]
     members += [Member(SOURCE, Role.SUPERVISOR, (SOURCE,)), *SHELLS]
-    return msgspec.json.encode(RouterSection(endpoint, AccessList(site, tuple(members)))).decode()
+    also = (f"tls/{listen}:{port_of(endpoint)}",) if listen else ()
+    members += hosts(site) if listen else ()
+    return msgspec.json.encode(RouterSection(endpoint, AccessList(site, tuple(members)), also)).decode()
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:

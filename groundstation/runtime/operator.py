@@ -158,7 +158,8 @@ class Operator:
         if now_ns >= self._next_lease_ns:
             self._next_lease_ns = now_ns + _LEASE_PERIOD_NS
             header = self._bus.header(_TEAM)
-            self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=header.stamp_ns + _LEASE_LIFE_NS))
+            expires_ns = header.stamp_ns + _LEASE_LIFE_NS
+            self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=expires_ns, run=self._bus.run))
         self.team.update(now_ns)
         if self._checks is not None:
             self._checks.update(now_ns)

@@ -18,17 +18,21 @@ _LINGER_NS = 25_000_000_000
 
 
 class RouterSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the router: where to listen, and whom to let in (None: everybody)."""
+    """What the supervisor hands to the router: where to listen, and whom to let in (None: everybody).
+
+    also: further endpoints, for other hosts.
+    """
 
     endpoint: str
     access: AccessList | None = None
+    also: tuple[str, ...] = ()
 
 
 def run(child: Child) -> int:
     """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
     section = msgspec.json.decode(child.section, type=RouterSection)
     strangers = RefusedStrangers()
-    session = open_router(section.endpoint, child.spec.identity, section.access)
+    session = open_router(section.endpoint, child.spec.identity, section.access, section.also)
     bus = ZenohBus(session, child.spec.site, child.name)
     child.ready()
     orphaned_ns = 0

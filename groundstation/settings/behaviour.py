@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from groundstation.settings.values import SettingsSection
+from groundstation.settings.values import AddressOrNone, SettingsSection
 
 Height = Annotated[float, Field(ge=0.3, le=20)]
 
@@ -124,11 +124,14 @@ class Console(SettingsSection):
 
 
 class Bus(SettingsSection):
-    """The router that all processes of a run talk through, on loopback.
+    """The router that all processes of a run talk through.
 
     4717 is nobody's: IANA has not assigned it; it lies apart from Zenoh (7446, 7447, 8000), DDS (7400 and up), MAVLink
     and autopilots in simulation (14550, 4560, 5760), web servers, and the ports that Linux gives to clients (32768 up).
     """
 
     port: Annotated[int, Field(ge=1024, le=65535)] = 4717
-    """TCP port of the router, on loopback only. A simulated run takes the next free one if it is taken."""
+    """TCP port of the router. A simulated run takes the next free one if it is taken."""
+    listen: AddressOrNone = ""
+    """Address of this host at which hosts that the site has admitted (`groundstation site`) may stop and order; empty:
+    loopback only."""

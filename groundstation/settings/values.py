@@ -65,3 +65,4 @@ MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
 # Only the driver gets the password, from the attribute: a field that is written, recorded or shown is a dump.
 Source = Annotated[str, AfterValidator(_is_source), PlainSerializer(without_password)]
 Address = Annotated[str, AfterValidator(_is_address)]
+AddressOrNone = Annotated[str, AfterValidator(lambda value: value and _is_address(value))]

@@ -1,4 +1,4 @@
-"""The certificates of a run: an authority that signs each member once and is then forgotten.
+"""Certificates: an authority signs each member of a run once and is then forgotten; that of a site is kept.
 
 Nobody, not even the owner of the run, can make another member later. The certificates hold for as long as anybody
 cares: a clock that is set right during a flight must not part a driver from its run.
@@ -6,16 +6,23 @@ cares: a clock that is set right during a flight must not part a driver from its
 
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from ipaddress import ip_address
 from pathlib import Path
+from typing import Self
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePrivateKey, generate_private_key
-from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
-from cryptography.x509.oid import NameOID
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    load_pem_private_key,
+)
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from groundstation.bus.zenoh_bus import AUTHORITY, CERTIFICATE, KEY
 from groundstation.errors import GroundStationError
@@ -23,47 +30,100 @@ from groundstation.errors import GroundStationError
 _BEGINS, _ENDS = datetime(2000, 1, 1, tzinfo=UTC), datetime(2100, 1, 1, tzinfo=UTC)
 
 
-def make_identities(folder: Path, address: str, names: Iterable[str]) -> None:
+@dataclass(frozen=True, slots=True)
+class Authority:
+    """A key that signs, and the certificate by which others know it; above: the authority that signed it."""
+
+    key: EllipticCurvePrivateKey
+    certificate: x509.Certificate
+    above: "Authority | None" = None
+
+    @classmethod
+    def make(cls, name: str, above: "Authority | None" = None) -> Self:
+        """Return a new authority, signed by the one above or, without one, by itself."""
+        key = generate_private_key(SECP256R1())
+        issuer, signer = (above.certificate.subject, above.key) if above else (_called(name), key)
+        constraints = x509.BasicConstraints(ca=True, path_length=0 if above else 1)
+        builder = _certificate(name, key, issuer).add_extension(constraints, critical=True)
+        return cls(key, builder.sign(signer, hashes.SHA256()), above)
+
+    @classmethod
+    def load(cls, certificate: bytes, key: bytes) -> Self:
+        """Return the authority that was kept in PEM; raises ValueError when it is none."""
+        loaded = load_pem_private_key(key, None)
+        if not isinstance(loaded, EllipticCurvePrivateKey):
+            raise ValueError("the key is of another kind")
+        return cls(loaded, x509.load_pem_x509_certificate(certificate))
+
+    @property
+    def pem(self) -> bytes:
+        """Its certificate."""
+        return self.certificate.public_bytes(Encoding.PEM)
+
+    @property
+    def trusted_pem(self) -> bytes:
+        """Its certificate and that of the authority above: whose members a router lets in."""
+        return self.pem + (self.above.pem if self.above else b"")
+
+    def member(self, name: str, addresses: Sequence[str] = ()) -> tuple[bytes, bytes]:
+        """Return certificate and key of a member in PEM; one without addresses cannot pass for a router."""
+        key = generate_private_key(SECP256R1())
+        usages = [ExtendedKeyUsageOID.CLIENT_AUTH] + ([ExtendedKeyUsageOID.SERVER_AUTH] if addresses else [])
+        builder = (
+            _certificate(name, key, self.certificate.subject)
+            .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+            .add_extension(x509.ExtendedKeyUsage(usages), critical=False)
+        )
+        if addresses:
+            hosts = [x509.IPAddress(ip_address(address)) for address in addresses]
+            builder = builder.add_extension(x509.SubjectAlternativeName(hosts), critical=False)
+        signed = builder.sign(self.key, hashes.SHA256()).public_bytes(Encoding.PEM)
+        return signed + (self.pem if self.above else b""), key_pem(key)
+
+
+def make_identities(
+    folder: Path, addresses: Sequence[str], names: Iterable[str], site: Authority | None = None
+) -> None:
     """Make a folder that only its owner can read, with an authority and a certificate and key for each name.
 
-    address: where the router listens; its certificate is good for that address only, as all of them are. Raises
-    GroundStationError when the folder cannot be made.
+    addresses: where the router listens; the certificates are good for those only. site: whose hosts the router lets in
+    too, and who vouches for it to them. Raises GroundStationError when the folder cannot be made.
     """
-    authority = generate_private_key(SECP256R1())
+    authority = Authority.make("run", site)
     try:
         shutil.rmtree(folder, ignore_errors=True)  # of a dead process with the same number
         folder.mkdir(mode=0o700)
-        _write(folder / AUTHORITY, _certificate("run", authority, authority, address))
+        write_private(folder / AUTHORITY, authority.trusted_pem)
         for name in names:
-            key = generate_private_key(SECP256R1())
-            _write(folder / f"{name}{CERTIFICATE}", _certificate(name, key, authority, address))
-            _write(folder / f"{name}{KEY}", key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
+            certificate, key = authority.member(name, addresses)
+            write_private(folder / f"{name}{CERTIFICATE}", certificate)
+            write_private(folder / f"{name}{KEY}", key)
     except OSError as error:
         raise GroundStationError(f"cannot write the run's certificates to {folder}: {error.strerror}") from error
 
 
-def _write(path: Path, content: bytes) -> None:
+def write_private(path: Path, content: bytes) -> None:
+    """Write a new file that only its owner can read."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     with os.fdopen(descriptor, "wb") as file:
         file.write(content)
 
 
-def _certificate(name: str, key: EllipticCurvePrivateKey, authority: EllipticCurvePrivateKey, address: str) -> bytes:
-    own = key is authority
-    builder = (
+def key_pem(key: EllipticCurvePrivateKey) -> bytes:
+    """Return a private key in PEM, without a password."""
+    return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+
+
+def _certificate(name: str, key: EllipticCurvePrivateKey, issuer: x509.Name) -> x509.CertificateBuilder:
+    return (
         x509.CertificateBuilder()
         .subject_name(_called(name))
-        .issuer_name(_called("run"))
+        .issuer_name(issuer)
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
         .not_valid_before(_BEGINS)
         .not_valid_after(_ENDS)
-        .add_extension(x509.BasicConstraints(ca=own, path_length=0 if own else None), critical=True)
     )
-    if not own:
-        host = x509.IPAddress(ip_address(address))
-        builder = builder.add_extension(x509.SubjectAlternativeName([host]), critical=False)
-    return builder.sign(authority, hashes.SHA256()).public_bytes(Encoding.PEM)
 
 
 def _called(name: str) -> x509.Name:

@@ -12,5 +12,5 @@ def join(record: RuntimeRecord, word: str, role: Role, timeout_s: float = 2.0) -
 
     Raises GroundStationError when no router answers.
     """
-    source = f"{word}_{os.getpid()}"
+    source = f"{word}_{record.host}_{os.getpid()}" if record.host else f"{word}_{os.getpid()}"
     return open_bus(record.endpoint, record.site, source, timeout_s, record.identity(role))

@@ -33,7 +33,10 @@ class ProcessRecord(msgspec.Struct, frozen=True):
 
 
 class RuntimeRecord(msgspec.Struct, frozen=True):
-    """A run as others see it; real: those of its drones that exist."""
+    """A run as others see it; real: those of its drones that exist.
+
+    host: what this host is called at the site, where the run is on another one; then run_dir is the run's name.
+    """
 
     site: str
     field: str
@@ -46,11 +49,12 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
     identities: str = ""
     """Folder of the run's certificates; "" where the bus asks for none."""
     real: tuple[str, ...] = ()
+    host: str = ""
 
     @property
     def name(self) -> str:
         """The name by which `--run` chooses this run."""
-        return f"{self.site}-{self.supervisor.pid}"
+        return f"{self.site}-{self.supervisor.pid}" if not self.host else self.site
 
     @property
     def alive(self) -> bool:
@@ -59,7 +63,8 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
 
     def identity(self, role: Role) -> Identity | None:
         """Return the identity with which a program of another shell joins the bus."""
-        return Identity(self.identities, shell(role), Path(self.run_dir).name) if self.identities else None
+        name = f"host-{self.host}" if self.host else shell(role)
+        return Identity(self.identities, name, Path(self.run_dir).name) if self.identities else None
 
     @property
     def has_truth(self) -> bool:

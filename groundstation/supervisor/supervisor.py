@@ -39,7 +39,10 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a run is called and where it happens; real: the drones that exist."""
+    """What a run is called and where it happens; real: the drones that exist.
+
+    listen: address at which the router is there for other hosts of the site, "" for none.
+    """
 
     site: str
     field: str
@@ -47,6 +50,7 @@ class Run:
     run_dir: Path
     drones: tuple[str, ...]
     real: tuple[str, ...] = ()
+    listen: str = ""
 
     @property
     def guarded(self) -> bool:
@@ -103,7 +107,11 @@ class Supervisor:
 
         members = [process.spec.name for process in self.processes if process.spec.on_bus or process.spec.is_router]
         names = (*members, SOURCE, *(member.name for member in SHELLS))
-        make_identities(self._identities, ports.host_of(self.run.endpoint), names)
+        from groundstation.supervisor.site import authority_of
+
+        addresses = (ports.host_of(self.run.endpoint), *filter(None, [self.run.listen]))
+        site = authority_of(self.run.site) if self.run.listen else None
+        make_identities(self._identities, addresses, names, site)
 
     def connect(self) -> None:
         """Join the bus; its router is up."""

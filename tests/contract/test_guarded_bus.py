@@ -43,7 +43,7 @@ def endpoint() -> str:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, endpoint: str) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("keys") / "lab-1"
-    make_identities(folder, "127.0.0.1", NAMES)
+    make_identities(folder, ["127.0.0.1"], NAMES)
     router = zenoh_bus.open_router(endpoint, Identity(str(folder), "router", "r"), AccessList("lab", MEMBERS))
     yield folder
     router.close()
@@ -143,9 +143,9 @@ def test_truth_does_not_reach_what_flies(join: Join) -> None:
 
 
 def test_strangers_do_not_get_in(endpoint: str, folder: Path, tmp_path: Path) -> None:
-    make_identities(tmp_path / "other", "127.0.0.1", ["tracker"])
+    make_identities(tmp_path / "other", ["127.0.0.1"], ["tracker"])
     forged = tmp_path / "forged"
-    make_identities(forged, "127.0.0.1", ["tracker"])
+    make_identities(forged, ["127.0.0.1"], ["tracker"])
     (forged / zenoh_bus.AUTHORITY).write_bytes((folder / zenoh_bus.AUTHORITY).read_bytes())
     plain = endpoint.replace("tls/", "tcp/")
     for address, identity in (

@@ -117,7 +117,7 @@ def watched(run: SitlRun) -> Watched:
 def test_strangers_neither_hear_nor_move_anything(run: SitlRun, watched: Watched, tmp_path: Path) -> None:
     """Forged setpoints, epochs far ahead, leases and take-offs, plain and over TLS, from any local program."""
     keys = tmp_path / "keys"
-    make_identities(keys, "127.0.0.1", ["tracker"])
+    make_identities(keys, ["127.0.0.1"], ["tracker"])
     run_authority = identities_of(run.record.site, run.record.supervisor.pid) / zenoh_bus.AUTHORITY
     (keys / zenoh_bus.AUTHORITY).write_bytes(run_authority.read_bytes())
     got = attack("bus", run.record.endpoint, run.record.site, keys)

@@ -137,3 +137,5 @@ class Lease(Message, frozen=True, kw_only=True):
     """The operator's process."""
     expires_ns: int
     """Time until which the lease holds [ns; boot clock]."""
+    run: str = ""
+    """Run that it is the lease of: what another host has to name in its orders."""

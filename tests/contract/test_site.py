@@ -1,0 +1,166 @@
+"""A site over real TLS: hosts that it admitted order in its runs, others do not, and none of them is more than that."""
+
+import socket
+import stat
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from groundstation.bus import topics, zenoh_bus
+from groundstation.bus.access import AccessList
+from groundstation.bus.messages import Command, FlightState, Lease, VehicleStatus, VelocitySetpoint, Verb
+from groundstation.bus.roles import Identity, Member, Role
+from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.errors import GroundStationError, OperatorMistake
+from groundstation.supervisor import site
+from groundstation.supervisor.authority import make_identities
+from groundstation.supervisor.joining import join
+
+MEMBERS = (
+    Member("supervisor", Role.SUPERVISOR, ("supervisor",)),
+    Member("drone_1", Role.DRIVER, ("drone_1",), ("drone_1",)),
+)
+HERE, ELSEWHERE = "127.0.0.1", "127.0.0.9"
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    site.found("lab")
+    return tmp_path
+
+
+@pytest.fixture
+def port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind((HERE, 0))
+        return int(probe.getsockname()[1])
+
+
+def admit(home: Path, host: str, port: int) -> None:
+    site.admit("lab", host, f"tls/{ELSEWHERE}:{port}", home / f"{host}.admission")
+    site.join(home / f"{host}.admission")
+
+
+class Run:
+    """A run whose router listens for other hosts too, with an operator and a driver that speak."""
+
+    def __init__(self, folder: Path, port: int) -> None:
+        make_identities(folder, [HERE, ELSEWHERE], ["router", *(m.name for m in MEMBERS)], site.authority_of("lab"))
+        access = AccessList("lab", (*MEMBERS, *site.hosts("lab")))
+        here, elsewhere = f"tls/{HERE}:{port}", f"tls/{ELSEWHERE}:{port}"
+        self.router = zenoh_bus.open_router(here, Identity(str(folder), "router", "r"), access, (elsewhere,))
+        self.operator, self.driver = (self._join(folder, here, member.name) for member in MEMBERS)
+        self.commands = self.driver.subscribe([topics.COMMAND])
+        self.setpoints = self.driver.subscribe([topics.SETPOINT])
+        self._over = threading.Event()
+        self._speaking = threading.Thread(target=self._speak)
+        self._speaking.start()
+
+    def _join(self, folder: Path, endpoint: str, name: str) -> ZenohBus:
+        return zenoh_bus.open_bus(endpoint, "lab", name, 2.0, Identity(str(folder), name, "run-7"))
+
+    def _speak(self) -> None:
+        while not self._over.wait(0.05):
+            lease = Lease(header=self.operator.header("team"), holder="operator", expires_ns=10**18, run="run-7")
+            self.operator.publish(topics.LEASE, lease)
+            header = self.driver.header("drone_1")
+            self.driver.publish(
+                topics.VEHICLE_STATUS, VehicleStatus(header=header, flight_state=FlightState.LANDED, mode="LANDED")
+            )
+
+    def close(self) -> None:
+        self._over.set()
+        self._speaking.join()
+        for one in (self.operator, self.driver, self.router):
+            one.close()
+
+
+@pytest.fixture
+def run(home: Path, port: int) -> Iterator[Run]:
+    admit(home, "laptop", port)
+    made = Run(home / "keys", port)
+    yield made
+    made.close()
+
+
+def test_an_admitted_host_finds_the_run_and_stops_it_under_its_own_name(run: Run) -> None:
+    (record,) = site.runs()
+    assert (record.run_dir, record.drones, record.host) == ("run-7", ("drone_1",), "laptop")
+    bus = join(record, "cli", Role.CLI)
+    command = Command(header=bus.header("team"), id="x", verb=Verb.LAND, scope=(), issuer=bus.source, run=bus.run)
+    for _ in range(50):
+        bus.publish(topics.COMMAND, command)
+        if run.commands.wait(0.05):
+            break
+    received = run.commands.drain()[0]
+    assert received.key.source.startswith("cli_laptop_")
+    assert isinstance(received.message, Command) and received.message.run == "run-7"
+    for source in ("tracker", "supervisor", "cli_other_1"):
+        liar = zenoh_bus.open_bus(record.endpoint, "lab", source, 2.0, record.identity(Role.CLI))
+        header = liar.header("drone_1")
+        liar.publish(
+            topics.SETPOINT,
+            VelocitySetpoint(header=header, velocity_m_s=(1, 0, 0), yaw_rate_rad_s=0, lifetime_ms=300, epoch=1),
+        )
+        liar.publish(topics.COMMAND, command)
+        liar.close()
+    time.sleep(0.2)
+    assert run.setpoints.drain_samples() == []
+    assert {r.key.source for r in run.commands.drain()} <= {bus.source}
+    bus.close()
+
+
+def test_who_was_not_admitted_before_the_run_or_was_expelled_says_nothing(home: Path, run: Run, port: int) -> None:
+    admit(home, "late", port)
+    late = Identity(str(site.folder("joined", "lab")), "host-late", "run-7")
+    bus = zenoh_bus.open_bus(f"tls/{ELSEWHERE}:{port}", "lab", "cli_late_1", 2.0, late)
+    heard = bus.subscribe([topics.LEASE])
+    command = Command(header=bus.header("team"), id="x", verb=Verb.LAND, scope=(), issuer=bus.source, run="run-7")
+    for _ in range(10):
+        bus.publish(topics.COMMAND, command)
+        time.sleep(0.02)
+    assert heard.drain_samples() == [] and run.commands.drain_samples() == []
+    bus.close()
+    site.expel("lab", "laptop")
+    assert [member.name for member in site.hosts("lab")] == ["host-late"]
+
+
+def test_a_host_cannot_pass_for_the_router(home: Path, run: Run, port: int) -> None:
+    """Its certificate names no address and is good for clients only."""
+    place = site.folder("joined", "lab")
+    with closing(socket.socket()) as probe:
+        probe.bind((ELSEWHERE, 0))
+        other = int(probe.getsockname()[1])
+    endpoint = f"tls/{ELSEWHERE}:{other}"
+    router = zenoh_bus.open_router(endpoint, Identity(str(place), "host-laptop", "r"), AccessList("lab", ()))
+    with pytest.raises(GroundStationError, match="no router answers"):
+        zenoh_bus.open_bus(endpoint, "lab", "drone_1", 0.0, Identity(str(home / "keys"), "drone_1", "r"))
+    router.close()
+
+
+def test_keys_are_for_their_owner_and_mistakes_are_named(home: Path, port: int) -> None:
+    admit(home, "laptop", port)
+    kept = [path for path in (home / "config").rglob("*") if path.is_file()] + [home / "laptop.admission"]
+    assert {stat.S_IMODE(path.stat().st_mode) for path in kept} == {0o600}
+    assert {stat.S_IMODE(site.folder(kind, "lab").stat().st_mode) for kind in ("sites", "joined")} == {0o700}
+    for wrong, words in (
+        (lambda: site.found("lab"), "has an authority already"),
+        (lambda: site.admit("lab", "laptop", "x", home / "x"), "admitted before"),
+        (lambda: site.admit("lab", "../x", "x", home / "x"), "small letters"),
+        (lambda: site.admit("hall", "laptop", "x", home / "x"), "site init hall"),
+        (lambda: site.expel("lab", "tablet"), "has admitted laptop"),
+        (lambda: site.join(Path("/dev/null")), "is no admission"),
+    ):
+        with pytest.raises(OperatorMistake, match=words):
+            wrong()
+
+
+def test_without_a_run_nothing_is_found(home: Path, port: int) -> None:
+    assert list(site.runs()) == []
+    admit(home, "laptop", port)
+    assert list(site.runs()) == []

@@ -6,17 +6,30 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.cli.monitor import cast_of, choose
+from groundstation.errors import OperatorMistake
 
 if TYPE_CHECKING:
     from groundstation.field.resolved import ResolvedField
     from groundstation.supervisor.runtime_file import RuntimeRecord
 
 
-@click.command(epilog="\b\nExamples:\n  groundstation console\n  groundstation console --port 9000 --run lab-4711")
+@click.command(
+    epilog="\b\nExamples:\n  groundstation console\n  groundstation console --port 9000 --run lab-4711\n"
+    "  groundstation console --invite stop"
+)
 @click.option("--run", "name", metavar="NAME", help="The run to show, where there are several.")
+@click.option(
+    "--invite",
+    metavar="ROLE",
+    type=click.Choice(("watch", "stop", "command")),
+    help="Let one tablet or phone in, by a code that works once; needs console.listen in the field.",
+)
 @click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
-def console(name: str | None, port: int | None) -> None:
-    """Serve the operator's page for a running ground station, on loopback. Leaving it stops nothing."""
+def console(name: str | None, invite: str | None, port: int | None) -> None:
+    """Serve the operator's page for a running ground station, on loopback. Leaving it stops nothing.
+
+    With --invite: print an address, as a QR code too, at which one device finds the run's own page.
+    """
     import asyncio
 
     from groundstation.bus.roles import Role
@@ -27,6 +40,8 @@ def console(name: str | None, port: int | None) -> None:
     from groundstation.supervisor.joining import join
 
     record = choose(name)
+    if invite is not None:
+        return _invite(record, invite)
     cast, field = cast_of(record), _field_of(record)
     truth = record.has_truth
     scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
@@ -41,6 +56,21 @@ def console(name: str | None, port: int | None) -> None:
         pass
     finally:
         bus.close()
+
+
+def _invite(record: "RuntimeRecord", role: str) -> None:
+    from groundstation.console.devices import DeviceRole, Devices
+    from groundstation.console.qr import qr_text
+    from groundstation.console.section import devices_of
+
+    devices = Devices(devices_of(record.identities))
+    if not devices.url:
+        raise OperatorMistake(f"the console of {record.name} is on loopback only: set console.listen in the field")
+    address = devices.invite(DeviceRole(role))
+    click.echo(qr_text(address))
+    click.echo(f"{address}\none device may {role}; the code works once, within 10 minutes")
+    click.echo("the browser warns of a certificate that nobody signed; it is the right one if its SHA-256 is")
+    click.echo(devices.fingerprint)
 
 
 def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":

@@ -4,28 +4,30 @@ import hmac
 import os
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
-from contextlib import suppress
-from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from groundstation.console.cookies import cookie_of
+from groundstation.console.devices import DeviceRole, Devices
 from groundstation.process.ports import user_of
 
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
+ROLE = "skein.role"
 Asgi = Callable[[Any, Any, Any], Awaitable[None]]
 
 
-def refusal(scope: Mapping[str, Any]) -> str:
-    """Return "" for a request that may come in, else the reason."""
+def refusal(scope: Mapping[str, Any], names: frozenset[str] = _LOOPBACK_NAMES) -> str:
+    """Return "" for a request that may come in, else the reason; names: those that this server goes by."""
     headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
     host = headers.get(b"host", "")
     # A foreign name that resolves to this host (DNS rebinding) would make a foreign page "same origin".
-    if _hostname(f"http://{host}") not in _LOOPBACK_NAMES:
-        return "the Host header names no loopback address"
+    if _hostname(f"http://{host}") not in names:
+        return "the Host header names no address of this server"
     if scope["type"] == "websocket":
         # Browsers let any page open a WebSocket to anywhere, and always say which page it was.
-        return "" if headers.get(b"origin", "") == f"http://{host}" else "the Origin is not this page"
+        page = f"{scope['scheme'].replace('ws', 'http')}://{host}"
+        return "" if headers.get(b"origin", "") == page else "the Origin is not this page"
     if scope["method"] not in _SAFE_METHODS:
         return "only GET"
     return "another site's request" if headers.get(b"sec-fetch-site", "none") == "cross-site" else ""
@@ -42,7 +44,7 @@ def security_headers(host: str) -> list[tuple[bytes, bytes]]:
     """Return the headers of every answer: nothing from elsewhere, no framing, no guessing of types, no copies kept."""
     policy = (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-        f"connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        f"connect-src 'self' ws://{host} wss://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
     return [
         (b"content-security-policy", policy.encode("latin-1")),
@@ -61,22 +63,22 @@ class Door:
     code: what others show, once as `/?code=`, then as a cookie; code_file: where its owner finds it.
     """
 
+    names = _LOOPBACK_NAMES
+
     def __init__(self, code: str, code_file: str = "") -> None:
         self._code, self._file = code, code_file
 
-    def admits(self, scope: Mapping[str, Any]) -> bool:
-        """Return whether a request comes from our own user, or with the code."""
-        return self._is_own(scope) or hmac.compare_digest(
-            _cookie(scope, self._cookie_name(scope)).encode(), self._code.encode()
-        )
+    def admits(self, scope: Mapping[str, Any]) -> DeviceRole | None:
+        """Return that a request from our own user, or with the code, may do everything; None for others."""
+        shown = cookie_of(scope, self._cookie_name(scope)).encode()
+        known = self._is_own(scope) or hmac.compare_digest(shown, self._code.encode())
+        return DeviceRole.COMMAND if known else None
 
-    def shows_code(self, scope: Mapping[str, Any]) -> bool:
-        """Return whether the address of a request holds the code."""
+    def welcome(self, scope: Mapping[str, Any]) -> bytes:
+        """Return the cookie that stands for the code from then on, if the address of a request holds it; else b""."""
         query = parse_qs(scope["query_string"].decode("latin-1"))
-        return hmac.compare_digest(query.get("code", [""])[0].encode(), self._code.encode())
-
-    def cookie(self, scope: Mapping[str, Any]) -> bytes:
-        """Return the cookie that stands for the code from then on."""
+        if not hmac.compare_digest(query.get("code", [""])[0].encode(), self._code.encode()):
+            return b""
         return f"{self._cookie_name(scope)}={self._code}; HttpOnly; SameSite=Strict; Path=/".encode()
 
     @property
@@ -96,11 +98,24 @@ class Door:
         return f"skein_{(scope.get('server') or ('', 0))[1]}"  # cookies of one host are seen on all of its ports
 
 
-def _cookie(scope: Mapping[str, Any], name: str) -> str:
-    cookies = SimpleCookie()
-    with suppress(CookieError):
-        cookies.load(b"; ".join(value for key, value in scope["headers"] if key == b"cookie").decode("latin-1"))
-    return cookies[name].value if name in cookies else ""
+class DeviceDoor:
+    """Lets invited devices in, by a code and then by a cookie; address: where they come to."""
+
+    def __init__(self, devices: Devices, address: str) -> None:
+        self._devices, self.names = devices, frozenset({address})
+
+    def admits(self, scope: Mapping[str, Any]) -> DeviceRole | None:
+        """Return what the device that sent a request may do, None if it may not come in."""
+        return self._devices.role_of(scope)
+
+    def welcome(self, scope: Mapping[str, Any]) -> bytes:
+        """Return the cookie for a request that shows a code that holds, else b""."""
+        return self._devices.welcome(scope)
+
+    @property
+    def reason(self) -> str:
+        """Return what a device is told that is not let in."""
+        return "this console lets invited devices in: groundstation console --invite stop"
 
 
 class Gate:
@@ -109,7 +124,7 @@ class Gate:
     refused: how many, as "other_site" (`refusal` has a reason) and "other_user" (the door does not admit them).
     """
 
-    def __init__(self, app: Asgi, door: Door) -> None:
+    def __init__(self, app: Asgi, door: Door | DeviceDoor) -> None:
         self._app, self._door = app, door
         self.refused: Counter[str] = Counter()
 
@@ -117,10 +132,11 @@ class Gate:
         """Let a request in, or not."""
         if scope["type"] not in ("http", "websocket"):
             return
-        kind, reason = "other_site", refusal(scope)
-        if not reason and not self._door.admits(scope):
-            if scope["type"] == "http" and self._door.shows_code(scope):
-                await _answer(send, 303, [(b"location", b"/"), (b"set-cookie", self._door.cookie(scope))], b"")
+        kind, reason = "other_site", refusal(scope, self._door.names)
+        role = None if reason else self._door.admits(scope)
+        if not reason and role is None:
+            if scope["type"] == "http" and (cookie := self._door.welcome(scope)):
+                await _answer(send, 303, [(b"location", b"/"), (b"set-cookie", cookie)], b"")
                 return
             kind, reason = "other_user", self._door.reason
         if reason:
@@ -134,7 +150,7 @@ class Gate:
                 message["headers"] = [*message["headers"], *security_headers(host)]
             await send(message)
 
-        await self._app(scope, receive, send_with_headers)
+        await self._app(scope | {ROLE: role}, receive, send_with_headers)
 
 
 async def _answer_403(scope: Any, receive: Any, send: Any, reason: str) -> None:

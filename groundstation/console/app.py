@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from groundstation.console.access import Door, Gate
+from groundstation.console.access import ROLE, DeviceDoor, Door, Gate
 from groundstation.console.pages import StaticFile
 from groundstation.console.protocol import Hello, decode
 from groundstation.console.session import Sessions
@@ -30,7 +30,10 @@ _GONE = (WebSocketDisconnect, ConnectionError, RuntimeError)
 
 
 class ConsoleApp:
-    """Builds the ASGI application. `seed` gets a frame's number and returns everything a new viewer must know."""
+    """Builds the ASGI applications: one for loopback, one for the network if it has a door.
+
+    seed: gets a frame's number and returns everything a new viewer must know.
+    """
 
     def __init__(
         self,
@@ -41,6 +44,7 @@ class ConsoleApp:
         seed: Callable[[int], str],
         clock: Callable[[], int],
         door: Door,
+        network: DeviceDoor | None = None,
     ) -> None:
         self._pages, self._token, self._board, self._sessions, self._seed = pages, token, board, sessions, seed
         self._clock = clock
@@ -52,7 +56,9 @@ class ConsoleApp:
             Route("/token", self._give_token),
             Route("/{path:path}", self._file),
         ]
-        self.asgi = Gate(Starlette(routes=routes), door)
+        application = Starlette(routes=routes)
+        self.asgi = Gate(application, door)
+        self.network = Gate(application, network) if network else None
 
     async def _file(self, request: Request) -> Response:
         file = self._pages.get(request.url.path)
@@ -73,6 +79,7 @@ class ConsoleApp:
                 await socket.close(_CLOSE_FULL, f"{MAX_VIEWERS} viewers are connected already")
             return
         viewer = PageConnection(next(self._numbers), self._board, socket.send_text, socket.send_bytes, self._clock)
+        viewer.role = socket.scope[ROLE]
         self._sessions.add(viewer)
         if first is not None:
             self._sessions.handle(viewer, first)

@@ -6,10 +6,13 @@ import msgspec
 
 from groundstation.bus.clock import now_ns
 from groundstation.bus.messages import Severity
+from groundstation.console.devices import Devices
+from groundstation.console.network import Network
 from groundstation.console.room import scene_from_field
-from groundstation.console.section import ConsoleSection, run_id
+from groundstation.console.section import ConsoleSection, devices_of, run_id
 from groundstation.console.server import HOST, ConsoleServer, claim_port
 from groundstation.errors import GroundStationError
+from groundstation.field.behaviour import ConsoleValues
 from groundstation.monitor.state import cast_from_field
 from groundstation.process.child import Child
 from groundstation.process.ports import holder_of
@@ -20,6 +23,7 @@ _OVERTAKEN_NS = 500_000_000
 _INTRUSIONS = {
     "other_site": "requests of other web sites",
     "other_user": "requests of other users without the code",
+    "device": "requests of devices that were not invited",
     "silent": "connections that asked for nothing",
 }
 
@@ -34,7 +38,8 @@ def run(child: Child) -> int:
     wanted = field.console.port
     listener = claim_port(wanted)
     cast, scene = cast_from_field(field), scene_from_field(field, section.truth)
-    server = ConsoleServer(child.bus, cast, scene, field, listener, run_id(section.run_dir))
+    network = _network(child, field.console)
+    server = ConsoleServer(child.bus, cast, scene, field, listener, run_id(section.run_dir), network=network)
     _announce(child, server.url, listener.getsockname()[1], wanted)
 
     intrusions, leaves_ns = Refusals(_INTRUSIONS), 0
@@ -52,6 +57,20 @@ def run(child: Child) -> int:
 
     asyncio.run(server.serve(go_on))
     return 0
+
+
+def _network(child: Child, values: ConsoleValues) -> Network | None:
+    """Return where devices come in, if the field has them come in; without it the page on loopback is served."""
+    if not values.listen or child.spec.identity is None:
+        return None
+    devices = Devices(devices_of(child.spec.identity.folder))
+    try:
+        network = Network.over(claim_port(values.port, values.listen), devices)
+    except GroundStationError as error:
+        child.event(Severity.ERROR, f"the console is not there for devices: {error}", "mend console.listen")
+        return None
+    child.event(Severity.INFO, f"console for invited devices at {devices.url}", "groundstation console --invite stop")
+    return network
 
 
 def _announce(child: Child, url: str, port: int, wanted: int) -> None:

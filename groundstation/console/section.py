@@ -16,6 +16,11 @@ class ConsoleSection(msgspec.Struct, frozen=True):
     truth: bool = False
 
 
+def devices_of(identities: str) -> Path:
+    """Return the folder of a run's invitations and devices; it lies with the run's certificates and goes with them."""
+    return Path(identities) / "devices"
+
+
 def run_id(run_dir: str) -> str:
     """Return the identity of a run: a console that is restarted in it has the same one, no other run does.
 

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import secrets
 import socket
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -30,11 +31,12 @@ from groundstation.bus.topics import (
     TRUTH,
     VEHICLE_STATUS,
 )
-from groundstation.console.access import Door
+from groundstation.console.access import Asgi, Door
 from groundstation.console.app import ConsoleApp
 from groundstation.console.code_file import CodeFile
 from groundstation.console.commands import CommandDesk
 from groundstation.console.half_open import HalfOpen, protocol
+from groundstation.console.network import Network
 from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
 from groundstation.console.player import Player
@@ -61,27 +63,27 @@ STATES = (*_NEWEST, *_LESS_OFTEN, TRUTH)
 TOPICS = (*STATES, *_EACH, IMAGE)
 
 
-def claim_port(port: int) -> socket.socket:
-    """Return a socket listening on loopback at this port, or one of the next nine, or any; two runs at once work."""
+def claim_port(port: int, address: str = HOST) -> socket.socket:
+    """Return a socket listening at this port, or one of the next nine, or any; two runs at once work."""
     for number in (*range(port, min(port + _PORTS_TRIED, 65536)), 0):
         listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
         try:
-            listener.bind((HOST, number))
+            listener.bind((address, number))
             listener.listen(128)
         except OSError:
             listener.close()
             continue
         return listener
-    raise GroundStationError(f"no port of {HOST} can be listened on")
+    raise GroundStationError(f"no port of {address} can be listened on: is it an address of this computer?")
 
 
 class ConsoleServer:
     """Serves one run. `scene`: what does not move; `field`: the resolved field, or None if it is not known.
 
     run: its identity (`section.run_id`), which pages name in their orders; player: what replays a recording on the bus,
-    where this is no live run.
+    where this is no live run; network: where devices come in, if they may.
     """
 
     def __init__(
@@ -93,7 +95,9 @@ class ConsoleServer:
         listener: socket.socket,
         run: str,
         player: Player | None = None,
+        network: Network | None = None,
     ) -> None:
+        self._network = network
         self._scene = scene
         self._listener = listener
         self._cast, self._bus, self._player = cast, bus, player
@@ -111,7 +115,9 @@ class ConsoleServer:
         self._code = CodeFile(listener.getsockname()[1])
         door = Door(self._code.code, str(self._code.path))
         pages = load_pages(token, run)
-        self.app = ConsoleApp(pages, token, self.board, self.sessions, self._seed, self._now_ns, door)
+        self.app = ConsoleApp(
+            pages, token, self.board, self.sessions, self._seed, self._now_ns, door, network.door if network else None
+        )
         self._run = run
         self._end: Event | None = None
         less_often = (*_LESS_OFTEN, TRUTH) if scene["truth"] else _LESS_OFTEN
@@ -128,7 +134,9 @@ class ConsoleServer:
     @property
     def refused(self) -> dict[str, int]:
         """How many requests and connections were not let in, by reason."""
-        return {**self.app.asgi.refused, "silent": self.half_open.ended}
+        devices = self.app.network.refused if self.app.network else Counter[str]()
+        refused = {"silent": self.half_open.ended, "device": devices["other_user"]}
+        return {**refused, **self.app.asgi.refused, "other_site": (self.app.asgi.refused + devices)["other_site"]}
 
     @property
     def overflowed(self) -> int:
@@ -137,8 +145,23 @@ class ConsoleServer:
 
     async def serve(self, go_on: Callable[[int, int], bool]) -> None:
         """Serve until `go_on(turns, late turns)`, asked in each turn, says no."""
+        servers = [self._served(self.app.asgi, self._listener)]
+        if self._network is not None and self.app.network is not None:
+            servers.append(self._served(self.app.network, self._network.listener, self._network))
+        try:
+            with self._code:
+                await self._turns(go_on, servers[0][1])
+                await self._say_farewell()
+        finally:
+            for server, _ in servers:
+                server.should_exit = True
+            await asyncio.gather(*(serving for _, serving in servers))
+
+    def _served(
+        self, app: Asgi, listener: socket.socket, network: Network | None = None
+    ) -> tuple[uvicorn.Server, "asyncio.Task[None]"]:
         config = uvicorn.Config(
-            self.app.asgi,
+            app,
             log_config=None,
             access_log=False,
             log_level="warning",
@@ -152,16 +175,11 @@ class ConsoleServer:
             server_header=False,
             timeout_graceful_shutdown=1,
             limit_concurrency=400,
+            ssl_certfile=network.certificate if network else None,
+            ssl_keyfile=network.key if network else None,
         )
         server = _Server(config)
-        serving = asyncio.create_task(server.serve(sockets=[self._listener]))
-        try:
-            with self._code:
-                await self._turns(go_on, serving)
-                await self._say_farewell()
-        finally:
-            server.should_exit = True
-            await serving
+        return server, asyncio.create_task(server.serve(sockets=[listener]))
 
     async def _turns(self, go_on: Callable[[int, int], bool], serving: "asyncio.Task[None]") -> None:
         loop = asyncio.get_running_loop()

@@ -12,6 +12,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import SimCommand
 from groundstation.bus.topics import SIM_COMMAND
 from groundstation.console.commands import STOPS, CommandDesk
+from groundstation.console.devices import DeviceRole
 from groundstation.console.operator_lock import OperatorLock
 from groundstation.console.player import Player
 from groundstation.console.protocol import (
@@ -42,6 +43,12 @@ def encoded(kind: str, **content: Any) -> str:
 
 def _ref_of(message: PageMessage) -> str:
     return message.ref if isinstance(message, CommandRequest) else ""
+
+
+def _may(role: DeviceRole, message: PageMessage) -> bool:
+    """Return whether a device of a role may say something; frames, hello and cameras are everybody's."""
+    stops = isinstance(message, CommandRequest) and message.verb in STOPS
+    return role is DeviceRole.COMMAND or (role is DeviceRole.STOP and stops)
 
 
 class Sessions:
@@ -107,6 +114,9 @@ class Sessions:
                 self._greet(viewer, message)
             case _ if not viewer.trusted:
                 self._refuse(viewer, "untrusted", "this page may only look: reload it")
+            case _ if not _may(viewer.role, message):
+                text = f"this device may {viewer.role} only: invite it anew to let it do more"
+                self._refuse(viewer, "role", text, _ref_of(message))
             case Play() | Speed() | Seek() | StepReplay():
                 self._replay(viewer, message)
             case _ if self._player is not None:
@@ -147,7 +157,7 @@ class Sessions:
             self.operator_lock.arrived(viewer.client, viewer.name)
         else:
             self.refused["token"] += 1
-        viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, trusted=viewer.trusted))
+        viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, trusted=viewer.trusted, role=viewer.role))
 
     def _has_token(self, hello: Hello) -> bool:
         return hmac.compare_digest(hello.token.encode(), self._token.encode())

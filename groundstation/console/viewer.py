@@ -5,6 +5,7 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 
+from groundstation.console.devices import DeviceRole
 from groundstation.console.snapshot import Snapshot
 
 # Frames that may be on the way unanswered; the page answers each fourth. 12 frames are 0.6 s.
@@ -33,6 +34,7 @@ class PageConnection:
         self.name = f"viewer {number}"
         self.client = ""
         self.trusted = False
+        self.role = DeviceRole.COMMAND
         self.too_slow = False
         self.watched: frozenset[str] = frozenset()
         self.skipped = 0

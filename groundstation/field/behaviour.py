@@ -57,9 +57,11 @@ class ConsoleValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     enabled: bool = True
     port: int = 8765
+    listen: str = ""
 
 
 class BusValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The router of the run's messages."""
 
     port: int = 4717
+    listen: str = ""

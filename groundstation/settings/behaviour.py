@@ -115,12 +115,15 @@ class RecordingSettings(SettingsSection):
 
 
 class Console(SettingsSection):
-    """The operator's web page, on loopback."""
+    """The operator's web page, on loopback, and for invited devices in the network."""
 
     enabled: bool = True
     """Whether the run serves the operator's web page."""
     port: Annotated[int, Field(ge=1024, le=65535)] = 8765
-    """TCP port of the page, on loopback only. If it is taken, the next free one is used and printed."""
+    """TCP port of the page. If it is taken, the next free one is used and printed."""
+    listen: AddressOrNone = ""
+    """Address of this host at which tablets and phones find the page, over TLS and by an invitation that works once
+    (`groundstation console --invite`); empty: loopback only."""
 
 
 class Bus(SettingsSection):

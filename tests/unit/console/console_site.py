@@ -13,6 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from groundstation.bus import clock
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.console.network import Network
 from groundstation.console.room import bare_scene
 from groundstation.console.server import ConsoleServer, claim_port
 from groundstation.monitor.state import Cast
@@ -28,14 +29,14 @@ def land(**other: Any) -> str:
 
 
 class Site:
-    def __init__(self) -> None:
+    def __init__(self, network: Network | None = None) -> None:
         exchange = MemoryExchange()
         self.bus = MemoryBus(exchange, "lab", "console")
         self.drone = MemoryBus(exchange, "lab", "drone_1")
         self.commands = self.drone.subscribe([t.COMMAND])
         cast = Cast("lab", {"drone_1": 0.15}, ("turtlebot",))
         scene = bare_scene("lab", ("drone_1",), True)
-        self.server = ConsoleServer(self.bus, cast, scene, None, claim_port(38765), RUN)
+        self.server = ConsoleServer(self.bus, cast, scene, None, claim_port(38765), RUN, network=network)
         self.port = int(self.server.url.rsplit(":", 1)[1].strip("/"))
         self.over = False
 
@@ -66,9 +67,9 @@ class Site:
         return page.close_code or 0, page.close_reason or ""
 
 
-def run(test: Test) -> None:
+def run(test: Test, network: Network | None = None) -> None:
     async def main() -> None:
-        site = Site()
+        site = Site(network)
         serving = asyncio.create_task(site.server.serve(lambda _turns, _late: not site.over))
         try:
             await asyncio.sleep(0.05)

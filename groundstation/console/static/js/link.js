@@ -35,7 +35,7 @@ export function watch(cameras) {
 }
 
 export function connect() {
-  socket = new WebSocket(`ws://${location.host}/ws`);
+  socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/ws`);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     retryMs = RETRY_MS;

@@ -1,0 +1,101 @@
+"""Tablets and phones in the network: each comes in by a code that works once, and may do what its role says.
+
+What is kept lies in a folder that only the owner of the run can read, and goes with the run: an invitation is a file
+named after the digest of its code, a device one named after the digest of its cookie. So a console that is restarted
+knows its devices, and another shell invites without asking the console.
+"""
+
+import hashlib
+import secrets
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+
+from groundstation.console.cookies import cookie_of
+from groundstation.supervisor.authority import Authority, write_private
+
+_INVITATION_LIVES_S = 600.0
+_INVITED, _KNOWN, _URL = "invited-", "device-", "url"
+_COOKIE = "__Host-skein"
+
+
+class DeviceRole(StrEnum):
+    """What a device may do."""
+
+    WATCH = "watch"
+    """Look."""
+    STOP = "stop"
+    """Look and stop."""
+    COMMAND = "command"
+    """All that the operator's own page may."""
+
+
+class Devices:
+    """The invitations and devices of one console. folder: made if needed, readable by its owner only."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(mode=0o700, exist_ok=True)
+
+    def open(self, address: str, port: int) -> tuple[Path, Path]:
+        """Note where the console is; returns the files of its certificate and key, made at its first start."""
+        certificate, key = self._folder / "console.pem", self._folder / "console.key"
+        if not key.exists():
+            made = Authority.make("console").member("console", [address])
+            for path, content in zip((certificate, key), made, strict=True):
+                write_private(path, content)
+        (self._folder / _URL).unlink(missing_ok=True)
+        write_private(self._folder / _URL, f"https://{address}:{port}/".encode())
+        return certificate, key
+
+    @property
+    def url(self) -> str:
+        """Where devices find the console; "" while it is nowhere."""
+        with suppress(OSError):
+            return (self._folder / _URL).read_text()
+        return ""
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of the console's certificate, which a browser shows as well."""
+        certificate = x509.load_pem_x509_certificate((self._folder / "console.pem").read_bytes())
+        return certificate.fingerprint(hashes.SHA256()).hex(":").upper()
+
+    def invite(self, role: DeviceRole) -> str:
+        """Return an address that lets one device in, within 10 minutes."""
+        code = secrets.token_urlsafe(12)
+        write_private(self._folder / f"{_INVITED}{_digest(code)}", role.encode())
+        return f"{self.url}?code={code}"
+
+    def welcome(self, scope: Mapping[str, Any]) -> bytes:
+        """Return the cookie for a request that shows a fresh code, which is used up by that; else b""."""
+        query = parse_qs(scope["query_string"].decode("latin-1"))
+        path = self._folder / f"{_INVITED}{_digest(query.get('code', [''])[0])}"
+        try:
+            fresh = time.time() - path.stat().st_mtime < _INVITATION_LIVES_S
+            role = path.read_bytes()
+            path.unlink()  # of two who show it at once, one finds it gone
+        except OSError:
+            return b""
+        if not fresh:
+            return b""
+        token = secrets.token_urlsafe(24)
+        write_private(self._folder / f"{_KNOWN}{_digest(token)}", role)
+        return f"{_COOKIE}={token}; Secure; HttpOnly; SameSite=Strict; Path=/".encode()
+
+    def role_of(self, scope: Mapping[str, Any]) -> DeviceRole | None:
+        """Return the role of the device that sent a request, None if it is not known."""
+        with suppress(OSError, ValueError):
+            return DeviceRole((self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _COOKIE))}").read_text())
+        return None
+
+
+def _digest(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()

@@ -1,0 +1,163 @@
+"""Tablets and phones in the network: invited once, by TLS, and each may do what its role says."""
+
+import asyncio
+import contextlib
+import json
+import os
+import ssl
+import stat
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from console_site import Site, land, run, until
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
+from websockets.typing import Origin
+
+from groundstation.bus import messages as m
+from groundstation.console.devices import DeviceRole, Devices
+from groundstation.console.network import Network
+from groundstation.console.server import claim_port
+
+ADDRESS = "127.0.0.1"
+LAX = ssl.create_default_context()
+LAX.check_hostname, LAX.verify_mode = False, ssl.CERT_NONE  # as a person does who compares the fingerprint
+
+
+class Tablet:
+    """A device that was not here before."""
+
+    def __init__(self, port: int) -> None:
+        self.site, self.cookie = f"https://{ADDRESS}:{port}", ""
+        self._port = port
+
+    async def get(self, path: str, host: str = "") -> tuple[int, str, bytes]:
+        reader, writer = await asyncio.open_connection(ADDRESS, self._port, ssl=LAX)
+        host = host or f"{ADDRESS}:{self._port}"
+        cookie = f"Cookie: {self.cookie}\r\n" if self.cookie else ""
+        writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n{cookie}Connection: close\r\n\r\n".encode())
+        head, _, body = (await asyncio.wait_for(reader.read(), 5)).partition(b"\r\n\r\n")
+        writer.close()
+        return int(head.split()[1]), head.decode(), body
+
+    async def enter(self, invitation: str) -> int:
+        status, head, _ = await self.get(invitation.removeprefix(self.site))
+        for line in head.splitlines():
+            if line.lower().startswith("set-cookie: "):
+                self.cookie = line.partition(": ")[2].partition(";")[0]
+        return status
+
+    def page(self, origin: str = "") -> connect:
+        return connect(
+            f"wss://{ADDRESS}:{self._port}/ws",
+            origin=Origin(origin or self.site),
+            ssl=LAX,
+            max_size=None,
+            additional_headers={"Cookie": self.cookie},
+        )
+
+
+Visit = Callable[[Site, Devices, Tablet], Awaitable[None]]
+
+
+def visited(tmp_path: Path, visit: Visit) -> None:
+    devices = Devices(tmp_path / "devices")
+    network = Network.over(claim_port(38785, ADDRESS), devices)
+    port = network.listener.getsockname()[1]
+
+    async def test(site: Site) -> None:
+        await visit(site, devices, Tablet(port))
+
+    run(test, network)
+
+
+def test_an_invitation_lets_one_device_in_once(tmp_path: Path) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        assert (await tablet.get("/"))[0] == (await tablet.get("/token"))[0] == 403
+        invitation = devices.invite(DeviceRole.STOP)
+        assert await tablet.enter(invitation) == 303
+        status, head, body = await tablet.get("/")
+        assert status == 200 and b"<title>" in body and "wss://" in head
+        thief = Tablet(tablet._port)
+        assert await thief.enter(invitation) == 403 and not thief.cookie
+        assert (await tablet.get("/", host="evil.example:443"))[0] == 403
+        with pytest.raises(InvalidStatus):
+            async with tablet.page(origin="https://evil.example"):
+                pass
+        assert site.server.refused["device"] == 3 and site.server.refused["other_site"] == 2
+
+    visited(tmp_path, visit)
+
+
+@pytest.mark.parametrize("role", DeviceRole)
+def test_a_device_may_what_its_role_says(tmp_path: Path, role: DeviceRole) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(role))
+        token = (await tablet.get("/token"))[2].decode()
+        async with tablet.page() as page:
+            await page.send(json.dumps({"type": "hello", "token": token, "client": "abcd"}))
+            for said in (land(verb="TAKEOFF", ref="start"), '{"type":"takeover"}', land(ref="stop")):
+                await page.send(said)
+            told, heard = "", []
+            async with asyncio.timeout(5):
+                while "welcome" not in told or (role is DeviceRole.WATCH and told.count("may watch only") < 3):
+                    message = await page.recv()
+                    told += message if isinstance(message, str) else ""
+            if role is not DeviceRole.WATCH:
+                heard = await until(site.commands.drain)
+            await asyncio.sleep(0.1)
+            heard += site.commands.drain()
+        verbs = {received.message.verb for received in heard}
+        refused, operator = site.server.sessions.refused["role"], site.server.sessions.operator_lock.client
+        assert f'"role":"{role}"' in told
+        assert (m.Verb.LAND in verbs) is (role is not DeviceRole.WATCH)
+        assert operator == ("abcd" if role is DeviceRole.COMMAND else "")
+        assert refused == {DeviceRole.WATCH: 3, DeviceRole.STOP: 2, DeviceRole.COMMAND: 0}[role]
+
+    visited(tmp_path, visit)
+
+
+def test_a_console_that_is_restarted_knows_its_devices_and_shows_the_same_certificate(tmp_path: Path) -> None:
+    folder, tablets, prints = tmp_path, [], []
+
+    async def first(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(DeviceRole.WATCH))
+        tablets.append(tablet)
+        prints.append(devices.fingerprint)
+
+    async def second(site: Site, devices: Devices, tablet: Tablet) -> None:
+        tablet.cookie = tablets[0].cookie
+        assert (await tablet.get("/"))[0] == 200
+        assert devices.fingerprint == prints[0]
+
+    visited(folder, first)
+    visited(folder, second)
+
+
+def test_silent_strangers_are_shown_out_before_they_speak_tls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("groundstation.console.network.PATIENCE_S", 0.3)
+
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        silent = [await asyncio.open_connection(ADDRESS, tablet._port) for _ in range(200)]
+        assert (await tablet.get("/"))[0] == 403
+        async with asyncio.timeout(5):
+            for reader, writer in silent:
+                with contextlib.suppress(ConnectionError):
+                    assert await reader.read() == b""
+                writer.close()
+
+    visited(tmp_path, visit)
+
+
+def test_an_old_invitation_is_none_and_all_is_for_its_owner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    devices = Devices(tmp_path / "devices")
+    devices.open(ADDRESS, 1)
+    code = devices.invite(DeviceRole.COMMAND).partition("?")[2].encode()
+    kept = list((tmp_path / "devices").iterdir())
+    assert {stat.S_IMODE(path.stat().st_mode) for path in kept} == {0o600}
+    assert stat.S_IMODE((tmp_path / "devices").stat().st_mode) == 0o700
+    assert not any(code.removeprefix(b"code=") in path.read_bytes() + os.fsencode(path) for path in kept)
+    monkeypatch.setattr("groundstation.console.devices.time.time", lambda: max(p.stat().st_mtime for p in kept) + 601)
+    assert devices.welcome({"query_string": code}) == b""
+    assert devices.welcome({"query_string": b"code=../../url"}) == devices.welcome({"query_string": b""}) == b""

@@ -158,8 +158,8 @@ class Operator:
         if now_ns >= self._next_lease_ns:
             self._next_lease_ns = now_ns + _LEASE_PERIOD_NS
             header = self._bus.header(_TEAM)
-            expires_ns = header.stamp_ns + _LEASE_LIFE_NS
-            self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=expires_ns, run=self._bus.run))
+            end_ns = header.stamp_ns + _LEASE_LIFE_NS
+            self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=end_ns, run=self._bus.run))
         self.team.update(now_ns)
         if self._checks is not None:
             self._checks.update(now_ns)
@@ -201,9 +201,8 @@ class Operator:
             self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")
 
     def _is_void(self, stop: Command, now_ns: int) -> bool:
-        if self._bus.run and stop.run != self._bus.run:
-            return True
-        return stop.header.clock == clock.clock_id() and now_ns - stop.header.stamp_ns > STOP_LIVES_NS
+        old = stop.header.clock == clock.clock_id() and now_ns - stop.header.stamp_ns > STOP_LIVES_NS
+        return old or bool(self._bus.run and stop.run != self._bus.run)
 
     def _is_partial(self, command: Command) -> bool:
         return bool(command.scope) and not set(command.scope) >= set(self.team.members)

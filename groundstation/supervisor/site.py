@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import msgspec
@@ -18,7 +18,7 @@ from groundstation.bus.roles import Identity, Member, Role
 from groundstation.bus.topics import LEASE, VEHICLE_STATUS
 from groundstation.bus.zenoh_bus import AUTHORITY, CERTIFICATE, KEY, open_bus
 from groundstation.errors import GroundStationError, OperatorMistake
-from groundstation.supervisor.authority import Authority, key_pem, write_private
+from groundstation.supervisor.authority import Authority, key_pem, make_identities, write_private
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 
 _HOSTS = "hosts.json"
@@ -65,6 +65,12 @@ def authority_of(site: str) -> Authority:
         raise OperatorMistake(
             f"{site} has no authority that can be read ({error}): groundstation site init {site}"
         ) from error
+
+
+def certify(run: Path, site: str, address: str, listen: str, names: Iterable[str]) -> None:
+    """Make the certificates of a run in its folder; one that listens for other hosts is vouched for by the site."""
+    above = authority_of(site) if listen else None
+    make_identities(run, [address, listen] if listen else [address], names, above)
 
 
 def _names(site: str) -> list[str]:

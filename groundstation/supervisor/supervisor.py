@@ -103,15 +103,11 @@ class Supervisor:
     def _make_identities(self) -> None:
         if self._identities is None:
             return
-        from groundstation.supervisor.authority import make_identities
+        from groundstation.supervisor.site import certify
 
         members = [process.spec.name for process in self.processes if process.spec.on_bus or process.spec.is_router]
         names = (*members, SOURCE, *(member.name for member in SHELLS))
-        from groundstation.supervisor.site import authority_of
-
-        addresses = (ports.host_of(self.run.endpoint), *filter(None, [self.run.listen]))
-        site = authority_of(self.run.site) if self.run.listen else None
-        make_identities(self._identities, addresses, names, site)
+        certify(self._identities, self.run.site, ports.host_of(self.run.endpoint), self.run.listen, names)
 
     def connect(self) -> None:
         """Join the bus; its router is up."""

@@ -81,7 +81,7 @@ def _summary(viewed: Viewed, used_s: float, seconds: float) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _served(drones: tuple[str, ...]) -> Iterator[tuple["subprocess.Popen[bytes]", str, str]]:
-    endpoint, port = f"tcp/{HOST}:{_free_port()}", _free_port()
+    endpoint, port = f"tcp/{HOST}:{free_port()}", free_port()
     router = open_router(endpoint)
     section = {"field": field_of(drones, port), "run_dir": "", "truth": True}
     spec = ChildSpec("console", "console", endpoint, _SITE, section=msgspec.json.encode(section).decode())
@@ -153,7 +153,7 @@ def watch(page: ClientConnection, seconds: float) -> Viewed:
 
 def echo(viewed: Viewed, seconds: float) -> dict[str, Any]:
     """Return what a bare echo of the same frames at the same times costs; it also takes them in, which we do not."""
-    listener = claim_port(_free_port())
+    listener = claim_port(free_port())
     port = listener.getsockname()[1]
     command = [sys.executable, "-m", "groundstation.bench.console_peer", str(listener.fileno())]
     process = subprocess.Popen(command, pass_fds=[listener.fileno()])
@@ -203,7 +203,8 @@ def cpu_s(pid: int) -> float:
     return total_ns / 1e9
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """Return a TCP port of loopback that nobody has."""
     with contextlib.closing(socket.socket()) as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])

@@ -13,6 +13,7 @@ BENCHES = {
     "mavlink": ("groundstation.cli.bench_mavlink:mavlink", "CPU and delays of driving many MAVLink vehicles."),
     "estimator": ("groundstation.cli.bench_estimator:estimator", "Time the joint filter, its path, and peers."),
     "recording": ("groundstation.cli.bench_recording:recording", "CPU of writing, opening and seeking recordings."),
+    "bus": ("groundstation.cli.bench_bus:bus", "Time round trips over the bus, plain and guarded."),
     "console": ("groundstation.cli.bench_console:console", "CPU and delays of the operator's page."),
 }
 

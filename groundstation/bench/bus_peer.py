@@ -1,0 +1,67 @@
+"""The other processes of `groundstation bench bus`: `router ENDPOINT FOLDER`, or `echo` with both for each bus.
+
+FOLDER holds the certificates; "-" for a plain bus. Each says "ready" and ends with its standard input.
+"""
+
+import sys
+import threading
+
+from groundstation.bus.access import AccessList
+from groundstation.bus.messages import Odometry, VelocitySetpoint
+from groundstation.bus.roles import Identity, Member, Role
+from groundstation.bus.topics import ODOMETRY, SETPOINT
+from groundstation.bus.zenoh_bus import ZenohBus, open_bus, open_router
+
+SITE, DRONE = "bench", "drone_1"
+TRACKER, DRIVER = Member("tracker", Role.TRACKER, ("tracker",)), Member(DRONE, Role.DRIVER, (DRONE,), (DRONE,))
+ROUTER = "router"
+
+
+def identity(folder: str, name: str) -> Identity | None:
+    """Return what a member joins with, None for a plain bus."""
+    return None if folder == "-" else Identity(folder, name, "bench")
+
+
+def route(endpoint: str, folder: str) -> None:
+    """Be a router until standard input ends."""
+    access = None if folder == "-" else AccessList(SITE, (TRACKER, DRIVER))
+    router = open_router(endpoint, identity(folder, ROUTER), access)
+    print("ready", flush=True)
+    sys.stdin.read()
+    router.close()
+
+
+def echo(ways: list[tuple[str, str]]) -> None:
+    """Answer each setpoint with an odometry of the same size as in flight, at once, on every bus."""
+    buses = [open_bus(endpoint, SITE, DRONE, 5.0, identity(folder, DRONE)) for endpoint, folder in ways]
+    for bus in buses:
+        threading.Thread(target=_answer, args=(bus,), daemon=True).start()
+    print("ready", flush=True)
+    sys.stdin.read()
+    for bus in buses:
+        bus.close()
+
+
+def _answer(bus: ZenohBus) -> None:
+    setpoints = bus.subscribe([SETPOINT], entity=DRONE)
+    while True:
+        setpoints.wait(1.0)
+        for received in setpoints.drain():
+            if isinstance(received.message, VelocitySetpoint):
+                header = bus.header(DRONE, received.message.header.stamp_ns)
+                answer = Odometry(
+                    header=header,
+                    velocity_m_s=(0.1, 0.2, 0.0),
+                    velocity_covariance=(0.01,) * 9,
+                    yaw_rad=0.3,
+                    roll_rad=0.0,
+                    pitch_rad=0.0,
+                )
+                bus.publish(ODOMETRY, answer)
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == ROUTER:
+        route(*sys.argv[2:4])
+    else:
+        echo(list(zip(sys.argv[2::2], sys.argv[3::2], strict=True)))

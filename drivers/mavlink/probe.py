@@ -3,6 +3,7 @@
 import time
 from dataclasses import dataclass, field
 
+from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import id_of
@@ -29,6 +30,7 @@ class Found:
     mode: str = ""
     armed: bool = False
     version: str = ""
+    serial_number: str = ""
     battery: str = ""
     video: str = ""
     located: bool = False
@@ -85,6 +87,7 @@ def _note(vehicle: Found, message: object) -> None:
     match message:
         case AutopilotVersion():
             raw = message.flight_sw_version
+            vehicle.serial_number = serial_number_of(message)
             vehicle.version = f"{raw >> 24}.{raw >> 16 & 255}.{raw >> 8 & 255}"
         case SysStatus() if message.battery_remaining >= 0:
             vehicle.battery = f"{message.battery_remaining} %"

@@ -56,13 +56,15 @@ class MavlinkSession:
     """What one vehicle still has to be asked; starts over when it was silent for 2 s.
 
     problems: parameters that forbid a take-off. detail: what is waited for, or "". notes: for the operator; drained by
-    the driver. overrides: parameters as the field file has them.
+    the driver. overrides: parameters as the field file has them. pinned: the serial number of the only vehicle that
+    may take off, "" for any.
     """
 
     def __init__(
         self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: GlobalOrigin,
-        overrides: Mapping[str, float] | None = None,
+        overrides: Mapping[str, float] | None = None, pinned: str = "",
     ) -> None:  # fmt: skip
+        self._pinned, self._serial_number = pinned.upper(), ""
         self._system, self._flavour, self._rates, self._origin = system, flavour, rates, origin
         self._needed = parameters.needed(flavour, our_system, overrides)
         self._by_name = {name: n for n in self._needed for name in n.names}
@@ -104,6 +106,9 @@ class MavlinkSession:
         """Return the pending step, or ""."""
         if not self._connected:
             return "waiting for its heartbeat"
+        if self._pinned and self._serial_number != self._pinned:
+            number = self._serial_number or "not known"
+            return f"it is another vehicle: its serial number is {number}, the field says {self._pinned}"
         missing = [kind for kind in self._rates if self._key(kind) not in requests.accepted]
         if missing:
             return f"asking for {missing[0].__name__.removesuffix('Message')}"
@@ -126,8 +131,9 @@ class MavlinkSession:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
             self._found[message.param_id] = value
 
-    def hear_version(self, flight_sw_version: int) -> None:
-        """Take the version of its firmware; a new one of which nothing is known is noted."""
+    def hear_version(self, flight_sw_version: int, serial_number: str = "") -> None:
+        """Take its number and the version of its firmware; a new one of which nothing is known is noted."""
+        self._serial_number = serial_number
         version = parameters.version_of(flight_sw_version)
         if version != self._version and not parameters.is_checked(self._flavour, version):
             text = f"its firmware is {version[0]}.{version[1]}: parameters were compared with {_CHECKED_WITH}"
@@ -149,7 +155,7 @@ class MavlinkSession:
                 self._connected, self._has_origin, self._origin_tries = False, False, 0
                 self._found.clear()
                 self._param_tries.clear()
-                self._version, self._version_tries = None, 0
+                self._version, self._version_tries, self._serial_number = None, 0, ""
                 requests.forget()
             return messages
         self._connected = True
@@ -186,7 +192,7 @@ class MavlinkSession:
         return names[tries % len(names)] if tries >= _ALIAS_AFTER else name
 
     def _version_request(self, now_ns: int) -> list[Message]:
-        tried = self._version_tries >= _VERSION_TRIES
+        tried = self._version_tries >= _VERSION_TRIES and not self._pinned
         if self._version is not None or tried or now_ns < self._next_version_ns:
             return []
         self._version_tries += 1

@@ -65,11 +65,15 @@ class LinkSettings(DriverSection):
 
 
 class VehicleSettings(DriverSection):
-    """One vehicle on the link: identity, pad [world], limits."""
+    """One vehicle on the link: identity, pad [world], limits.
+
+    serial_number: of the only vehicle that may take off ("": any).
+    """
 
     name: Name
     system_id: Annotated[int, Field(ge=1, le=250)]
     flavour: Literal["px4", "ardupilot"]
+    serial_number: str = ""
     pad_m: tuple[float, float] = (0.0, 0.0)
     pad_yaw_rad: float = 0.0
     limits: VehicleLimits = VehicleLimits()

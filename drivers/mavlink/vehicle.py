@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from drivers.base import LinkHealth
 from drivers.datagrams import DatagramLog
-from drivers.mavlink import convert
+from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import BaseAttitude
 from drivers.mavlink.links.seam import Heard, MavlinkLink
@@ -80,7 +80,9 @@ class MavlinkVehicle:
         )
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
         ours, known = settings.link.system_id, dict(vehicle.parameters)
-        self._session = MavlinkSession(self.system, self.flavour, rates, ours, settings.origin, known)
+        self._session = MavlinkSession(
+            self.system, self.flavour, rates, ours, settings.origin, known, vehicle.serial_number
+        )
         pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
         self.orders = Orders(vehicle, self.flavour, self._requests)
@@ -262,7 +264,7 @@ class MavlinkVehicle:
                 if isinstance(value, service.ParamValue):
                     self._session.hear_parameter(value)
                 elif isinstance(value, telemetry.AutopilotVersion):
-                    self._session.hear_version(value.flight_sw_version)
+                    self._session.hear_version(value.flight_sw_version, identity.serial_number_of(value))
                 else:
                     self._session.hear_origin()
             except WireError as error:

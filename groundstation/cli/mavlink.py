@@ -51,6 +51,8 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
         facts = [vehicle.flavour, vehicle.version, vehicle.mode, "ARMED" if vehicle.armed else "disarmed"]
         facts += [f"battery {vehicle.battery}" if vehicle.battery else "", "has a position" if vehicle.located else ""]
         click.echo(f"system {system:3d}: {', '.join(filter(None, facts))}; {vehicle.frames / seconds:.0f} messages/s")
+        if vehicle.serial_number:
+            click.echo(f"  serial_number {vehicle.serial_number}")
         if vehicle.video:
             click.echo(f"  video {vehicle.video}")
         for text in vehicle.texts:

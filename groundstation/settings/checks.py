@@ -169,8 +169,6 @@ def _own_video(parts: Parts) -> Iterator[Finding]:
     for name, drone in parts.drones.items():
         if drone.video is not None and drone.kind != "ardrone":
             yield ("drones", name, "video"), f"has no meaning for {drone.kind}"
-        if drone.serial_number and drone.kind != "ardrone":
-            yield ("drones", name, "serial_number"), f"has no meaning for {drone.kind}"
         source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
         if source.kind is not SourceKind.ARDRONE:
             continue

@@ -167,8 +167,8 @@ class Drone(SettingsSection):
     address: Address
     """IPv4 address of the vehicle; each its own."""
     serial_number: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{0,40}$")] = ""
-    """Serial number of an AR.Drone: another one at its address does not take off. groundstation ardrone probe shows
-    it."""
+    """Serial number of the vehicle (of a MAVLink one: its uid2, else uid): another one at its address does not take
+    off. groundstation ardrone probe and mavlink probe show it."""
     limits: LimitSettings = LimitSettings()
     """What the drone is never commanded to exceed, and when its battery makes it land."""
     marker: RobotMarker

@@ -213,6 +213,7 @@ def _mavlink_vehicle(name: str, drone: Drone) -> VehicleSettings:
         name=name,
         system_id=mavlink.system_id,
         flavour=mavlink.flavour,
+        serial_number=drone.serial_number,
         pad_m=drone.pad_m,
         pad_yaw_rad=drone.pad_yaw_rad,
         limits=VehicleLimits(

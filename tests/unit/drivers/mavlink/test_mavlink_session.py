@@ -1,5 +1,6 @@
 """Reading parameters: one that a firmware does not know is named, and hides none of the others."""
 
+from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.parameters import needed
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession
@@ -7,6 +8,7 @@ from drivers.mavlink.settings import GlobalOrigin
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import REAL32
 from drivers.mavlink.wire.service import ParamRequestRead, ParamValue
+from drivers.mavlink.wire.telemetry import AutopilotVersion
 
 MS = 1_000_000
 
@@ -34,6 +36,27 @@ def test_a_parameter_that_is_never_answered_is_named_with_the_firmware() -> None
     session = read_all({"GPS1_TYPE"}, 15.0)
     session.hear_version(0x04060200)
     assert "does not know parameter GPS1_TYPE" in session.detail(Requests(1))
+
+
+def test_a_vehicle_with_another_serial_number_is_not_ready() -> None:
+    session = MavlinkSession(1, Flavour.PX4, {}, 255, GlobalOrigin(), pinned="0a0B")
+    requests = Requests(1)
+    asked = [m for turn in range(3000) for m in session.step(10_000 * MS + turn * 10 * MS, 0, requests)]
+    assert sum(getattr(m, "param1", 0) == 148 for m in asked) > 10, "it goes on asking for the number"
+    assert session.detail(requests) == "it is another vehicle: its serial number is not known, the field says 0A0B"
+    session.hear_version(0x01100000, "0C0D")
+    assert "its serial number is 0C0D" in session.detail(requests)
+    session.hear_version(0x01100000, "0A0B")
+    assert "another vehicle" not in session.detail(requests)
+    session.step(10**12, 10**11, requests)
+    session.step(10**12 + 10**9, 0, requests)
+    assert "not known" in session.detail(requests), "after a silence it may be another one"
+
+
+def test_the_serial_number_is_uid2_or_else_uid() -> None:
+    assert serial_number_of(AutopilotVersion(0, 0, uid=0xAB)) == "00000000000000AB"
+    assert serial_number_of(AutopilotVersion(0, 0, uid=0xAB, uid2=(1, 255, *(0,) * 16))) == "01FF" + "00" * 16
+    assert serial_number_of(AutopilotVersion(0, 0)) == ""
 
 
 def test_an_older_or_newer_name_counts_as_well() -> None:

@@ -79,10 +79,8 @@ class MavlinkVehicle:
             maxlen=256
         )
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
-        ours, known = settings.link.system_id, dict(vehicle.parameters)
-        self._session = MavlinkSession(
-            self.system, self.flavour, rates, ours, settings.origin, known, vehicle.serial_number
-        )
+        ours, known, pinned = settings.link.system_id, dict(vehicle.parameters), vehicle.serial_number
+        self._session = MavlinkSession(self.system, self.flavour, rates, ours, settings.origin, known, pinned)
         pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
         self.orders = Orders(vehicle, self.flavour, self._requests)

@@ -54,9 +54,22 @@ def numbers(value: str, option: str, low: int, high: int) -> list[int]:
 @click.option("--seed", type=click.IntRange(0), default=3, show_default=True, help="Seed of the beliefs.")
 @click.option("--limit", "limit_s", type=FiniteRange(0.1), default=20.0, show_default=True, help="Seconds a peer "
               "may take for one step; beyond it the rest is extrapolated and marked.")  # fmt: skip
+@click.option(
+    "--model",
+    type=click.Choice(["planar", "frustum"]),
+    default="planar",
+    show_default=True,
+    help="The planner of the experiments, or that which flies.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
-def planner(robots: str, layout: str, peer: str, repeats: int, seed: int, limit_s: float, as_json: bool) -> None:
-    """Time one control step of the planar planner: CPU time of one core, median of interleaved rounds."""
+def planner(
+    robots: str, layout: str, peer: str, repeats: int, seed: int, limit_s: float, model: str, as_json: bool
+) -> None:
+    """Time one control step of a planner: CPU time of one core, median of interleaved rounds.
+
+    The planner that flies is timed on fresh beliefs and on those of a team in flight; for it, --robots, --layout
+    (without random), --repeats and --seed count.
+    """
     sizes, layouts = numbers(robots, "--robots", 1, 500), choices(layout, _LAYOUTS, "--layout")
     peers = choices(peer, _PEERS, "--peer")
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -70,9 +83,32 @@ def planner(robots: str, layout: str, peer: str, repeats: int, seed: int, limit_
         if terminal:
             click.echo(f"\r\033[K{text}", err=True, nl=False)
 
+    if model == "frustum":
+        from groundstation.bench.frustum import run_frustum_bench
+
+        chosen = [one for one in layouts if one != "random"]
+        timed = run_frustum_bench(sizes, chosen, repeats, seed, tell=tell)
+        tell("")
+        click.echo(json.dumps(timed, indent=1) if as_json else _frustum_table(timed))
+        return
     result = run_bench(sizes, layouts, peers, repeats, seed, limit_s, tell)
     tell("")
     click.echo(json.dumps(result, indent=1) if as_json else _table(result))
+
+
+def _frustum_table(result: dict[str, Any]) -> str:
+    lines = [
+        f"{'layout':10} {'robots':>6} {'belief':8} {'CPU ms':>8} {'p99':>8} {'topol.':>6} {'solved':>6} {'eval.':>6} "
+        f"{'gap':>5} {'over ms':>8}"
+    ]
+    for row in result["rows"]:
+        lines.append(
+            f"{row['layout']:10} {row['robots']:6} {row['belief']:8} {row['cpu_ms_median']:8.2f} "
+            f"{row['cpu_ms_p99']:8.2f} {row['topologies']:6} {row['solved']:6.0%} {row['evaluations']:6} "
+            f"{row['gap']:5.2f} {row['over_ms']:8.2f}"
+        )
+    lines.append(f"over ms: beyond a budget of {result['budget_ms']:g} ms at most (negative: done before)")
+    return "\n".join(lines)
 
 
 def _table(result: dict[str, Any]) -> str:

@@ -38,6 +38,14 @@ def test_bench_table_and_wrong_options(capsys: pytest.CaptureFixture[str]) -> No
         assert run(["bench", "planner", *wrong]) == 2
 
 
+def test_bench_of_the_planner_that_flies(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["bench", "planner", "--model", "frustum", "--robots", "1", "--layout", "flat", "--repeats", "1"]
+    assert run(arguments) == 0
+    assert "running" in capsys.readouterr().out
+    assert run([*arguments, "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["rows"]) == 2
+
+
 def test_exponent_uses_measured_rows_from_ten_robots_on() -> None:
     rows = [
         {"layout": "flat", "method": "m", "robots": n, "cpu_ms_median": float(n) ** 2, "extrapolated": n > 40}

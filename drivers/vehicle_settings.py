@@ -1,9 +1,11 @@
 """Limits and time-outs that every vehicle driver has; the kinds add their own."""
 
+import ipaddress
 import math
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.field.behaviour import SafetyValues
@@ -14,6 +16,18 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
+
+
+def is_address(value: str) -> str:
+    """Return an IPv4 address as it is; raises what pydantic tells of another text."""
+    try:
+        ipaddress.IPv4Address(value)
+    except ValueError:
+        raise PydanticCustomError("address", "must be an IPv4 address such as 192.168.1.11") from None
+    return value
+
+
+Address = Annotated[str, AfterValidator(is_address)]
 
 
 class DriverSection(BaseModel):
@@ -60,3 +74,13 @@ class SilenceLimits(DriverSection):
             pad_m=pad_m,
             min_separation_m=self.min_separation_m,
         )
+
+
+def silence_limits(safety: SafetyValues) -> SilenceLimits:
+    """Return what a field's safety section says of silence."""
+    return SilenceLimits(
+        setpoint_lifetime_ms=safety.setpoint_lifetime_ms,
+        land_after_s=safety.land_after_s,
+        unseen_land_after_s=safety.unseen_land_after_s,
+        min_separation_m=safety.min_separation_m,
+    )

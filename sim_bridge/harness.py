@@ -12,8 +12,6 @@ from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
-from sim_bridge.devices.ardrone_firmware import FIRMWARES
-from sim_bridge.devices.mavlink_open import open_vehicle
 from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
@@ -21,9 +19,9 @@ from sim_bridge.link_bursts import with_bursts
 from sim_bridge.real.followers import Followers
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
+from sim_bridge.world.emulation import emulation_of
 from sim_bridge.world.unicycle import Unicycle
 from sim_bridge.world.world import World
-from sim_bridge.wrong_values import WrongValues
 
 _TRUTH_TICKS = 4  # 50 Hz
 _COMMAND_TICKS = 10
@@ -109,20 +107,11 @@ class Harness:
 
     def _open_emulators(self) -> None:
         order, world = self._order, self.world
-        faults = order.scenario.faults
-        body_at = exchanged(faults)
-        wrong = {name: WrongValues(fault for fault in faults if fault.entity == name) for name in world.drones}
-        copters, ardrones = world.copters, world.ardrones
-        for name in copters:
-            copter = copters[body_at.get(name, name)]
-            vehicle = open_vehicle(name, order.site.drones[name], copter, order, wrong[name])
-            self._stage.add(name, vehicle, vehicle.socket.fileno())
-        drones = order.scenario.drones
-        for name in ardrones:
+        body_at = exchanged(order.scenario.faults)
+        for name in world.drones:
             body = body_at.get(name, name)
-            firmware = FIRMWARES[drones.firmware_of(name)].without(drones.omit_options)
-            address, parts = order.addresses[name], (ardrones[body], world.onboard[body])
-            emulator = ArDroneEmulator(name, address, *parts, drones.navdata_hz, firmware, wrong[name])
+            emulation = emulation_of(order.site.drones[name].kind)
+            emulator = emulation.open(name, world.drones[body], world.onboard.get(body), order)
             self._stage.add(name, emulator, emulator.fileno())
 
     @property

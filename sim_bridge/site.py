@@ -5,7 +5,7 @@ every new key, so what is not named here is ignored.
 """
 
 import math
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -79,21 +79,12 @@ class EmulatedCamera(_Part):
     pan_left_deg: float = 0.0
 
 
-class MavlinkIdentity(_Part):
-    """Who a MAVLink vehicle is, and the port that it listens on or calls."""
-
-    flavour: Literal["px4", "ardupilot"]
-    system_id: int
-    port: int = 14550
-    listen: bool = False
-    local_address: str = "127.0.0.1"
-
-
 class SiteDrone(_Part):
-    """One drone: kind, place and heading of its pad, marker and camera."""
+    """One drone: kind, place and heading of its pad, what it carries; sections of its kind are kept as they came."""
 
-    kind: Literal["ardrone", "mavlink"]
-    mavlink: MavlinkIdentity | None = None
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
+
+    kind: str
     pad_m: tuple[float, float]
     pad_yaw_deg: float = 0.0
     marker: MarkerOfDrone
@@ -104,11 +95,9 @@ class SiteDrone(_Part):
         """Return the heading on the pad [rad; world]."""
         return math.radians(self.pad_yaw_deg)
 
-    def require_mavlink(self) -> MavlinkIdentity:
-        """Return the identity of a MAVLink vehicle; raises SettingsError if it has none."""
-        if self.mavlink is None:
-            raise SettingsError([f"kind: {self.kind} has no mavlink section"])
-        return self.mavlink
+    def section(self, key: str) -> dict[str, Any]:
+        """Return the section that only its kind has; empty where it is not given."""
+        return (self.model_extra or {}).get(key) or {}
 
 
 class SiteCamera(_Part):

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 from sim_bridge.cameras import Cameras
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_video import VideoMode
-from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.render.spec import RenderSpec
 from sim_bridge.truth import TruthBoard, remove_stale_boards
+from sim_bridge.world.emulation import Emulator
 from sim_bridge.world.world import World
 
 
@@ -17,13 +17,13 @@ class Stage:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        self.emulators: dict[str, ArDroneEmulator | MavlinkEmulator] = {}
+        self.emulators: dict[str, Emulator] = {}
         self.cameras: Cameras | None = None
         self._board: TruthBoard | None = None
         self._poll = select.poll()
         self._readers: dict[int, Callable[[], None]] = {}
 
-    def add(self, name: str, emulator: ArDroneEmulator | MavlinkEmulator, descriptor: int) -> None:
+    def add(self, name: str, emulator: Emulator, descriptor: int) -> None:
         """Take a device in, and read from it whenever its descriptor has something."""
         self.emulators[name] = emulator
         self._poll.register(descriptor, select.POLLIN)

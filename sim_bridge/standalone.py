@@ -23,6 +23,7 @@ from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_video import PORT
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.devices.mavlink_truth import TruthTeller
@@ -32,6 +33,7 @@ from sim_bridge.stage import Stage
 from sim_bridge.target_paths import Standstill
 from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.emulation import Body
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS, World
 
@@ -107,7 +109,7 @@ class Hangar:
             raise
 
     def _open_mavlink(self, name: str, copter: MavlinkCopter) -> None:
-        identity, choice = self._site.drones[name].require_mavlink(), self._mavlink
+        identity, choice = identity_of(self._site.drones[name]), self._mavlink
         flavour, system = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT, identity.system_id
         place = name.rpartition("@")[2], identity.port
         parameters = Parameters(flavour, system, choice.indoor)
@@ -148,10 +150,11 @@ class Hangar:
             }
         return json.dumps({"time": round(self.world.time_s, 3), "drones": drones})
 
-    def _phase(self, name: str, drone: Quadrotor | MavlinkCopter) -> str:
+    def _phase(self, name: str, drone: Body) -> str:
         if isinstance(drone, Quadrotor):
             return drone.autopilot.phase.name
-        return ("ARMED " if drone.motors_on else "") + drone.steering.name
+        words = ["ARMED"] if drone.autopilot.motors_on else []
+        return " ".join([*words, drone.steering.name] if isinstance(drone, MavlinkCopter) else words)
 
     def close(self) -> None:
         """Stop the pictures and close all ports; idempotent."""

@@ -93,3 +93,8 @@ class WrongValues:
                 break
             found = reading
         return found
+
+
+def wrong_values_of(faults: Iterable[Fault], name: str) -> WrongValues:
+    """Return the edge of one vehicle under the faults of a scenario."""
+    return WrongValues(fault for fault in faults if fault.entity == name)

@@ -56,10 +56,10 @@ def flown_field(path: Path, options: Sequence[str]) -> dict[str, Any]:
 
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
-    from groundstation.settings.sections import DriverKind, driver_sections
+    from groundstation.settings.sections import CAMERA, driver_sections
 
     field = load_field(path, (*options, "recording.raw_datagrams=false"))
-    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     return {"field": msgspec.to_builtins(resolved_field(field)), "sections": sections}
 
 

@@ -116,11 +116,11 @@ def _link_settings(target: str, key_file: str, kind: str) -> Any:
 def _vehicle(path: Path, name: str) -> tuple[Any, Any]:
     from drivers.mavlink.settings import MavlinkDriverSettings
     from groundstation.settings.load import load_field
-    from groundstation.settings.sections import DriverKind, driver_sections
+    from groundstation.settings.sections import driver_sections
 
     field = load_field(path)
     for section in driver_sections(field):
-        if section.kind is DriverKind.MAVLINK:
+        if section.kind == "mavlink":
             settings = MavlinkDriverSettings.model_validate_json(section.section)
             for vehicle in settings.vehicles:
                 if vehicle.name == name:

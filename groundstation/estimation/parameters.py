@@ -24,6 +24,7 @@ from groundstation.geometry.rotations import (
     base_from_tilted_optical,
     world_from_downward_optical,
 )
+from groundstation.vehicles import kind_named
 
 # `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
 WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
@@ -41,31 +42,6 @@ _MANOEUVRING_SHARE = 0.07
 _TURN_SHARE, _SPEED_SHARE = 0.5 / math.pi, 0.4 / 0.7
 # Of the acceleration of a target that turns, what is left to one that goes straight on.
 _STRAIGHT_SHARE = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class _Habits:
-    """How long a kind of vehicle's errors last [s], and the error of its climb rate [m/s; of its highest: share].
-
-    tells_attitude: its own attitude is better than what we could make of its IMU.
-    """
-
-    velocity_s: float
-    attitude_s: float
-    climb_s: float
-    climb_m_s: float
-    climb_share: float
-    reports_climb: bool
-    tells_attitude: bool
-
-
-# An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. A MAVLink vehicle flies on our
-# position: it has no height of its own to report; its velocity follows our errors as slowly as its filter does. An
-# AR.Drone's navdata call a drone level that leans into moving air.
-_HABITS = {
-    "ardrone": _Habits(0.4, 5.0, 0.7, 0.0, 0.2, False, False),
-    "mavlink": _Habits(5.0, 10.0, 2.0, 0.02, 0.0, True, True),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +80,14 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         cameras,
         max_lateness_s=estimator.max_lateness_s,
         gate_probability=estimator.gate_probability,
-        inertial={n: d.odometry.velocity_scale for n, d in drones.items() if not _HABITS[d.kind].tells_attitude},
+        inertial={
+            n: d.odometry.velocity_scale for n, d in drones.items() if not kind_named(d.kind).habits.tells_attitude
+        },
     )
 
 
 def _robot(drone: FieldDrone) -> OdometryRobot:
-    odometry, habits = drone.odometry, _HABITS[drone.kind]
+    odometry, habits = drone.odometry, kind_named(drone.kind).habits
     return OdometryRobot(
         marker_position_m=drone.marker.position_m,
         velocity_scale=odometry.velocity_scale,

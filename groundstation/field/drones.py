@@ -1,6 +1,6 @@
 """A drone: limits, marker, camera, errors of its own sensors, link."""
 
-from typing import Literal
+import math
 
 import msgspec
 
@@ -46,39 +46,19 @@ class OdometryErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     attitude_std_deg: float = 1.0
     yaw_rate_std_deg_s: float = 1.0
 
-
-class VideoChoice(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Video settings that are written to an AR.Drone."""
-
-    codec: Literal["h264_360p", "h264_720p"] = "h264_360p"
-    channel: Literal["front", "bottom"] = "front"
-    bitrate: int | None = None
+    @property
+    def attitude_std_rad(self) -> float:
+        """Return the error of roll and pitch [rad]."""
+        return math.radians(self.attitude_std_deg)
 
 
-class MavlinkLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A MAVLink vehicle and the link to it."""
+class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
+    """One drone of the team; pad_m, pad_yaw_deg: where it takes off [world].
 
-    flavour: Literal["px4", "ardupilot"]
-    system_id: int
-    link: Literal["pymavlink", "mavsdk"] = "pymavlink"
-    port: int = 14550
-    listen: bool = False
-    local_address: str = "0.0.0.0"
-    serial: str = ""
-    key_file: str = ""
-    take_off_m: float = 0.8
-    vision_hz: float = 30.0
-    parameters: dict[str, float] = {}
-    forward: str = ""
-    forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
+    Sections that only its kind has are for its driver and are left out.
+    """
 
-
-class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One drone of the team; pad_m, pad_yaw_deg: where it takes off [world]."""
-
-    kind: Literal["ardrone", "mavlink"]
-    mavlink: MavlinkLink | None = None
-    video: VideoChoice | None = None
+    kind: str
     enabled: bool = True
     address: str
     serial_number: str = ""
@@ -88,3 +68,8 @@ class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     odometry: OdometryErrors = OdometryErrors()
     pad_m: Vector2
     pad_yaw_deg: float = 0.0
+
+    @property
+    def pad_yaw_rad(self) -> float:
+        """Return the heading on the pad [rad; world]."""
+        return math.radians(self.pad_yaw_deg)

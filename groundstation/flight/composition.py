@@ -10,7 +10,6 @@ from typing import Any
 import msgspec
 
 from drivers.camera.settings import SourceKind, parse_source
-from drivers.registry import entry_point
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
@@ -18,13 +17,16 @@ from groundstation.flight.real_parts import ALL_EMULATED, RealParts
 from groundstation.process.ports import port_of
 from groundstation.runtime.router import RouterSection
 from groundstation.settings.schema import Field
-from groundstation.settings.sections import DriverKind, DriverSection, core_section, driver_sections, rerouted
+from groundstation.settings.sections import CAMERA, DriverSection, core_section, driver_sections, rerouted
 from groundstation.supervisor import process_table as rows
 from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.site import hosts
 from groundstation.supervisor.supervisor import SOURCE
+from groundstation.vehicles import kind_named
+
+_CAMERA_DRIVER = "drivers.camera.driver:run"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,15 +101,15 @@ def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec], liste
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:
-    row = rows.CAMERA if section.kind is DriverKind.CAMERA else rows.DRONE
+    row = rows.CAMERA if section.kind == CAMERA else rows.DRONE
     spec = replace(
         row,
         name=section.name,
-        entry=entry_point(section.kind),
+        entry=_CAMERA_DRIVER if section.kind == CAMERA else kind_named(section.kind).driver,
         section=section.section,
         entities=section.entities,
     )
-    if section.kind is DriverKind.CAMERA:
+    if section.kind == CAMERA:
         return spec
     return replace(spec, failsafe_datagrams=failsafe_datagrams(field, section))
 

@@ -10,9 +10,8 @@ from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import rotation_z, world_from_downward_optical
+from groundstation.vehicles import kind_named
 
-# Of the base above the floor: an AR.Drone on its feet, and what is usual of vehicles of that size.
-_STANDING_M = {"ardrone": (0.06, 0.015), "mavlink": (0.08, 0.04)}
 # How well a person sets a drone on a cross and a line on the floor.
 PLACED_M, PLACED_RAD = 0.01, math.radians(1.5)
 # Of a lens and of a print that were measured, as shares.
@@ -95,5 +94,5 @@ def stand_of(field: ResolvedField) -> Stand:
 
 
 def _pad(drone: FieldDrone) -> Pad:
-    height, std = _STANDING_M[drone.kind]
+    height, std = kind_named(drone.kind).standing_m
     return Pad(drone.pad_m, math.radians(drone.pad_yaw_deg), height, std, drone.marker.position_m)

@@ -9,10 +9,12 @@ from drivers.camera.settings import SourceKind, parse_source
 from groundstation.errors import without_password
 from groundstation.settings.behaviour import EstimatorSettings, PlannerSettings, SafetySettings
 from groundstation.settings.document import KeyPath
-from groundstation.settings.drones import Drone, Mavlink
+from groundstation.settings.drones import Drone
+from groundstation.settings.kind_checks import findings_of_kinds
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings, RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
+from groundstation.vehicles import kind_named
 
 Finding = tuple[KeyPath, str]
 
@@ -131,59 +133,24 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
     yield from _unique(((("drones", n, "address"), d.address, n) for n, d in parts.drones.items()), "address")
 
 
-def _mavlink(parts: Parts) -> Iterator[Finding]:
-    flown: dict[str, Mavlink] = {}
-    for name, drone in parts.drones.items():
-        path: KeyPath = ("drones", name, "mavlink")
-        if drone.kind != "mavlink":
-            if drone.mavlink is not None:
-                yield path, f"has no meaning for {drone.kind}"
-        elif drone.mavlink is None:
-            yield path, "must be given for kind: mavlink"
-        else:
-            flown[name] = drone.mavlink
-            yield from _mavlink_way(path, drone.mavlink)
-    yield from _unique(((("drones", n, "mavlink", "system_id"), m.system_id, n) for n, m in flown.items()), "system id")
-    shared: dict[int, tuple[str, tuple[str, str, str]]] = {}
-    for name, m in flown.items():
-        how = (m.link, m.key_file, m.local_address)
-        if m.listen and shared.setdefault(m.port, (name, how))[1] != how:
-            yield ("drones", name, "mavlink", "port"), f"is shared with {shared[m.port][0]}, which is reached otherwise"
-
-
-def _mavlink_way(path: KeyPath, mavlink: Mavlink) -> Iterator[Finding]:
-    if mavlink.key_file and mavlink.link == "mavsdk":
-        yield (*path, "link"), "must be pymavlink for a signed link: MAVSDK cannot sign"
-    elif mavlink.serial and mavlink.listen:
-        yield (*path, "listen"), "has no meaning on a serial line"
-
-
-_VIDEO_WIDTHS = {"h264_360p": 640, "h264_720p": 1280}
+def _kinds(parts: Parts) -> Iterator[Finding]:
+    yield from findings_of_kinds(parts.drones)
 
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
-    """An AR.Drone's video is taken from that very drone, in the size that its settings ask for."""
+    """A vehicle's video is taken from that very vehicle."""
     for name, camera in parts.cameras.items():
         if parse_source(camera.source).kind is SourceKind.ARDRONE:
             yield ("cameras", name, "source"), "must not be an AR.Drone's video: drones carry their cameras"
     for name, drone in parts.drones.items():
-        if drone.video is not None and drone.kind != "ardrone":
-            yield ("drones", name, "video"), f"has no meaning for {drone.kind}"
         source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
         if source.kind is not SourceKind.ARDRONE:
             continue
-        if drone.kind != "ardrone":
+        if kind_named(drone.kind).camera != source.kind.value:
             yield path, f"must not be an AR.Drone's video for kind: {drone.kind}"
         elif source.host != drone.address:
             got = without_password(drone.camera.source)
             yield path, f"must be this drone's own address, ardrone://{drone.address} (got {got})"
-        codec = drone.video.codec if drone.video is not None else "h264_360p"
-        wanted, found = _VIDEO_WIDTHS[codec], drone.camera.calibration.width_px
-        if found != wanted:
-            yield (
-                ("drones", name, "camera", "calibration"),
-                f"must be for pictures {wanted} wide, as video codec {codec} sends them (got {found})",
-            )
 
 
 def _names(parts: Parts) -> Iterator[Finding]:
@@ -255,7 +222,7 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _team,
     _pads,
     _distinct,
-    _mavlink,
+    _kinds,
     _own_video,
     _names,
     _heights,

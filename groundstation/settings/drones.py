@@ -1,16 +1,16 @@
 """Settings of one drone: address, limits, marker, camera, errors of its own sensors."""
 
 import math
-from typing import Annotated, Literal, Never, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, create_model
+from pydantic_core import PydanticCustomError, PydanticKnownError
 
-from groundstation.errors import SettingsError
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.values import Address, OnVehicle, SettingsSection, Source, Vector2, VideoDelay
+from groundstation.vehicles import KindSection, all_kinds, kind_named, refused_kinds
 
-VehicleKind = Literal["ardrone", "mavlink"]
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
 Delay = Annotated[float, Field(ge=0, le=1000)]
 
@@ -104,64 +104,22 @@ class OdometryCalibration(SettingsSection):
         return math.radians(self.attitude_std_deg)
 
 
-class ArDroneVideo(SettingsSection):
-    """Video settings that are written to an AR.Drone."""
-
-    codec: Literal["h264_360p", "h264_720p"] = "h264_360p"
-    """Video that the drone sends over TCP 5555: 640x360 or 1280x720 pixels. The calibration must have the same size."""
-    channel: Literal["front", "bottom"] = "front"
-    """Which of the drone's cameras sends."""
-    bitrate: Annotated[int, Field(ge=250, le=4000)] | None = None
-    """Constant bit rate [kbit/s]; none: the drone chooses."""
+def _is_kind(name: str) -> str:
+    known = [f"'{one}'" for one in all_kinds()]
+    if name in refused_kinds():
+        raise PydanticCustomError("kind", "cannot be used: {why}", {"why": refused_kinds()[name]})
+    if f"'{name}'" not in known:
+        raise PydanticKnownError("literal_error", {"expected": " or ".join((", ".join(known[:-1]), known[-1]))})
+    return name
 
 
-class Mavlink(SettingsSection):
-    """A MAVLink vehicle and the link to it.
-
-    By default the driver opens the link to address:port over UDP; `listen` and `serial` replace that.
-    """
-
-    flavour: Literal["px4", "ardupilot"]
-    """The autopilot's firmware; the driver refuses a vehicle that reports another one."""
-    system_id: Annotated[int, Field(ge=1, le=250)]
-    """MAVLink system id of the vehicle; each its own."""
-    link: Literal["pymavlink", "mavsdk"] = "pymavlink"
-    """Library on our side of the link. Signed links need pymavlink."""
-    port: Annotated[int, Field(ge=1024, le=65535)] = 14550
-    """UDP port: the vehicle's, or ours with listen."""
-    listen: bool = False
-    """true: the vehicle opens the connection to local_address:port. Vehicles that share a port share one driver
-    process. When the driver is dead, others speak to the vehicle from another port than the one it called."""
-    local_address: Address = "0.0.0.0"
-    """IPv4 address that the driver listens on, with listen."""
-    serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d+)?$")] = ""
-    """Serial radio DEVICE:BAUD instead of UDP, such as /dev/ttyUSB0:57600; empty: UDP."""
-    key_file: str = ""
-    """File with the signing key (32 bytes, or 64 hex digits), kept outside the field file; empty: frames are not
-    signed."""
-    take_off_m: Annotated[float, Field(ge=0.4, le=3)] = 0.8
-    """Height [m] that a take-off climbs to."""
-    vision_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
-    """Rate [Hz] at which the vehicle's position estimate is sent to its autopilot."""
-    parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
-    """Parameters of the autopilot that this drone needs otherwise than `groundstation mavlink setup` proposes, or
-    besides, by name; the driver warns of the former."""
-    forward: Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$")] = ""
-    """A second ground station that sees the vehicle, such as udp:127.0.0.1:14550 for QGroundControl. It may stop the
-    vehicle and ask it questions, never fly it. Empty: none."""
-    forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
-    """What that ground station may read and write besides."""
-
-
-class Drone(SettingsSection):
+class DroneOfAnyKind(SettingsSection):
     """One drone with all three levels merged."""
 
-    kind: VehicleKind
+    kind: Annotated[
+        str, AfterValidator(_is_kind), Field(json_schema_extra=lambda schema: schema.update(enum=[*all_kinds()]))
+    ]
     """Which driver flies it."""
-    mavlink: Mavlink | None = None
-    """How a MAVLink vehicle is reached; required for kind: mavlink, refused for others."""
-    video: ArDroneVideo | None = None
-    """Video settings written to an AR.Drone at start; without this section the drone keeps its own."""
     enabled: bool = True
     """false: the drone stays out of the run but keeps its entry in the file."""
     address: Address
@@ -188,16 +146,26 @@ class Drone(SettingsSection):
         """Return the heading on the pad [rad; world]."""
         return math.radians(self.pad_yaw_deg)
 
-    def require_mavlink(self) -> Mavlink:
-        """Return how the vehicle is met; raises SettingsError where nothing says so."""
-        if self.mavlink is None:
-            raise SettingsError([f"kind: {self.kind} has no mavlink section"])
-        return self.mavlink
+    @property
+    def sections(self) -> dict[str, KindSection]:
+        """Return those of the sections that only its kind has, by their keys; what is not given is left out."""
+        keys = kind_named(self.kind).sections
+        return {key: section for key in keys if isinstance(section := getattr(self, key, None), KindSection)}
 
 
-def unknown_kind(kind: Never) -> SettingsError:
-    """Return the refusal of a kind of vehicle that a choice between kinds left out.
+def _with_sections_of_kinds() -> type[DroneOfAnyKind]:
+    sections: dict[str, Any] = {
+        key: (model | None, Field(default=None, description=f"Only for kind: {kind.name}. {model.__doc__}"))
+        for kind in all_kinds().values()
+        for key, model in kind.sections.items()
+    }
+    return create_model(
+        "Drone", __base__=DroneOfAnyKind, __module__=__name__, __doc__=DroneOfAnyKind.__doc__, **sections
+    )
 
-    A kind that exists is no `Never`: mypy shows each choice that a new kind must be added to.
-    """
-    return SettingsError([f"kind: {kind} is not known; known: {', '.join(get_args(VehicleKind))}"])
+
+if TYPE_CHECKING:
+    Drone = DroneOfAnyKind
+else:
+    # Which kinds there are is known when the program runs: each brings its own sections.
+    Drone = _with_sections_of_kinds()

@@ -1,12 +1,13 @@
 """Kinds of values that a field file is made of, and the base of its sections."""
 
-import ipaddress
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
 from pydantic_core import PydanticCustomError
 
 from drivers.camera.settings import parse_source
+from drivers.vehicle_settings import Address as Address
+from drivers.vehicle_settings import is_address
 from groundstation.errors import without_password
 
 NAME_PATTERN = r"^[a-z][a-z0-9_]{0,47}$"
@@ -37,14 +38,6 @@ def _rising(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-def _is_address(value: str) -> str:
-    try:
-        ipaddress.IPv4Address(value)
-    except ValueError:
-        raise PydanticCustomError("address", "must be an IPv4 address such as 192.168.1.11") from None
-    return value
-
-
 def _is_source(value: str) -> str:
     try:
         parse_source(value)
@@ -64,5 +57,4 @@ SquareSize = Annotated[float, Field(ge=5, le=200)]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
 # Only the driver gets the password, from the attribute: a field that is written, recorded or shown is a dump.
 Source = Annotated[str, AfterValidator(_is_source), PlainSerializer(without_password)]
-Address = Annotated[str, AfterValidator(_is_address)]
-AddressOrNone = Annotated[str, AfterValidator(lambda value: value and _is_address(value))]
+AddressOrNone = Annotated[str, AfterValidator(lambda value: value and is_address(value))]

@@ -83,6 +83,10 @@ class MavlinkEmulator:
         """Return the vehicle's own time since power-on."""
         return self._ticks * TICK_NS
 
+    def fileno(self) -> int:
+        """Return the descriptor of its port."""
+        return self.socket.fileno()
+
     def receive(self) -> None:
         """Take all waiting datagrams."""
         for _ in range(_DATAGRAMS_PER_TICK):

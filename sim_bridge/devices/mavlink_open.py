@@ -6,6 +6,7 @@ from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import VideoStreamInformation
 from sim_bridge.devices.camera_stream import PATH
 from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
+from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.site import Lens, SiteDrone
@@ -31,7 +32,7 @@ def open_vehicle(
 
     Where the field's driver waits for its vehicles (`listen`), the vehicle calls it.
     """
-    identity = drone.require_mavlink()
+    identity = identity_of(drone)
     flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
     video = None
     if name in order.streams and drone.camera is not None:

@@ -6,6 +6,7 @@ from typing import Protocol
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate
 from groundstation.bus.topics import ESTIMATE
+from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.launch_spec import PoseSource, RealBody
 from sim_bridge.real.autopilot_truth import AutopilotTruth
 from sim_bridge.real.placed import Placement
@@ -92,6 +93,6 @@ class Followers:
 def _feed(name: str, body: RealBody, site: Site, bus: Bus) -> PoseFeed:
     drone = site.drones[name]
     if body.source is PoseSource.AUTOPILOT and body.address is not None:
-        system = drone.require_mavlink().system_id
+        system = identity_of(drone).system_id
         return AutopilotTruth(name, body.address, system, Placement(drone.pad_m, drone.pad_yaw_rad))
     return EstimateFeed(name, bus)

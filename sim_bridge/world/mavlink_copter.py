@@ -152,6 +152,10 @@ class MavlinkCopter:
                 self._vertical(-0.5 * self.estimate.velocity[2])
                 self._move(tuple(self._acceleration), 0.0, wake)
 
+    def sense(self) -> None:
+        """Let its estimator take the readings of this tick."""
+        self.estimate.step(self.airframe, self.motors_on)
+
     def _blown(self, push: Vector3) -> Vector3:
         share, (x, y) = self._tick_s / _BRACE_S, self._braced
         self._braced = (x + share * (self.wind[0] - x), y + share * (self.wind[1] - y))

@@ -2,8 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Collection, Mapping
-from typing import assert_never
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,8 @@ from sim_bridge.site import Site, SiteDrone
 from sim_bridge.truth import WIDTH
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard
-from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
+from sim_bridge.world.emulation import Body, emulation_of, senses_of
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.obstacles import boxes_of, floor_below
 from sim_bridge.world.puppet import Puppet
@@ -42,9 +42,10 @@ class World:
     ) -> None:
         self.bodies = site.bodies
         self.ticks = 0
-        self.drones: dict[str, Quadrotor | MavlinkCopter] = {}
+        self.drones: dict[str, Body] = {}
         self.puppets: dict[str, Puppet] = {}
         self.onboard: dict[str, Onboard] = {}
+        self._senses: dict[str, Callable[[], None]] = {}
         room = self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         for name, drone in site.drones.items():
             if name in real:
@@ -68,20 +69,15 @@ class World:
         self._disturbed: frozenset[str] = frozenset()
         self._states = np.zeros((len(self.bodies), WIDTH))
 
-    def _drone(self, name: str, drone: SiteDrone, scenario: Scenario, seed: int) -> Quadrotor | MavlinkCopter:
-        place, rng = (drone.pad_m, drone.pad_yaw_rad), generator_of(seed, name)
-        match drone.kind:
-            case "ardrone":
-                body = Quadrotor(*place, scenario.drones, TICK_S, rng)
-                sensors = generator_of(seed, f"{name}/onboard")
-                magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
-                self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
-                return body
-            case "mavlink":
-                response = PX4_RESPONSE if drone.require_mavlink().flavour == "px4" else ARDUPILOT_RESPONSE
-                return MavlinkCopter(*place, scenario.mavlink, response, TICK_S, rng)
-            case other:
-                assert_never(other)
+    def _drone(self, name: str, drone: SiteDrone, scenario: Scenario, seed: int) -> Body:
+        body = emulation_of(drone.kind).body(drone, scenario, TICK_S, generator_of(seed, name))
+        if isinstance(body, Quadrotor):
+            sensors = generator_of(seed, f"{name}/onboard")
+            magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
+            self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
+        elif (sense := senses_of(body)) is not None:
+            self._senses[name] = sense
+        return body
 
     @property
     def time_s(self) -> float:
@@ -91,7 +87,7 @@ class World:
     @property
     def airborne(self) -> tuple[str, ...]:
         """Return the names of the drones without contact to the floor."""
-        bodies = (*self.drones.items(), *self.puppets.items())
+        bodies: list[tuple[str, Body | Puppet]] = [*self.drones.items(), *self.puppets.items()]
         return tuple(name for name, drone in bodies if drone.airborne)
 
     def step(self) -> None:
@@ -106,9 +102,9 @@ class World:
         for name, drone in drones.items():
             drone.step(wakes.get(name, _STILL_AIR))
             drone.airframe.confine(*self._half_room)
-            if isinstance(drone, MavlinkCopter):
-                drone.estimate.step(drone.airframe, drone.motors_on)
-            else:
+            if (sense := self._senses.get(name)) is not None:
+                sense()
+            elif isinstance(drone, Quadrotor):
                 if self._zones or self._echoes:
                     self._disturb(name, drone)
                 self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed, drone.air)
@@ -179,7 +175,8 @@ class World:
         if below.on_ground:
             return _STILL_AIR
         strongest = _STILL_AIR
-        for other, drone in (*self.drones.items(), *self.puppets.items()):
+        others: list[tuple[str, Body | Puppet]] = [*self.drones.items(), *self.puppets.items()]
+        for other, drone in others:
             if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
                 strongest = push  # wakes do not add
         return strongest

@@ -8,7 +8,7 @@ import pytest
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
-from groundstation.settings.sections import DriverKind, driver_sections
+from groundstation.settings.sections import CAMERA, driver_sections
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import Drawn
@@ -19,7 +19,7 @@ SECONDS = 10.0
 
 def fly(field_name: str, *faults: Fault, seconds: float = SECONDS, seed: int = 3) -> dict[str, Any]:
     field = load_field(find_field(field_name), ("recording.raw_datagrams=false",))
-    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     scenario = Scenario().model_copy(update={"faults": faults})
     flight = FaultFlight(Drawn(msgspec.to_builtins(resolved_field(field)), scenario, seed), sections, seconds)
     return flight.run() | {"events": [line for _, line in flight.events]}

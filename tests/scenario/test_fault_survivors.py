@@ -10,7 +10,7 @@ from groundstation.settings.files import find_field, find_scenario
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
-from groundstation.settings.sections import DriverKind, driver_sections
+from groundstation.settings.sections import CAMERA, driver_sections
 from sim_bridge.study.faults.command import fly
 
 SECONDS = 20.0
@@ -33,7 +33,7 @@ def order() -> dict[str, Any]:
     """What `groundstation experiment faults` hands to the simulator."""
     path = find_field("lab")
     field = load_field(path, ("recording.raw_datagrams=false",))
-    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     scenario = json.loads(json.dumps(load_scenario(find_scenario("realistic", path))))
     builtins = msgspec.to_builtins(resolved_field(field))
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}

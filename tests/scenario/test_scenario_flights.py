@@ -10,7 +10,7 @@ from groundstation.settings.files import find_field, find_scenario
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
-from groundstation.settings.sections import DriverKind, driver_sections
+from groundstation.settings.sections import CAMERA, driver_sections
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
 
@@ -21,7 +21,7 @@ def fly(name: str, strategy: str, seconds: float = 8.0) -> dict[str, Any]:
     path = find_field("lab")
     scenario = parse_scenario(json.dumps(load_scenario(find_scenario(name, path))))
     field = load_field(path, ("recording.raw_datagrams=false",))
-    sections = [(str(s.kind), s.section) for s in driver_sections(field) if s.kind is not DriverKind.CAMERA]
+    sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     drawn = as_drawn(msgspec.to_builtins(resolved_field(field)), scenario, 1)
     return ScenarioFlight(drawn, sections, seconds, strategy).fly()
 

@@ -15,6 +15,7 @@ from drivers.watchdog_types import WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Severity
 from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site
@@ -76,7 +77,7 @@ def devices_of(
         firmware = scenario.drones.firmware_of(name)
         devices[name] = MemoryArDrone(addresses[name], drone, world.onboard[name], firmware, wrong[name], network)
     for name, copter in world.copters.items():
-        identity = site.drones[name].require_mavlink()
+        identity = identity_of(site.drones[name])
         flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
         calls = (identity.local_address, identity.port) if identity.listen else None
         place = (addresses[name], identity.port)

@@ -34,11 +34,11 @@ def words_of(tmp_path, **mavlink):
     field = load_field(FIELD)
     for name, drone in field.drones.items():
         if drone.kind == "mavlink":
-            other = drone.require_mavlink().model_copy(update=mavlink)
+            other = drone.sections["mavlink"].model_copy(update=mavlink)
             field.drones[name] = drone.model_copy(update={"mavlink": other})
     table = process_table(field, "tcp/127.0.0.1:1", tmp_path, simulation=None, monitor=False)
     spoken = [s.failsafe_datagrams for s in table if s.failsafe_datagrams and s.failsafe_datagrams.hover[0] == 0xFD]
-    return spoken, [d.require_mavlink().system_id for d in field.drones.values() if d.kind == "mavlink"]
+    return spoken, [d.model_dump()["mavlink"]["system_id"] for d in field.drones.values() if d.kind == "mavlink"]
 
 
 @pytest.fixture

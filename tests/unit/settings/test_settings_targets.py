@@ -20,7 +20,7 @@ from groundstation.sensing.topology import Topology
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
-from groundstation.settings.sections import DriverKind, driver_sections
+from groundstation.settings.sections import CAMERA, driver_sections
 
 CONFIG = Path(__file__).parents[3] / "config"
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
@@ -80,7 +80,7 @@ def test_several_targets_reach_estimator_planner_and_every_camera() -> None:
     assert isinstance(entities["turtlebot_2"], CoordinatedTurnTarget)
     assert planning.parameters_from_field(plain).target_weights == {"turtlebot_1": 1.0, "turtlebot_2": 4.0}
     assert {"turtlebot_1", "turtlebot_2"} <= set(sensors_from_field(plain).marker_height_m)
-    cameras = [section for section in driver_sections(field) if section.kind is DriverKind.CAMERA]
+    cameras = [section for section in driver_sections(field) if section.kind == CAMERA]
     assert len(cameras) == 3
     assert all('"turtlebot_1"' in camera.section and '"turtlebot_2"' in camera.section for camera in cameras)
 

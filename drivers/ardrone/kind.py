@@ -1,0 +1,115 @@
+"""AR.Drones as a kind of vehicle."""
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from drivers.ardrone.settings import (
+    ArDroneDriverSettings,
+    ArDroneLimits,
+    FlightConfiguration,
+    VelocityScale,
+    Video,
+)
+from drivers.ardrone.wire import at
+from drivers.vehicle_settings import silence_limits
+from groundstation.vehicles import (
+    DriverProcess,
+    ErrorHabits,
+    Finding,
+    KindSection,
+    StopDatagrams,
+    VehicleKind,
+    VehicleOrder,
+)
+
+_AT_PORT = 5556
+_VIDEO_WIDTHS = {"h264_360p": 640, "h264_720p": 1280}
+
+
+class ArDroneVideo(KindSection):
+    """Video settings that are written to an AR.Drone."""
+
+    codec: Literal["h264_360p", "h264_720p"] = "h264_360p"
+    """Video that the drone sends over TCP 5555: 640x360 or 1280x720 pixels. The calibration must have the same size."""
+    channel: Literal["front", "bottom"] = "front"
+    """Which of the drone's cameras sends."""
+    bitrate: Annotated[int, Field(ge=250, le=4000)] | None = None
+    """Constant bit rate [kbit/s]; none: the drone chooses."""
+
+
+def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
+    return [DriverProcess((order.name,), _settings(order).model_dump_json()) for order in orders]
+
+
+def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
+    drone, limits = order.drone, order.drone.limits
+    return ArDroneDriverSettings(
+        name=order.name,
+        address=drone.address,
+        serial_number=drone.serial_number,
+        limits=ArDroneLimits(
+            max_speed_m_s=limits.max_speed_m_s,
+            max_climb_m_s=limits.max_climb_m_s,
+            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
+            max_tilt_deg=limits.max_tilt_deg,
+            battery_min=limits.battery_min,
+            battery_hold_s=limits.battery_hold_s,
+        ),
+        odometry=VelocityScale(
+            velocity_scale=drone.odometry.velocity_scale, velocity_std_m_s=drone.odometry.velocity_std_m_s
+        ),
+        safety=silence_limits(order.safety),
+        pad_m=drone.pad_m,
+        # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
+        flight=FlightConfiguration(altitude_max_m=max(0.5, order.top_m), ultrasound_freq=8 if order.index % 2 else 7),
+        video=_video(order),
+        raw_datagrams=order.raw_datagrams,
+    )
+
+
+def _video(order: VehicleOrder) -> Video | None:
+    video = order.sections.get("video")
+    if not isinstance(video, ArDroneVideo):
+        return None
+    return Video(codec=video.codec, channel=video.channel, bitrate=video.bitrate)
+
+
+def _stop(_orders: Sequence[VehicleOrder]) -> StopDatagrams:
+    # WIRE: sequence number 1 resets the drone's count, so it obeys whoever speaks after its driver. Hovering is PCMD
+    # without flags, and no REF: a start bit would lift a drone that stands.
+    hover = at.encode_datagram([at.pcmd(at.ProgressiveMotion())], 1)
+    land = at.encode_datagram([at.ref(start=False), at.pcmd(at.ProgressiveMotion())], 1)
+    return StopDatagrams(_AT_PORT, hover, land)
+
+
+def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
+    """The calibration of a drone's own video has the size that its settings ask for."""
+    for order in orders:
+        if not order.drone.camera.source.startswith("ardrone://"):
+            continue
+        video = order.sections.get("video")
+        codec = video.codec if isinstance(video, ArDroneVideo) else "h264_360p"
+        wanted, found = _VIDEO_WIDTHS[codec], order.drone.camera.calibration.width_px
+        if found != wanted:
+            text = f"must be for pictures {wanted} wide, as video codec {codec} sends them (got {found})"
+            yield order.name, (("camera", "calibration"), text)
+
+
+# An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. Its navdata call a drone level that
+# leans into moving air.
+KIND = VehicleKind(
+    name="ardrone",
+    summary="Parrot AR.Drone 1.0 and 2.0",
+    driver="drivers.ardrone.driver:run",
+    habits=ErrorHabits(0.4, 5.0, 0.7, 0.0, 0.2, reports_climb=False, tells_attitude=False),
+    processes=_processes,
+    stop=_stop,
+    sections={"video": ArDroneVideo},
+    check=_check,
+    standing_m=(0.06, 0.015),  # on its feet
+    camera="ardrone",
+    has_serial_number=True,
+    emulator="sim_bridge.devices.ardrone_emulation:EMULATION",
+)

@@ -1,0 +1,176 @@
+"""Vehicles with a MAVLink autopilot as a kind of vehicle: PX4 and ArduPilot."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
+from drivers.vehicle_settings import Address, VehicleLimits, silence_limits
+from groundstation.errors import SettingsError
+from groundstation.vehicles import (
+    DriverProcess,
+    ErrorHabits,
+    Finding,
+    KindSection,
+    StopDatagrams,
+    VehicleKind,
+    VehicleOrder,
+)
+
+_VOICE = "drivers.mavlink.voice:MavlinkVoice"
+
+
+class Mavlink(KindSection):
+    """A MAVLink vehicle and the link to it.
+
+    By default the driver opens the link to address:port over UDP; `listen` and `serial` replace that.
+    """
+
+    flavour: Literal["px4", "ardupilot"]
+    """The autopilot's firmware; the driver refuses a vehicle that reports another one."""
+    system_id: Annotated[int, Field(ge=1, le=250)]
+    """MAVLink system id of the vehicle; each its own."""
+    link: Literal["pymavlink", "mavsdk"] = "pymavlink"
+    """Library on our side of the link. Signed links need pymavlink."""
+    port: Annotated[int, Field(ge=1024, le=65535)] = 14550
+    """UDP port: the vehicle's, or ours with listen."""
+    listen: bool = False
+    """true: the vehicle opens the connection to local_address:port. Vehicles that share a port share one driver
+    process. When the driver is dead, others speak to the vehicle from another port than the one it called."""
+    local_address: Address = "0.0.0.0"
+    """IPv4 address that the driver listens on, with listen."""
+    serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d+)?$")] = ""
+    """Serial radio DEVICE:BAUD instead of UDP, such as /dev/ttyUSB0:57600; empty: UDP."""
+    key_file: str = ""
+    """File with the signing key (32 bytes, or 64 hex digits), kept outside the field file; empty: frames are not
+    signed."""
+    take_off_m: Annotated[float, Field(ge=0.4, le=3)] = 0.8
+    """Height [m] that a take-off climbs to."""
+    vision_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
+    """Rate [Hz] at which the vehicle's position estimate is sent to its autopilot."""
+    parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
+    """Parameters of the autopilot that this drone needs otherwise than `groundstation mavlink setup` proposes, or
+    besides, by name; the driver warns of the former."""
+    forward: Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$")] = ""
+    """A second ground station that sees the vehicle, such as udp:127.0.0.1:14550 for QGroundControl. It may stop the
+    vehicle and ask it questions, never fly it. Empty: none."""
+    forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
+    """What that ground station may read and write besides."""
+
+
+def _own(order: VehicleOrder) -> Mavlink:
+    section = order.sections.get("mavlink")
+    if not isinstance(section, Mavlink):
+        raise SettingsError([f"kind: {order.drone.kind} has no mavlink section"])
+    return section
+
+
+def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
+    links: dict[object, list[VehicleOrder]] = {}  # those that call the same port share a process
+    for order in orders:
+        mavlink = _own(order)
+        links.setdefault(mavlink.port if mavlink.listen else order.name, []).append(order)
+    return [
+        DriverProcess(tuple(one.name for one in group), _settings(group).model_dump_json()) for group in links.values()
+    ]
+
+
+def _settings(orders: Sequence[VehicleOrder]) -> MavlinkDriverSettings:
+    first, mavlink = orders[0], _own(orders[0])
+    return MavlinkDriverSettings(
+        link=LinkSettings(kind=mavlink.link, target=_target(first, mavlink), key_file=mavlink.key_file),
+        vehicles=tuple(_vehicle(order) for order in orders),
+        safety=silence_limits(first.safety),
+        vision=VisionFeedback(rate_hz=mavlink.vision_hz),
+        raw_datagrams=first.raw_datagrams,
+    )
+
+
+def _target(order: VehicleOrder, mavlink: Mavlink) -> str:
+    if mavlink.serial:
+        return f"serial:{mavlink.serial}"
+    if mavlink.listen:
+        return f"udpin:{mavlink.local_address}:{mavlink.port}"
+    return f"udpout:{order.drone.address}:{mavlink.port}"
+
+
+def _vehicle(order: VehicleOrder) -> VehicleSettings:
+    drone, mavlink, limits = order.drone, _own(order), order.drone.limits
+    return VehicleSettings(
+        name=order.name,
+        system_id=mavlink.system_id,
+        flavour=mavlink.flavour,
+        serial_number=drone.serial_number,
+        pad_m=drone.pad_m,
+        pad_yaw_rad=drone.pad_yaw_rad,
+        limits=VehicleLimits(
+            max_speed_m_s=limits.max_speed_m_s,
+            max_climb_m_s=limits.max_climb_m_s,
+            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
+            battery_min=limits.battery_min,
+            battery_hold_s=limits.battery_hold_s,
+        ),
+        take_off_m=mavlink.take_off_m,
+        parameters=mavlink.parameters,
+        forward=mavlink.forward,
+        forward_allows=mavlink.forward_allows,
+        velocity_std_m_s=drone.odometry.velocity_std_m_s,
+        attitude_std_rad=drone.odometry.attitude_std_rad,
+    )
+
+
+def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
+    # Only here: pymavlink's dialect takes its time to load.
+    from drivers.mavlink.failsafe import hover_and_land
+
+    mavlink = _own(orders[0])
+    hover, land = hover_and_land([_own(order).system_id for order in orders], signed=bool(mavlink.key_file))
+    way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file})
+    return StopDatagrams(mavlink.port, hover, land, _VOICE, way, mavlink.listen)
+
+
+def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
+    systems: dict[int, str] = {}
+    shared: dict[int, tuple[str, tuple[str, str, str]]] = {}
+    for order in orders:
+        name, mavlink = order.name, _own(order)
+        for key, text in _way(mavlink):
+            yield name, (("mavlink", key), text)
+        if (other := systems.setdefault(mavlink.system_id, name)) != name:
+            yield name, (("mavlink", "system_id"), f"system id {mavlink.system_id} is already that of {other}")
+        how = (mavlink.link, mavlink.key_file, mavlink.local_address)
+        if mavlink.listen and shared.setdefault(mavlink.port, (name, how))[1] != how:
+            text = f"is shared with {shared[mavlink.port][0]}, which is reached otherwise"
+            yield name, (("mavlink", "port"), text)
+
+
+def _way(mavlink: Mavlink) -> Iterator[tuple[str, str]]:
+    if mavlink.key_file and mavlink.link == "mavsdk":
+        yield "link", "must be pymavlink for a signed link: MAVSDK cannot sign"
+    elif mavlink.serial and mavlink.listen:
+        yield "listen", "has no meaning on a serial line"
+
+
+def _moved(local_address: str, sections: Mapping[str, KindSection]) -> dict[str, dict[str, object]]:
+    # Vehicles that call us do so within the simulated network; there are no serial lines in it.
+    return {"mavlink": {"local_address": local_address, "serial": ""}}
+
+
+# It flies on our position: it has no height of its own to report; its velocity follows our errors as slowly as its
+# filter does.
+KIND = VehicleKind(
+    name="mavlink",
+    summary="vehicles with a PX4 or ArduPilot autopilot",
+    driver="drivers.mavlink.driver:run",
+    habits=ErrorHabits(5.0, 10.0, 2.0, 0.02, 0.0, reports_climb=True, tells_attitude=True),
+    processes=_processes,
+    stop=_stop,
+    sections={"mavlink": Mavlink},
+    required=frozenset({"mavlink"}),
+    has_serial_number=True,
+    check=_check,
+    moved=_moved,
+    emulator="sim_bridge.devices.mavlink_emulation:EMULATION",
+)

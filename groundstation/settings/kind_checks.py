@@ -1,0 +1,37 @@
+"""What must hold of the sections that only one kind of vehicle has."""
+
+from collections.abc import Iterator, Mapping
+
+import msgspec
+
+from groundstation.field.behaviour import SafetyValues
+from groundstation.field.drones import FieldDrone
+from groundstation.settings.document import KeyPath
+from groundstation.settings.drones import Drone
+from groundstation.vehicles import VehicleOrder, all_kinds, kind_named
+
+
+def findings_of_kinds(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, str]]:
+    """Return each section at a drone of another kind, each one missing, and what the kinds find wrong in theirs."""
+    teams: dict[str, list[VehicleOrder]] = {}
+    for index, (name, drone) in enumerate(drones.items()):
+        yield from _misplaced(name, drone)
+        missing = sorted(kind_named(drone.kind).required - set(drone.sections))
+        for key in missing:
+            yield ("drones", name, key), f"must be given for kind: {drone.kind}"
+        if not missing:
+            values = msgspec.convert(drone.model_dump(mode="json"), FieldDrone)
+            order = VehicleOrder(name, index, values, SafetyValues(), 0.0, False, drone.sections)
+            teams.setdefault(drone.kind, []).append(order)
+    for kind, team in teams.items():
+        for name, (below, text) in kind_named(kind).check(team):
+            yield ("drones", name, *below), text
+
+
+def _misplaced(name: str, drone: Drone) -> Iterator[tuple[KeyPath, str]]:
+    others = {key for kind in all_kinds().values() if kind.name != drone.kind for key in kind.sections}
+    if not kind_named(drone.kind).has_serial_number:
+        others.add("serial_number")
+    for key in sorted(others):
+        if getattr(drone, key, None):
+            yield ("drones", name, key), f"has no meaning for {drone.kind}"

@@ -1,0 +1,25 @@
+"""Kinds of vehicles: what one is made of (`kind`), and which there are (`registry`)."""
+
+from groundstation.vehicles.kind import (
+    DriverProcess,
+    ErrorHabits,
+    Finding,
+    KindSection,
+    StopDatagrams,
+    VehicleKind,
+    VehicleOrder,
+)
+from groundstation.vehicles.registry import all_kinds, kind_named, refused_kinds
+
+__all__ = [
+    "DriverProcess",
+    "ErrorHabits",
+    "Finding",
+    "KindSection",
+    "StopDatagrams",
+    "VehicleKind",
+    "VehicleOrder",
+    "all_kinds",
+    "kind_named",
+    "refused_kinds",
+]

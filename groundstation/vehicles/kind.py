@@ -1,0 +1,121 @@
+"""What a kind of vehicle is made of: one object says it to settings, supervisor, estimator and simulator.
+
+The object is light: drivers and emulators are named as "module:attribute" and loaded by the process that runs them.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from pydantic import BaseModel, ConfigDict
+
+from groundstation.field.behaviour import SafetyValues
+from groundstation.field.drones import FieldDrone
+
+# Path of keys below the drone in the field file, and what is wrong there.
+Finding = tuple[tuple[str | int, ...], str]
+
+
+class KindSection(BaseModel):
+    """Base of a kind's own section in the field file: frozen, strict, closed; text below a key is its description."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+_NONE: Mapping[str, KindSection] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorHabits:
+    """How long a kind's errors last [s], and the error of its climb rate [m/s; of its highest: share].
+
+    tells_attitude: its own attitude is better than what we could make of its IMU.
+    """
+
+    velocity_s: float
+    attitude_s: float
+    climb_s: float
+    climb_m_s: float
+    climb_share: float
+    reports_climb: bool
+    tells_attitude: bool
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleOrder:
+    """What a kind is told of one drone of a field.
+
+    index: its place among all drones; sections: those keys of the field file that only its kind has, None left out;
+    top_m: of the fence; raw_datagrams: whether they are recorded.
+    """
+
+    name: str
+    index: int
+    drone: FieldDrone
+    safety: SafetyValues
+    top_m: float
+    raw_datagrams: bool
+    sections: Mapping[str, KindSection] = field(default_factory=lambda: _NONE)
+
+
+@dataclass(frozen=True, slots=True)
+class DriverProcess:
+    """A driver process: the vehicles that it flies, the first of which it is named after, and its section as JSON."""
+
+    vehicles: tuple[str, ...]
+    section: str
+
+
+@dataclass(frozen=True, slots=True)
+class StopDatagrams:
+    """What stops and lands vehicles whose driver is dead, in their own protocol, and the port that it is sent to.
+
+    hover must never lift a vehicle that stands. voice, way, called: as in supervisor.process_spec.FailsafeDatagrams.
+    """
+
+    port: int
+    hover: bytes
+    land: bytes
+    voice: str = ""
+    way: str = ""
+    called: bool = False
+
+
+def _no_findings(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
+    return iter(())
+
+
+def _nothing_moves(local_address: str, sections: Mapping[str, KindSection]) -> dict[str, dict[str, object]]:
+    return {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleKind:
+    """One kind of vehicle.
+
+    name: the word for `kind` in the field file. summary: a line for people. driver: "module:function" of the driver
+    process. sections: keys of the field file that only this kind has; required: those that must be given.
+    processes: who shares a driver process, with its settings; stop: what vehicles of one process are sent when it is
+    dead. check: (drone, finding) for what is wrong between the sections of this kind. standing_m: height of the base
+    above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme of the
+    vehicle's own video, "" if it has none. has_serial_number: the driver knows the vehicle's own. moved: changes of
+    sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
+    sim_bridge.world.emulation.Emulation, "" if there is none.
+    """
+
+    name: str
+    summary: str
+    driver: str
+    habits: ErrorHabits
+    processes: Callable[[Sequence[VehicleOrder]], list[DriverProcess]]
+    stop: Callable[[Sequence[VehicleOrder]], StopDatagrams]
+    sections: Mapping[str, type[KindSection]] = field(default_factory=dict)
+    required: frozenset[str] = frozenset()
+    check: Callable[[Sequence[VehicleOrder]], Iterator[tuple[str, Finding]]] = _no_findings
+    standing_m: tuple[float, float] = (0.08, 0.04)
+    camera: str = ""
+    has_serial_number: bool = False
+    moved: Callable[[str, Mapping[str, KindSection]], dict[str, dict[str, object]]] = _nothing_moves
+    emulator: str = ""

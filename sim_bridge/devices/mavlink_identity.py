@@ -1,0 +1,28 @@
+"""Who an emulated MAVLink vehicle is."""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from groundstation.errors import SettingsError
+from sim_bridge.site import SiteDrone
+
+
+class MavlinkIdentity(BaseModel):
+    """Who a MAVLink vehicle is, and the port that it listens on or calls."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    flavour: Literal["px4", "ardupilot"]
+    system_id: int
+    port: int = 14550
+    listen: bool = False
+    local_address: str = "127.0.0.1"
+
+
+def identity_of(drone: SiteDrone) -> MavlinkIdentity:
+    """Return who a MAVLink vehicle is; raises SettingsError where nothing says so."""
+    section: dict[str, Any] = drone.section("mavlink")
+    if not section:
+        raise SettingsError([f"kind: {drone.kind} has no mavlink section"])
+    return MavlinkIdentity.model_validate(section)

@@ -1,0 +1,98 @@
+"""What a kind of vehicle brings to the simulator: how it moves, and how it speaks at the wire."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from groundstation.errors import SettingsError
+from groundstation.vehicles import kind_named
+from groundstation.vehicles.registry import load
+from sim_bridge.launch_spec import LaunchSpec
+from sim_bridge.scenario import Scenario
+from sim_bridge.site import SiteDrone
+from sim_bridge.world.ardrone_airframe import Airframe
+
+Vector3 = tuple[float, float, float]
+
+
+class Motors(Protocol):
+    """What turns the propellers."""
+
+    @property
+    def motors_on(self) -> bool:
+        """Whether they turn."""
+
+
+class Body(Protocol):
+    """A vehicle of the room. battery: share of the full charge; wind: push of the air by a fault [m/s^2; world].
+
+    One that has a method `sense` is told after each step, when walls have had their say, to take its readings.
+    """
+
+    airframe: Airframe
+    battery: float
+    wind: tuple[float, float]
+
+    @property
+    def autopilot(self) -> Motors:
+        """Return what turns its propellers."""
+
+    @property
+    def airborne(self) -> bool:
+        """Whether it has no contact with the floor."""
+
+    def step(self, wake: Vector3) -> None:
+        """Advance by one tick under the wake of the others [m/s^2; world]."""
+
+    def wake_on(self, other: Airframe) -> Vector3 | None:
+        """Return how its downwash accelerates another one below it, None when out of its reach."""
+
+
+class Emulator(Protocol):
+    """A vehicle at its sockets: `receive`, a step of the world, then `send`, once per tick of 5 ms.
+
+    silent: sends nothing; deaf: obeys nothing (faults).
+    """
+
+    silent: bool
+    deaf: bool
+
+    def fileno(self) -> int:
+        """Return the descriptor that becomes readable when something arrives."""
+
+    def receive(self) -> None:
+        """Take all that waits, without waiting for any."""
+
+    def send(self) -> None:
+        """End a tick: send what is due."""
+
+    def close(self) -> None:
+        """Close the ports."""
+
+
+class Emulation(Protocol):
+    """How one kind of vehicle is emulated; `groundstation.vehicles.VehicleKind.emulator` names it."""
+
+    def body(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> Body:
+        """Return a vehicle that stands on its pad."""
+
+    def open(self, name: str, body: Any, onboard: Any, order: LaunchSpec) -> Emulator:
+        """Return the listening emulator of a body that `body` made; raises GroundStationError for a taken port.
+
+        onboard: its sensors, where the world keeps them, else None.
+        """
+
+
+def emulation_of(kind: str) -> Emulation:
+    """Return how a kind of vehicle is emulated; raises SettingsError naming a kind that nobody emulates."""
+    reference = kind_named(kind).emulator
+    if not reference:
+        raise SettingsError([f"kind: {kind} has no emulator: it cannot be simulated"])
+    emulation: Emulation = load(reference)
+    return emulation
+
+
+def senses_of(body: Body) -> Callable[[], None] | None:
+    """Return how a body takes its readings, None for one whose sensors the world keeps."""
+    return getattr(body, "sense", None)

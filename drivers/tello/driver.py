@@ -1,0 +1,246 @@
+"""The Tello driver: reader thread, what a decision means to the vehicle, and the process entry `run`."""
+
+import math
+import select
+import socket
+import threading
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass
+
+from pydantic import ValidationError
+
+from drivers.base import HostProcess, LinkHealth
+from drivers.datagrams import DatagramLog
+from drivers.host import VehicleHost, run_hosts
+from drivers.plausibility.health import Health, Sensor
+from drivers.plausibility.limits import PlausibilityLimits
+from drivers.plausibility.motion import MotionMonitor, MotionSample
+from drivers.tello.settings import TelloDriverSettings
+from drivers.tello.wire.text import (
+    COMMAND_PORT,
+    EMERGENCY,
+    LAND,
+    OK,
+    SDK,
+    STATE_PORT,
+    TAKE_OFF,
+    State,
+    WireError,
+    parse_state,
+    rc,
+)  # fmt: skip
+from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import FlightState, Odometry, Vector3
+from groundstation.bus.topics import ODOMETRY
+from groundstation.errors import DriverError, SettingsError
+from groundstation.process.priority import go_first
+
+RATE_HZ = 20.0
+_FRESH_NS = 300_000_000
+# The motors' time is told in whole seconds.
+_MOTORS_NS = 1_300_000_000
+_AIRBORNE_CM = 20
+_STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
+# Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
+_PAUSE_NS = {SDK: 1_000_000_000, TAKE_OFF: 4_000_000_000, LAND: 500_000_000, EMERGENCY: 100_000_000}
+# Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
+LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """The newest word of the vehicle; times 0: never. motors_ns: when the motors' time last rose."""
+
+    heard_ns: int = 0
+    motors_ns: int = 0
+    state: State | None = None
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+
+    def airborne(self, now_ns: int) -> bool:
+        """Return whether it flies, by its distance from the floor and its motors."""
+        high = self.state is not None and max(self.state.tof, self.state.height) >= _AIRBORNE_CM
+        return high or (self.motors_ns > 0 and now_ns - self.motors_ns < _MOTORS_NS)
+
+
+def velocity_from_state(state: State) -> Vector3:
+    """Return the velocity [m/s; base_stabilized, FLU]."""
+    north, east, down = (0.1 * speed for speed in state.velocity)
+    c, s = math.cos(math.radians(state.yaw)), math.sin(math.radians(state.yaw))
+    return c * north + s * east, s * north - c * east, -down
+
+
+class Tello:
+    """One Tello behind its two ports; `drivers.base.Vehicle`."""
+
+    def __init__(self, settings: TelloDriverSettings, bus: Bus) -> None:
+        self.name, self.address = settings.name, settings.address
+        self.heard = Heard()
+        self._settings, self._bus = settings, bus
+        self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
+        self._commands = self._open(0)
+        self._states = self._open(STATE_PORT)
+        self._ready = False
+        self._asked = Action.WAIT
+        self._sent_ns: dict[bytes, int] = {}
+        self._rejected: Counter[str] = Counter()
+        self._rate_hz = 0.0
+        self._plausibility = MotionMonitor(LIMITS)
+        self._closing = threading.Event()
+        self._reader = threading.Thread(target=self._read, name="tello", daemon=True)
+        self._reader.start()
+
+    def _open(self, port: int) -> socket.socket:
+        # Connected, so that only this vehicle is heard: several share the state's port, and each socket gets its own.
+        udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            if port:
+                udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            udp.bind((self._settings.local_address, port))
+            udp.connect((self.address, COMMAND_PORT))
+        except OSError as error:
+            udp.close()
+            raise DriverError(f"{self.name}: UDP {self._settings.local_address}:{port}: {error.strerror}") from error
+        udp.setblocking(False)
+        return udp
+
+    # -- reader thread ------------------------------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        while not self._closing.is_set():
+            readable, _, _ = select.select([self._commands, self._states], [], [], 0.1)
+            for udp in readable:
+                with suppress(OSError):  # nobody listens there yet
+                    data = udp.recv(2048)
+                    self._log.received(clock.now_ns(), data)
+                    self._take(clock.now_ns(), data, udp is self._states)
+
+    def _take(self, now_ns: int, data: bytes, is_state: bool) -> None:
+        if not is_state:
+            self._ready = self._ready or data.strip().lower() == OK
+            return
+        try:
+            state = parse_state(data)
+        except WireError as error:
+            self._rejected[error.reason] += 1
+            return
+        before, velocity = self.heard, velocity_from_state(state)
+        ran = before.state is not None and state.time > before.state.time
+        if before.heard_ns:
+            self._rate_hz += 0.1 * (1e9 / max(1, now_ns - before.heard_ns) - self._rate_hz)
+        self.heard = Heard(now_ns, now_ns if ran else before.motors_ns, state, velocity)
+        self._publish(now_ns, state, velocity)
+
+    def _publish(self, now_ns: int, state: State, velocity: Vector3) -> None:
+        roll, pitch, yaw = math.radians(state.roll), -math.radians(state.pitch), -math.radians(state.yaw)
+        sample = MotionSample(now_ns, velocity[:2], roll, pitch, state.acceleration)
+        report = self._plausibility.update(sample, self._flight_state(now_ns))
+        if report.of(Sensor.TELEMETRY, Sensor.VELOCITY) is Health.BAD:
+            return
+        variance = self._settings.velocity_std_m_s**2 + _STEP_STD_M_S**2
+        message = Odometry(
+            header=self._bus.header(self.name, now_ns),
+            velocity_m_s=velocity,
+            velocity_covariance=(variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance),
+            yaw_rad=yaw,
+            roll_rad=roll,
+            pitch_rad=pitch,
+        )
+        self._bus.publish(ODOMETRY, message)
+
+    # -- sender loop --------------------------------------------------------------------------------------------------
+
+    def _flight_state(self, now_ns: int) -> FlightState:
+        if self.heard.state is None:
+            return FlightState.UNKNOWN
+        if not self.heard.airborne(now_ns):
+            return FlightState.LANDED
+        if self._asked is Action.LAND:
+            return FlightState.LANDING
+        rising = self._asked is Action.TAKE_OFF and self.heard.state.height < 2 * _AIRBORNE_CM
+        return FlightState.TAKING_OFF if rising else FlightState.FLYING
+
+    def view(self, now_ns: int) -> VehicleView:
+        """Return what the vehicle last said."""
+        heard = self.heard
+        fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
+        battery = None if heard.state is None else heard.state.battery / 100
+        not_ready = "" if self._ready else "it has not answered `command`"
+        unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
+        scale, (x, y, z) = self._settings.velocity_scale, heard.velocity_m_s
+        state = self._flight_state(now_ns)
+        return VehicleView(state, fresh, battery, not_ready, self._ready, unsound, (scale * x, scale * y, z))
+
+    def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
+        """Send what the decision means to a Tello; sticks count only while it flies."""
+        self._asked = decision.action
+        flies = self.heard.airborne(now_ns)
+        match decision.action:
+            case Action.CUT:
+                self._repeat(now_ns, EMERGENCY)
+            case Action.LAND if flies:
+                self._repeat(now_ns, LAND)
+            case Action.TAKE_OFF if not flies:
+                self._repeat(now_ns, TAKE_OFF if self._ready else SDK)
+            case Action.FLY if flies:
+                self._send(now_ns, self._sticks(decision))
+            case Action.HOVER | Action.TAKE_OFF if flies:
+                self._send(now_ns, rc(0, 0, 0, 0))
+            case _:
+                self._repeat(now_ns, SDK)
+        if not self._ready:
+            self._repeat(now_ns, SDK)
+
+    def _sticks(self, decision: WatchdogDecision) -> bytes:
+        own, (forward, left, up) = self._settings, decision.velocity_m_s
+        turn = math.degrees(decision.yaw_rate_rad_s)
+        share = (
+            -left / own.full_speed_m_s, forward / own.full_speed_m_s, up / own.full_climb_m_s,
+            -turn / own.full_yaw_rate_deg_s,
+        )  # fmt: skip
+        right, ahead, rise, clockwise = (round(100 * one) for one in share)
+        return rc(right, ahead, rise, clockwise)
+
+    def _repeat(self, now_ns: int, word: bytes) -> None:
+        if now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]:
+            self._sent_ns[word] = now_ns
+            self._send(now_ns, word)
+
+    def _send(self, now_ns: int, data: bytes) -> None:
+        with suppress(OSError):  # a full buffer or an absent vehicle loses packets, as radio does
+            self._commands.send(data)
+            self._log.sent(now_ns, data)
+
+    def health(self, now_ns: int) -> LinkHealth:
+        """Return rate and refusals of the link."""
+        silent = now_ns - self.heard.heard_ns > _FRESH_NS
+        return LinkHealth(None, 0.0 if silent else self._rate_hz, dict(self._rejected))
+
+    def flush(self) -> None:
+        """Publish the raw datagrams that wait."""
+        self._log.flush()
+
+    def close(self) -> None:
+        """Stop the reader and close the sockets."""
+        self._closing.set()
+        self._reader.join(timeout=1.0)
+        self._commands.close()
+        self._states.close()
+        self._log.flush()
+
+
+def run(child: HostProcess) -> int:
+    """Fly one Tello until a stop is requested; the process entry."""
+    try:
+        settings = TelloDriverSettings.model_validate_json(child.section)
+    except ValidationError as error:
+        raise SettingsError([str(error)]) from error
+    tello = Tello(settings, child.bus)
+    try:
+        go_first()
+        authority = settings.safety.authority(settings.limits, settings.pad_m)
+        return run_hosts(child, [VehicleHost(child, tello, authority)], RATE_HZ)
+    finally:
+        tello.close()

@@ -1,0 +1,1 @@
+"""The Tello's text protocol: bytes in, values out."""

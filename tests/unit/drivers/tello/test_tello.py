@@ -1,0 +1,154 @@
+"""The Tello at the wire: text, signs and units by flying its emulator, what is no state."""
+
+import json
+import math
+import random
+import socket
+import time
+
+import pytest
+
+from drivers.tello.driver import Heard, velocity_from_state
+from drivers.tello.wire.text import COMMAND_PORT, STATE_PORT, State, WireError, parse_rc, parse_state, rc, state_text
+from groundstation.vehicles import kind_named
+from sim_bridge.devices.tello import TelloBody, TelloEmulator
+from sim_bridge.scenario import Scenario, parse_scenario
+from sim_bridge.site import SiteDrone
+from sim_bridge.world.noise import generator_of
+
+STATE = State(-3, 2, -120, (5, -4, 1), 71, 50, 82, 14, (17.0, -4.0, -956.0))
+ADDRESS = "127.64.77.11"
+DRONE = SiteDrone.model_validate(
+    {"kind": "tello", "pad_m": (0.0, 0.0), "pad_yaw_deg": 30.0, "marker": {"code": 1, "position_m": (0.0, 0.0, 0.08)}}
+)
+
+
+class Rig:
+    """The emulator with a partner, in a world without others and without a clock."""
+
+    def __init__(self) -> None:
+        scenario: Scenario = parse_scenario(json.dumps({"mavlink": {"air_unrest_m_s2": 0.0}}))
+        self.body = TelloBody(DRONE, scenario, 0.005, generator_of(1, "tello"))
+        self.vehicle = TelloEmulator("tello", ADDRESS, self.body)
+        self.partner = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.partner.bind(("127.64.77.1", 0))
+        self.states = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.states.bind(("127.64.77.1", STATE_PORT))
+        for udp in (self.partner, self.states):
+            udp.settimeout(1.0)
+
+    def say(self, words: bytes, seconds: float = 0.0) -> None:
+        self.partner.sendto(words, (ADDRESS, COMMAND_PORT))
+        time.sleep(0.001)
+        self.vehicle.receive()
+        self.turn(seconds)
+
+    def turn(self, seconds: float) -> None:
+        for _ in range(round(seconds / 0.005)):
+            self.body.step((0.0, 0.0, 0.0))
+            self.body.sense()
+            self.vehicle.send()
+
+    def state(self) -> State:
+        self.states.setblocking(False)
+        last = b""
+        while True:
+            try:
+                last = self.states.recv(2048)
+            except BlockingIOError:
+                return parse_state(last)
+
+    def close(self) -> None:
+        self.vehicle.close()
+        self.partner.close()
+        self.states.close()
+
+
+@pytest.fixture
+def rig():
+    rig = Rig()
+    yield rig
+    rig.close()
+
+
+def test_a_state_survives_its_text():
+    assert parse_state(state_text(STATE)) == STATE
+
+
+def test_sticks_survive_their_text_and_are_cut():
+    assert parse_rc(rc(-100, 7, 0, 100)) == (-100, 7, 0, 100)
+    assert rc(-250, 0, 101, 3) == b"rc -100 0 100 3"
+    assert parse_rc(b"rc 1 2 3") is None and parse_rc(b"rc a 0 0 0") is None and parse_rc(b"rc 0 0 0 101") is None
+
+
+def test_mutated_states_are_refused_or_sane():
+    draw, refused = random.Random(4), 0
+    for _ in range(3000):
+        data = bytearray(state_text(STATE))
+        for _ in range(draw.randint(1, 6)):
+            data[draw.randrange(len(data))] = draw.randrange(256)
+        try:
+            state = parse_state(bytes(data))
+        except WireError:
+            refused += 1
+            continue
+        assert abs(state.yaw) <= 180 and 0 <= state.battery <= 100 and all(map(math.isfinite, state.acceleration))
+    assert 500 < refused < 3000
+
+
+def test_it_flies_only_after_it_was_greeted(rig):
+    rig.say(b"takeoff", 1.0)
+    assert not rig.body.motors_on
+    assert rig.partner.recv(64).startswith(b"unknown command")
+
+
+@pytest.mark.parametrize(
+    ("sticks", "velocity", "turn"),
+    [((0, 40, 0, 0), (0.4, 0, 0), 0), ((40, 0, 0, 0), (0, -0.4, 0), 0), ((0, 0, 30, 0), (0, 0, 0.3), 0),
+     ((0, 0, 0, 30), (0, 0, 0), -0.52), ((-20, -30, 0, -30), (-0.3, 0.2, 0), 0.52)],
+)  # fmt: skip
+def test_signs_and_units_of_sticks_and_state_agree(rig, sticks, velocity, turn):
+    rig.say(b"command")
+    rig.say(b"takeoff", 4.0)
+    before = rig.state()
+    rig.say(rc(*sticks), 2.0)
+    after = rig.state()
+    assert velocity_from_state(after) == pytest.approx(velocity, abs=0.16)
+    turned = -math.radians(math.remainder(after.yaw - before.yaw, 360.0))
+    assert turned == pytest.approx(2.0 * turn, abs=0.15)
+    assert rig.body.airframe.velocity_stabilized() == pytest.approx(velocity[:2], abs=0.16)
+
+
+def test_it_lands_after_fifteen_silent_seconds(rig):
+    rig.say(b"command")
+    rig.say(b"takeoff", 4.0)
+    rig.turn(10.0)
+    assert rig.body.airborne
+    rig.turn(6.0)
+    assert not rig.body.airborne and not rig.body.motors_on
+
+
+def test_emergency_stops_the_motors_and_hover_does_not_start_them(rig):
+    stop = kind_named("tello").stop([])
+    rig.say(b"command")
+    rig.say(stop.hover, 1.0)
+    assert not rig.body.motors_on
+    rig.say(b"takeoff", 4.0)
+    rig.say(stop.hover, 1.0)
+    assert rig.body.airborne
+    rig.say(b"emergency")
+    assert not rig.body.motors_on
+
+
+def test_the_fail_safe_lands_one_that_flies_away(rig):
+    rig.say(b"command")
+    rig.say(b"takeoff", 4.0)
+    rig.say(rc(0, 50, 0, 0), 1.0)
+    rig.say(kind_named("tello").stop([]).land, 4.0)
+    assert not rig.body.motors_on
+
+
+def test_a_vehicle_whose_motors_run_on_the_floor_counts_as_airborne():
+    low = State(0, 0, 0, (0, 0, 0), 10, 0, 80, 3, (0.0, 0.0, -1000.0))
+    assert Heard(1, 1_000_000_000, low).airborne(2_000_000_000)
+    assert not Heard(1, 1_000_000_000, low).airborne(3_000_000_000)

@@ -128,8 +128,8 @@ class Planner:
         """Return the best of the current topology and its neighbours; raises EstimatorFault for a broken belief.
 
         current: over the robots to plan for (those missing in the belief are ignored). `should_stop` is asked after
-        every few evaluations, some 0.3 ms. A plan that was stopped is repeated exactly by giving its number of
-        evaluations as `max_evaluations`.
+        every few evaluations, some 0.3 ms for ten robots. A plan that was stopped is repeated exactly by giving its
+        number of evaluations as `max_evaluations`.
         """
         current = current.reconciled(current.robots & frozenset(belief.layout.robots))
         scene = scene_from_belief(belief, current.robots)
@@ -165,6 +165,8 @@ class Planner:
             if search.must_stop():
                 return
             problem = self._builder.build(scene, topology)
+            if search.must_stop():
+                return
             if self.parameters.mode == "paper":
                 ranked += [] if topology == first else [_Ranked(0.0, problem, np.zeros_like(best))]
                 continue

@@ -36,6 +36,22 @@ def test_old_states_are_forgotten(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     assert left == [*(f"numba-{number:02d}" for number in range(8, 20)), "other"]
 
 
+def test_a_cache_of_more_begins_with_what_flies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    flying = numba_cache.activate()
+    (flying / "kernels").mkdir(parents=True)
+    (flying / "kernels" / "a.nbi").write_bytes(b"compiled")
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    everything = numba_cache.activate(numba_cache.EVERYTHING)
+    assert everything != flying
+    assert (everything / "kernels" / "a.nbi").read_bytes() == b"compiled"
+    (everything / "kernels" / "a.nbi").write_bytes(b"newer")
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    numba_cache.activate(numba_cache.EVERYTHING)
+    assert (everything / "kernels" / "a.nbi").read_bytes() == b"newer", "begun once"
+
+
 def test_a_cache_counts_as_complete_only_when_all_was_compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     folder = tmp_path / "numba-1"
     (folder / "another_checkouts_kernels").mkdir(parents=True)

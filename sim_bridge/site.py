@@ -97,7 +97,8 @@ class SiteDrone(_Part):
 
     def section(self, key: str) -> dict[str, Any]:
         """Return the section that only its kind has; empty where it is not given."""
-        return (self.model_extra or {}).get(key) or {}
+        extra = self.model_extra or {}
+        return extra.get(key) or extra.get("sections", {}).get(key) or {}
 
 
 class SiteCamera(_Part):

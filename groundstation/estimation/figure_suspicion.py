@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.arrays import Vector
+from groundstation.arrays import Matrix, Vector
+from groundstation.errors import EstimatorFault
+from groundstation.estimation.linear import cholesky
 from groundstation.estimation.sight_loops import Gap, Key
 
 # How well each figure is known (one sigma), and how wrong a suspect may be: shares, [rad], [s].
@@ -86,6 +88,8 @@ class FigureSuspicion:
                 gap = np.median([one.gap_m for one in gaps], axis=0)
                 slope = np.mean([one.by_figure for one in gaps], axis=0)
                 far = float(np.mean([one.far_m for one in gaps]))
+                if not (np.isfinite(gap).all() and np.isfinite(slope).all()):
+                    continue
                 variance = _LASTS * (_BIAS_M**2 + (_LEAN_RAD * far) ** 2)
                 self._information += slope.T @ slope / variance
                 self._pull -= slope.T @ gap / variance
@@ -126,7 +130,19 @@ class FigureSuspicion:
         sigma = self._surveyed.copy()
         for place in places:
             sigma[place] = _WRONG[self._keys[place][1]]
-        posterior = np.linalg.inv(self._information + np.diag(1.0 / sigma**2))
+        posterior, spread = _covariance(self._information + np.diag(1.0 / sigma**2))
         sizes = posterior @ self._pull
-        spread = float(np.linalg.slogdet(posterior)[1]) - 2.0 * float(np.sum(np.log(sigma)))
+        spread -= 2.0 * float(np.sum(np.log(sigma)))
         return 0.5 * (float(self._pull @ sizes) + spread), sizes, np.sqrt(np.diag(posterior))
+
+
+def _covariance(information: Matrix) -> tuple[Matrix, float]:
+    """Return the covariance of an information matrix, and the logarithm of its determinant, by Cholesky's factor."""
+    factor, size = information.copy(), len(information)
+    if not cholesky(factor, size):
+        raise EstimatorFault("the information of the figures is not positive definite")
+    inverse = np.zeros_like(information)
+    for row in range(size):
+        inverse[row, row] = 1.0
+        inverse[row] = (inverse[row] - factor[row, :row] @ inverse[:row]) / factor[row, row]
+    return inverse.T @ inverse, -2.0 * float(np.sum(np.log(np.diag(factor))))

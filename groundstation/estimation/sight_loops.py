@@ -124,7 +124,7 @@ class SightLoops:
         place = seen(np.zeros(len(self.keys)))
         if place is None:
             return None
-        return _Point(at_s, place, self._slopes(seen, place, camera, o), float(np.linalg.norm(o.position_m)))
+        return _Point(at_s, place, self._slopes(seen, place, camera, o), math.hypot(*o.position_m))
 
     def _to_drone(self, camera: str, o: RelativeObservation, point: _Point) -> Iterator[Gap]:
         def marker(theta: Vector) -> Vector | None:

@@ -1,6 +1,7 @@
 """A drone: limits, marker, camera, errors of its own sensors, link."""
 
 import math
+from typing import Any
 
 import msgspec
 
@@ -52,10 +53,10 @@ class OdometryErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         return math.radians(self.attitude_std_deg)
 
 
-class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
+class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One drone of the team; pad_m, pad_yaw_deg: where it takes off [world].
 
-    Sections that only its kind has are for its driver and are left out.
+    sections: those that only its kind has, by key, as they are written; its driver and its emulator read them.
     """
 
     kind: str
@@ -68,8 +69,26 @@ class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
     odometry: OdometryErrors = OdometryErrors()
     pad_m: Vector2
     pad_yaw_deg: float = 0.0
+    sections: dict[str, Any] = {}
 
     @property
     def pad_yaw_rad(self) -> float:
         """Return the heading on the pad [rad; world]."""
         return math.radians(self.pad_yaw_deg)
+
+
+_COMMON = frozenset(FieldDrone.__struct_fields__)
+
+
+def drone_from_values(values: Any) -> FieldDrone:
+    """Return a drone from decoded JSON; raises msgspec.ValidationError that names the key at fault."""
+    return msgspec.convert(gathered(values), FieldDrone)
+
+
+def gathered(values: Any) -> Any:
+    """Return a drone's values with the sections that only its kind has under one key."""
+    if not isinstance(values, dict):
+        return values
+    common = {key: value for key, value in values.items() if key in _COMMON}
+    own = {key: value for key, value in values.items() if key not in _COMMON}
+    return {**common, "sections": {**own, **common.get("sections", {})}}

@@ -1,7 +1,7 @@
 """The resolved field: room, team, targets and behaviour."""
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -13,7 +13,7 @@ from groundstation.field.behaviour import (
     RecordingValues,
     SafetyValues,
 )
-from groundstation.field.drones import FieldDrone, camera_name
+from groundstation.field.drones import FieldDrone, camera_name, gathered
 from groundstation.field.room import LensCalibration, Room, WorldCamera
 from groundstation.field.targets import SingleTarget, Target, WeightedTarget
 
@@ -52,4 +52,12 @@ def field_from_json(content: bytes) -> ResolvedField:
 
     Raises msgspec.DecodeError that names the key at fault.
     """
-    return msgspec.json.decode(content, type=ResolvedField)
+    return field_from_values(msgspec.json.decode(content))
+
+
+def field_from_values(content: Any) -> ResolvedField:
+    """Return a resolved field from decoded JSON; raises msgspec.ValidationError that names the key at fault."""
+    drones = content.get("drones") if isinstance(content, dict) else None
+    if isinstance(drones, dict):
+        content = {**content, "drones": {name: gathered(drone) for name, drone in drones.items()}}
+    return msgspec.convert(content, ResolvedField)

@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 
-import msgspec
-
 from groundstation.field.behaviour import SafetyValues
-from groundstation.field.drones import FieldDrone
+from groundstation.field.drones import drone_from_values
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
 from groundstation.vehicles import VehicleOrder, all_kinds, kind_named
@@ -20,7 +18,7 @@ def findings_of_kinds(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, st
         for key in missing:
             yield ("drones", name, key), f"must be given for kind: {drone.kind}"
         if not missing:
-            values = msgspec.convert(drone.model_dump(mode="json"), FieldDrone)
+            values = drone_from_values(drone.model_dump(mode="json"))
             order = VehicleOrder(name, index, values, SafetyValues(), 0.0, False, drone.sections)
             teams.setdefault(drone.kind, []).append(order)
     for kind, team in teams.items():

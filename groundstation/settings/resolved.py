@@ -2,10 +2,8 @@
 
 import io
 
-import msgspec
-
 from groundstation.errors import without_password
-from groundstation.field.resolved import ResolvedField
+from groundstation.field.resolved import ResolvedField, field_from_values
 from groundstation.settings.drones import Drone
 from groundstation.settings.schema import Field
 from groundstation.settings.target import OneOfTargets, TrackedBody
@@ -16,7 +14,7 @@ STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > set-point > TAKEOFF"
 
 def resolved_field(field: Field) -> ResolvedField:
     """Return the field as the values that all other packages read, without passwords."""
-    return msgspec.convert(field.model_dump(mode="json"), ResolvedField)
+    return field_from_values(field.model_dump(mode="json"))
 
 
 def yaml_of(field: Field) -> str:

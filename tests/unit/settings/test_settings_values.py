@@ -60,8 +60,8 @@ def test_both_sides_have_the_same_keys_types_and_defaults() -> None:
     judged, read = set(facts(Field)), set(facts(ResolvedField))
     # What a target's base fills in may be left out of the file, and is always there for those who read it.
     differing = {line for line in judged ^ read if not re.search(rf"\.target(s\[1\]|\[0\])\.({_BY_BASE})\b", line)}
-    # What only one kind of vehicle has is read by its driver.
-    own = "|".join(OF_KINDS)
+    # What only one kind of vehicle has stands together, and is read by its driver and its emulator.
+    own = "|".join([*OF_KINDS, "sections"])
     differing = {line for line in differing if not re.match(rf"field\.drones\[1\]\.({own})\b", line)}
     assert not differing
     assert "field.drones[1].limits.max_speed_m_s: default 0.6" in read
@@ -72,10 +72,10 @@ def test_a_field_keeps_every_value(name: str) -> None:
     field = load_field(find_field(name))
     kept = field.model_dump(mode="json")
     for drone in kept["drones"].values():
-        for key in OF_KINDS:
-            drone.pop(key)
+        drone["sections"] = {key: drone.pop(key) for key in OF_KINDS}
     assert as_json(resolved_field(field)) == kept
     assert field_from_json(field.model_dump_json().encode()) == resolved_field(field)
+    assert field_from_json(msgspec.json.encode(resolved_field(field))) == resolved_field(field)
 
 
 def test_an_unknown_key_is_an_error() -> None:

@@ -53,10 +53,11 @@ class OdometryErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         return math.radians(self.attitude_std_deg)
 
 
-class FieldDrone(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
     """One drone of the team; pad_m, pad_yaw_deg: where it takes off [world].
 
-    sections: those that only its kind has, by key, as they are written; its driver and its emulator read them.
+    sections: those that only its kind has, by key, as they are written; its driver and its emulator read them. Where a
+    drone is decoded without `gathered`, as in the processes that do not need them, they are left out.
     """
 
     kind: str

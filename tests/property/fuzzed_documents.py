@@ -1,6 +1,7 @@
 """Damaged messages of the bus and of pages, and field files, and the decoders that read them."""
 
 import json
+from copy import deepcopy
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -133,7 +134,7 @@ def _damaged_tree(rng: Random) -> Any:
                 elif rng.random() < 0.1 and isinstance(inner, dict):
                     inner[rng.choice(("x", "", "drone_2", "tpye"))] = inner.pop(key)
                 else:
-                    inner[key] = rng.choice(_ODD)
+                    inner[key] = deepcopy(rng.choice(_ODD))  # what is damaged next must not change the choice itself
                 break
             inner = inner[key]
     return tree

@@ -19,10 +19,27 @@ def recorded_field(content: bytes, options: Sequence[str] = (), estimator: Path 
     estimator: a field file, or a file with an `estimator:` section alone; that section then replaces the recorded one,
     and what it leaves out has its default. Options come last. Keys that are younger than the recording have defaults.
     """
-    tree = parse(content.decode("utf-8", "replace"), _NAME)
+    tree = _with_kinds_sections(parse(content.decode("utf-8", "replace"), _NAME))
     if estimator is not None:
         tree = _with_section(tree, read(estimator), estimator)
     return field_of_tree(tree, options, Path(_NAME))
+
+
+def _with_kinds_sections(tree: Node) -> Node:
+    """Return the tree with the sections of each drone's kind beside its other keys; re-runs record them together."""
+    drones = tree.get("drones")
+    if not isinstance(tree.value, dict) or drones is None or not isinstance(drones.value, dict):
+        return tree
+    spread = replace(drones, value={name: _spread(drone) for name, drone in drones.value.items()})
+    return replace(tree, value={**tree.value, "drones": spread})
+
+
+def _spread(drone: Node) -> Node:
+    together = drone.get("sections") if isinstance(drone.value, dict) else None
+    if together is None or not isinstance(drone.value, dict) or not isinstance(together.value, dict):
+        return drone
+    common = {key: node for key, node in drone.value.items() if key != "sections"}
+    return replace(drone, value={**together.value, **common})
 
 
 def _with_section(tree: Node, other: Node, path: Path) -> Node:

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
+from groundstation.settings.recorded import recorded_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.vehicles import all_kinds
@@ -75,7 +76,9 @@ def test_a_field_keeps_every_value(name: str) -> None:
         drone["sections"] = {key: drone.pop(key) for key in OF_KINDS}
     assert as_json(resolved_field(field)) == kept
     assert field_from_json(field.model_dump_json().encode()) == resolved_field(field)
-    assert field_from_json(msgspec.json.encode(resolved_field(field))) == resolved_field(field)
+    written = msgspec.json.encode(resolved_field(field))  # as a re-run records it
+    assert field_from_json(written) == resolved_field(field)
+    assert resolved_field(recorded_field(written)) == resolved_field(field)
 
 
 def test_an_unknown_key_is_an_error() -> None:

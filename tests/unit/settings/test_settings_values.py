@@ -88,6 +88,13 @@ def test_an_unknown_key_is_an_error() -> None:
         field_from_json(msgspec.json.encode(dump))
 
 
+@pytest.mark.parametrize("drones", [None, [], {"drone_1": 5}])
+def test_drones_that_are_none_are_an_error(drones: Any) -> None:
+    dump = load_field(find_field("lab")).model_dump(mode="json") | {"drones": drones}
+    with pytest.raises(msgspec.ValidationError, match=r"at `\$\.drones"):
+        field_from_json(msgspec.json.encode(dump))
+
+
 def test_differences_are_found() -> None:
     class Judged(BaseModel):
         same: Annotated[tuple[float, ...], "of something"] = (1.0,)

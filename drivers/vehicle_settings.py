@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.field.behaviour import SafetyValues
+from groundstation.field.drones import DroneLimits
 
 _SAFETY = SafetyValues()
 
@@ -83,4 +84,15 @@ def silence_limits(safety: SafetyValues) -> SilenceLimits:
         land_after_s=safety.land_after_s,
         unseen_land_after_s=safety.unseen_land_after_s,
         min_separation_m=safety.min_separation_m,
+    )
+
+
+def vehicle_limits(limits: DroneLimits) -> VehicleLimits:
+    """Return what a field says that a drone of any kind is never asked to exceed."""
+    return VehicleLimits(
+        max_speed_m_s=limits.max_speed_m_s,
+        max_climb_m_s=limits.max_climb_m_s,
+        max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
+        battery_min=limits.battery_min,
+        battery_hold_s=limits.battery_hold_s,
     )

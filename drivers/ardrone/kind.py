@@ -13,7 +13,7 @@ from drivers.ardrone.settings import (
     Video,
 )
 from drivers.ardrone.wire import at
-from drivers.vehicle_settings import silence_limits
+from drivers.vehicle_settings import silence_limits, vehicle_limits
 from groundstation.vehicles import (
     DriverProcess,
     ErrorHabits,
@@ -44,19 +44,12 @@ def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
 
 
 def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
-    drone, limits = order.drone, order.drone.limits
+    drone = order.drone
     return ArDroneDriverSettings(
         name=order.name,
         address=drone.address,
         serial_number=drone.serial_number,
-        limits=ArDroneLimits(
-            max_speed_m_s=limits.max_speed_m_s,
-            max_climb_m_s=limits.max_climb_m_s,
-            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
-            max_tilt_deg=limits.max_tilt_deg,
-            battery_min=limits.battery_min,
-            battery_hold_s=limits.battery_hold_s,
-        ),
+        limits=ArDroneLimits(**vehicle_limits(drone.limits).model_dump(), max_tilt_deg=drone.limits.max_tilt_deg),
         odometry=VelocityScale(
             velocity_scale=drone.odometry.velocity_scale, velocity_std_m_s=drone.odometry.velocity_std_m_s
         ),

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
-from drivers.vehicle_settings import Address, VehicleLimits, silence_limits
+from drivers.vehicle_settings import Address, silence_limits, vehicle_limits
 from groundstation.errors import SettingsError
 from groundstation.vehicles import (
     DriverProcess,
@@ -97,7 +97,7 @@ def _target(order: VehicleOrder, mavlink: Mavlink) -> str:
 
 
 def _vehicle(order: VehicleOrder) -> VehicleSettings:
-    drone, mavlink, limits = order.drone, _own(order), order.drone.limits
+    drone, mavlink = order.drone, _own(order)
     return VehicleSettings(
         name=order.name,
         system_id=mavlink.system_id,
@@ -105,13 +105,7 @@ def _vehicle(order: VehicleOrder) -> VehicleSettings:
         serial_number=drone.serial_number,
         pad_m=drone.pad_m,
         pad_yaw_rad=drone.pad_yaw_rad,
-        limits=VehicleLimits(
-            max_speed_m_s=limits.max_speed_m_s,
-            max_climb_m_s=limits.max_climb_m_s,
-            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
-            battery_min=limits.battery_min,
-            battery_hold_s=limits.battery_hold_s,
-        ),
+        limits=vehicle_limits(drone.limits),
         take_off_m=mavlink.take_off_m,
         parameters=mavlink.parameters,
         forward=mavlink.forward,

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from drivers.tello.settings import TelloDriverSettings
 from drivers.tello.wire.text import COMMAND_PORT, LAND, rc
-from drivers.vehicle_settings import Address, VehicleLimits, silence_limits
+from drivers.vehicle_settings import Address, silence_limits, vehicle_limits
 from groundstation.vehicles import DriverProcess, ErrorHabits, KindSection, StopDatagrams, VehicleKind, VehicleOrder
 
 
@@ -29,19 +29,13 @@ def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
 
 
 def _settings(order: VehicleOrder) -> TelloDriverSettings:
-    given, drone, limits = order.sections.get("tello"), order.drone, order.drone.limits
+    given, drone = order.sections.get("tello"), order.drone
     own = given if isinstance(given, Tello) else Tello()
     return TelloDriverSettings(
         name=order.name,
         address=drone.address,
         pad_m=drone.pad_m,
-        limits=VehicleLimits(
-            max_speed_m_s=limits.max_speed_m_s,
-            max_climb_m_s=limits.max_climb_m_s,
-            max_yaw_rate_deg_s=limits.max_yaw_rate_deg_s,
-            battery_min=limits.battery_min,
-            battery_hold_s=limits.battery_hold_s,
-        ),
+        limits=vehicle_limits(drone.limits),
         safety=silence_limits(order.safety),
         velocity_scale=drone.odometry.velocity_scale,
         velocity_std_m_s=drone.odometry.velocity_std_m_s,

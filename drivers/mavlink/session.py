@@ -76,6 +76,7 @@ class MavlinkSession:
         self._next_version_ns = 0
         self._connected = False
         self._found: dict[str, float] = {}
+        self._comparison: tuple[list[str], list[str]] | None = None
         self._asked: set[str] = set()
         self._param_tries: Counter[str] = Counter()
         self._has_origin = False
@@ -85,14 +86,20 @@ class MavlinkSession:
     @property
     def problems(self) -> list[str]:
         """Return the faults of the parameters read so far."""
-        found = self._found
-        read = [n for n in self._needed if not found.keys().isdisjoint(n.names)]
-        return [text for n in read if (text := parameters.difference(n, found))]
+        return self._compared()[0]
 
     @property
     def unread(self) -> list[str]:
         """Return the parameters that were not read yet."""
-        return [n.name for n in self._needed if self._found.keys().isdisjoint(n.names)]
+        return self._compared()[1]
+
+    def _compared(self) -> tuple[list[str], list[str]]:
+        if self._comparison is None:  # asked at each turn, changed by a value only
+            found = self._found
+            read = [n for n in self._needed if not found.keys().isdisjoint(n.names)]
+            faults = [text for n in read if (text := parameters.difference(n, found))]
+            self._comparison = faults, [n.name for n in self._needed if found.keys().isdisjoint(n.names)]
+        return self._comparison
 
     @property
     def unchecked(self) -> list[str]:
@@ -129,7 +136,7 @@ class MavlinkSession:
         """Take a parameter's value; raises WireError."""
         if message.param_id in self._by_name:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
-            self._found[message.param_id] = value
+            self._found[message.param_id], self._comparison = value, None
 
     def hear_version(self, flight_sw_version: int, serial_number: str = "") -> None:
         """Take its number and the version of its firmware; a new one of which nothing is known is noted."""
@@ -154,6 +161,7 @@ class MavlinkSession:
             if self._connected:
                 self._connected, self._has_origin, self._origin_tries = False, False, 0
                 self._found.clear()
+                self._comparison = None
                 self._param_tries.clear()
                 self._version, self._version_tries, self._serial_number = None, 0, ""
                 requests.forget()

@@ -17,7 +17,7 @@ from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.frames import Message
 from drivers.mavlink.wire.telemetry import HighresImu
-from groundstation.bench.mavlink_vehicles import FIRST_SYSTEM
+from groundstation.bench.mavlink_vehicles import AHEAD_M_S, FIRST_SYSTEM
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -123,14 +123,14 @@ class _Tracker(threading.Thread):
             entities = tuple(
                 EntityEstimate(
                     name=name, kind="robot", mean=(0.0, 0.0, 1.0, 0.0), covariance=_STANDING,
-                    velocity_m_s=(0.0, 0.0, 0.0), converged=True, age_s=0.0,
+                    velocity_m_s=(AHEAD_M_S, 0.0, 0.0), converged=True, age_s=0.0,
                 )
                 for name in self._names
             )  # fmt: skip
             self._bus.publish(ESTIMATE, Estimate(header=self._bus.header("team"), entities=entities, epoch=1))
             for number, name in enumerate(self._names):
                 setpoint = VelocitySetpoint(
-                    header=self._bus.header(name), velocity_m_s=(0.1, 0.0, 0.0), yaw_rate_rad_s=0.0,
+                    header=self._bus.header(name), velocity_m_s=(AHEAD_M_S, 0.0, 0.0), yaw_rate_rad_s=0.0,
                     lifetime_ms=300, epoch=1,
                 )  # fmt: skip
                 self._link.told_ns[FIRST_SYSTEM + number] = clock.now_ns()
@@ -199,6 +199,8 @@ def _flown(
             break
         deadline_ns = max(deadline_ns + round(1e9 / RATE_HZ), now_ns)
         sleep_serving(host, hosts, deadline_ns)
+    if fallen := [h for h in hosts if h.watchdog.mode != stage]:
+        raise DriverError(f"a vehicle left {stage} while it was measured: {fallen[0].watchdog.reason}")
     elapsed_s, cpu_s = (clock.now_ns() - measured[0]) / 1e9, time.process_time() - measured[1]
     frames = link.frames - measured[2]
     return {

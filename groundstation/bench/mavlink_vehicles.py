@@ -1,9 +1,11 @@
 """Vehicles that only talk, for the bench: `python -m groundstation.bench.mavlink_vehicles PORT COUNT SECONDS`.
 
 Each says yes to everything and streams 50 LOCAL_POSITION_NED, 50 ATTITUDE_QUATERNION and 100 HIGHRES_IMU a second;
-the IMU's time is the host's monotonic clock at sending. No physics, so that the host's share is what is measured.
+the IMU's time is the host's monotonic clock at sending. Its physics is one trembling drift, so that the host's share is
+what is measured and no sensor counts as frozen.
 """
 
+import math
 import socket
 import sys
 import time
@@ -18,10 +20,13 @@ from drivers.mavlink.wire.parameters import carried_from_value
 FIRST_SYSTEM = 11
 _TICK_S = 0.01
 _HEALTHY = 0b1111
+_START_S, _CLIMB_S, _TREMOR = 1.0, 1.0, 0.01
+# As fast as the bench asks.
+AHEAD_M_S = 0.1
 
 
 class TalkingVehicle:
-    """A PX4 that stands still, whatever its commands."""
+    """A PX4 that rises by 1 m once it is armed, then flies ahead at AHEAD_M_S, whatever else it is told."""
 
     def __init__(self, system: int, port: int) -> None:
         self._encoder, self._decoder = FrameEncoder(system, 1), FrameDecoder()
@@ -40,15 +45,28 @@ class TalkingVehicle:
         """Send what a hundredth of a second brings."""
         self._answer()
         now_ns = time.monotonic_ns()
-        self._send(telemetry.HighresImu(now_ns // 1000, 0.0, 0.0, -9.8, 0.0, 0.0, 0.0))
+        self._send(telemetry.HighresImu(now_ns // 1000, _TREMOR * math.sin(tick), 0.0, -9.8, 0.0, 0.0, 0.0))
         if tick % 2:
-            self._send(telemetry.LocalPositionNed(now_ns // 1_000_000 % (1 << 32), 0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
-            self._send(telemetry.AttitudeQuaternion(0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            self._send(self._position(now_ns, tick))
+            half_rad = _TREMOR * math.sin(tick)
+            self._send(telemetry.AttitudeQuaternion(0, 1.0, half_rad, 0.0, 0.0, 0.0, 0.0, 0.0))
         if tick % 20 == 0:
-            aloft = self._armed_s and time.monotonic() - self._armed_s > 1.0
+            aloft = self._armed_s and time.monotonic() - self._armed_s > _START_S
             self._send(telemetry.ExtendedSysState(0, 2 if aloft else 1))
             self._send(telemetry.Heartbeat(2, Flavour.PX4, 129 if self._armed_s else 1, self._mode, 4))
             self._send(telemetry.SysStatus(_HEALTHY, _HEALTHY, _HEALTHY, battery_remaining=90))
+
+    def _position(self, now_ns: int, tick: int) -> telemetry.LocalPositionNed:
+        armed_s = time.monotonic() - self._armed_s if self._armed_s else 0.0
+        risen = min(max((armed_s - _START_S) / _CLIMB_S, 0.0), 1.0)
+        climb_m_s = 1.0 / _CLIMB_S if 0.0 < risen < 1.0 else 0.0
+        ahead_s = max(armed_s - _START_S - _CLIMB_S, 0.0)
+        north_m_s, east_m_s = _TREMOR * math.sin(tick), _TREMOR * math.cos(tick)
+        if ahead_s:
+            north_m_s += AHEAD_M_S
+        return telemetry.LocalPositionNed(
+            now_ns // 1_000_000 % (1 << 32), AHEAD_M_S * ahead_s, 0.0, -risen, north_m_s, east_m_s, -climb_m_s
+        )
 
     def _answer(self) -> None:
         for _ in range(64):

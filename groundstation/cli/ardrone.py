@@ -1,4 +1,4 @@
-"""`groundstation ardrone`: what an AR.Drone at an address is, without flying it."""
+"""`groundstation ardrone`: what an AR.Drone at an address is, and which network and owner it has, without flying it."""
 
 import ipaddress
 import json
@@ -10,10 +10,14 @@ from groundstation.cli.exits import ExitCode
 from groundstation.errors import DriverError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from drivers.ardrone.probe import ProbeReport
 
 
-@click.group(epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1")
+@click.group(
+    epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1\n  groundstation ardrone join 192.168.1.1 LAB"
+)
 def ardrone() -> None:
     """Meet AR.Drones."""
 
@@ -47,6 +51,65 @@ def probe(address: str, as_json: bool) -> int:
         return ExitCode.FAULT
     click.echo(json.dumps(_facts(report), indent=2) if as_json else _text(report))
     return ExitCode.OK
+
+
+@ardrone.command(
+    epilog="\b\nExamples:\n  groundstation ardrone join 192.168.1.1 LAB\n"
+    "  groundstation ardrone join 192.168.1.11 --access-point    (what it was when new)\n\n"
+    "Exit codes: 0 set, 1 it did not take a setting, 2 wrong arguments, 4 it does not answer, or flies."
+)
+@click.argument("address", callback=_address)
+@click.argument("network", default="")
+@click.option("--access-point", is_flag=True, help="Let it be an access point of its own again.")
+def join(address: str, network: str, access_point: bool) -> int:
+    """Let the drone at ADDRESS join the open network NETWORK each time it starts; it takes a free address."""
+    from drivers.ardrone.network_setup import membership
+
+    if access_point == bool(network):
+        raise click.UsageError("Name the network, or give --access-point.")
+    code = _write(address, lambda: membership(network))
+    if code == ExitCode.OK:
+        where = (
+            "192.168.1.1" if access_point else "the access point's list of clients shows its address; probe it there"
+        )
+        click.echo(f"switch it off and on again; then: {where}")
+    return code
+
+
+@ardrone.command(
+    epilog="\b\nExamples:\n  groundstation ardrone setup 192.168.1.11 --pair\n"
+    "  groundstation ardrone setup 192.168.1.11 --unpair\n\n"
+    "Exit codes: 0 set, 1 it did not take a setting, 2 wrong arguments, 4 it does not answer, or flies."
+)
+@click.argument("address", callback=_address)
+@click.option("--pair", is_flag=True, help="Obey this computer only.")
+@click.option("--owner", metavar="MAC", help="Obey the computer with this hardware address only.")
+@click.option("--unpair", is_flag=True, help="Obey anybody in its network, as when new.")
+def setup(address: str, pair: bool, owner: str | None, unpair: bool) -> int:
+    """Say whom the drone at ADDRESS obeys. That prevents mistakes, not attacks: such an address can be imitated."""
+    from drivers.ardrone.network_setup import UNPAIRED, own_hardware_address, pairing
+
+    if pair + unpair + (owner is not None) != 1:
+        raise click.UsageError("Give one of --pair, --owner and --unpair.")
+    return _write(address, lambda: pairing(UNPAIRED if unpair else owner or own_hardware_address(address)))
+
+
+def _write(address: str, settings: "Callable[[], dict[str, str]]") -> int:
+    from drivers.ardrone.network_setup import change
+
+    try:
+        wanted = settings()
+        found = change(address, wanted)
+    except DriverError as error:
+        click.echo(str(error), err=True)
+        return ExitCode.FAULT
+    refused = False
+    for key, (before, after) in found.items():
+        taken = after == wanted[key]
+        refused = refused or not taken
+        said = "as it was" if taken and before == after else f"was {before or 'empty'}" if taken else "NOT TAKEN"
+        click.echo(f"{key} {wanted[key]}: {said}")
+    return ExitCode.FAILED if refused else ExitCode.OK
 
 
 def _facts(report: "ProbeReport") -> dict[str, Any]:

@@ -44,7 +44,7 @@ class Orders:
         self._action = Action.WAIT
         self._since_ns = 0
         self._climb_until_ns = 0
-        self._fresh_start = False
+        self._rises_to_take_off = False
         self._due_ns = 0
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
@@ -103,7 +103,9 @@ class Orders:
 
     def _enter(self, now_ns: int, action: Action) -> None:
         self.drift.let_go()
-        self._fresh_start = action is Action.TAKE_OFF or (self._fresh_start and action is Action.HOVER)
+        # The first hover after a take-off goes on to the height that was asked for.
+        starts = action is Action.TAKE_OFF or (self._rises_to_take_off and action is Action.HOVER)
+        self._rises_to_take_off = starts
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
             self._requests.accepted.discard("take-off")  # once per start: a second one would begin its spool-up anew
@@ -156,7 +158,11 @@ class Orders:
         return self._send(now_ns, self.drift.hold(now_ns, height_m), 0.0)
 
     def _hover(self, now_ns: int, mode: DriverMode, guided: bool, climbed_m: float) -> SetPositionTargetLocalNed | None:
-        if mode is not DriverMode.HOVER or climbed_m >= _CLIMBED * self._vehicle.take_off_m:
+        if mode is not DriverMode.HOVER and self._rises_to_take_off:  # HOLD: not one step higher
+            self._rises_to_take_off = False
+            self._requests.drop("arming", "guided mode", "take-off")
+            self.drift.let_go()
+        if not self._rises_to_take_off or climbed_m >= _CLIMBED * self._vehicle.take_off_m:
             self._climb_until_ns = 0
         if now_ns < self._climb_until_ns:
             # It has left the ground; it goes on to its take-off height (ArduPilot does so by itself).
@@ -165,7 +171,7 @@ class Orders:
             return self._climb(now_ns, climbed_m)
         if not guided:
             return None
-        return self._stand(now_ns, self._vehicle.take_off_m if self._fresh_start else None)
+        return self._stand(now_ns, self._vehicle.take_off_m if self._rises_to_take_off else None)
 
     def _fly(self, now_ns: int, decision: WatchdogDecision, guided: bool) -> SetPositionTargetLocalNed | None:
         if not guided and now_ns < self._regain_until_ns:

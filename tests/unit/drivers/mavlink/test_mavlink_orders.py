@@ -1,0 +1,71 @@
+"""Orders to an autopilot: HOLD in a climb stops it where it is, a plain hover goes on to the height asked for."""
+
+import pytest
+
+from drivers.mavlink.commands import Orders
+from drivers.mavlink.requests import Requests
+from drivers.mavlink.settings import VehicleSettings
+from drivers.mavlink.wire.names import ARMED, Flavour, Landed, guided_mode
+from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
+from groundstation.bus.messages import EntityEstimate
+
+SURE = (1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4)
+TAKE_OFF_M = 0.8
+
+
+class Climb:
+    """A vehicle that follows its set-points at once; `seen`: the tracker knows where it is."""
+
+    def __init__(self, flavour, seen):
+        vehicle = VehicleSettings(name="v", system_id=1, flavour=flavour.name.lower(), take_off_m=TAKE_OFF_M)
+        self.flavour, self.seen = flavour, seen
+        self.orders = Orders(vehicle, flavour, Requests(1))
+        self.now_ns, self.height_m, self.climb_m_s = 10**9, 0.0, 0.0
+
+    def turn(self, mode, action):
+        self.now_ns += 50_000_000
+        if self.seen:
+            place = EntityEstimate(name="v", kind="robot", mean=(0.0, 0.0, self.height_m, 0.0), covariance=SURE,
+                                   velocity_m_s=(0.0, 0.0, self.climb_m_s), converged=True, age_s=0.0)  # fmt: skip
+            self.orders.drift.hear(self.now_ns, place, (0.0, 0.0, self.climb_m_s))
+        landed = Landed.IN_AIR if self.height_m > 0.02 else Landed.ON_GROUND
+        told = self.orders.step(
+            self.now_ns, WatchdogDecision(mode, action), ARMED, guided_mode(self.flavour), landed, self.height_m,
+            self.climb_m_s,
+        )  # fmt: skip
+        if told is not None:
+            self.climb_m_s = -told.vz
+        elif self.flavour is Flavour.ARDUPILOT and action is Action.TAKE_OFF:
+            self.climb_m_s = 0.4  # by its own take-off
+        self.height_m = max(0.0, self.height_m + 0.05 * self.climb_m_s)
+
+    def rise_to(self, height_m):
+        for _ in range(200):
+            if self.height_m >= height_m:
+                return
+            self.turn(DriverMode.TAKING_OFF, Action.TAKE_OFF)
+        raise AssertionError("it did not climb")
+
+
+@pytest.mark.parametrize("seen", [True, False])
+@pytest.mark.parametrize("flavour", [Flavour.PX4, Flavour.ARDUPILOT])
+def test_hold_in_a_climb_stops_it_where_it_is(flavour, seen):
+    climb = Climb(flavour, seen)
+    climb.rise_to(0.3)
+    for _ in range(60):
+        climb.turn(DriverMode.HOLD, Action.HOVER)
+    assert 0.2 <= climb.height_m <= 0.45
+    assert abs(climb.climb_m_s) < 0.02
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_hover_after_the_take_off_goes_on_to_its_height_and_a_later_hold_keeps_it(seen):
+    climb = Climb(Flavour.PX4, seen)
+    climb.rise_to(0.3)
+    for _ in range(100):
+        climb.turn(DriverMode.HOVER, Action.HOVER)
+    assert climb.height_m == pytest.approx(TAKE_OFF_M, abs=0.08)
+    reached_m = climb.height_m
+    for _ in range(40):
+        climb.turn(DriverMode.HOLD, Action.HOVER)
+    assert climb.height_m == pytest.approx(reached_m, abs=0.05)

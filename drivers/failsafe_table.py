@@ -119,6 +119,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.STOP_REQUESTED, land, "the driver was ordered to stop"),
         Failsafe(Condition.SUPERVISOR_DEAD, land, "the supervisor is dead", limits.brake_s),
         Failsafe(Condition.SUPERVISOR_SILENT, land, "the supervisor does not answer", noticed_s, patience, SLOWLY),
+        # Frozen and stuck sensors as well: drivers/plausibility says which, VehicleView.plausible makes them silence.
         Failsafe(Condition.TELEMETRY_SILENT, land, "{why}", noticed_s, patience, SLOWLY),
         Failsafe(Condition.STATE_UNKNOWN, land, "the vehicle does not say what it does", noticed_s, patience, SLOWLY),
         Failsafe(Condition.BATTERY_LOW, land, "battery below its limit", limits.battery_hold_s,

@@ -87,7 +87,7 @@ class VehicleHost:
         for received in self._leases.drain():
             if isinstance(received.message, Lease):
                 self._count("lease", self.watchdog.accept_lease(now_ns, received.message))
-        view = self._judge(now_ns, self.vehicle.view(now_ns).believed)
+        view = self._judge(now_ns, self.vehicle.view(now_ns).plausible)
         self.watchdog.see(view, self._upstream())
         for received in self._commands.drain():
             if isinstance(received.message, Command):

@@ -112,8 +112,8 @@ class VehicleView:
     lost_s: float = 0.0
 
     @property
-    def believed(self) -> "VehicleView":
-        """Return the view that may be acted upon: values that cannot be true are left out."""
+    def plausible(self) -> "VehicleView":
+        """Return the view that may be acted upon: a vehicle whose values cannot be true counts as silent."""
         return replace(self, fresh=False) if self.unsound and self.fresh else self
 
     @property

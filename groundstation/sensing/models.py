@@ -43,7 +43,10 @@ class Frustum:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviation of a relative position: hypot(base_m, per_m d, per_m2 d^2), isotropic; and of a heading."""
+    """Standard deviation of a relative position: hypot(base_m, per_m d, per_m2 d^2), isotropic; and of a heading.
+
+    What a plan counts on. A real sighting carries a covariance of its own (drivers/camera/pose.py).
+    """
 
     base_m: float = 0.02
     per_m: float = 0.0175

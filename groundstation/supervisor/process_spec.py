@@ -14,7 +14,10 @@ class Restart(StrEnum):
 
 
 class StopOrder(IntEnum):
-    """Shut-down goes through these in order; within one, processes stop together."""
+    """Shut-down goes through these in order; within one, processes stop together.
+
+    `start.py` starts those from CONNECTS on first, because all others speak through them.
+    """
 
     DECIDES = 0
     DRIVES = 1

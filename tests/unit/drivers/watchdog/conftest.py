@@ -54,7 +54,7 @@ class Bench:
     def view(self):
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = replace(view, unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near)
-        return replace(seen, speed_m_s=self.speed, stray=self.stray).believed
+        return replace(seen, speed_m_s=self.speed, stray=self.stray).plausible
 
     def see(self):
         """Let the watchdog know what the vehicle says, as its host does before it hands over orders."""

@@ -2,10 +2,11 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from groundstation.arrays import Array
+from groundstation.arrays import Array, IntArray
 from groundstation.estimation.layout import CORE_SIZE, EntityKind, StateLayout
 
 
@@ -41,9 +42,16 @@ class JointBelief:
 
         without: names of those that are left out too.
         """
-        blocks = [b for b in self.layout.blocks if b.kind is not EntityKind.CAMERA and b.name not in without]
-        kept = [block.start + i for block in blocks for i in range(CORE_SIZE)]
-        layout = StateLayout()
-        for block in blocks:
-            layout = layout.with_entity(block.name, block.kind, block.labels[:CORE_SIZE])
-        return JointBelief(self.mean[kept], self.covariance[np.ix_(kept, kept)], layout, self.stamp_ns)
+        layout, kept = _core_of(self.layout, frozenset(without))
+        return JointBelief(self.mean[kept[1][0]], self.covariance[kept], layout, self.stamp_ns)
+
+
+@lru_cache(maxsize=64)
+def _core_of(layout: StateLayout, without: frozenset[str]) -> tuple[StateLayout, tuple[IntArray, ...]]:
+    """Return the layout of the core, and its entries as indices of rows and columns."""
+    blocks = [b for b in layout.blocks if b.kind is not EntityKind.CAMERA and b.name not in without]
+    kept = [block.start + i for block in blocks for i in range(CORE_SIZE)]
+    core = StateLayout()
+    for block in blocks:
+        core = core.with_entity(block.name, block.kind, block.labels[:CORE_SIZE])
+    return core, np.ix_(kept, kept)

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from groundstation.bus.messages import Verdict
+from groundstation.arrays import IntArray
+from groundstation.bus.messages import Vector3, Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.correction import is_distribution
 from groundstation.estimation.event_log import EventLog, change_values, observation_values
@@ -50,6 +51,7 @@ class FixedLagFilter:
         self._last: int
         self._step_ns = round(parameters.step_s * NS_PER_S)
         self._lag_ns = round(parameters.max_lateness_s * NS_PER_S)
+        self._layouts: dict[bytes, tuple[StateLayout, tuple[IntArray, ...]]] = {}
         self._driven = {i: model for i, model in enumerate(self._models) if isinstance(model, DrivenModel)}
         self._delays = {
             i: (round(model.velocity_delay_s * NS_PER_S), round(model.height_delay_s * NS_PER_S))
@@ -162,15 +164,11 @@ class FixedLagFilter:
 
     def belief(self) -> JointBelief:
         """Return the belief over the entities that have joined."""
-        layout = StateLayout()
-        kept: list[int] = []
-        active = self._state.memory["active"]
-        for index, (name, model) in enumerate(zip(self.names, self._models, strict=True)):
-            if active[index] and model.labels:
-                layout = layout.with_entity(name, model.kind, model.labels)
-                part = self._tables.part(index)
-                kept.extend(range(part.start, part.stop))
-        return JointBelief(self._moments.mean[kept], self._moments.P[np.ix_(kept, kept)], layout, self._now_ns)
+        joined = self._state.memory["active"].tobytes()
+        if joined not in self._layouts:
+            self._layouts[joined] = self._layout()
+        layout, kept = self._layouts[joined]
+        return JointBelief(self._moments.mean[kept[1][0]], self._moments.P[kept], layout, self._now_ns)
 
     def age_s(self, name: str) -> float:
         """Return the time since an entity was last corrected by an observation; infinite if it has not joined."""
@@ -183,13 +181,26 @@ class FixedLagFilter:
 
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
         """Return a joined robot's velocity [m/s; world] from its last odometry and what is known of its errors."""
-        index = self._index[robot]
-        own = self._moments.mean[self._tables.part(index)]
-        return self._driven[index].velocity_m_s(own, self._state.memory[index])
+        if robot not in self._velocities:
+            index = self._index[robot]
+            own = self._moments.mean[self._tables.part(index)]
+            self._velocities[robot] = self._driven[index].velocity_m_s(own, self._state.memory[index])
+        return self._velocities[robot]
 
     def mode_probabilities(self) -> tuple[float, ...]:
         """Return how likely each combination of modes is; one number where no target switches."""
         return tuple(self._state.weights.tolist())
+
+    def _layout(self) -> tuple[StateLayout, tuple[IntArray, ...]]:
+        """Return the layout over the entities that have joined, and its entries as indices of rows and columns."""
+        layout, kept = StateLayout(), list[int]()
+        active = self._state.memory["active"]
+        for index, (name, model) in enumerate(zip(self.names, self._models, strict=True)):
+            if active[index] and model.labels:
+                layout = layout.with_entity(name, model.kind, model.labels)
+                part = self._tables.part(index)
+                kept.extend(range(part.start, part.stop))
+        return layout, np.ix_(kept, kept)
 
     def _build_state(self, admitted: Sequence[bool]) -> None:
         ring = self._behind + self._ahead
@@ -199,6 +210,7 @@ class FixedLagFilter:
         self._log = EventLog()
         self._fresh: dict[int, tuple[str, str, float]] = {}
         self._moments = Moments(self._state.means[0].copy(), self._state.covariances[0].copy())
+        self._velocities: dict[str, Vector3] = {}
         self._started = False
         self._origin_ns = self._now_ns = self._last = self._dirty = 0
 
@@ -249,6 +261,7 @@ class FixedLagFilter:
         inputs = Inputs(self._odometry.rows, log.events, order, log.outcomes)
         span = Span(first, last, self._seconds(now_ns))
         replay(self._event_kernels, self._tables, self._checkpoints, inputs, span, self._state, self._moments)
+        self._velocities.clear()
         self._now_ns, self._last, self._dirty = now_ns, last, last
         self._log.forget_before(self._origin_ns + (last - self._behind) * self._step_ns)
 

@@ -53,7 +53,7 @@ class Study:
         self.world = World(self.site, scenario, options.seed)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
         self.score = FlightScore(_SCORE_TICKS * TICK_NS / 1e9, field.estimator.gate_probability)
-        self.cpu_s: defaultdict[str, float] = defaultdict(float)
+        self.spent_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(options.seed, "study")
         self._scenario = scenario
         self._queue: list[tuple[int, int, str, Message]] = []
@@ -85,7 +85,7 @@ class Study:
 
     def run(self) -> dict[str, Any]:
         """Fly until the duration is over; returns the figures, with the CPU time of each part."""
-        started = time.process_time()
+        cpu, wall = time.process_time(), time.perf_counter()
         for drone in self.world.ardrones.values():
             drone.autopilot.take_off()
         ticks = round((_TAKE_OFF_S + self.options.duration_s) * 1e9) // TICK_NS
@@ -93,21 +93,24 @@ class Study:
             self.step()
         report = self.score.report()
         report["max_fence_violation_m"] = round(self.fence_violation_m, 3)
-        self.cpu_s["total"] = time.process_time() - started
-        report["cpu_s"] = {name: round(value, 2) for name, value in self.cpu_s.items()}
+        total_s = time.process_time() - cpu
+        # Of the parts the wall clock is read: asking for the CPU time so often took half of it.
+        share = total_s / (time.perf_counter() - wall)
+        report["cpu_s"] = {name: round(share * value, 2) for name, value in self.spent_s.items()}
+        report["cpu_s"]["total"] = round(total_s, 2)
         return {"seed": self.options.seed, "duration_s": self.options.duration_s, **report}
 
     def step(self) -> None:
         """Advance the world by one tick, and everything that is due."""
         world = self.world
-        mark = time.process_time()
+        mark = time.perf_counter()
         world.step()
         if self._links:
             estimates = self.tracker.estimates()
             for link in self._links.values():
                 link.step(world.time_s, estimates)
         self._sense()
-        self.cpu_s["world"] += time.process_time() - mark
+        self.spent_s["world"] += time.perf_counter() - mark
         tracking = world.time_s >= _TAKE_OFF_S
         if world.ticks % self._tick_every == 0:
             self._tick(tracking)
@@ -142,27 +145,27 @@ class Study:
 
     def _tick(self, tracking: bool) -> None:
         now_ns, tracker = self.now_ns, self.tracker
-        mark = time.process_time()
+        mark = time.perf_counter()
         while self._queue and self._queue[0][0] <= now_ns:
             _, _, key, message = heapq.heappop(self._queue)
             tracker.ingest(key, message, now_ns)
         tracker.advance(now_ns)
-        self.cpu_s["filter"] += time.process_time() - mark
+        self.spent_s["filter"] += time.perf_counter() - mark
         for correction in tracker.take_corrections():
             self.score.note(correction)
         tracker.take_notices()
         if not (tracking and self.options.plan):
             return
-        mark = time.process_time()
+        mark = time.perf_counter()
         if self.world.ticks % self._plan_every == 0:
             tracker.plan(now_ns)
-        self.cpu_s["planner"] += time.process_time() - mark
-        mark = time.process_time()
+        self.spent_s["planner"] += time.perf_counter() - mark
+        mark = time.perf_counter()
         for name, limited in tracker.setpoints(now_ns).items():
             setpoint = limited.setpoint
             pilot = self._links.get(name) or self._pilots[name]
             pilot.obey(setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.world.time_s)
-        self.cpu_s["setpoints"] += time.process_time() - mark
+        self.spent_s["setpoints"] += time.perf_counter() - mark
 
     def _judge(self) -> None:
         states = self.world.states().copy()

@@ -67,7 +67,8 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         for value in astuple(self):
-            if type(value) in _ALWAYS or _is_finite(value):
+            kind = type(value)
+            if math.isfinite(value) if kind is float else kind in _ALWAYS or _is_finite(value):
                 continue
             name = next(name for name in self.__struct_fields__ if not _is_finite(getattr(self, name)))
             raise ValueError(f"{name} is not finite")

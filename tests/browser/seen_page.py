@@ -57,12 +57,29 @@ class Seen:
         self.page.screenshot(path=str(self.shots() / f"{name}.png"), full_page=True)
 
 
-def open_seen(browser: Any, contexts: list[Any], url: str, **options: Any) -> Seen:
+def give_role(context: Any, role: str) -> None:
+    """Let the server's welcome name another role, as it does for an invited device."""
+
+    def between(page: Any) -> None:
+        server = page.connect_to_server()
+        page.on_message(server.send)
+        server.on_message(
+            lambda text: page.send(
+                text.replace('"role":"command"', f'"role":"{role}"') if isinstance(text, str) else text
+            )
+        )
+
+    context.route_web_socket("**/ws", between)
+
+
+def open_seen(browser: Any, contexts: list[Any], url: str, role: str = "", **options: Any) -> Seen:
     """Return a page of its own profile at the address, once it has the first frames."""
     from playwright.sync_api import Error
 
     context = browser.new_context(viewport={"width": 1440, "height": 900}, **options)
     contexts.append(context)
+    if role:
+        give_role(context, role)
     seen = Seen(context.new_page())
     seen.page.on("request", lambda request: seen.requests.append(request.url))
     seen.page.on("websocket", lambda socket: seen.requests.append(socket.url))

@@ -138,3 +138,22 @@ def test_answers_that_were_lost_are_given_again(stage: Any) -> None:
     stage.flight.deaf = set()
     page.wait(lambda s: s["orders"][0]["state"] == "confirmed")
     assert verbs(stage) == ["LAND"]  # said again, but one command
+
+
+def test_a_device_that_may_only_stop_has_stops_and_says_why_it_cannot_start(stage: Any) -> None:
+    page = stage.open(role="stop")
+    for start in ("take-off", "track", "resume"):
+        assert page.there(start).is_disabled()
+        assert page.there(start).get_attribute("title") == "this device may stop only"
+    page.there("hold").click()
+    page.wait(lambda s: verbs(stage) == ["HOLD"])
+
+
+def test_a_device_that_may_only_watch_has_no_enabled_button(stage: Any) -> None:
+    page = stage.open(role="watch")
+    for button in ("take-off", "track", "resume", "hold", "land-all", "cut-motors", "drone_2-land"):
+        assert page.there(button).is_disabled(), button
+    assert page.there("land-all").get_attribute("title") == "this device may watch only"
+    page.page.keyboard.press("l")
+    page.wait(lambda s: page.there("order").count() and "may watch only" in page.there("order").first.inner_text())
+    assert verbs(stage) == []

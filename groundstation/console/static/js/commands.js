@@ -22,6 +22,7 @@ export function give(verb, drones = [], run = store.run) {
   if (replaying()) return; // the server would refuse it as well
   const order = { ref: `${me.client}-${++count}`, verb, drones, run, given: moment(), given_ms: now() };
   own.push(order);
+  if (!mayGive(verb)) { put(order, "refused", roleText()); return showOrders(); }
   put(order, "unsent", `no connection: goes out if it is back within ${STOP_LIVES_MS / 1000} s. Now: ${inShell(verb)}`);
   if (runOver()) put(order, "dropped", OVER);
   else if (run === store.run && transmit(order)) put(order, "sent");
@@ -29,6 +30,9 @@ export function give(verb, drones = [], run = store.run) {
   showOrders();
 }
 
+// The server refuses the rest as well: a page of another make may ask for more.
+const mayGive = (verb) => me.role === "command" || (me.role === "stop" && STOPS.has(verb));
+const roleText = () => `this device may ${me.role} only`;
 const inShell = (verb) => `groundstation ${verb.toLowerCase().replace("_", "-")} in a shell`;
 const put = (order, state, note = "") => Object.assign(order, { state, note, since: moment() });
 
@@ -92,15 +96,15 @@ export function showControls() {
   const names = droneNames(), session = store.s.session ?? {}, replay = replaying();
   for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land], [data-hold]")) {
     node.dataset.title ??= node.title;
-    node.disabled = replay || runOver();
-    node.title = runOver() ? OVER : node.dataset.title;
+    node.disabled = replay || runOver() || !mayGive("LAND");
+    node.title = runOver() ? OVER : !mayGive("LAND") ? roleText() : node.dataset.title;
   }
   for (const node of document.querySelectorAll(".count")) text(node, names.length ? `${names.length}` : "");
-  const free = !session.operator, mine = session.operator === me.client;
-  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
-  byId("takeover").hidden = replay || !me.trusted || free || mine;
-  const able = !replay && !runOver() && me.trusted && store.connected && (free || mine) && Boolean(session.lease);
-  const why = replay ? "a replay: nothing here can be commanded" : runOver() ? OVER : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
+  const free = !session.operator, mine = session.operator === me.client, mayStart = mayGive("TAKEOFF");
+  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayStart ? roleText() : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
+  byId("takeover").hidden = replay || !me.trusted || !mayStart || free || mine;
+  const able = !replay && !runOver() && me.trusted && mayStart && store.connected && (free || mine) && Boolean(session.lease);
+  const why = replay ? "a replay: nothing here can be commanded" : runOver() ? OVER : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !mayStart ? roleText() : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
     const reason = why || refusalOf(verb);
     byId(id).disabled = !able || Boolean(reason);

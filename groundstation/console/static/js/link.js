@@ -4,8 +4,8 @@ import { store, takeDelta, takeSeed } from "./store.js";
 
 const ACK_EVERY = 4, RETRY_MS = 300, RETRY_MAX_MS = 2000;
 const handlers = { seed: [], delta: [], notice: [], picture: [], state: [], welcome: [] };
-// greeted: this connection has had its seed and its welcome.
-export const me = { client: clientId(), name: "", trusted: false, greeted: false };
+// greeted: this connection has had its seed and its welcome. role: what this device may do: watch, stop or command.
+export const me = { client: clientId(), name: "", trusted: false, greeted: false, role: "command" };
 
 let socket = null, token = document.querySelector("meta[name=token]").content, retryMs = RETRY_MS, watched = [];
 
@@ -78,7 +78,7 @@ function take(message) {
       break;
     }
     case "welcome":
-      Object.assign(me, { name: message.name, trusted: message.trusted, greeted: true });
+      Object.assign(me, { name: message.name, trusted: message.trusted, role: message.role, greeted: true });
       tell("welcome"); tell("state");
       break;
     case "notice":

@@ -2,7 +2,7 @@
 // Keys drive the one that was dragged last, the first at the start.
 
 import { byId } from "./dom.js";
-import { send } from "./link.js";
+import { me, send } from "./link.js";
 import { entity, steerable, store } from "./store.js";
 
 const SPEED_M_S = 0.4, TURN_RAD_S = 1.2, PERIOD_MS = 100, GRAB_PX = 24, PLACE_MS = 100;
@@ -25,7 +25,7 @@ export function startSteering(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    const target = steerable() && pointers.size === 1 ? grabbed(view, event.offsetX, event.offsetY) : null;
+    const target = steerable() && me.role === "command" && pointers.size === 1 ? grabbed(view, event.offsetX, event.offsetY) : null;
     if (target) [held, ghost] = [target.name, view.world(event.offsetX, event.offsetY)];
   });
   canvas.addEventListener("pointermove", (event) => move(event, view));
@@ -75,7 +75,7 @@ function place() {
 
 function key(event, view) {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (event.key in KEYS && steerable()) { event.preventDefault(); down.add(event.key); drive(); }
+  if (event.key in KEYS && steerable() && me.role === "command") { event.preventDefault(); down.add(event.key); drive(); }
   else if (event.key === "+" || event.key === "=") view.zoom(1.2);
   else if (event.key === "-") view.zoom(1 / 1.2);
   else if (event.key === "0") view.fit();

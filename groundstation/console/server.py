@@ -43,7 +43,7 @@ from groundstation.console.player import Player
 from groundstation.console.room import lenses_of
 from groundstation.console.session import Sessions
 from groundstation.console.snapshot import Snapshot
-from groundstation.console.state import ConsoleState
+from groundstation.console.state import NO_CAMERAS, ConsoleState
 from groundstation.errors import GroundStationError
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.state import Cast
@@ -105,7 +105,8 @@ class ConsoleServer:
         self._now_ns = player.now_ns if player else clock.now_ns
         self.url = f"http://{HOST}:{listener.getsockname()[1]}/"
         self.board = Snapshot()
-        self.state = ConsoleState(cast, self._now_ns())
+        self._cameras = field.cameras if field else NO_CAMERAS
+        self.state = ConsoleState(cast, self._now_ns(), self._cameras)
         self._pictures = PictureDesk(self._lenses)
         token = secrets.token_urlsafe(24)
         steered = cast.targets if scene["truth"] and player is None else ()
@@ -232,7 +233,7 @@ class ConsoleServer:
         """Forget what was seen: a replay has gone to another time. `show_anew` updates the viewers."""
         for subscription in (self._newest, self._less_often, self._each, self._images):
             subscription.drain_samples()
-        self.state = ConsoleState(self._cast, self._now_ns())
+        self.state = ConsoleState(self._cast, self._now_ns(), self._cameras)
         self._pictures = PictureDesk(self._lenses)
         self.sessions.desk = CommandDesk(self._bus, tuple(self._cast.drones))
 

@@ -1,6 +1,7 @@
 """What the console knows, and how it is said to the page; the newest of everything is shared with the monitor."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from groundstation.bus import messages as m
@@ -8,6 +9,8 @@ from groundstation.bus.api import Received
 from groundstation.console.history import History
 from groundstation.console.innovation_statistics import InnovationStatistics
 from groundstation.console.snapshot import Snapshot
+from groundstation.console.standing import StandingDrones
+from groundstation.field.room import WorldCamera
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.state import Cast, MonitorState, StampedMessage
 
@@ -16,12 +19,14 @@ _ALTERNATIVES = 8
 _AIRBORNE = frozenset({m.FlightState.TAKING_OFF, m.FlightState.FLYING, m.FlightState.HOVERING, m.FlightState.LANDING})
 # Sections that change slowly are looked at every so many turns.
 _OFTEN, _SELDOM = 2, 5
+NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
 
 
 class ConsoleState:
     """Takes messages in and puts the sections of the board; pure but for what it is given."""
 
-    def __init__(self, cast: Cast, started_ns: int) -> None:
+    def __init__(self, cast: Cast, started_ns: int, cameras: Mapping[str, WorldCamera] = NO_CAMERAS) -> None:
+        self.standing = StandingDrones(cameras, cast.drones)
         self.monitor = MonitorState(cast=cast, started_ns=started_ns)
         self.health = InnovationStatistics()
         self.history = History(cast.targets)
@@ -41,6 +46,9 @@ class ConsoleState:
                     self.truth[item.header.entity] = StampedMessage(item.header.stamp_ns, truth)
                 case m.Innovation() as innovation:
                     self.health.take(innovation)
+                case m.RelativeObservation() as sighting:
+                    self.standing.see(sighting)
+                    self.monitor.ingest((item,))
                 case _:
                     self.monitor.ingest((item,))
 
@@ -85,11 +93,25 @@ class ConsoleState:
         since_ns = self._airborne_since_ns
         return {"airborne_since_ms": None if since_ns is None else since_ns / 1e6, "flown": self._flown}
 
+    def _standing(self, now_ns: int) -> list[dict[str, Any]]:
+        estimate = self.monitor.estimate.message.entities if self.monitor.estimate else ()
+        states = {name: seen.message.flight_state for name, seen in self.monitor.vehicles.items()}
+        found = self.standing.now(now_ns, states, {entity.name for entity in estimate})
+        return [
+            {
+                "name": one.name,
+                "place": _rounded(one.place_m, 2),
+                "yaw": None if one.yaw_rad is None else round(one.yaw_rad, 2),
+            }
+            for one in found
+        ]
+
     def put_seldom(self, board: Snapshot, now_ns: int) -> None:
         """Put what may be a quarter of a second old."""
         known = self.monitor
         board.put("cameras", {name: _camera(seen) for name, seen in known.cameras.items()})
         board.put("processes", {name: _process(seen) for name, seen in known.processes.items()})
+        board.put("standing", self._standing(now_ns))
         alarms = [{"text": alarm.text, "grave": alarm.grave} for alarm in alarms_of(known, now_ns)]
         board.put("alarms", alarms)
         board.put("health", self.health.summary())

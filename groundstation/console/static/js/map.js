@@ -1,6 +1,6 @@
 // The map: from the floor up, one function for each layer.
 
-import { drawBodies, drawEllipses, drawGhost, drawTrails, drawTruth, drawVelocities } from "./map_bodies.js";
+import { drawBodies, drawEllipses, drawGhost, drawStanding, drawTrails, drawTruth, drawVelocities } from "./map_bodies.js";
 import { drawRoom } from "./map_room.js";
 import { drawFootprints, drawGraph } from "./map_sensing.js";
 import { estimateAge, store } from "./store.js";
@@ -25,6 +25,7 @@ export function drawMap(view, ghost) {
   drawn.ellipses = drawEllipses(g, view);
   if (layers.truth && store.scene.truth) drawTruth(g, view);
   if (layers.velocities) drawVelocities(g, view, stale);
+  drawStanding(g, view);
   drawBodies(g, view, stale);
   g.globalAlpha = 1;
   if (ghost) drawGhost(g, view, ghost);

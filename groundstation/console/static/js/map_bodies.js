@@ -83,6 +83,18 @@ export function drawBodies(g, view, stale) {
   g.globalAlpha = alpha;
 }
 
+// Where a fixed camera sees who stands: fainter than what flies, and without an ellipse, because no filter has it.
+export function drawStanding(g, view) {
+  const alpha = g.globalAlpha;
+  for (const { name, place, yaw } of store.s.standing ?? []) {
+    const [x, y] = view.point(...place);
+    g.globalAlpha = alpha * 0.6;
+    drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), colourOf(name));
+    g.globalAlpha = alpha;
+    label(g, `${name} stands`, x, y - Math.max(20, 0.36 * view.scale), colourOf(name), 13, 500);
+  }
+}
+
 function drawDrone(g, x, y, yaw, r, colour) {
   g.save();
   g.translate(x, y);

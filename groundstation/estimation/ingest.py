@@ -117,9 +117,12 @@ class Intake:
         if stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
         values = (message.velocity_m_s, *attitude, message.height_m)
-        if self._odometry_watch.is_frozen(message.header.entity, values, stamp_ns):
+        entity = message.header.entity
+        frozen = self._odometry_watch.is_frozen(entity, values, stamp_ns)
+        # A vehicle that tells whole numbers repeats them as long as it stands.
+        if frozen and not self._standing.get(entity, (0, False))[1]:
             return Verdict.FROZEN
-        return self._filter.add_motion(message.header.entity, self._attitudes.motion(message, stamp_ns), now_ns)
+        return self._filter.add_motion(entity, self._attitudes.motion(message, stamp_ns), now_ns)
 
     def _observation(self, key: str, message: RelativeObservation, stamp_ns: int, now_ns: int) -> Verdict:
         if message.header.entity != message.observer:

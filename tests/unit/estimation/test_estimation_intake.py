@@ -171,6 +171,15 @@ def test_only_the_newest_word_on_flying_may_come_late() -> None:
     assert desk.filter.airborne("drone")
 
 
+def test_a_standing_vehicle_may_repeat_itself() -> None:
+    desk = Desk()
+    desk.take(desk.status(FlightState.LANDED, 600 * MS))
+    still = [desk.take(desk.odometry((500 - 10 * k) * MS, yaw_rad=0.5), NOW - (500 - 10 * k) * MS) for k in range(50)]
+    assert Verdict.FROZEN not in still
+    desk.take(desk.status(FlightState.FLYING))
+    assert desk.take(desk.odometry(-1 * MS, yaw_rad=0.5)) is Verdict.FROZEN
+
+
 def test_a_sensor_that_repeats_itself_is_frozen_and_thaws() -> None:
     desk = Desk()
     ages = [(500 - 10 * k) * MS for k in range(50)]

@@ -44,6 +44,7 @@ _FRESH_NS = 300_000_000
 _MOTORS_NS = 1_300_000_000
 _AIRBORNE_CM = 20
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
+_STILL_M_S = 0.25
 # Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
 _PAUSE_NS = {SDK: 1_000_000_000, TAKE_OFF: 4_000_000_000, LAND: 500_000_000, EMERGENCY: 100_000_000}
 # Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
@@ -159,8 +160,10 @@ class Tello:
             return FlightState.LANDED
         if self._asked is Action.LAND:
             return FlightState.LANDING
-        rising = self._asked is Action.TAKE_OFF and self.heard.state.height < 2 * _AIRBORNE_CM
-        return FlightState.TAKING_OFF if rising else FlightState.FLYING
+        if self._asked is Action.TAKE_OFF and self.heard.state.height < 2 * _AIRBORNE_CM:
+            return FlightState.TAKING_OFF
+        still = self._asked is Action.HOVER and math.hypot(*self.heard.velocity_m_s) < _STILL_M_S
+        return FlightState.HOVERING if still else FlightState.FLYING
 
     def view(self, now_ns: int) -> VehicleView:
         """Return what the vehicle last said."""
@@ -194,14 +197,13 @@ class Tello:
             self._repeat(now_ns, SDK)
 
     def _sticks(self, decision: WatchdogDecision) -> bytes:
-        own, (forward, left, up) = self._settings, decision.velocity_m_s
-        turn = math.degrees(decision.yaw_rate_rad_s)
-        share = (
-            -left / own.full_speed_m_s, forward / own.full_speed_m_s, up / own.full_climb_m_s,
-            -turn / own.full_yaw_rate_deg_s,
-        )  # fmt: skip
-        right, ahead, rise, clockwise = (round(100 * one) for one in share)
-        return rc(right, ahead, rise, clockwise)
+        own, limits, (forward, left, up) = self._settings, self._settings.limits, decision.velocity_m_s
+        # A velocity beyond its limit keeps its direction.
+        shorter = min(1.0, limits.max_speed_m_s / max(math.hypot(forward, left), 1e-9)) / own.full_speed_m_s
+        rise = max(-limits.max_climb_m_s, min(limits.max_climb_m_s, up)) / own.full_climb_m_s
+        fastest = limits.max_yaw_rate_deg_s
+        turn = max(-fastest, min(fastest, math.degrees(decision.yaw_rate_rad_s))) / own.full_yaw_rate_deg_s
+        return rc(*(round(100 * share) for share in (-left * shorter, forward * shorter, rise, -turn)))
 
     def _repeat(self, now_ns: int, word: bytes) -> None:
         if now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]:

@@ -167,4 +167,5 @@ KIND = VehicleKind(
     check=_check,
     moved=_moved,
     emulator="sim_bridge.devices.mavlink_emulation:EMULATION",
+    example={"mavlink": {"flavour": "px4", "system_id": 1}},
 )

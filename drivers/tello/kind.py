@@ -61,4 +61,5 @@ KIND = VehicleKind(
     required=frozenset({"tello"}),
     moved=_moved,
     emulator="sim_bridge.devices.tello:EMULATION",
+    example={"tello": {}},
 )

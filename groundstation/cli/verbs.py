@@ -69,6 +69,7 @@ VERBS: dict[str, CommandRow] = {
     "mavlink": CommandRow(
         "Prepare", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."
     ),
+    "vehicle": CommandRow("Prepare", "groundstation.cli.vehicle:vehicle", "List the kinds of vehicles, and judge one."),
     "site": CommandRow("Prepare", "groundstation.cli.site:site", "Let other hosts stop and order."),
     "experiment": CommandRow(
         "Study", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."

@@ -102,7 +102,8 @@ class VehicleKind:
     above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme of the
     vehicle's own video, "" if it has none. has_serial_number: the driver knows the vehicle's own. moved: changes of
     sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
-    sim_bridge.world.emulation.Emulation, "" if there is none.
+    sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
+    sections; the conformance kit flies that one.
     """
 
     name: str
@@ -119,3 +120,4 @@ class VehicleKind:
     has_serial_number: bool = False
     moved: Callable[[str, Mapping[str, KindSection]], dict[str, dict[str, object]]] = _nothing_moves
     emulator: str = ""
+    example: Mapping[str, Mapping[str, object]] = field(default_factory=dict)

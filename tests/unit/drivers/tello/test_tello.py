@@ -1,5 +1,6 @@
 """The Tello at the wire: text, signs and units by flying its emulator, what is no state."""
 
+import dataclasses
 import json
 import math
 import random
@@ -8,9 +9,14 @@ import time
 
 import pytest
 
-from drivers.tello.driver import Heard, velocity_from_state
+from drivers.tello.driver import Heard, Tello, velocity_from_state
+from drivers.tello.settings import TelloDriverSettings
 from drivers.tello.wire.text import COMMAND_PORT, STATE_PORT, State, WireError, parse_rc, parse_state, rc, state_text
+from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import FlightState
 from groundstation.vehicles import kind_named
+from sim_bridge.conformance.subject import subject_of
 from sim_bridge.devices.tello import TelloBody, TelloEmulator
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.site import SiteDrone
@@ -21,6 +27,38 @@ ADDRESS = "127.64.77.11"
 DRONE = SiteDrone.model_validate(
     {"kind": "tello", "pad_m": (0.0, 0.0), "pad_yaw_deg": 30.0, "marker": {"code": 1, "position_m": (0.0, 0.0, 0.08)}}
 )
+
+
+class Flight:
+    """The driver's object between a bus and a vehicle that hears everything, without a loop."""
+
+    def __init__(self) -> None:
+        order = subject_of("tello").order()
+        settings = TelloDriverSettings.model_validate_json(kind_named("tello").processes([order])[0].section)
+        settings = settings.model_copy(update={"address": "127.64.78.11", "local_address": "127.64.78.1"})
+        self.heard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.heard.bind((settings.address, COMMAND_PORT))
+        self.heard.settimeout(1.0)
+        self.tello = Tello(settings, MemoryBus(MemoryExchange(), "lab", "tello"))
+
+    def told(self, action: Action, velocity=(0.0, 0.0, 0.0), turn=0.0, state=STATE) -> tuple[bytes, FlightState]:
+        """Return what the vehicle is sent for a decision, and what the driver then says of its flight."""
+        now_ns = time.monotonic_ns()
+        self.tello._ready = True
+        self.tello.heard = Heard(now_ns, now_ns, state, velocity_from_state(state))
+        self.tello.apply(now_ns, WatchdogDecision(DriverMode.TRACK, action, velocity, turn))
+        return self.heard.recv(64), self.tello.view(now_ns).flight_state
+
+    def close(self) -> None:
+        self.tello.close()
+        self.heard.close()
+
+
+@pytest.fixture
+def flight():
+    flight = Flight()
+    yield flight
+    flight.close()
 
 
 class Rig:
@@ -94,6 +132,24 @@ def test_mutated_states_are_refused_or_sane():
             continue
         assert abs(state.yaw) <= 180 and 0 <= state.battery <= 100 and all(map(math.isfinite, state.acceleration))
     assert 500 < refused < 3000
+
+
+@pytest.mark.parametrize(
+    ("velocity", "turn", "words"),
+    [((0.3, 0.0, 0.0), 0.0, b"rc 0 30 0 0"), ((3.0, 4.0, 0.0), 0.0, b"rc -48 36 0 0"),
+     ((0.0, 0.0, -2.0), 0.0, b"rc 0 0 -40 0"), ((0.0, 0.0, 0.0), 9.0, b"rc 0 0 0 -60")],
+)  # fmt: skip
+def test_sticks_keep_the_limits_of_the_field_and_the_direction(flight, velocity, turn, words):
+    assert flight.told(Action.FLY, velocity, turn)[0] == words
+
+
+def test_it_says_when_it_hovers(flight):
+    still = dataclasses.replace(STATE, velocity=(0, 1, 0))
+    assert flight.told(Action.HOVER, state=still) == (b"rc 0 0 0 0", FlightState.HOVERING)
+    assert flight.told(Action.HOVER, state=dataclasses.replace(STATE, velocity=(6, 0, 0)))[1] is FlightState.FLYING
+    assert flight.told(Action.FLY, state=still)[1] is FlightState.FLYING
+    assert flight.told(Action.LAND, state=still) == (b"land", FlightState.LANDING)
+    assert flight.told(Action.CUT, state=still)[0] == b"emergency"
 
 
 def test_it_flies_only_after_it_was_greeted(rig):

@@ -1,0 +1,259 @@
+"""One flight of the kit: room, bus, heartbeat, driver and those above it, and the verbs that a script flies with."""
+
+import importlib
+import os
+import signal
+import socket
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from groundstation.bus.messages import AckStage, Verb
+from groundstation.bus.topics import COMMAND_ACK, EVENT, PROCESS_STATUS, VEHICLE_STATUS
+from groundstation.bus.zenoh_bus import open_bus, open_router
+from groundstation.process.child import ChildSpec
+from groundstation.process.heartbeat import HeartbeatBlock
+from groundstation.vehicles import StopDatagrams
+from sim_bridge.conformance.driver_process import DriverLife
+from sim_bridge.conformance.record import Moment, Record
+from sim_bridge.conformance.room import Room
+from sim_bridge.conformance.subject import NAME, SITE, Subject
+from sim_bridge.conformance.upstream import Upstream
+from sim_bridge.fault_kinds import Fault
+from sim_bridge.world.emulation import Emulator
+
+_GUARDIAN = 3
+_SLOT = 1
+
+
+class FlightFailed(Exception):
+    """A flight did not come to where its checks begin."""
+
+
+class Bench:
+    """A context in which one vehicle of the kit flies; what is seen goes into `record`."""
+
+    def __init__(self, subject: Subject, faults: Iterable[Fault] = ()) -> None:
+        self.subject, self.record = subject, Record()
+        self._folder = tempfile.TemporaryDirectory(prefix="conformance-")
+        self._log = Path(self._folder.name) / "driver.log"
+        self._lives: list[DriverLife] = []
+        self.room = Room(subject.launch(faults), self.record)
+        self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._router = open_router(self._endpoint)
+        self._buses = [open_bus(self._endpoint, SITE, name) for name in ("kit", "stranger")]
+        self._block = HeartbeatBlock.create(f"skein-conformance-{os.getpid()}-{id(self)}", 4)
+        self.up = Upstream(self._buses[0], self._buses[1], self._block, self.record)
+
+    def __enter__(self) -> Self:
+        self.room.__enter__()
+        self.up.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for life in self._lives:
+            life.close()
+        self.up.close()
+        self.room.__exit__()
+        for bus in self._buses:
+            bus.close()
+        self._router.close()
+        self._block.close(remove=True)
+        self.record.log = self._log.read_text(errors="replace") if self._log.exists() else ""
+        self._folder.cleanup()
+
+    # -- the driver's process -----------------------------------------------------------------------------------------
+
+    def start_driver(self) -> DriverLife:
+        """Start the driver, anew if it ran before."""
+        kind, process = self.subject.kind, self.subject.kind.processes([self.subject.order()])[0]
+        self._block.clear(_SLOT)
+        spec = ChildSpec(NAME, "driver", self._endpoint, SITE, str(self._block.path), _SLOT)
+        self._lives.append(DriverLife(kind.driver, process, spec, self._log))
+        return self._lives[-1]
+
+    @property
+    def driver(self) -> DriverLife:
+        """Return the present life of the driver."""
+        return self._lives[-1]
+
+    def await_exit(self, limit_s: float) -> None:
+        """Wait for the driver's end and note its exit code; a late one is noted as none."""
+        ended = self.wait(lambda: not self.driver.alive, limit_s, must=False)
+        self.record.exits.append(self.driver.exit_code if ended else None)
+
+    @contextmanager
+    def voice(self) -> Iterator[Callable[[str], None]]:
+        """Speak for a dead driver as supervisor and guardian do: with "hover" or "land"."""
+        stop = self.subject.kind.stop([self.subject.order()])
+        addresses = self._block.addresses(_SLOT) if stop.called else ((self.subject.address, stop.port),)
+        voice = _open(stop)
+        try:
+            yield lambda word: voice.say(stop.hover if word == "hover" else stop.land, addresses)
+        finally:
+            voice.close()
+
+    def speak(self, word: str, seconds: float) -> None:
+        """Say one word for a dead driver, ten times a second for a while."""
+        with self.voice() as say, self.mark(f"told to {word}"):
+            for _ in range(round(10 * seconds)):
+                say(word)
+                time.sleep(0.1)
+
+    # -- what a script waits for --------------------------------------------------------------------------------------
+
+    @property
+    def now(self) -> Moment:
+        """Return the newest true state."""
+        return self.record.moments[-1]
+
+    @property
+    def emulator(self) -> Emulator:
+        """Return the emulated vehicle."""
+        return self.room.emulator
+
+    def wait(self, condition: Callable[[], bool], limit_s: float, must: bool = True, what: str = "") -> bool:
+        """Wait until something holds; raises FlightFailed in time unless it need not."""
+        deadline = time.monotonic() + limit_s
+        while not condition():
+            if time.monotonic() > deadline:
+                if must:
+                    raise FlightFailed(f"{what or 'what the flight waits for'} did not come within {limit_s:g} s; "
+                                       f"{self.last_words()}")  # fmt: skip
+                return False
+            time.sleep(0.01)
+        return True
+
+    def last_words(self) -> str:
+        """Return what the driver said last."""
+        status = self.newest(VEHICLE_STATUS)
+        said = f"{status.flight_state}, {status.mode}: {status.detail}" if status else "no status"
+        events = [one.message.text for one in self.record.heard(EVENT)[-3:]]
+        return f"last status {said}; events: {'; '.join(events) or 'none'}"
+
+    def newest(self, topic: Any) -> Any:
+        """Return the newest message of a topic, or None."""
+        heard = self.record.heard(topic)
+        return heard[-1].message if heard else None
+
+    @contextmanager
+    def mark(self, name: str) -> Iterator[None]:
+        """Name a span of time."""
+        begin = time.monotonic_ns()
+        yield
+        self.record.marks[name] = (begin, time.monotonic_ns())
+
+    def spend(self, name: str, seconds: float) -> None:
+        """Let a named span of time pass."""
+        with self.mark(name):
+            time.sleep(seconds)
+
+    def mode(self, *modes: str) -> bool:
+        """Whether the driver says that it is in one of these modes."""
+        status = self.newest(VEHICLE_STATUS)
+        return status is not None and status.mode in modes
+
+    def order(self, name: str, verb: Verb, limit_s: float = 5.0, **how: Any) -> str:
+        """Give a command and wait for its first answer; returns the stage."""
+        before = len(self.record.heard(COMMAND_ACK))
+        made = self.up.order(name, verb, **how)
+        answers: list[str] = []
+
+        def answered() -> bool:
+            heard = self.record.heard(COMMAND_ACK)[before:]
+            answers[:] = [one.message.stage for one in heard if one.message.command_id == made.id]
+            return any(stage != AckStage.RECEIVED for stage in answers)
+
+        self.wait(answered, limit_s, must=False)
+        return answers[-1] if answers else ""
+
+    # -- common parts of scripts --------------------------------------------------------------------------------------
+
+    def newest_after_start(self) -> bool:
+        """Whether this life of the driver has spoken."""
+        heard = self.record.heard(VEHICLE_STATUS)
+        return bool(heard) and heard[-1].at_ns > self.driver.started_ns
+
+    def connect(self) -> None:
+        """Start the driver and wait until it says that it is ready."""
+        with self.mark("start"):
+            self.start_driver()
+            self.wait(self._is_ready, 30.0, what="READY on the ground")
+
+    def _is_ready(self) -> bool:
+        process, status = self.newest(PROCESS_STATUS), self.newest(VEHICLE_STATUS)
+        return process is not None and process.state == "READY" and status is not None and status.mode == "LANDED"
+
+    def take_off(self, name: str = "take off") -> None:
+        """Take off, patiently: some vehicles need a while until they may."""
+        deadline = time.monotonic() + 25.0
+        while self.order(name, Verb.TAKEOFF) != AckStage.ACCEPTED:
+            if time.monotonic() > deadline:
+                raise FlightFailed(f"TAKEOFF was not accepted; {self.last_words()}")
+            time.sleep(0.5)
+        with self.mark("climb"):
+            self.wait(lambda: self.mode("HOVER") and self.now.position[2] > 0.3, 15.0, what="HOVER in the air")
+            self.wait(lambda: abs(self.now.velocity[2]) < 0.1 and self.now.position[2] > 0.4, 6.0, must=False)
+
+    def track(self, name: str = "track") -> None:
+        """Take off and let the set-points move it; they say to stand still."""
+        self.connect()
+        self.take_off()
+        self.spend("hover", 1.0)
+        self.begin_tracking(name)
+
+    def begin_tracking(self, name: str = "track", verb: Verb = Verb.TRACK) -> None:
+        """Order TRACK, or RESUME, and wait until the driver is in TRACK."""
+        self.order(name, verb)
+        self.wait(lambda: self.mode("TRACK"), 2.0, what="TRACK")
+
+    def fly(self, mark: str, velocity: Sequence[float], turn: float, seconds: float) -> None:
+        """Fly a velocity [m/s; base_stabilized] and a turn [rad/s] for a while, then stand still."""
+        x, y, z = velocity
+        self.up.wanted = ((x, y, z), turn)
+        self.spend(mark, seconds)
+        self.up.wanted = ((0.0, 0.0, 0.0), 0.0)
+
+    def await_landing(self, mark: str, limit_s: float = 20.0) -> None:
+        """Wait until it stands with motors off, or until the time is over; how long that took is a fact."""
+        with self.mark(mark):
+            begin = time.monotonic()
+            landed = self.wait(lambda: self.now.on_ground and not self.now.motors, limit_s, must=False)
+            self.record.facts[mark] = time.monotonic() - begin if landed else float("inf")
+
+    def end(self) -> None:
+        """Ask the driver of a standing vehicle to stop, and wait for that."""
+        self.driver.send(signal.SIGTERM)
+        self.await_exit(4.0)
+
+
+def _open(stop: StopDatagrams) -> Any:
+    if not stop.voice:
+        return _UdpVoice()
+    module, _, name = stop.voice.partition(":")
+    return getattr(importlib.import_module(module), name)(stop.way, _GUARDIAN)
+
+
+class _UdpVoice:
+    def __init__(self) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def say(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
+        for address in addresses:
+            self._socket.sendto(datagram, address)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _free_port() -> int:
+    with socket.socket() as tcp:
+        tcp.bind(("127.0.0.1", 0))
+        port: int = tcp.getsockname()[1]
+        return port

@@ -1,0 +1,46 @@
+"""One check: a sentence that holds for every kind of vehicle, the flight it is seen in, and the function that looks."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sim_bridge.conformance.record import Record
+from sim_bridge.conformance.subject import Subject
+
+
+class NotApplicable(Exception):
+    """The kind does not have what a check is about, such as a height of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What a check looks at; the record is empty for those of the kind's object alone."""
+
+    subject: Subject
+    record: Record
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """name: its identifier; text: what must hold; flight: its script, "" for the kind's object alone.
+
+    judge raises AssertionError with what was seen instead, or NotApplicable.
+    """
+
+    name: str
+    text: str
+    flight: str
+    judge: Callable[[Case], None]
+
+
+CHECKS: dict[str, Check] = {}
+
+
+def check(flight: str = "") -> Callable[[Callable[[Case], None]], Callable[[Case], None]]:
+    """Return a decorator that adds a function to the list of checks; its docstring is the sentence."""
+
+    def added(judge: Callable[[Case], None]) -> Callable[[Case], None]:
+        text = (judge.__doc__ or "").strip().rstrip(".")
+        CHECKS[judge.__name__] = Check(judge.__name__, text, flight, judge)
+        return judge
+
+    return added

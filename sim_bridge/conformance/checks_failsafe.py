@@ -1,0 +1,298 @@
+"""Checks of everything that stops a vehicle without an order, and of what must not start it again."""
+
+import math
+
+import numpy as np
+
+from groundstation.bus.messages import AckStage
+from groundstation.bus.topics import COMMAND_ACK, EVENT, VEHICLE_STATUS
+from sim_bridge.conformance.check import Case, check
+
+_STILL_M_S = 0.2
+_LANDED_S = 14.0
+
+
+def _brakes(case: Case, mark: str, after_s: float) -> None:
+    """The vehicle has less than half of its speed after a while, and stands at the end of the span."""
+    begin, _ = case.record.span(mark)
+    before, later = case.record.at(begin).speed, case.record.at(begin + round(after_s * 1e9)).speed
+    assert later < max(_STILL_M_S, 0.5 * before), f"{later:.2f} m/s after {after_s} s, {before:.2f} before"
+
+
+def _still(case: Case, mark: str, skip_s: float = 0.0) -> None:
+    motion = case.record.motion(mark, skip_s)
+    assert motion, f"nothing was seen of: {mark}"
+    speed = max(one.speed for one in motion)
+    assert speed < _STILL_M_S, f"{speed:.2f} m/s"
+
+
+def _lands(case: Case, mark: str, limit_s: float = _LANDED_S) -> None:
+    case.record.span(mark)
+    took = case.record.facts[mark]
+    assert took < limit_s, f"it stood after {took:.1f} s" if math.isfinite(took) else "it did not land"
+
+
+def _modes(case: Case, mark: str) -> set[str]:
+    return {one.message.mode for one in case.record.heard(VEHICLE_STATUS, mark)}
+
+
+@check("silence")
+def silence_brakes(case: Case) -> None:
+    """Without set-points it hovers: 0.3 s later it brakes, after 0.9 s it has lost half of its speed."""
+    _brakes(case, "silence", 0.95)
+
+
+@check("silence")
+def silence_ends_in_hover(case: Case) -> None:
+    """1.3 s after the last set-point it stands."""
+    _still(case, "silence", 1.35)
+
+
+@check("silence")
+def moment_of_silence_is_survived(case: Case) -> None:
+    """A silence of 0.4 s changes no mode, and set-points count again at once."""
+    assert _modes(case, "after a pause") == {"TRACK"}, f"modes {_modes(case, 'after a pause')}"
+    assert case.record.motion("after a pause")[-1].speed > 0.15, "it stands"
+
+
+@check("silence")
+def long_silence_needs_resume(case: Case) -> None:
+    """After a longer silence set-points move nothing until RESUME."""
+    _still(case, "set-points without RESUME", 0.2)
+    assert _modes(case, "set-points without RESUME") == {"HOVER"}
+
+
+@check("silence")
+def resume_is_answered(case: Case) -> None:
+    """RESUME is RECEIVED, ACCEPTED, and EFFECTIVE once a set-point is obeyed."""
+    stages = case.record.stages("resume after silence", COMMAND_ACK)
+    assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE], " ".join(stages)
+
+
+@check("silence")
+def lasting_silence_lands(case: Case) -> None:
+    """3 s after the last set-point it lands."""
+    case.record.span("until it lands")
+    after = case.record.facts["landing after"]
+    assert 2.7 < after < 3.8, f"after {after:.1f} s"
+
+
+@check("silence")
+def landing_is_latched(case: Case) -> None:
+    """Set-points do not stop a landing."""
+    _lands(case, "landing")
+    heights = [one.position[2] for one in case.record.motion("latched")]
+    assert max(heights) - heights[0] < 0.15, f"it rose by {max(heights) - heights[0]:.2f} m"
+
+
+@check("silence")
+def landing_refuses_orders(case: Case) -> None:
+    """TRACK, RESUME and TAKEOFF during a landing are refused."""
+    for command in ("track while landing", "take off while landing", "resume while landing"):
+        stages = case.record.stages(command, COMMAND_ACK)
+        assert stages == [AckStage.RECEIVED, AckStage.REFUSED], f"{command}: {' '.join(stages)}"
+
+
+@check("silence")
+def landed_stays_down(case: Case) -> None:
+    """After a landing by failsafe it stays down while set-points come."""
+    assert not [one for one in case.record.motion("landed", 0.3) if not one.on_ground or one.motors], "it rose"
+
+
+@check("epochs")
+def new_epoch_moves_nothing(case: Case) -> None:
+    """Set-points of a new epoch move nothing before RESUME."""
+    _still(case, "new epoch without RESUME")
+
+
+@check("epochs")
+def new_epoch_needs_resume(case: Case) -> None:
+    """TRACK is refused after a new epoch."""
+    stages = case.record.stages("track a new epoch", COMMAND_ACK)
+    assert stages == [AckStage.RECEIVED, AckStage.REFUSED], " ".join(stages)
+
+
+@check("epochs")
+def new_epoch_counts_after_resume(case: Case) -> None:
+    """RESUME lets the new epoch's set-points count."""
+    assert case.record.motion("new epoch resumed")[-1].speed > 0.2, "it stands"
+
+
+@check("epochs")
+def old_epoch_moves_nothing(case: Case) -> None:
+    """Set-points of an older epoch move nothing."""
+    _still(case, "old epoch")
+
+
+@check("epochs")
+def old_sequence_moves_nothing(case: Case) -> None:
+    """Set-points with an older sequence number move nothing."""
+    _still(case, "old sequence")
+
+
+@check("epochs")
+def other_source_moves_nothing(case: Case) -> None:
+    """Set-points of anybody but the tracker move nothing, and are counted."""
+    _still(case, "other source")
+    counted = case.record.heard(VEHICLE_STATUS, "epoch far ahead")[-1].message.rejected
+    assert counted.get("setpoint_other_source"), f"refused: {counted}"
+
+
+@check("epochs")
+def epoch_far_ahead_moves_nothing(case: Case) -> None:
+    """A set-point of an epoch far ahead does not make the true ones look old."""
+    _still(case, "epoch far ahead")
+    assert _modes(case, "epoch far ahead") == {"TRACK"}, f"{_modes(case, 'epoch far ahead')}"
+
+
+@check("epochs")
+def unconverged_moves_nothing(case: Case) -> None:
+    """Set-points of a tracker that does not know where the vehicle is move nothing."""
+    _still(case, "not converged")
+
+
+@check("epochs")
+def stop_in_the_air_lands(case: Case) -> None:
+    """SIGTERM in the air lands the vehicle; then the driver ends with exit code 0."""
+    _lands(case, "stopped in the air")
+    assert case.record.exits == [0], f"exit code {case.record.exits}"
+
+
+@check("killed")
+def hover_datagram_stops_it(case: Case) -> None:
+    """After kill -9 of its driver the kind's hover datagram stops the vehicle."""
+    _still(case, "told to hover", 1.8)
+
+
+@check("killed")
+def hover_datagram_keeps_its_height(case: Case) -> None:
+    """Meanwhile it keeps its height within 0.4 m."""
+    heights = [one.position[2] for one in case.record.motion("told to hover")]
+    assert max(heights) - min(heights) < 0.4, f"{min(heights):.2f} to {max(heights):.2f} m"
+
+
+@check("killed")
+def new_life_lands(case: Case) -> None:
+    """A driver that starts while the vehicle flies lands it."""
+    _lands(case, "landing by a new life")
+
+
+@check("killed")
+def new_life_flies_again(case: Case) -> None:
+    """After that landing the new life takes off on order."""
+    stages = case.record.stages("take off after a new life", COMMAND_ACK)
+    assert stages and stages[-1] == AckStage.EFFECTIVE, f"{' '.join(stages)} {case.record.failure}"
+
+
+@check("killed")
+def land_datagram_lands_it(case: Case) -> None:
+    """After kill -9 the kind's land datagram alone brings it down, motors off."""
+    end = case.record.motion("landed by others")[-1]
+    assert end.on_ground and not end.motors, f"it is at {end.position[2]:.2f} m"
+
+
+@check("orphaned")
+def frozen_supervisor_brakes(case: Case) -> None:
+    """While the supervisor stands still the vehicle hovers."""
+    assert case.record.motion("supervisor frozen")[-1].speed < 0.3, "it flies on"
+
+
+@check("orphaned")
+def supervisor_is_obeyed_again(case: Case) -> None:
+    """When the supervisor goes on within a second, set-points count again."""
+    assert case.record.motion("supervisor again")[-1].speed > 0.15, "it stands"
+
+
+@check("orphaned")
+def orphan_lands(case: Case) -> None:
+    """When the supervisor dies the driver lands the vehicle."""
+    _lands(case, "orphaned")
+
+
+@check("orphaned")
+def orphan_ends(case: Case) -> None:
+    """Then the driver ends by itself."""
+    case.record.span("exit of an orphan")
+    assert case.record.facts["orphan ended"], "it still runs"
+
+
+@check("unheard")
+def unheard_vehicle_brakes(case: Case) -> None:
+    """A vehicle that falls silent is told to hover: after 1.2 s it has lost half of its speed."""
+    _brakes(case, "silent vehicle", 1.2)
+
+
+@check("unheard")
+def unheard_vehicle_is_lost(case: Case) -> None:
+    """A vehicle that falls silent is called LOST."""
+    said = [one.message.flight_state for one in case.record.heard(VEHICLE_STATUS, "silent vehicle")]
+    assert said and said[-1] == "LOST", f"said: {said[-3:]}"
+
+
+@check("unheard")
+def unheard_vehicle_lands(case: Case) -> None:
+    """A vehicle that stays silent is landed."""
+    _lands(case, "landing unheard")
+
+
+@check("unheard")
+def heard_again_it_is_known(case: Case) -> None:
+    """When it speaks again its state is known again: it stands."""
+    said = case.record.heard(VEHICLE_STATUS, "heard again")[-1].message.flight_state
+    assert said == "LANDED", f"it is called {said}"
+
+
+@check("cut")
+def cut_stops_the_motors(case: Case) -> None:
+    """CUT_MOTORS stops the motors in the air within 0.5 s."""
+    begin, _ = case.record.span("fall")
+    assert not case.record.at(begin + 500_000_000).motors, "they turn"
+
+
+@check("cut")
+def cut_is_answered(case: Case) -> None:
+    """CUT_MOTORS is effective once the motors stand."""
+    stages = case.record.stages("cut", COMMAND_ACK)
+    assert stages and stages[-1] == AckStage.EFFECTIVE, " ".join(stages)
+
+
+@check("cut")
+def cut_needs_a_new_take_off(case: Case) -> None:
+    """After a cut nothing starts the motors but a TAKEOFF, and that does."""
+    assert not [one for one in case.record.motion("cut", 0.1) if one.motors], "they turn again"
+    stages = case.record.stages("take off after the cut", COMMAND_ACK)
+    assert stages and stages[-1] == AckStage.EFFECTIVE, f"{' '.join(stages)} {case.record.failure}"
+
+
+@check("cut")
+def low_battery_lands(case: Case) -> None:
+    """A charge below the limit lands it."""
+    _lands(case, "landing with a low battery")
+
+
+@check("frozen")
+def frozen_telemetry_stops_it(case: Case) -> None:
+    """When its reports repeat themselves it is stopped within 2.5 s, and landed."""
+    speeds = [one.speed for one in case.record.motion("frozen", 2.5)]
+    assert not speeds or float(np.median(speeds[:100])) < 0.25, f"{np.median(speeds[:100]):.2f} m/s"
+    _lands(case, "landing frozen")
+
+
+@check("jumping")
+def impossible_velocity_stops_it(case: Case) -> None:
+    """When it reports a velocity that cannot be true it is stopped and landed."""
+    _lands(case, "landing jumping")
+
+
+@check("jumping")
+def impossible_velocity_is_not_flown_by(case: Case) -> None:
+    """What it is told meanwhile never makes it faster than its limit and a half."""
+    speed = max(one.speed for one in case.record.motion("jumping"))
+    assert speed < 0.9, f"{speed:.2f} m/s"
+
+
+@check("jumping")
+def operator_is_told_why(case: Case) -> None:
+    """The operator is told why it landed."""
+    texts = [one.message.text for one in case.record.heard(EVENT, "jumping")]
+    assert any("LANDING" in text or "HOVER" in text for text in texts), f"events: {texts}"

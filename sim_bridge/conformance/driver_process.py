@@ -1,0 +1,86 @@
+"""The kind's driver as the supervisor would start it: a process with a section, a bus, a heartbeat and a parent."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+
+from groundstation.process.child import ChildSpec
+from groundstation.vehicles import DriverProcess
+
+# Between kit and driver stands a parent of its own, so that the driver can lose it.
+_PARENT = (
+    "import subprocess, sys\n"
+    "child = subprocess.Popen(sys.argv[1:], stdout=sys.stderr)\n"
+    "print(child.pid, flush=True)\n"
+    "sys.exit(child.wait() & 255)\n"
+)
+_SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class DriverLife:
+    """One life of a driver; log: where its standard error goes."""
+
+    def __init__(self, entry: str, process: DriverProcess, spec: ChildSpec, log: Path) -> None:
+        document = json.dumps(asdict(spec) | {"section": process.section}).encode()
+        command = [sys.executable, "-c", _PARENT, sys.executable, "-m", "groundstation.process.entry", spec.name, entry]
+        environment = os.environ | dict.fromkeys(_SINGLE_THREADED, "1")
+        with os.fdopen(os.memfd_create("child"), "r+b") as told, log.open("ab") as errors:
+            told.write(document)
+            told.flush()
+            told.seek(0)
+            self._parent = subprocess.Popen(
+                command, stdin=told, stdout=subprocess.PIPE, stderr=errors, start_new_session=True, env=environment
+            )
+        assert self._parent.stdout is not None
+        self.pid = int(self._parent.stdout.readline())
+        self._watch = os.pidfd_open(self.pid)
+        self.started_ns = time.monotonic_ns()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the driver runs."""
+        try:
+            signal.pidfd_send_signal(self._watch, 0)
+        except ProcessLookupError:
+            return False
+        return not self._is_zombie()
+
+    def _is_zombie(self) -> bool:
+        with suppress(OSError):
+            return Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        return True
+
+    def send(self, number: signal.Signals) -> None:
+        """Send the driver a signal; nothing happens to one that has ended."""
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._watch, number)
+
+    def orphan(self) -> None:
+        """Kill the driver's parent."""
+        self._parent.kill()
+        self._parent.wait()
+
+    @property
+    def exit_code(self) -> int | None:
+        """Return the exit code of a driver whose parent lived to see its end, else None."""
+        with suppress(subprocess.TimeoutExpired):
+            return self._parent.wait(timeout=2.0)
+        return None
+
+    def close(self) -> None:
+        """End what still runs; idempotent."""
+        if self._watch < 0:
+            return
+        self.send(signal.SIGKILL)
+        self._parent.kill()
+        self._parent.wait()
+        if self._parent.stdout is not None:
+            self._parent.stdout.close()
+        os.close(self._watch)
+        self._watch = -1

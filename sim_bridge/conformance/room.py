@@ -1,0 +1,123 @@
+"""The emulated vehicle in its room, turned in real time by a thread; its true motion is written down."""
+
+import random
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from groundstation.process.priority import go_first
+from sim_bridge.conformance.record import Moment, Record
+from sim_bridge.conformance.subject import NAME
+from sim_bridge.launch_spec import LaunchSpec
+from sim_bridge.stage import Stage
+from sim_bridge.tick_schedule import Clockwork
+from sim_bridge.world.emulation import Emulator, emulation_of
+from sim_bridge.world.world import World
+
+_STOOD_NS = 60_000_000
+
+
+class Room:
+    """One vehicle at its sockets. Use it as a context; calls from other threads go through `do`."""
+
+    def __init__(self, launch: LaunchSpec, record: Record) -> None:
+        self.world = World(launch.site, launch.scenario, launch.seed)
+        self.body = self.world.drones[NAME]
+        emulation = emulation_of(launch.site.drones[NAME].kind)
+        self.emulator: Emulator = emulation.open(NAME, self.body, self.world.onboard.get(NAME), launch)
+        self._stage = Stage(self.world)
+        self._stage.add(NAME, self.emulator, self.emulator.fileno())
+        self._record = record
+        self._wishes: list[Callable[[], None]] = []
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._turn, name="room", daemon=True)
+        self.damage: random.Random | None = None
+        self.damaged_per_datagram = 0
+        self.damaged = 0
+
+    def __enter__(self) -> "Room":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._stage.close()
+
+    def do(self, wish: Callable[[], None]) -> None:
+        """Have something done between two ticks."""
+        self._wishes.append(wish)
+
+    def _turn(self) -> None:
+        go_first()
+        clock = Clockwork(time.monotonic_ns())
+        last_ns = time.monotonic_ns()
+        with self._damaging():
+            while not self._ended.is_set():
+                deadline_ns = clock.next_deadline()
+                time.sleep(max(0.0, (deadline_ns - time.monotonic_ns()) / 1e9))
+                now_ns = time.monotonic_ns()
+                if now_ns - last_ns > _STOOD_NS:
+                    self._record.stood_ms = max(self._record.stood_ms, (now_ns - last_ns) / 1e6)
+                last_ns = now_ns
+                clock.begin(now_ns)
+                while self._wishes:
+                    self._wishes.pop(0)()
+                self._stage.tick(clock.deadline_ns)
+                self._note(now_ns)
+
+    def _note(self, now_ns: int) -> None:
+        one = self.body.airframe
+        self._record.moments.append(
+            Moment(
+                now_ns,
+                (one.x, one.y, one.z),
+                (one.vx, one.vy, one.vz),
+                (one.roll, one.pitch, one.yaw),
+                not self.body.airborne,
+                self.body.autopilot.motors_on,
+                self.body.battery,
+            )
+        )
+
+    @contextmanager
+    def _damaging(self) -> Iterator[None]:
+        """Let damaged copies follow each datagram of the vehicle, from the vehicle's own port, when asked to."""
+        honest: Any = socket.socket.sendto
+        mine = threading.get_ident()
+
+        def sendto(self_: socket.socket, data: Any, *where: Any) -> int:
+            sent: int = honest(self_, data, *where)
+            if self.damage is not None and threading.get_ident() == mine:
+                for _ in range(self.damaged_per_datagram):
+                    honest(self_, damaged(bytes(data), self.damage), *where)
+                    self.damaged += 1
+            return sent
+
+        socket.socket.sendto = sendto  # type: ignore[assignment,method-assign]
+        try:
+            yield
+        finally:
+            socket.socket.sendto = honest  # type: ignore[method-assign]
+
+
+def damaged(datagram: bytes, draw: random.Random) -> bytes:
+    """Return a datagram with bits turned, bytes cut out, doubled or replaced."""
+    data = bytearray(datagram)
+    for _ in range(draw.randint(1, 6)):
+        place = draw.randrange(len(data) + 1)
+        match draw.randrange(5):
+            case 0 if place < len(data):
+                data[place] ^= 1 << draw.randrange(8)
+            case 1 if place < len(data):
+                data[place] = draw.choice((0, 0x7F, 0x80, 0xFF, draw.randrange(256)))
+            case 2:
+                del data[place : place + draw.randint(1, 16)]
+            case 3:
+                data[place:place] = draw.randbytes(draw.randint(1, 16))
+            case _:
+                del data[place:]
+    return bytes(data)

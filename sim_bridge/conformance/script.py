@@ -1,0 +1,60 @@
+"""What a flight of the kit is, the list of all, and how one is flown."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sim_bridge.conformance.bench import Bench, FlightFailed
+from sim_bridge.conformance.record import Record
+from sim_bridge.conformance.subject import Subject
+from sim_bridge.fault_kinds import Fault
+
+_TRIES = 3
+_STOOD_MS = 150.0
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """One flight: what is done, and the faults of the vehicle's own reports in it."""
+
+    name: str
+    run: Callable[[Bench], None]
+    faults: tuple[Fault, ...] = ()
+
+
+SCRIPTS: dict[str, Script] = {}
+
+
+def script(*faults: Fault) -> Callable[[Callable[[Bench], None]], Callable[[Bench], None]]:
+    """Return a decorator that adds a flight to the list, under its function's name."""
+
+    def added(run: Callable[[Bench], None]) -> Callable[[Bench], None]:
+        name = run.__name__.removeprefix("_")
+        SCRIPTS[name] = Script(name, run, faults)
+        return run
+
+    return added
+
+
+def fly(script: Script, subject: Subject, damaged: int) -> Record:
+    """Return what a flight left behind; one in which this machine stood still is flown again, three times at most.
+
+    damaged: datagrams that are damaged for it, in all.
+    """
+    record = Record()
+    for _ in range(_TRIES):
+        try:
+            bench = Bench(subject, script.faults)
+        except OSError as error:
+            return Record(failure=f"the room could not be opened: {error}")
+        record = bench.record
+        record.facts["damaged"] = damaged
+        with bench:
+            try:
+                script.run(bench)
+            except FlightFailed as error:
+                record.failure = str(error)
+        if record.stood_ms <= _STOOD_MS:
+            return record
+    record.failure = f"this machine stood still for {record.stood_ms:.0f} ms in each of {_TRIES} flights: not judged"
+    record.marks.clear()
+    return record

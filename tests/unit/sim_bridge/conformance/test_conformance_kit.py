@@ -1,0 +1,181 @@
+"""The conformance kit: our kinds' objects pass, wrong flights fail, its command and its plug-in find the checks."""
+
+import math
+import os
+import random
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from groundstation.bus.api import Received
+from groundstation.bus.keys import parse
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import AckStage, CommandAck, FlightState, Odometry, VehicleStatus, Verb
+from groundstation.bus.topics import COMMAND_ACK, ODOMETRY, VEHICLE_STATUS
+from groundstation.errors import SettingsError
+from sim_bridge.conformance.check import CHECKS, Case
+from sim_bridge.conformance.flights import LEG_S, SCRIPTS, SPEED_M_S
+from sim_bridge.conformance.kit import Kit, chosen
+from sim_bridge.conformance.record import Heard, Moment, Record
+from sim_bridge.conformance.room import damaged
+from sim_bridge.conformance.subject import NAME, subject_of
+
+ROOT = Path(__file__).parents[4]
+S = 1_000_000_000
+LEGS = {"forward": (1, 0), "left": (0, 1), "back": (-1, 0), "right": (0, -1)}
+BUS = MemoryBus(MemoryExchange(), "lab", "driver")
+
+
+def heard(topic, at_ns, message):
+    return Heard(at_ns, Received(parse(BUS.key(topic, NAME)), message.header, message, b""))
+
+
+def odometry(at_ns, velocity):
+    variance = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.0025)
+    header = BUS.header(NAME, at_ns)
+    return heard(
+        ODOMETRY,
+        at_ns + 1000,
+        Odometry(header=header, velocity_m_s=velocity, velocity_covariance=variance, yaw_rad=0.0, roll_rad=0.0,
+                 pitch_rad=0.0),
+    )  # fmt: skip
+
+
+def flown(turned_rad=0.0, told=1.0):
+    """Return a square that a vehicle of heading 0.4 rad flew, turned by an angle; told: of its velocity."""
+    record, at_ns, place, yaw = Record(), S, [0.0, 0.0], 0.4
+    for mark, (ahead, aside) in LEGS.items():
+        begin = at_ns
+        angle = math.atan2(aside, ahead) + yaw + turned_rad
+        velocity = (SPEED_M_S * math.cos(angle), SPEED_M_S * math.sin(angle), 0.0)
+        for tick in range(round(LEG_S / 0.01)):
+            at_ns += S // 100
+            place = [p + 0.01 * v for p, v in zip(place, velocity[:2], strict=True)]
+            moment = Moment(at_ns, (place[0], place[1], 1.0), velocity, (0.0, 0.0, yaw), False, True, 0.9)
+            record.moments.append(moment)
+            if tick % 5 == 0:
+                forward, left = moment.forward_left
+                noise = 0.001 * (tick % 3)
+                record.messages["odometry"].append(odometry(at_ns, (told * forward + noise, told * left - noise, 0.0)))
+        record.marks[mark] = (begin, at_ns)
+        for _ in range(120):
+            at_ns += S // 100
+            record.moments.append(replace(moment, at_ns=at_ns, velocity=(0.0, 0.0, 0.0)))
+    return record
+
+
+def verdict(record, name, kind="tello"):
+    kit = Kit(kind)
+    kit._records = dict.fromkeys(["", *SCRIPTS], record)
+    return kit.judge(CHECKS[name])
+
+
+@pytest.mark.parametrize("kind", ["ardrone", "mavlink", "tello"])
+def test_the_objects_of_our_kinds_pass(kind):
+    kit = Kit(kind)
+    checks = [one for one in chosen("kind") if one.name != "kind_is_light"]  # it starts an interpreter
+    assert [(v.check.name, v.why) for v in kit.verdicts(checks) if v.end == "failed"] == []
+    assert len(checks) > 15
+
+
+def test_there_are_many_checks_and_each_says_what_must_hold():
+    assert len(CHECKS) >= 60
+    assert {one.flight for one in CHECKS.values()} == {"", *SCRIPTS}
+    assert not [name for name, one in CHECKS.items() if len(one.text) < 15]
+
+
+SQUARE = [
+    *("forward_is_forward", "left_is_left", "back_is_back", "right_is_right", "square_closes"),
+    *("forward_velocity_is_told", "left_velocity_is_told", "velocity_deviation_is_true", "odometry_is_fresh"),
+    *("odometry_comes_often", "velocity_covariance_is_honest"),
+]
+
+
+@pytest.mark.parametrize("name", SQUARE)
+def test_a_good_square_passes(name):
+    assert verdict(flown(), name).end == "passed"
+
+
+@pytest.mark.parametrize(
+    ("record", "names"),
+    [
+        (flown(turned_rad=math.pi), ("forward_is_forward", "left_is_left", "back_is_back", "right_is_right")),
+        (flown(turned_rad=math.pi / 2), ("forward_is_forward", "left_is_left")),
+        (flown(told=-1.0), ("forward_velocity_is_told", "left_velocity_is_told", "velocity_deviation_is_true")),
+        (flown(told=0.1), ("forward_velocity_is_told", "left_velocity_is_told")),
+        (Record(failure="it fell"), SQUARE),
+    ],
+)
+def test_wrong_signs_units_and_failed_flights_fail(record, names):
+    assert {verdict(record, name).end for name in names} == {"failed"}
+
+
+def test_answers_are_looked_for_by_their_command():
+    def answered(*stages):
+        record = Record(commands={"hold": "hold-1"})
+        for stage in stages:
+            ack = CommandAck(header=BUS.header(NAME, S), command_id="hold-1", verb=Verb.HOLD, stage=stage)
+            record.messages["command_ack"].append(heard(COMMAND_ACK, S, ack))
+        return verdict(record, "hold_is_answered").end
+
+    assert answered(AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE) == "passed"
+    assert answered(AckStage.RECEIVED, AckStage.ACCEPTED) == "failed"
+
+
+def test_a_vehicle_that_rises_from_the_ground_fails():
+    stands = Moment(S, (0.0, 0.0, 0.06), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), True, False, 0.9)
+    record = Record(moments=[replace(stands, at_ns=S + i) for i in range(5)], marks={"told to hover": (S, 2 * S)})
+    assert verdict(record, "hover_datagram_lifts_nothing").end == "passed"
+    record.moments.append(replace(stands, at_ns=S + 9, motors=True))
+    assert verdict(record, "hover_datagram_lifts_nothing").end == "failed"
+
+
+def test_a_driver_that_is_silent_for_long_fails():
+    record = Record(marks={"damaged": (S, 5 * S)})
+    for at_ns in (2 * S, 4 * S):
+        status = VehicleStatus(header=BUS.header(NAME, at_ns), flight_state=FlightState.LANDED, mode="LANDED")
+        record.messages[VEHICLE_STATUS.name].append(heard(VEHICLE_STATUS, at_ns, status))
+    assert verdict(record, "driver_goes_on_speaking_under_damage").end == "failed"
+
+
+def test_damage_is_of_many_kinds_and_repeatable():
+    data = b"AT*REF=1,290718208\r"
+    made = [damaged(data, random.Random(7)) for _ in range(2)]
+    assert made[0] == made[1]
+    draw = random.Random(1)
+    lengths = {len(damaged(data, draw)) for _ in range(300)}
+    assert min(lengths) < len(data) < max(lengths)
+
+
+def test_a_vehicle_is_made_as_its_kind_s_example_says_and_otherwise():
+    other = subject_of("mavlink", ["mavlink.flavour=ardupilot"])
+    assert other.sections["mavlink"].model_dump()["flavour"] == "ardupilot"
+    case = Case(subject_of("tello"), Record())
+    assert case.subject.sections["tello"].model_dump()["local_address"] == case.subject.local_address
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "text"),
+    [
+        ("zeppelin", [], "kind: zeppelin is not known"),
+        ("tello", ["wings.span=1"], "tello has no section wings"),
+        ("tello", ["tello"], "tello: must be SECTION.KEY=VALUE"),
+        ("tello", ["tello.full_speed_m_s=-3"], "full_speed_m_s"),
+    ],
+)
+def test_what_cannot_be_judged_is_named(kind, options, text):
+    with pytest.raises(SettingsError, match=text):
+        subject_of(kind, options)
+
+
+@pytest.mark.slow
+def test_the_plug_in_makes_a_test_of_each_check(tmp_path):
+    command = [sys.executable, "-m", "pytest", "-p", "sim_bridge.conformance.plugin", "-p", "no:cacheprovider"]
+    command += ["--skein-vehicle", "tello", "--skein-only", "kind", "-q"]
+    env = os.environ | {"PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    result = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=100, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "18 passed" in result.stdout

@@ -1,7 +1,7 @@
 """Connections that do not say what they want: each has 5 s, and when there are too many the oldest one goes.
 
 A browser sends its request at once, so the oldest is never somebody's page; without this, a few hundred silent
-connections keep everybody else out.
+connections keep everybody else out. From the network, one address has so many connections at most, silent or not.
 """
 
 import asyncio
@@ -11,6 +11,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 PATIENCE_S = 5.0
 MOST = 64
+MOST_OF_A_PEER = 24
+"""A page has one connection that stays, and a browser opens six at most to load it."""
 
 
 class HalfOpen:
@@ -42,13 +44,37 @@ class HalfOpen:
         transport.abort()
 
 
-def protocol(waiting: HalfOpen) -> type[H11Protocol]:
-    """Return uvicorn's HTTP protocol, with impatience."""
+class PeerLimit:
+    """The open connections of each address; `refused` counts those beyond what one may have."""
+
+    def __init__(self, most: int = MOST_OF_A_PEER) -> None:
+        self._most = most
+        self._open: dict[str, list[asyncio.Transport]] = {}
+        self.refused = 0
+
+    def enter(self, transport: asyncio.Transport) -> None:
+        """Take a connection, or end it."""
+        for address in [each for each, theirs in self._open.items() if all(one.is_closing() for one in theirs)]:
+            del self._open[address]
+        theirs = self._open.setdefault(transport.get_extra_info("peername")[0], [])
+        theirs[:] = [one for one in theirs if not one.is_closing()]
+        if len(theirs) < self._most:
+            theirs.append(transport)
+        else:
+            self.refused += 1
+            transport.abort()
+
+
+def protocol(waiting: HalfOpen, peers: PeerLimit | None = None) -> type[H11Protocol]:
+    """Return uvicorn's HTTP protocol, with impatience and, where peers are given, with their limit."""
 
     class Impatient(H11Protocol):
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
-            waiting.enter(transport)
+            if peers is not None:
+                peers.enter(transport)
+            if not transport.is_closing():
+                waiting.enter(transport)
 
         def data_received(self, data: bytes) -> None:
             super().data_received(data)

@@ -25,6 +25,7 @@ _INTRUSIONS = {
     "other_user": "requests of other users without the code",
     "device": "requests of devices that were not invited",
     "silent": "connections that asked for nothing",
+    "crowd": "connections beyond those that one address may have",
 }
 
 

@@ -35,7 +35,7 @@ from groundstation.console.access import Asgi, Door
 from groundstation.console.app import ConsoleApp
 from groundstation.console.code_file import CodeFile
 from groundstation.console.commands import CommandDesk
-from groundstation.console.half_open import HalfOpen, protocol
+from groundstation.console.half_open import HalfOpen, PeerLimit, protocol
 from groundstation.console.network import Network
 from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
@@ -112,7 +112,7 @@ class ConsoleServer:
         steered = cast.targets if scene["truth"] and player is None else ()
         desk = CommandDesk(bus, tuple(cast.drones))
         self.sessions = Sessions(bus, desk, token, run, steered, lambda: self._pictures.frames, player)
-        self.half_open = HalfOpen()
+        self.half_open, self.peers = HalfOpen(), PeerLimit()
         self._code = CodeFile(listener.getsockname()[1])
         door = Door(self._code.code, str(self._code.path))
         pages = load_pages(token, run)
@@ -136,7 +136,7 @@ class ConsoleServer:
     def refused(self) -> dict[str, int]:
         """How many requests and connections were not let in, by reason."""
         devices = self.app.network.refused if self.app.network else Counter[str]()
-        refused = {"silent": self.half_open.ended, "device": devices["other_user"]}
+        refused = {"silent": self.half_open.ended, "crowd": self.peers.refused, "device": devices["other_user"]}
         return {**refused, **self.app.asgi.refused, "other_site": (self.app.asgi.refused + devices)["other_site"]}
 
     @property
@@ -168,7 +168,7 @@ class ConsoleServer:
             log_level="warning",
             lifespan="off",
             ws="websockets-sansio",
-            http=protocol(self.half_open),
+            http=protocol(self.half_open, self.peers if network else None),
             ws_max_size=16 * 1024,
             ws_per_message_deflate=False,
             ws_ping_interval=10.0,

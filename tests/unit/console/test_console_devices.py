@@ -118,6 +118,21 @@ def test_a_device_may_what_its_role_says(tmp_path: Path, role: DeviceRole) -> No
     visited(tmp_path, visit)
 
 
+def test_one_address_of_the_network_has_so_many_connections_at_most(tmp_path: Path) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(DeviceRole.WATCH))
+        site.server.peers._most = 3
+        async with tablet.page(), tablet.page(), tablet.page():
+            with pytest.raises((OSError, IndexError)):  # ended before an answer
+                await tablet.get("/")
+            assert site.server.refused["crowd"] >= 1
+            assert (await site.request("/"))[0] == 200, "the operator's own page comes by loopback"
+        await until(lambda: all(one.is_closing() for ones in site.server.peers._open.values() for one in ones))
+        assert (await tablet.get("/"))[0] == 200
+
+    visited(tmp_path, visit)
+
+
 def test_a_console_that_is_restarted_knows_its_devices_and_shows_the_same_certificate(tmp_path: Path) -> None:
     folder, tablets, prints = tmp_path, [], []
 

@@ -19,10 +19,11 @@ from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
 from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.ardrone.uplink_watch import UplinkWatch
 from drivers.ardrone.velocity_loop import VelocityLoop
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
-from drivers.ardrone.wire.options import DEMO
+from drivers.ardrone.wire.options import DEMO, SPEED_REFERENCES
 from drivers.ardrone.wire.state import StateBit, bit_names
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
@@ -54,7 +55,10 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LatestNavdata:
-    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last reported motion; velocity as reported."""
+    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last reported motion; velocity as reported.
+
+    obeyed: sequence number of the last PCMD that it says it obeyed, if it says so.
+    """
 
     heard_ns: int = 0
     moved_ns: int = 0
@@ -64,6 +68,7 @@ class LatestNavdata:
     battery: float | None = None
     model: Model = Model.UNKNOWN
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    obeyed: int | None = None
 
 
 class ArDrone:
@@ -84,7 +89,7 @@ class ArDrone:
         self._session = ArdroneSession(
             partial(wishes, settings), ids_of(settings.name), inquirer, settings.flight.flat_trim
         )
-        self._rate_watch = RateWatch()
+        self._rate_watch, self._uplink = RateWatch(), UplinkWatch()
         self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
         self._loop = VelocityLoop(settings.limits)
@@ -116,12 +121,13 @@ class ArDrone:
     def _hear(self, now_ns: int, packet: Navdata) -> None:
         motion = convert.motion_from_navdata(packet)
         telemetry = replace(self.telemetry, heard_ns=now_ns, state=packet.state)
-        demo = packet.read(DEMO)
+        demo, references = packet.read(DEMO), packet.read(SPEED_REFERENCES)
         if demo is not None and motion is not None:
             telemetry = replace(
                 telemetry,
                 moved_ns=now_ns,
                 velocity_m_s=motion.velocity_m_s,
+                obeyed=None if references is None else references.sequence,
                 control_state=demo.control_state,
                 battery=min(demo.battery_percent, 100) / 100,
                 model=self.telemetry.model if self.telemetry.model is not Model.UNKNOWN else model_from_navdata(packet),
@@ -180,11 +186,14 @@ class ArDrone:
     def _watch_rate(self, now_ns: int) -> None:
         if self._session.phase is not SessionPhase.READY:
             self._rate_watch.reset()
+            self._uplink.reset()
         elif now_ns >= self._next_rate_ns:
             self._next_rate_ns = now_ns + _RATE_PERIOD_NS
-            notice = self._rate_watch.step(now_ns, self._link.rates(now_ns)[0])
-            if notice is not None:
-                self._session.news.append(notice)
+            heard = self.telemetry
+            notices = [self._rate_watch.step(now_ns, self._link.rates(now_ns)[0])]
+            if heard.obeyed is not None and now_ns - heard.moved_ns < _FRESH_NS:
+                notices.append(self._uplink.step(now_ns, heard.obeyed, heard.flight_state in UP))
+            self._session.news.extend(notice for notice in notices if notice is not None)
 
     def news(self) -> list[Notice]:
         """Return the events for the operator, once."""
@@ -226,7 +235,8 @@ class ArDrone:
         rate_hz, quality = self._link.rates(now_ns)
         heights = Counter({"height_jump": self._publisher.heights.refused})
         rejected = dict(self._link.rejected + self._refused + heights)
-        return LinkHealth(quality, rate_hz, rejected, self._session.detail)
+        detail = "its commands do not arrive" if self._uplink.cut else self._session.detail
+        return LinkHealth(quality, rate_hz, rejected, detail)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

@@ -1,6 +1,6 @@
 """AR.Drones as a kind of vehicle."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -24,7 +24,6 @@ from groundstation.vehicles import (
     VehicleOrder,
 )
 
-_AT_PORT = 5556
 _VIDEO_WIDTHS = {"h264_360p": 640, "h264_720p": 1280}
 
 
@@ -39,12 +38,51 @@ class ArDroneVideo(KindSection):
     """Constant bit rate [kbit/s]; none: the drone chooses."""
 
 
+_Port = Annotated[int, Field(ge=1, le=65535)]
+# WIRE (docs/reference/ardrone.md 5.4): values of pic:ultrasound_freq.
+_ULTRASOUND: dict[int, Literal[7, 8]] = {22: 7, 25: 8}
+
+
+class ArDroneOwn(KindSection):
+    """How an AR.Drone is set up for its room, and where it is reached."""
+
+    hull: Literal["indoor", "outdoor"] = "indoor"
+    """Which hull it wears; the outdoor one has no rings around the propellers."""
+    outdoor: bool = False
+    """true: it flies outdoors, with another set of limits, over which those of the field file are written."""
+    flat_trim: Literal["at_connect", "on_order"] = "at_connect"
+    """When its attitude is taken for level. at_connect: by the driver whenever it connects to a drone that stands;
+    on_order: only by `groundstation ardrone trim`, for pads that are not level."""
+    ultrasound_hz: Literal[22, 25] | None = None
+    """Rate of its ultrasound [Hz]; none: 22 and 25 in turn, in the order of the drones, so that neighbours differ."""
+    strict_checksum: bool = True
+    """Whether navdata with a wrong checksum is refused; false for firmwares and bridges that send none."""
+    navdata_port: _Port = 5554
+    """UDP port of its navdata."""
+    at_port: _Port = 5556
+    """UDP port that it takes commands at."""
+    control_port: _Port = 5559
+    """TCP port of its configuration."""
+    ftp_port: _Port = 5551
+    """TCP port of its version."""
+
+
+_PORTS = ("navdata_port", "at_port", "control_port", "ftp_port")
+
+
+def _own(order: VehicleOrder) -> ArDroneOwn:
+    own = order.sections.get("ardrone")
+    return own if isinstance(own, ArDroneOwn) else ArDroneOwn()
+
+
 def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
     return [DriverProcess((order.name,), _settings(order).model_dump_json()) for order in orders]
 
 
 def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
-    drone = order.drone
+    drone, own = order.drone, _own(order)
+    # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
+    rate_hz = own.ultrasound_hz or (25 if order.index % 2 else 22)
     return ArDroneDriverSettings(
         name=order.name,
         address=drone.address,
@@ -55,10 +93,17 @@ def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
         ),
         safety=silence_limits(order.safety),
         pad_m=drone.pad_m,
-        # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
-        flight=FlightConfiguration(altitude_max_m=max(0.5, order.top_m), ultrasound_freq=8 if order.index % 2 else 7),
+        flight=FlightConfiguration(
+            altitude_max_m=max(0.5, order.top_m),
+            outdoor=own.outdoor,
+            without_shell=own.hull == "outdoor",
+            ultrasound_freq=_ULTRASOUND[rate_hz],
+            flat_trim=own.flat_trim == "at_connect",
+        ),
         video=_video(order),
         raw_datagrams=order.raw_datagrams,
+        strict_checksum=own.strict_checksum,
+        **{name: getattr(own, name) for name in _PORTS},
     )
 
 
@@ -69,12 +114,12 @@ def _video(order: VehicleOrder) -> Video | None:
     return Video(codec=video.codec, channel=video.channel, bitrate=video.bitrate)
 
 
-def _stop(_orders: Sequence[VehicleOrder]) -> StopDatagrams:
+def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
     # WIRE: sequence number 1 resets the drone's count, so it obeys whoever speaks after its driver. Hovering is PCMD
     # without flags, and no REF: a start bit would lift a drone that stands.
     hover = at.encode_datagram([at.pcmd(at.ProgressiveMotion())], 1)
     land = at.encode_datagram([at.ref(start=False), at.pcmd(at.ProgressiveMotion())], 1)
-    return StopDatagrams(_AT_PORT, hover, land)
+    return StopDatagrams(_own(orders[0]).at_port, hover, land)
 
 
 def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
@@ -90,6 +135,11 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
             yield order.name, (("camera", "calibration"), text)
 
 
+def _moved(_local_address: str, _sections: Mapping[str, KindSection]) -> dict[str, dict[str, object]]:
+    # An emulated one has the ports of a new one.
+    return {"ardrone": {name: ArDroneOwn.model_fields[name].default for name in _PORTS}}
+
+
 # An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. Its navdata call a drone level that
 # leans into moving air.
 KIND = VehicleKind(
@@ -99,7 +149,8 @@ KIND = VehicleKind(
     habits=ErrorHabits(0.4, 5.0, 0.7, 0.0, 0.2, reports_climb=False, tells_attitude=False),
     processes=_processes,
     stop=_stop,
-    sections={"video": ArDroneVideo},
+    sections={"video": ArDroneVideo, "ardrone": ArDroneOwn},
+    moved=_moved,
     check=_check,
     standing_m=(0.06, 0.015),  # on its feet
     camera="ardrone",

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from drivers.ardrone.conversation import CONTROL_PORT, FTP_PORT, Conversation
 from drivers.ardrone.queries import TcpInquirer
+from drivers.ardrone.wire import at
 from drivers.ardrone.wire.state import StateBit
 from groundstation.errors import DriverError
 
@@ -24,6 +25,7 @@ _ACCESS_POINT, _CLIENT = "0", "2"
 _NAME = re.compile(r"[ !#-+\--~]{1,32}")
 _HARDWARE_ADDRESS = re.compile(r"([0-9A-Fa-f]{2}:){5}[0-9A-Fa-f]{2}")
 _SIOCGIFADDR = 0x8915
+_TRIMS = 3
 
 
 def pairing(owner: str) -> dict[str, str]:
@@ -64,6 +66,25 @@ def _address_of(any_socket: socket.socket, interface: str) -> str:
     except OSError:  # it has none
         return ""
     return socket.inet_ntoa(answer[20:24])
+
+
+def trim(address: str) -> None:
+    """Let a drone that stands take its present attitude for level, until it is switched off.
+
+    Raises DriverError when it does not answer, or its motors may turn.
+    """
+    line = Conversation(address)
+    try:
+        line.wait_for_answer()
+        if line.is_set(StateBit.FLY):
+            raise DriverError(f"{address} flies: land it first")
+        for _ in range(_TRIMS):
+            line.say(at.ftrim())  # datagrams get lost, and nothing acknowledges it
+            line.listen(0.05)
+    except OSError as error:
+        raise DriverError(f"{address} cannot be reached: {error.strerror or error}") from error
+    finally:
+        line.close()
 
 
 def change(address: str, wanted: Mapping[str, str]) -> dict[str, tuple[str, str]]:

@@ -94,6 +94,27 @@ def setup(address: str, pair: bool, owner: str | None, unpair: bool) -> int:
     return _write(address, lambda: pairing(UNPAIRED if unpair else owner or own_hardware_address(address)))
 
 
+@ardrone.command(
+    epilog="\b\nExamples:\n  groundstation ardrone trim 192.168.1.11\n\n"
+    "Exit codes: 0 told, 2 wrong arguments, 4 it does not answer, or flies."
+)
+@click.argument("address", callback=_address)
+def trim(address: str) -> int:
+    """Let the drone at ADDRESS take its present attitude for level, until it is switched off.
+
+    For fields with `ardrone.flat_trim: on_order`: put it on something level, trim it, then start the ground station.
+    """
+    from drivers.ardrone.network_setup import trim as order
+
+    try:
+        order(address)
+    except DriverError as error:
+        click.echo(str(error), err=True)
+        return ExitCode.FAULT
+    click.echo(f"{address} was told that it stands level; nothing acknowledges that")
+    return ExitCode.OK
+
+
 def _write(address: str, settings: "Callable[[], dict[str, str]]") -> int:
     from drivers.ardrone.network_setup import change
 

@@ -250,4 +250,5 @@ def test_sizes_of_whole_packets():
     totals = {profile: 16 + sum(sizes.values()) + 8 for profile, sizes in OPTION_SIZES.items()}
     assert totals["ar1-1.7"] == 1327
     assert totals["ar2-2.3"] == 1916
+    assert totals["ar2-2.4-beta"] == 2384
     assert totals["ar2-2.4.8"] == 1916 + 16 + 8 + 8 + 204

@@ -56,5 +56,6 @@ OPTION_SIZES: dict[str, dict[int, int]] = {
     "ar2-2.2": dict(_AR2_2_3),
     "ar2-2.3": dict(_AR2_2_3),
     "ar2-2.3.3": _AR2_2_3 | {Tag.MAGNETO: 83},
+    "ar2-2.4-beta": _AR2_2_3 | {Tag.GPS: 480},
     "ar2-2.4.8": _AR2_2_3 | {Tag.PWM: 92, Tag.MAGNETO: 83, Tag.WIND: 64, Tag.GPS: 216},
 }

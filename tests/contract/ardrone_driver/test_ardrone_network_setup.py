@@ -78,3 +78,13 @@ def test_a_hardware_address_is_checked_and_loopback_has_none():
 )  # fmt: skip
 def test_one_wish_at_a_time(arguments):
     assert isinstance(run(*arguments).exception, click.UsageError)
+
+
+def test_a_drone_is_trimmed_where_it_stands_and_nowhere_else(drone_alone):
+    drone = drone_alone("2.4.8")
+    result = run("trim", drone.address)
+    assert result.return_value == 0, result.output
+    assert len(drone.said("FTRIM")) == 3 and {name for name, _, _ in drone.lines} == {"FTRIM"}
+    flying = drone_alone("2.4.8", state=FLY)
+    result = run("trim", flying.address)
+    assert result.return_value == 4 and "land it first" in result.output and flying.lines == []

@@ -6,6 +6,7 @@ from drivers.ardrone.dump import category, differences, parse_dump
 from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.identity import Identity, Model, identity_from_dump, identity_from_version, model_from_navdata
 from drivers.ardrone.rate_watch import RateWatch
+from drivers.ardrone.uplink_watch import UplinkWatch
 from drivers.ardrone.wire.navdata import Navdata
 
 MS = 1_000_000
@@ -49,6 +50,24 @@ def test_a_scan_is_told_once_with_its_remedy_and_its_end():
     first, second = [notice for notice in told if notice is not None]
     assert "fell from 198 to 5 Hz" in first.text and "scan" in first.remedy and first.severity == "WARNING"
     assert "back at 198 Hz" in second.text
+
+
+def told_by(watch, numbers, flies=True):
+    """Take a number each 20 ms."""
+    return [watch.step(i * 20 * MS, number, flies) for i, number in enumerate(numbers)]
+
+
+def test_a_cut_of_the_uplink_is_told_with_its_end():
+    notices = told_by(UplinkWatch(), [*range(1, 50), *[49] * 40, *range(90, 100)])
+    first, second = [notice for notice in notices if notice is not None]
+    assert "obeyed no command for 0.5 s" in first.text and first.severity == "WARNING" and first.remedy
+    assert "again after 0.8 s" in second.text
+
+
+def test_drones_that_stand_and_those_that_never_count_lose_no_commands():
+    assert not any(told_by(UplinkWatch(), [*range(1, 50), *[49] * 100], flies=False))
+    assert not any(told_by(UplinkWatch(), [0] * 200))
+    assert not any(told_by(UplinkWatch(), [*range(1, 50), *[49] * 20, *range(60, 90)]))
 
 
 def test_one_late_second_and_slow_streams_are_no_scan():

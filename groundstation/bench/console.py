@@ -20,7 +20,11 @@ from websockets.typing import Origin
 
 from groundstation.bench.console_feed import CAMERA, TalkingTeam
 from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Command
+from groundstation.bus.topics import COMMAND
 from groundstation.bus.zenoh_bus import open_bus, open_router
+from groundstation.console.section import run_id
 from groundstation.console.server import HOST, claim_port
 from groundstation.errors import GroundStationError
 from groundstation.field.resolved import ResolvedField
@@ -30,6 +34,7 @@ _WARM_S = 3.0
 _START_S = 30.0
 _ACK_EVERY = 4
 _SITE = "lab"
+_ORDERS, _BETWEEN_ORDERS_S = 60, 0.1
 
 
 @dataclass
@@ -57,6 +62,7 @@ def measure(seconds: float, drones: int, jpegs: list[bytes], browser: str = "") 
                 begin_s = cpu_s(process.pid)
                 viewed = watch(page, seconds)
                 used_s = cpu_s(process.pid) - begin_s
+                ordered = order_often(page, bus)
             shown = drawn(browser, url, seconds) if browser else {}
         finally:
             team.over.set()
@@ -64,7 +70,7 @@ def measure(seconds: float, drones: int, jpegs: list[bytes], browser: str = "") 
             bus.close()
     if not viewed.latencies_ms:
         raise GroundStationError("the console said nothing of the team: is this machine too busy to start it?")
-    return _summary(viewed, used_s, seconds) | {"peer": echo(viewed, seconds)} | shown
+    return _summary(viewed, used_s, seconds) | ordered | {"peer": echo(viewed, seconds)} | shown
 
 
 def _summary(viewed: Viewed, used_s: float, seconds: float) -> dict[str, Any]:
@@ -75,8 +81,13 @@ def _summary(viewed: Viewed, used_s: float, seconds: float) -> dict[str, Any]:
         "frames_per_s": round(len(texts) / seconds, 1),
         "pictures_per_s": round((len(viewed.frames) - len(texts)) / seconds, 1),
         "kbyte_per_s": round(sum(len(frame) for _, frame in viewed.frames) / seconds / 1e3, 1),
-        "estimate_to_socket_ms": {"median": round(median(late), 1), "p99": round(late[int(0.99 * len(late))], 1)},
+        "estimate_to_socket_ms": _quantiles(late),
     }
+
+
+def _quantiles(late_ms: list[float]) -> dict[str, float]:
+    ordered = sorted(late_ms)
+    return {"median": round(median(ordered), 1), "p99": round(ordered[int(0.99 * len(ordered))], 1)}
 
 
 @contextlib.contextmanager
@@ -151,6 +162,27 @@ def watch(page: ClientConnection, seconds: float) -> Viewed:
     return viewed
 
 
+def order_often(page: ClientConnection, bus: Bus) -> dict[str, Any]:
+    """Return how long an order of the page takes to arrive at another member of the bus."""
+    commands, arrivals_ns = bus.subscribe([COMMAND], capacity=256), list[int]()
+    commands.on_arrival = lambda: arrivals_ns.append(clock.now_ns())
+    known, late_ms = set[str](), list[float]()
+    for number in range(_ORDERS):
+        sent_ns = clock.now_ns()
+        order = {"type": "order", "verb": "HOLD", "drones": [], "run": run_id(""), "ref": f"bench-{number}"}
+        page.send(json.dumps({**order, "age_ms": 0.0, "at_ms": sent_ns / 1e6}))
+        watch(page, _BETWEEN_ORDERS_S)
+        # Nobody acknowledges, so earlier orders are repeated meanwhile.
+        for at_ns, received in zip(arrivals_ns, commands.drain(), strict=False):
+            if isinstance(received.message, Command) and received.message.id not in known:
+                known.add(received.message.id)
+                late_ms.append((at_ns - sent_ns) / 1e6)
+        arrivals_ns.clear()
+    if len(late_ms) < _ORDERS // 2:
+        raise GroundStationError(f"only {len(late_ms)} of {_ORDERS} orders came to the bus")
+    return {"order_to_bus_ms": _quantiles(late_ms)}
+
+
 def echo(viewed: Viewed, seconds: float) -> dict[str, Any]:
     """Return what a bare echo of the same frames at the same times costs; it also takes them in, which we do not."""
     listener = claim_port(free_port())
@@ -190,8 +222,7 @@ def drawn(browser: str, url: str, seconds: float) -> dict[str, Any]:
     late = sorted(state["latencies"])
     if not late:
         raise GroundStationError("the page drew nothing")
-    figures = {"median": round(median(late), 1), "p99": round(late[int(0.99 * len(late))], 1)}
-    return {"estimate_to_drawn_ms": figures, "drawing_ms": round(state["drawMs"], 2)}
+    return {"estimate_to_drawn_ms": _quantiles(late), "drawing_ms": round(state["drawMs"], 2)}
 
 
 def cpu_s(pid: int) -> float:

@@ -9,7 +9,12 @@ from groundstation.cli.bench_limits import judge
 from groundstation.cli.numbers import FiniteRange
 
 _CHROMIUM = "/usr/bin/chromium"
-_LIMITS = {"cpu_percent_of_core": 5.0, "estimate_to_socket_ms": 60.0, "estimate_to_drawn_ms": 60.0}
+_LIMITS = {
+    "cpu_percent_of_core": 5.0,
+    "estimate_to_socket_ms": 60.0,
+    "estimate_to_drawn_ms": 60.0,
+    "order_to_bus_ms": 20.0,
+}
 
 
 @click.command(epilog="Example: groundstation bench console --seconds 20 --json")

@@ -37,15 +37,22 @@ class FaultKind(StrEnum):
     PICTURE_FROZEN = "picture_frozen"
     PICTURE_BLACK = "picture_black"
     WRONG_BOARD = "wrong_board"
+    CAPTURE_SILENT = "capture_silent"
+    CAPTURE_FROZEN = "capture_frozen"
+    BODY_JUMPED = "body_jumped"
+    BODIES_SWAPPED = "bodies_swapped"
 
 
 class Part(Enum):
-    """What can have a fault: any vehicle, an AR.Drone alone, a camera, or the marker of a drone or target."""
+    """What can have a fault: any vehicle, an AR.Drone alone, a camera, the marker of a drone or target, a motion
+    capture system, or its body on a drone or target."""
 
     VEHICLE = auto()
     ARDRONE = auto()
     CAMERA = auto()
     MARKER = auto()
+    CAPTURE = auto()
+    BODY = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +92,10 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.PICTURE_FROZEN: KindRules(Part.CAMERA),
     FaultKind.PICTURE_BLACK: KindRules(Part.CAMERA),
     FaultKind.WRONG_BOARD: KindRules(Part.MARKER, other=True),
+    FaultKind.CAPTURE_SILENT: KindRules(Part.CAPTURE),
+    FaultKind.CAPTURE_FROZEN: KindRules(Part.CAPTURE),
+    FaultKind.BODY_JUMPED: KindRules(Part.BODY, (-5.0, 5.0), 0.5),
+    FaultKind.BODIES_SWAPPED: KindRules(Part.BODY, other=True),
 }
 
 
@@ -103,21 +114,24 @@ class Fault(Section):
     obstacle_below: something value high [m] stands under its ultrasound; wind: air pushes by value [m/s^2], and an
     AR.Drone's reported tilt does not say how far it leans against it; ids_swapped: two vehicles have each other's
     address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen, picture_black: its
-    images come, and repeat the last one, are black; wrong_board: the entity carries the board of the other."""
+    images come, and repeat the last one, are black; wrong_board: the entity carries the board of the other;
+    capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame; body_jumped: all
+    systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other."""
     entity: str
-    """The drone or camera (of a drone's camera: the drone); for wrong_board a drone or target."""
+    """The drone, camera (of a drone's camera: the drone) or motion capture system; for boards and bodies a drone or
+    target."""
     start_s: Annotated[float, Field(ge=0)]
     """When it breaks [s after the simulator is ready]."""
     end_s: Annotated[float, Field(ge=0)] | None = None
     """When it heals [s after the simulator is ready]; none: it does not."""
     value: Annotated[float, Field(ge=-1000, le=1000)] | None = None
     """How much, as `kind` explains; none: 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1 deg/s, 30 deg, a charge of 1,
-    0.4 m, 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop must be told."""
+    0.4 m (body_jumped: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop must be told."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Where value points: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""
     other: str | None = None
-    """ids_swapped, wrong_board: the other vehicle; the drone or target whose board it is."""
+    """ids_swapped, wrong_board, bodies_swapped: the other vehicle; the drone or target whose board or body it is."""
 
     @property
     def amount(self) -> float:

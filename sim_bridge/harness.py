@@ -12,6 +12,7 @@ from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
+from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
@@ -20,6 +21,7 @@ from sim_bridge.real.followers import Followers
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.emulation import emulation_of
+from sim_bridge.world.noise import generator_of
 from sim_bridge.world.unicycle import Unicycle
 from sim_bridge.world.world import World
 
@@ -113,11 +115,20 @@ class Harness:
             emulation = emulation_of(order.site.drones[name].kind)
             emulator = emulation.open(name, world.drones[body], world.onboard.get(body), order)
             self._stage.add(name, emulator, emulator.fileno())
+        for name, place in order.captures.items():
+            self._open_capture(name, place)
+
+    def _open_capture(self, name: str, place: tuple[str, int]) -> None:
+        order, world = self._order, self.world
+        rng, system = generator_of(order.seed, f"capture {name}"), order.site.motion_capture[name]
+        faults, errors = order.scenario.faults, order.scenario.cameras.mounting_errors
+        server = NatnetEmulator(name, place, system, world.bodies, world.states, rng, faults, errors)
+        self._stage.add(name, server, server.fileno())
 
     @property
     def _inventory(self) -> str:
         real = f", real: {', '.join(self._order.real)}" if self._order.real else ""
-        return f"{len(self._stage.emulators)} drones, {len(self._order.streams)} cameras{real}"
+        return f"{len(self.world.drones)} drones, {len(self._order.streams)} cameras{real}"
 
     def _all_landed(self) -> bool:
         emulated = any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())

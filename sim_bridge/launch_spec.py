@@ -43,6 +43,7 @@ class _Envelope(BaseModel):
     scenario: dict[str, Any] = {}
     addresses: dict[str, str]
     streams: dict[str, tuple[str, int]] = {}
+    captures: dict[str, tuple[str, int]] = {}
     real: dict[str, RealBody] = {}
     seed: int | None = Field(default=None, ge=0)
 
@@ -52,7 +53,8 @@ class LaunchSpec:
     """A checked start order.
 
     addresses: loopback address of each emulated drone; streams: address and port of each emulated
-    camera, by the name of the world-fixed camera or of the drone that carries it; real: drones and targets that exist.
+    camera, by the name of the world-fixed camera or of the drone that carries it; real: drones and targets that exist;
+    captures: address and port of each emulated motion capture system.
     """
 
     child: ChildSpec
@@ -62,6 +64,7 @@ class LaunchSpec:
     streams: dict[str, tuple[str, int]]
     seed: int
     real: Mapping[str, RealBody] = field(default_factory=dict)
+    captures: Mapping[str, tuple[str, int]] = field(default_factory=dict)
 
     @property
     def unseen(self) -> frozenset[str]:
@@ -81,6 +84,8 @@ def read_order(path: Path) -> LaunchSpec:
     scenario = parse_scenario(json.dumps(envelope.scenario))
     if strangers := sorted(set(envelope.real) - set(site.bodies)):
         raise SettingsError([f"{path}: real: {name!r} is no body of the field" for name in strangers])
+    if strangers := sorted(set(envelope.captures) - set(site.motion_capture)):
+        raise SettingsError([f"{path}: captures: {name!r} is no motion capture system" for name in strangers])
     _check_faults(scenario.faults, site, envelope.streams, envelope.real)
     strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
     if strangers:
@@ -93,7 +98,8 @@ def read_order(path: Path) -> LaunchSpec:
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])
     seed = scenario.seed if envelope.seed is None else envelope.seed
-    return LaunchSpec(envelope.child, site, scenario, envelope.addresses, envelope.streams, seed, envelope.real)
+    addresses, streams, real, captures = envelope.addresses, envelope.streams, envelope.real, envelope.captures
+    return LaunchSpec(envelope.child, site, scenario, addresses, streams, seed, real, captures)
 
 
 def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], real: Collection[str] = ()) -> None:
@@ -105,6 +111,8 @@ def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], r
         Part.ARDRONE: ardrones,
         Part.CAMERA: sorted(cameras),
         Part.MARKER: list(site.bodies),
+        Part.CAPTURE: sorted(site.motion_capture),
+        Part.BODY: list(site.bodies),
     }
     problems = []
     for number, fault in enumerate(faults):

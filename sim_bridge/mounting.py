@@ -1,4 +1,4 @@
-"""The true mounting of a camera: a little off the field file, like a real one, and turned by a bump."""
+"""The true place of what is fixed in the room: a little off the field file, like a real one; a camera after a bump."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
-from sim_bridge.site import SiteCamera
+from sim_bridge.site import SiteCamera, SiteCapture
 from sim_bridge.world.noise import generator_of
 
 
@@ -21,6 +21,13 @@ def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple
     error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
     known, place = world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m, dtype=np.float64)
     return (rotation_from_euler(*error) @ known, place + off) if errors else (known, place)
+
+
+def surveyed(system: SiteCapture, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and origin [m; world] of the axes that a motion capture system takes for the world's."""
+    error = math.radians(system.attitude_std_deg) * rng.standard_normal(3)
+    off = system.position_std_m * rng.standard_normal(3)
+    return (rotation_from_euler(*error), off) if errors else (np.eye(3), np.zeros(3))
 
 
 def turned_about(angle_deg: float, axis_deg: float) -> Array:

@@ -112,6 +112,39 @@ class SiteCamera(_Part):
     rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+class SiteBody(_Part):
+    """A rigid body of a motion capture system on an entity."""
+
+    name: str = ""
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+
+
+class SiteVolume(_Part):
+    """The box in which a motion capture system sees bodies."""
+
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    z_m: tuple[float, float]
+
+
+class SiteCapture(_Part):
+    """A motion capture system: origin and heading of its axes in the world, its vertical axis, bodies, noise."""
+
+    volume_m: SiteVolume
+    bodies: dict[str, SiteBody] = {}
+    up: Literal["y", "z"] = "z"
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    delay_ms: float = 5.0
+    pose_std_m: float = 0.003
+    heading_std_deg: float = 1.0
+    attitude_std_deg: float = 0.0
+    position_std_m: float = 0.0
+    rate_hz: float = 30.0
+    observes: tuple[str, ...] = ("robots",)
+
+
 class TargetMarker(MarkerPrint):
     """The marker of the target, flat, `height_m` above the floor."""
 
@@ -136,6 +169,8 @@ class Site(_Part):
     site: str
     room: SimulatedRoom
     cameras: dict[str, SiteCamera] = {}
+    motion_capture: dict[str, SiteCapture] = {}
+    truth: dict[str, str] = {}
     drones: dict[str, SiteDrone]
     target: SingleTarget | None = None
     targets: dict[str, SiteTarget] = {}

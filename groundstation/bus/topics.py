@@ -62,9 +62,11 @@ IMU = Topic("imu", m.ImuSample, 200, Quality.SENSOR, _DRIVER)
 ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR, _DRIVER)
 """Driver to tracker: velocity, attitude and height as the vehicle measured them."""
 OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _CAMERA)
-"""Camera driver to tracker: one marker that a camera saw."""
+"""Camera or motion capture driver to tracker: one marker that a camera saw, one body that was captured."""
 SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: a completely searched picture, and the owners of the markers in it."""
+BODY_POSES = Topic("body_poses", m.BodyPoses, 30, Quality.SENSOR, _CAMERA)
+"""Motion capture driver: where its system has each body."""
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
 CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA)
@@ -116,6 +118,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         ODOMETRY,
         OBSERVATION,
         SEARCHED_PICTURE,
+        BODY_POSES,
         VEHICLE_STATUS,
         CAMERA_STATUS,
         ESTIMATE,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import MotionCapture, WorldCamera
 
 Interval = tuple[float, float]
 
@@ -47,7 +48,8 @@ class SearchParameters:
 def search_from_field(field: ResolvedField) -> SearchParameters:
     """Return the settings of a resolved field."""
     room, planner = field.room, field.planner
-    cameras = tuple(name for name, camera in field.cameras.items() if "targets" in camera.observes)
+    fixed: dict[str, WorldCamera | MotionCapture] = {**field.cameras, **field.sensing_capture}
+    cameras = tuple(name for name, sensor in fixed.items() if "targets" in sensor.observes)
     return SearchParameters(
         room_m=(room.size_m[0], room.size_m[1]),
         fence_x_m=room.fence.x_m,

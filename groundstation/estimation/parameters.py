@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from groundstation.estimation.models import (
     ConstantVelocityTarget,
     CoordinatedTurnTarget,
@@ -17,7 +19,7 @@ from groundstation.estimation.models import (
 from groundstation.estimation.models.odometry_robot import AERIAL
 from groundstation.field.drones import FieldDrone, OnboardCamera
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import WorldCamera
+from groundstation.field.room import MotionCapture, WorldCamera
 from groundstation.field.targets import Target
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
@@ -30,6 +32,8 @@ from groundstation.vehicles import kind_named
 WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
 # Of the time of exposure about the calibrated delay of a video: +-20 ms, as the honest scenario has it [s].
 STAMP_STD_S = 0.0115
+# Of a motion capture system's, which tells its own delay but for that of the network [s].
+CAPTURE_STAMP_STD_S = 0.002
 # A calibrated velocity scale is good to this, and creeps by this in a second.
 _SCALE_STD, _SCALE_DRIFT = 0.04, 0.002
 _VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
@@ -70,10 +74,12 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
     drones, estimator = resolved.drones, resolved.estimator
     entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
     entities |= {name: _target(target) for name, target in resolved.tracked.items()}
-    entities |= {name: _mount(camera) for name, camera in resolved.cameras.items()}
+    fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
+    entities |= {name: _mount(sensor) for name, sensor in fixed.items()}
     cameras: dict[str, ObservationModel] = {
         name: _world_camera(name, camera) for name, camera in resolved.cameras.items()
     }
+    cameras |= {name: _capture(name, system) for name, system in resolved.sensing_capture.items()}
     cameras |= {name: _onboard_camera(name, drone.camera) for name, drone in drones.items()}
     return EstimatorParameters(
         entities,
@@ -135,11 +141,22 @@ def _target(target: Target) -> MotionModel:
     return ManoeuvringTarget((straight, turning), (target.straight_s or straight_s, target.turning_s or turning_s))
 
 
-def _mount(camera: WorldCamera) -> FixedMount:
+def _mount(sensor: WorldCamera | MotionCapture) -> FixedMount:
+    # The poses of a motion capture system come along the world's axes and from its origin; that these are off by
+    # something is one error for all of them.
     return FixedMount(
-        position_m=camera.position_m,
-        attitude_std_rad=math.radians(camera.attitude_std_deg),
-        position_std_m=camera.position_std_m,
+        position_m=sensor.position_m if isinstance(sensor, WorldCamera) else (0.0, 0.0, 0.0),
+        attitude_std_rad=math.radians(sensor.attitude_std_deg),
+        position_std_m=sensor.position_std_m,
+    )
+
+
+def _capture(name: str, system: MotionCapture) -> MountedCamera:
+    return MountedCamera(
+        carrier=name,
+        rotation=np.eye(3),
+        observes_targets="targets" in system.observes,
+        stamp_std_s=CAPTURE_STAMP_STD_S,
     )
 
 

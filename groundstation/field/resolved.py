@@ -14,7 +14,7 @@ from groundstation.field.behaviour import (
     SafetyValues,
 )
 from groundstation.field.drones import FieldDrone, camera_name, gathered
-from groundstation.field.room import LensCalibration, Room, WorldCamera
+from groundstation.field.room import LensCalibration, MotionCapture, Room, WorldCamera
 from groundstation.field.targets import SingleTarget, Target, WeightedTarget
 
 
@@ -24,7 +24,9 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     schema_version: Literal[1] = 1
     site: str
     room: Room
-    cameras: dict[str, WorldCamera]
+    cameras: dict[str, WorldCamera] = {}
+    motion_capture: dict[str, MotionCapture] = {}
+    truth: dict[Literal["from"], str] = {}
     drones: dict[str, FieldDrone]
     target: SingleTarget | None = None
     targets: dict[str, WeightedTarget] = {}
@@ -39,6 +41,16 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     def tracked(self) -> Mapping[str, Target]:
         """Return the targets by name, in the file's order."""
         return self.targets if self.target is None else {self.target.name: self.target}
+
+    @property
+    def sensing_capture(self) -> Mapping[str, MotionCapture]:
+        """Return the motion capture systems that the tracker hears: all but the truth."""
+        return {name: one for name, one in self.motion_capture.items() if name != self.truth.get("from")}
+
+    @property
+    def world_sensors(self) -> tuple[str, ...]:
+        """Return the names of what is fixed in the world and observes: cameras, then motion capture."""
+        return (*self.cameras, *self.sensing_capture)
 
     @property
     def calibrations(self) -> dict[str, LensCalibration]:

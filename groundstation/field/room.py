@@ -69,3 +69,37 @@ class WorldCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     attitude_std_deg: float = 0.2
     position_std_m: float = 0.01
     observes: tuple[Literal["robots", "targets"], ...] = ("robots",)
+
+
+class RigidBody(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A motion capture system's name of the body on an entity ("": the entity's), and its origin and heading there."""
+
+    name: str = ""
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+
+
+class Volume(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The box in which a motion capture system sees bodies [m; world]."""
+
+    x_m: Interval
+    y_m: Interval
+    z_m: Interval
+
+
+class MotionCapture(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A motion capture system, fixed in the world: place [m; world] and heading of its axes, what it sees, how well."""
+
+    source: str
+    volume_m: Volume
+    bodies: dict[str, RigidBody] = {}
+    observes: tuple[Literal["robots", "targets"], ...] = ("robots",)
+    up: Literal["y", "z"] = "z"
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    delay_ms: float = 5.0
+    rate_hz: float = 30.0
+    pose_std_m: float = 0.003
+    heading_std_deg: float = 1.0
+    attitude_std_deg: float = 0.1
+    position_std_m: float = 0.005

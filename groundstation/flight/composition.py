@@ -17,7 +17,14 @@ from groundstation.flight.real_parts import ALL_EMULATED, RealParts
 from groundstation.process.ports import port_of
 from groundstation.runtime.router import RouterSection
 from groundstation.settings.schema import Field
-from groundstation.settings.sections import CAMERA, DriverSection, core_section, driver_sections, rerouted
+from groundstation.settings.sections import (
+    CAMERA,
+    MOTION_CAPTURE,
+    DriverSection,
+    core_section,
+    driver_sections,
+    rerouted,
+)
 from groundstation.supervisor import process_table as rows
 from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
@@ -26,7 +33,7 @@ from groundstation.supervisor.site import hosts
 from groundstation.supervisor.supervisor import SOURCE
 from groundstation.vehicles import kind_named
 
-_CAMERA_DRIVER = "drivers.camera.driver:run"
+_SENSOR_DRIVERS = {CAMERA: "drivers.camera.driver:run", MOTION_CAPTURE: "drivers.motion_capture.driver:run"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +59,14 @@ def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) ->
     addresses = {
         name: network.drone_address(index) for index, name in enumerate(field.drones) if name not in real.drones
     }
-    return rerouted(field, addresses, _streams(field, network, real), streams_only=frozenset(real.drones))
+    streams = _streams(field, network, real)
+    return rerouted(field, addresses, streams, frozenset(real.drones), _captures(field, network))
+
+
+def _captures(field: Field, network: Network) -> dict[str, tuple[str, int]]:
+    """Return where the emulated motion capture systems listen: behind the cameras."""
+    first = len(field.cameras) + len(field.drones)
+    return {name: network.stream(first + index) for index, name in enumerate(field.motion_capture)}
 
 
 def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
@@ -101,15 +115,16 @@ def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec], liste
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:
-    row = rows.CAMERA if section.kind == CAMERA else rows.DRONE
+    sensor = _SENSOR_DRIVERS.get(section.kind)
+    row = rows.CAMERA if sensor is not None else rows.DRONE
     spec = replace(
         row,
         name=section.name,
-        entry=_CAMERA_DRIVER if section.kind == CAMERA else kind_named(section.kind).driver,
+        entry=sensor or kind_named(section.kind).driver,
         section=section.section,
         entities=section.entities,
     )
-    if section.kind == CAMERA:
+    if sensor is not None:
         return spec
     return replace(spec, failsafe_datagrams=failsafe_datagrams(field, section))
 
@@ -121,6 +136,7 @@ def _sim_bridge(field: Field, simulation: Simulation) -> ProcessSpec:
         "scenario": simulation.scenario,
         "addresses": {name: drone.address for name, drone in field.drones.items() if name not in real.drones},
         "streams": _streams(field, network, real),
+        "captures": _captures(field, network),
         "real": {name: {"source": body.source, "address": body.address} for name, body in real.bodies.items()},
         "seed": simulation.seed,
     }

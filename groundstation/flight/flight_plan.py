@@ -37,6 +37,9 @@ def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan
     for name, camera in field.cameras.items():
         right, down, forward = world_from_downward_optical(camera.rotation_deg)[2].tolist()
         cameras[name] = FixedCamera(camera.position_m[2], (right, down, forward))
+    for name in field.motion_capture:
+        if name != field.truth.get("from"):
+            cameras[name] = FixedCamera(0.0, (0.0, 0.0, 1.0))
     limits = TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
     resolved = field_from_json(field.model_dump_json().encode())
     return FlightPlan(duration_s, asks, cameras, limits, field=resolved)

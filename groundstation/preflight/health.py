@@ -41,17 +41,19 @@ def _battery(name: str, status: VehicleStatus, lands_at: float) -> Finding:
 
 def camera_findings(field: ResolvedField, statuses: Mapping[str, CameraStatus]) -> Iterator[Finding]:
     """Yield what is told of each camera; statuses: by the camera's name on the bus."""
-    dark = [name for name in field.cameras if name not in statuses or not statuses[name].connected]
-    if len(dark) == len(field.cameras):
+    fixed = field.world_sensors
+    dark = [name for name in fixed if name not in statuses or not statuses[name].connected]
+    if len(dark) == len(fixed):
         remedy = "check power, source and network of one at least: without it nobody knows where the drones are"
-        yield Finding(Level.MUST, "cameras", "no fixed camera sends pictures", remedy)
-    for name in (*field.cameras, *map(camera_name, field.drones)):
+        yield Finding(Level.MUST, "cameras", "no sensor that is fixed in the world sends anything", remedy)
+    for name in (*field.cameras, *field.motion_capture, *map(camera_name, field.drones)):
         status = statuses.get(name)
         if status is None or not status.connected:
-            why = status.detail if status is not None and status.detail else "no picture arrives"
+            why = status.detail if status is not None and status.detail else "nothing arrives"
             yield Finding(Level.SHOULD, name, why, "check its power, its source and its network")
             continue
-        found = f"{status.fps:.0f} pictures/s, {status.age_ms:.0f} ms old, {status.detections} sightings"
+        what = "frames" if name in field.motion_capture else "pictures"
+        found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} sightings"
         good = status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS
         remedy = "" if good else "fewer or smaller pictures, a better link, or a faster machine"
         yield Finding(Level.OK if good else Level.SHOULD, name, found, remedy)

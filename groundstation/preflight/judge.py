@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from groundstation.bus.messages import CameraStatus, VehicleStatus
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.captured_pads import captured_pad_findings
 from groundstation.preflight.health import camera_findings, drone_findings
 from groundstation.preflight.stand import PadSighting, stand_of
 from groundstation.preflight.suspicions import opinion
@@ -29,7 +30,10 @@ def judge(
 def pad_findings(
     field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
 ) -> Iterator[Finding]:
-    """Yield what fixed cameras say of drones on their pads: who is not seen, and what is wrong with who is."""
+    """Yield what is fixed in the room says of drones on their pads: who is not seen, what is wrong with who is."""
+    yield from captured_pad_findings(field, sightings, flew)
+    if not field.cameras:
+        return
     known = [s for s in sightings if s.drone in field.drones and s.camera in field.cameras]
     seen = {s.drone for s in known}
     unseen = [name for name in field.drones if name not in seen and name not in flew]

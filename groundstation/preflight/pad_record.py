@@ -17,7 +17,7 @@ _MEDIAN_COST = 1.57
 
 
 class PadRecord:
-    """What each fixed camera lately saw of each drone."""
+    """What each sensor that is fixed in the room lately saw of each drone."""
 
     def __init__(self, cameras: Collection[str]) -> None:
         self._cameras = frozenset(cameras)

@@ -34,7 +34,7 @@ class Criterion(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> list[Criterion]:
-    """Return all criteria that apply: those against the truth need a simulator."""
+    """Return all criteria that apply: those against the truth need a simulator or motion capture."""
     criteria = [
         *_promises(figures, facts),
         _of_failsafes(figures),
@@ -45,7 +45,8 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
     if figures.sim_overrun_percent is not None or figures.target is not None:
         criteria = [*_against_truth(figures, field), *_of_the_demo(figures, facts), *criteria]
         criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, MAX_CPU_CORES))
-        criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
+        if figures.sim_overrun_percent is not None or not field.truth:
+            criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
     return criteria
 
 

@@ -14,13 +14,14 @@ from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Record, RecordingError, open_parts, parts
 from groundstation.report import run_facts
+from groundstation.report.captured_truth import captured_tracks
 from groundstation.report.rerun import rerun_of
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
 
 _WANTED = frozenset(
     (topic.plane, topic.name)
     for topic in (
-        *(t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
+        *(t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
         *(t.PROCESS_STATUS, t.SIM_STATUS, t.TRUTH, t.VEHICLE_STATUS),
     )
 )
@@ -66,6 +67,7 @@ class _Rows:
         self._estimates: defaultdict[str, list[tuple[float, m.EntityEstimate]]] = defaultdict(list)
         self._processes: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
         self._sim: list[tuple[float, ...]] = []
+        self._captured: list[TimedMessage[m.BodyPoses]] = []
 
     def take(self, records: Iterable[Record]) -> None:
         """Sort records into rows."""
@@ -84,6 +86,8 @@ class _Rows:
                 self._truth[message.header.entity].append(
                     (time_s, *message.position_m, message.attitude_rad[2], float(message.on_ground))
                 )
+            case m.BodyPoses() if message.header.entity == data.resolved.truth.get("from"):
+                self._captured.append(TimedMessage(time_s, message))
             case m.Estimate():
                 for entity in message.entities:
                     self._estimates[entity.name].append((time_s, entity))
@@ -112,6 +116,8 @@ class _Rows:
         for name, rows in self._truth.items():
             table = np.array(sorted(rows))
             data.truth[name] = TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5] > 0.5)
+        if self._captured:
+            data.truth = captured_tracks(self._captured, data.vehicles)
         for name, entries in self._estimates.items():
             data.estimates[name] = _estimate_track(entries)
         for name, rows in self._processes.items():

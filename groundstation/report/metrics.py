@@ -17,7 +17,8 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     """What report.json says of a run; None where there was nothing to measure.
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error.
-    failsafe_landings: which drones a failsafe landed or cut, when and why.
+    failsafe_landings: which drones a failsafe landed or cut, when and why. truth: what the errors are measured against,
+    a motion capture system of the field or the simulator, "" for nothing.
     """
 
     tracked_s: float
@@ -47,6 +48,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     overflowed: dict[str, int]
     events: dict[str, int]
     loud_events: list[str]
+    truth: str = ""
 
 
 _LOUD_EVENTS = 50
@@ -89,6 +91,7 @@ def figures_of(data: RunData) -> RunFigures:
         overflowed=load.overflowed(data),
         events=dict(Counter(str(event.message.severity) for event in data.events)),
         loud_events=_loud(data),
+        truth=data.resolved.truth.get("from", "simulator") if data.truth else "",
     )
 
 

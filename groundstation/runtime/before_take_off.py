@@ -33,7 +33,7 @@ class BeforeTakeOff:
         self._vehicles: dict[str, VehicleStatus] = {}
         self._cameras: dict[str, CameraStatus] = {}
         self._flew: set[str] = set()
-        self._record = PadRecord(field.cameras)
+        self._record = PadRecord(field.world_sensors)
 
     def update(self, now_ns: int) -> None:
         """Take in what has arrived."""
@@ -55,8 +55,10 @@ class BeforeTakeOff:
 
     def complete(self, now_ns: int) -> bool:
         """Return whether every process has spoken and every drone that has not flown was seen often enough."""
+        if not set(self._field.world_sensors) <= self._cameras.keys():
+            return False
         seen = {sighting.drone for sighting in self._record.medians(now_ns)}
-        return set(self._field.drones) <= seen | self._flew and set(self._field.cameras) <= self._cameras.keys()
+        return set(self._field.drones) <= seen | self._flew
 
     def findings(self, now_ns: int) -> list[Finding]:
         """Return everything that is to be said now, the grave first."""

@@ -4,13 +4,19 @@ import math
 
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import LensCalibration, WorldCamera
+from groundstation.field.room import LensCalibration, MotionCapture, WorldCamera
 from groundstation.field.targets import Marker
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.sensing.models import Frustum, Noise, OnboardCameraModel, SensorSuite, WorldCameraModel
 
 BORDER_SQUARES = 3.5
 """Half the diagonal of a board, in squares of it: the whole board must be in the picture."""
+
+FAR_M = 200.0
+"""How far above its box the eye of a motion capture system is thought."""
+
+CAPTURE_BORDER_M = 0.1
+"""A body this near to the border of a motion capture system's box is counted on no more."""
 
 DETECTION_PX = 10.0
 """A square must be this large to be found with certainty; bounds the range of world-fixed cameras."""
@@ -30,7 +36,8 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
     smallest = min(square, *(_square_m(target.marker) for target in targets.values()))
     reach = field.planner.planned_range_m
     return SensorSuite(
-        world={name: _world(camera, square) for name, camera in field.cameras.items()},
+        world={name: _world(camera, square) for name, camera in field.cameras.items()}
+        | {name: _captured(system) for name, system in field.sensing_capture.items()},
         onboard={name: _onboard(drone, smallest, reach) for name, drone in drones.items()},
         marker_height_m=heights | {name: target.marker.height_m for name, target in targets.items()},
     )
@@ -51,6 +58,21 @@ def _world(camera: WorldCamera, square_m: float) -> WorldCameraModel:
     rotation = world_from_downward_optical(camera.rotation_deg)
     view = _frustum(camera.calibration, reach, square_m)
     return WorldCameraModel(camera.position_m, view, noise, rotation.T, "targets" in camera.observes)
+
+
+def _captured(system: MotionCapture) -> WorldCameraModel:
+    """Return a box as the view of an eye so far above it that its sides are all but upright."""
+    box = system.volume_m
+    middle = ((box.x_m[0] + box.x_m[1]) / 2, (box.y_m[0] + box.y_m[1]) / 2)
+    half = ((box.x_m[1] - box.x_m[0]) / 2, (box.y_m[1] - box.y_m[0]) / 2)
+    position = (*middle, box.z_m[1] + FAR_M)
+    # The top of the box is what the pyramid is cut to; at its foot it is wider by what lies between, over FAR_M.
+    view = Frustum(
+        half[0] / FAR_M, half[1] / FAR_M, math.hypot(FAR_M + box.z_m[1] - box.z_m[0], *half), CAPTURE_BORDER_M
+    )
+    std_m = math.hypot(system.pose_std_m, system.position_std_m)
+    noise = Noise(std_m, 0.0, 0.0, math.radians(math.hypot(system.heading_std_deg, system.attitude_std_deg)))
+    return WorldCameraModel(position, view, noise, observes_targets="targets" in system.observes)
 
 
 def _onboard(drone: FieldDrone, square_m: float, range_m: float) -> OnboardCameraModel:

@@ -41,8 +41,14 @@ def _views(field: Field) -> Iterator[Finding]:
         unseen -= seen
         if not seen:
             yield path, "and its place leave no pad in its view: it knows of a drone only after that has flown there"
+    for box in (one.volume_m for name, one in field.motion_capture.items() if name != field.truth.get("from")):
+        unseen -= {name for name in unseen if _within(box.x_m, pads[name][0]) and _within(box.y_m, pads[name][1])}
     for name in sorted(unseen):
-        yield ("drones", name, "pad_m"), "is in view of no fixed camera: nobody knows where it is when it takes off"
+        yield ("drones", name, "pad_m"), "is in view of nothing fixed: nobody knows where it is when it takes off"
+
+
+def _within(span: tuple[float, float], value: float) -> bool:
+    return span[0] <= value <= span[1]
 
 
 def _in_picture(camera: WorldCameraSettings, centre: Array) -> bool:

@@ -12,6 +12,7 @@ from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
 from groundstation.settings.kind_checks import findings_of_kinds
 from groundstation.settings.marker import MarkerSettings
+from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.room import CalibrationSettings, RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
 from groundstation.vehicles import kind_named
@@ -26,10 +27,16 @@ _ROBOT_HEIGHT_M = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The sections that are sound in themselves; a check is left out where one that it needs is missing."""
+    """The sections that are sound in themselves; a check is left out where one that it needs is missing.
+
+    truth: the sensor that judges; given: the names of all that is fixed in the world, also where its entry is faulty.
+    """
 
     room: RoomSettings | None = None
     cameras: dict[str, WorldCameraSettings] = field(default_factory=dict)
+    motion_capture: dict[str, MotionCaptureSettings] = field(default_factory=dict)
+    truth: str | None = None
+    given: frozenset[str] = frozenset()
     drones: dict[str, Drone] = field(default_factory=dict)
     target: TargetSettings | None = None
     targets: dict[str, OneOfTargets] = field(default_factory=dict)
@@ -82,6 +89,25 @@ def _cameras_above_fence(parts: Parts) -> Iterator[Finding]:
 def _team(parts: Parts) -> Iterator[Finding]:
     if parts.drones and not parts.flying:
         yield ("drones",), "at least one drone must be enabled"
+
+
+def _root(parts: Parts) -> Iterator[Finding]:
+    """Every sensing topology starts from what is fixed in the world."""
+    if parts.truth is not None and (parts.truth not in parts.given or parts.truth in parts.cameras):
+        known = ", ".join(parts.motion_capture) or "there is none"
+        yield ("truth", "from"), f"must name a motion capture system of the field: {known} (got {parts.truth})"
+    if not parts.given - {parts.truth}:
+        yield ("cameras",), "one camera at least, or a motion capture system that is not the truth, must be given"
+
+
+def _captured(parts: Parts) -> Iterator[Finding]:
+    known = {*parts.drones, *(name for name, _ in parts.tracked.values())}
+    for name, system in parts.motion_capture.items():
+        for entity in system.bodies:
+            if entity not in known:
+                yield ("motion_capture", name, "bodies", entity), f"{entity} is no drone or target of the field"
+        called = [(("motion_capture", name, "bodies", n), body.name or n, n) for n, body in system.bodies.items()]
+        yield from _unique(called, "the body's name")
 
 
 def _pads(parts: Parts) -> Iterator[Finding]:
@@ -156,6 +182,7 @@ def _own_video(parts: Parts) -> Iterator[Finding]:
 def _names(parts: Parts) -> Iterator[Finding]:
     named: list[tuple[KeyPath, str]] = [(("drones", name), name) for name in parts.drones]
     named += [(("cameras", name), name) for name in parts.cameras]
+    named += [(("motion_capture", name), name) for name in parts.motion_capture]
     if parts.target is not None:
         named.append((("target", "name"), parts.target.name))
     named += [(("targets", name), name) for name in parts.targets]
@@ -167,7 +194,8 @@ def _names(parts: Parts) -> Iterator[Finding]:
 
 def _kind_of(path: KeyPath) -> str:
     """Return what kind of thing a path of the field file names."""
-    return {"drones": "a drone", "cameras": "a camera", "targets": "a target"}.get(str(path[0]), "the target")
+    kinds = {"drones": "a drone", "cameras": "a camera", "targets": "a target"}
+    return (kinds | {"motion_capture": "a motion capture system"}).get(str(path[0]), "the target")
 
 
 def _heights(parts: Parts) -> Iterator[Finding]:
@@ -219,6 +247,8 @@ def _calibrations(parts: Parts) -> Iterator[Finding]:
 _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _fence_in_room,
     _cameras_above_fence,
+    _root,
+    _captured,
     _team,
     _pads,
     _distinct,

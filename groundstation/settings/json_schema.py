@@ -39,6 +39,7 @@ def field_file_schema() -> dict[str, Any]:
     }
     schema["required"] = sorted({*schema["required"], "schema_version"})
     schema["anyOf"] = [{"required": ["target"]}, {"required": ["targets"]}]
+    schema["allOf"] = [{"anyOf": [{"required": ["cameras"]}, {"required": ["motion_capture"]}]}]
     return {"$schema": _DIALECT, **schema, "title": "Field file"}
 
 

@@ -9,7 +9,7 @@ from groundstation.errors import SettingsError, without_password
 from groundstation.settings.document import KeyPath, Node, SourceLine, dotted, parse, read
 from groundstation.settings.wording import problem
 
-NAMED = ("drones", "cameras", "targets", "types")
+NAMED = ("drones", "cameras", "motion_capture", "targets", "types")
 
 
 def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:

@@ -139,10 +139,22 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
     single = ("room", "target", "estimator", "planner", "safety")
     return Parts(
         cameras=named("cameras"),
+        motion_capture=named("motion_capture"),
+        truth=_text(plain.get("truth"), "from"),
+        given=frozenset(_keys(plain.get("cameras")) + _keys(plain.get("motion_capture"))),
         drones=named("drones"),
         targets=named("targets"),
         **{name: sound(Field.model_fields[name].annotation, name) for name in single},
     )
+
+
+def _keys(section: Any) -> list[str]:
+    return list(section) if isinstance(section, dict) else []
+
+
+def _text(section: Any, key: str) -> str | None:
+    value = section.get(key) if isinstance(section, dict) else None
+    return value if isinstance(value, str) else None
 
 
 def _valid(model: Any, value: Any) -> Any:

@@ -13,6 +13,7 @@ from groundstation.settings.behaviour import (
     SafetySettings,
 )
 from groundstation.settings.drones import Drone
+from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.room import RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
 from groundstation.settings.values import Name, SettingsSection
@@ -33,8 +34,14 @@ class Field(SettingsSection):
     """Name of the place. It is part of every key on the bus and of every run folder."""
     room: RoomSettings
     """The room and its fence."""
-    cameras: Annotated[dict[Name, WorldCameraSettings], Constraint(min_length=1)]
-    """Cameras fixed in the world, by name; one at least, because every sensing topology starts from them."""
+    cameras: dict[Name, WorldCameraSettings] = Constraint(default_factory=dict)
+    """Cameras fixed in the world, by name. Every sensing topology starts from what is fixed in the world: a camera or a
+    motion capture system at least."""
+    motion_capture: dict[Name, MotionCaptureSettings] = Constraint(default_factory=dict)
+    """Motion capture systems, by name."""
+    truth: dict[Literal["from"], Name] = Constraint(default_factory=dict)
+    """What judges a flight: `from`, the name of a motion capture system. It is recorded, every report has the errors of
+    the estimate against it, and the tracker does not hear it."""
     drones: Annotated[dict[Name, Drone], Constraint(min_length=1)]
     """The drones, by name."""
     target: TargetSettings | None = None

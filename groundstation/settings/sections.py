@@ -3,22 +3,27 @@
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from drivers.camera.settings import SourceKind, parse_source
 from groundstation.field.drones import camera_name
 from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
+from groundstation.settings.capture_sections import capture_section
 from groundstation.settings.drones import Drone
+from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.vehicles import VehicleOrder, kind_named
 
 # What a driver process of a camera talks to; that of a vehicle, its kind.
 CAMERA = "camera"
+# And that of a motion capture system.
+MOTION_CAPTURE = "motion_capture"
 
 
 @dataclass(frozen=True, slots=True)
 class DriverSection:
-    """One driver process: its name, its kind, what it drives (a drone or a camera of the field), and its section.
+    """One driver process: its name, its kind, what it drives (a drone or a sensor of the field), and its section.
 
     entities: all that it speaks of.
     """
@@ -35,16 +40,18 @@ def rerouted(
     addresses: Mapping[str, str],
     streams: Mapping[str, tuple[str, int]],
     streams_only: Collection[str] = (),
+    captures: Mapping[str, tuple[str, int]] = MappingProxyType({}),
 ) -> Field:
-    """Return the same field with other addresses of drones and other sources of cameras, by name.
+    """Return the same field with other addresses of drones and other sources of sensors, by name.
 
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
-    port), spoken to as the field's own source is where that is an AR.Drone's video, else by HTTP. This, and that a
-    drone may have any serial number, is all that simulation changes. streams_only: drones whose cameras are never their
-    own video. Raises KeyError for a name that is not in the field.
+    port), spoken to as the field's own source is where that is an AR.Drone's video, else by HTTP. captures: motion
+    capture system -> (address, port), spoken to by NatNet. This, and that a drone may have any serial number, is all
+    that simulation changes. streams_only: drones whose cameras are never their own video. Raises KeyError for a name
+    that is not in the field.
     """
-    for name in (*addresses, *streams):
-        if name not in field.drones and name not in field.cameras:
+    for name in (*addresses, *streams, *captures):
+        if name not in field.drones and name not in field.cameras and name not in field.motion_capture:
             raise KeyError(name)
     drones = {
         name: _moved(_with_source(drone, streams.get(name), name in streams_only), addresses.get(name))
@@ -54,7 +61,12 @@ def rerouted(
         name: camera.model_copy(update={"source": _source(camera.source, streams.get(name))})
         for name, camera in field.cameras.items()
     }
-    return field.model_copy(update={"drones": drones, "cameras": cameras})
+    systems = {name: _emulated(one, captures.get(name)) for name, one in field.motion_capture.items()}
+    return field.model_copy(update={"drones": drones, "cameras": cameras, "motion_capture": systems})
+
+
+def _emulated(system: MotionCaptureSettings, place: tuple[str, int] | None) -> MotionCaptureSettings:
+    return system if place is None else system.model_copy(update={"source": f"natnet://{place[0]}:{place[1]}"})
 
 
 def _with_source(drone: Drone, stream: tuple[str, int] | None, plain: bool) -> Drone:
@@ -86,7 +98,7 @@ def core_section(field: Field, run_dir: str, epoch: int) -> str:
 
 
 def driver_sections(field: Field) -> list[DriverSection]:
-    """Return all driver processes of a field: vehicles, then cameras; full searches of cameras are staggered.
+    """Return all driver processes of a field: vehicles, then sensors; full searches of cameras are staggered.
 
     Raises SettingsError for a kind of vehicle that is not known.
     """
@@ -106,7 +118,11 @@ def driver_sections(field: Field) -> list[DriverSection]:
         )
         for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
     ]
-    return _vehicles(field) + fixed + carried
+    captured = [
+        DriverSection(name, MOTION_CAPTURE, name, capture_section(field, name).model_dump_json(), (name,))
+        for name in field.motion_capture
+    ]
+    return _vehicles(field) + fixed + captured + carried
 
 
 def vehicle_order(field: Field, name: str) -> VehicleOrder:

@@ -78,6 +78,7 @@ class Eye:
     ) -> None:  # fmt: skip
         self.name = name
         self.period_s = 1.0 / cameras.fps
+        self.lateness_ms: float | None = None  # a video's delay is the scenario's
         self._lens = lens.intrinsics
         self._carrier = name if isinstance(mount, SiteDrone) else None
         if isinstance(mount, SiteDrone):

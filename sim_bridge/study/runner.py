@@ -16,7 +16,8 @@ from groundstation.tracker import Tracker, tracker_from_field
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 from sim_bridge.study.ardrone_pilot import Pilot
-from sim_bridge.study.camera_model import eyes_of
+from sim_bridge.study.camera_model import Eye, eyes_of
+from sim_bridge.study.capture_model import CaptureEye, captures_of
 from sim_bridge.study.mavlink_copter import CopterLink
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
@@ -73,7 +74,10 @@ class Study:
             name: Pilot(drone, world.onboard[name], field.drones[name].odometry.velocity_scale, lifetime)
             for name, drone in world.ardrones.items()
         }
-        self._eyes = eyes_of(self.site, scenario.cameras, options.outliers, options.seed)
+        self._eyes: list[Eye | CaptureEye] = [
+            *eyes_of(self.site, scenario.cameras, options.outliers, options.seed),
+            *captures_of(self.site, scenario.cameras.mounting_errors, options.seed),
+        ]
         fence = field.room.fence
         self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])
         self.fence_violation_m = 0.0
@@ -132,7 +136,9 @@ class Study:
             frame, before = (int((t - phase) / eye.period_s) for t in (world.time_s, world.time_s - TICK_NS / 1e9))
             if frame == before:
                 continue
-            delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
+            delay_ms = eye.lateness_ms
+            if delay_ms is None:
+                delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
             seen = eye.look(world, now_ns, CLOCK)
             for sighting in seen:
                 # A later frame arrives with the delay that its stamp was corrupted by.

@@ -12,6 +12,7 @@ from groundstation.bus.messages import FlightState, Message, Odometry, RelativeO
 from groundstation.estimation.layout import EntityKind
 from groundstation.field.resolved import ResolvedField
 from sim_bridge.scenario import Scenario
+from sim_bridge.study.camera_model import Eye
 from sim_bridge.study.runner import Study, StudyOptions
 
 DRONES = ("drone_1", "drone_2")
@@ -71,7 +72,9 @@ class Abused(Study):
         """Return the largest error of a height now: of drones, and of the ceiling camera."""
         belief, truth = self.tracker.belief, dict(zip(self.world.bodies, self.world.states(), strict=True))
         true = {name: float(truth[name][2]) for name in DRONES}
-        true |= {eye.name: float(eye._position[2]) for eye in self._eyes if eye.name not in DRONES}
+        true |= {
+            eye.name: float(eye._position[2]) for eye in self._eyes if isinstance(eye, Eye) and eye.name not in DRONES
+        }
         return max(abs(float(belief.mean_of(name)[2]) - z) for name, z in true.items())
 
     def joined_again(self) -> set[str]:

@@ -28,6 +28,8 @@ from groundstation.bus.messages.flight import (
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
 from groundstation.bus.messages.process import RUN, Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.messages.sensing import (
+    BodyPose,
+    BodyPoses,
     CameraStatus,
     ClockOffset,
     ImuSample,
@@ -44,6 +46,8 @@ __all__ = [
     "AckStage",
     "Alternative",
     "Belief",
+    "BodyPose",
+    "BodyPoses",
     "CameraStatus",
     "ClockOffset",
     "Command",

@@ -58,16 +58,16 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
     """One entity's marker as seen by one camera; stamped with the exposure, about the observer."""
 
     observer: str
-    """A drone, or the name of a world-fixed camera."""
+    """A drone, or the name of a world-fixed camera or of a motion capture system."""
     subject: str
     """The robot or target whose marker was seen."""
     camera: str
-    """The camera."""
+    """The camera or the motion capture system."""
     position_m: Vector3
-    """Centre of the marker [m; camera_optical]."""
+    """Centre of the marker [m; camera_optical; motion capture: from the world's origin, along the world's axes]."""
     yaw_rad: float | None
-    """Heading of the subject [rad], counter-clockwise, relative to the observer's base_stabilized x axis (world-fixed
-    camera: world x axis); none: unknown."""
+    """Heading of the subject [rad], counter-clockwise, relative to the observer's base_stabilized x axis (what is fixed
+    in the world: world x axis); none: unknown."""
     covariance: tuple[float, ...]
     """Covariance of (position, yaw), 4x4 row-major, or 3x3 without yaw."""
     alternative: PoseHypothesis | None = None
@@ -93,6 +93,26 @@ class SearchedPicture(Message, frozen=True, kw_only=True):
     """The camera."""
     found: tuple[str, ...] = ()
     """The robots and targets whose markers it shows."""
+
+
+class BodyPose(msgspec.Struct, frozen=True):
+    """Where a motion capture system has one body."""
+
+    name: str
+    """The robot or target."""
+    position_m: Vector3
+    """Its centre [m; world], of a target the point of the floor below its centre."""
+    attitude: Quaternion
+    """world_from_base as quaternion (w, x, y, z)."""
+
+
+class BodyPoses(Message, frozen=True, kw_only=True):
+    """All bodies that a motion capture system tracked in one frame; stamped with the exposure."""
+
+    bodies: tuple[BodyPose, ...]
+    """The bodies."""
+    refused: dict[str, str] = msgspec.field(default_factory=dict)
+    """Of these, the bodies whose poses cannot be true, and why."""
 
 
 class CameraStatus(Message, frozen=True, kw_only=True):

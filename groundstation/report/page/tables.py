@@ -54,7 +54,8 @@ def accuracy_table(report: RunReport) -> str:
          number(item.anees, 2), "–" if item.yaw_rmse_rad is None else f"{item.yaw_rmse_rad * 57.29578:.1f}")
         for name, item in entities.items() if item is not None
     ]  # fmt: skip
-    head = ("entity", "rms error [m]", "largest [m]", "lost [s]", "covered", "NEES per dof", "yaw rms [deg]")
+    against = f"entity (truth: {report.figures.truth})" if report.figures.truth else "entity"
+    head = (against, "rms error [m]", "largest [m]", "lost [s]", "covered", "NEES per dof", "yaw rms [deg]")
     return table(head, rows, "The recording holds no ground truth: errors are unknown.")
 
 

@@ -160,7 +160,7 @@ def test_a_look_ends_where_nothing_arrives(lab_field: ResolvedField) -> None:
     assert not looking.finished(1000 * MS)
     assert looking.finished(9000 * MS)
     told = "\n".join(looking.tell(whole=True))
-    assert "no fixed camera sends pictures" in told and "nothing is heard of it" in told
+    assert "no sensor that is fixed in the world sends anything" in told and "nothing is heard of it" in told
 
 
 @pytest.mark.parametrize(("battery", "level"), [(0.9, None), (0.3, Level.SHOULD), (0.17, Level.MUST)])

@@ -137,7 +137,8 @@ def test_the_json_schema_knows_every_key_of_the_file() -> None:
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
     assert schema["additionalProperties"] is False
-    assert set(schema["required"]) == {"schema_version", "site", "room", "cameras", "drones", "planner"}
+    assert set(schema["required"]) == {"schema_version", "site", "room", "drones", "planner"}
+    assert schema["allOf"] == [{"anyOf": [{"required": ["cameras"]}, {"required": ["motion_capture"]}]}]
     assert schema["anyOf"] == [{"required": ["target"]}, {"required": ["targets"]}]
     assert set(schema["properties"]) == {*Field.model_fields, "defaults", "types"}
     definitions = schema["$defs"]
@@ -189,7 +190,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     path = tmp_path / "s.yaml"
     path.write_text(WRONG_SCENARIO.lstrip(), encoding="utf-8")
     kinds = [f"'{kind}'" for kind in FaultKind][:-1]
-    assert len(kinds) == 22
+    assert len(kinds) == 26
     with pytest.raises(SettingsError) as caught:
         load_scenario(path, ["cameras.blur_px=20", "seed"])
     assert [problem.removeprefix(f"{path}") for problem in caught.value.problems] == [
@@ -199,7 +200,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
         ":4: target.path.half_lenght_m: unknown key, did you mean half_length_m?",
         ":6: cameras.fps: must be <= 60 (got 90)",
         ":7: cameras.corner_noise: unknown key, did you mean corner_noise_px?",
-        f":9: faults[0].kind: must be {', '.join(kinds)} or 'wrong_board'"
+        f":9: faults[0].kind: must be {', '.join(kinds)} or 'bodies_swapped'"
         ' (got "camera_ct"), did you mean camera_cut?',
     ]
     path.write_text("schema_version: 1\ntarget:\n  path: {shape: figure_eigth}\n", encoding="utf-8")

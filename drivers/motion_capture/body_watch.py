@@ -1,0 +1,106 @@
+"""Whether the poses of a motion capture system can be true: frozen, jumped and exchanged bodies are found. Pure."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+
+from groundstation.time_units import NS_PER_S
+
+Vector3 = tuple[float, float, float]
+# A marker that stands jitters by tenths of a millimetre from frame to frame; repeats to the last bit are none of it.
+_FROZEN_S, _FROZEN_FRAMES = 0.2, 5
+# What noise and one lost frame may add to the way that a body makes between two frames.
+_MARGIN_M = 0.05
+# Jumps that add up to less than this have led back to where the body was.
+_BACK_M = 0.15
+# Who was out of sight for so long may be anywhere, and may have been named anew.
+_FORGOTTEN_S = 1.0
+
+
+@dataclass(slots=True)
+class _Track:
+    """One body: its last pose, since when it repeats, and the sum of its jumps [m]."""
+
+    stamp_ns: int
+    position: Vector3
+    repeats: int = 0
+    since_ns: int = 0
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    jumped_m: float = 0.0
+
+
+@dataclass(slots=True)
+class BodyWatch:
+    """Follows all bodies of one system from frame to frame; max_speed_m_s: nothing moves faster."""
+
+    max_speed_m_s: float
+    _tracks: dict[str, _Track] = field(default_factory=dict)
+    _exchanged: set[frozenset[str]] = field(default_factory=set)
+
+    def look(self, stamp_ns: int, positions: Mapping[str, Vector3]) -> dict[str, str]:
+        """Take in the tracked bodies of a frame; return for each why it must not be used, "" for those that may."""
+        self._forget(stamp_ns)
+        before = {name: track.position for name, track in self._tracks.items()}
+        reach_m = {name: self._reach_m(track, stamp_ns) for name, track in self._tracks.items()}
+        jumped = {
+            name: _difference(position, before[name])
+            for name, position in positions.items()
+            if name in before and math.dist(before[name], position) > reach_m[name]
+        }
+        for pair in list(_exchanges(jumped, before, positions, reach_m)):
+            self._exchanged ^= {pair}
+            for name in pair:
+                jumped.pop(name, None)
+        for name, position in positions.items():
+            self._follow(name, stamp_ns, position, jumped.get(name))
+        return {name: self._fault(name, stamp_ns) for name in positions}
+
+    def _forget(self, stamp_ns: int) -> None:
+        gone = [n for n, track in self._tracks.items() if stamp_ns - track.stamp_ns > _FORGOTTEN_S * NS_PER_S]
+        for name in gone:
+            del self._tracks[name]
+        self._exchanged = {pair for pair in self._exchanged if not pair & set(gone)}
+
+    def _reach_m(self, track: _Track, stamp_ns: int) -> float:
+        """Return how far a body may have moved since its last pose [m]."""
+        return self.max_speed_m_s * max(0, stamp_ns - track.stamp_ns) / NS_PER_S + _MARGIN_M
+
+    def _follow(self, name: str, stamp_ns: int, position: Vector3, jump: Vector3 | None) -> None:
+        track = self._tracks.setdefault(name, _Track(stamp_ns, position))
+        if position == track.position:
+            track.repeats += 1
+        else:
+            track.repeats, track.since_ns = 0, stamp_ns
+        track.since_ns = track.since_ns or stamp_ns
+        if jump is not None:
+            x, y, z = track.offset
+            track.offset = (x + jump[0], y + jump[1], z + jump[2])
+            track.jumped_m = math.hypot(*track.offset)
+        track.stamp_ns, track.position = stamp_ns, position
+
+    def _fault(self, name: str, stamp_ns: int) -> str:
+        track = self._tracks[name]
+        if track.repeats >= _FROZEN_FRAMES and stamp_ns - track.since_ns >= _FROZEN_S * NS_PER_S:
+            return "its pose repeats to the last bit: the stream is frozen"
+        for pair in self._exchanged:
+            if name in pair:
+                (other,) = pair - {name}
+                return f"its name was exchanged with that of {other} in flight"
+        return f"jumped by {track.jumped_m:.2f} m from one frame to the next" if track.jumped_m > _BACK_M else ""
+
+
+def _difference(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _exchanges(
+    jumped: Mapping[str, Vector3],
+    before: Mapping[str, Vector3],
+    now: Mapping[str, Vector3],
+    reach_m: Mapping[str, float],
+) -> Iterator[frozenset[str]]:
+    """Yield the pairs of bodies that jumped to each other's places."""
+    for a, b in combinations(sorted(jumped), 2):
+        if math.dist(now[a], before[b]) <= reach_m[b] and math.dist(now[b], before[a]) <= reach_m[a]:
+            yield frozenset((a, b))

@@ -1,0 +1,95 @@
+"""From rigid bodies in the system's axes to entities in the world's."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.motion_capture.settings import BodySection, MotionCaptureSection
+from groundstation.arrays import Array
+from groundstation.bus.messages import BodyPose, Header, RelativeObservation
+from groundstation.geometry.rotations import euler_from_rotation, rotation_z
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class EntityPose:
+    """Where an entity is: centre [m; world], world_from_base (3, 3), centre of its marker [m; world]."""
+
+    position: Vector3
+    rotation: Array
+    marker: Vector3
+
+
+class Placement:
+    """Turns the poses of one system's bodies into those of the entities that carry them."""
+
+    def __init__(self, settings: MotionCaptureSection) -> None:
+        self._rotation, self._translation = settings.world_from_system()
+        self._upright = settings.upright()
+        self._name, self._covariance = settings.name, settings.covariance()
+
+    def entity_pose(self, body: BodySection, position: Vector3, quaternion: Quaternion) -> EntityPose | None:
+        """Return the pose of the entity that carries a body; None for numbers that are no pose.
+
+        position [m], quaternion (x, y, z, w): of the body, in the system's axes.
+        """
+        length = math.sqrt(sum(value * value for value in quaternion))
+        if not 0.5 < length < 2.0 or not all(math.isfinite(value) for value in position):  # nan compares false
+            return None
+        system_from_body = _rotation_of(quaternion, length)
+        # WIRE (docs/reference/natnet.md 5): a body's axes are the system's at the moment of its definition, so what
+        # sets the system upright sets the body upright.
+        world_from_body = self._rotation @ system_from_body @ self._upright.T
+        world_from_base = world_from_body @ rotation_z(math.radians(body.yaw_deg)).T
+        origin = self._rotation @ np.array(position) + self._translation
+        centre = origin - world_from_base @ np.array(body.position_m)
+        marker = centre + world_from_base @ np.array(body.marker_m)
+        return EntityPose(_triple(centre), world_from_base, _triple(marker))
+
+    def observation(self, entity: str, pose: EntityPose, header: Header) -> RelativeObservation:
+        """Return what the tracker is told of an entity."""
+        return RelativeObservation(
+            header=header,
+            observer=self._name,
+            subject=entity,
+            camera=self._name,
+            position_m=pose.marker,
+            yaw_rad=euler_from_rotation(pose.rotation)[2],
+            covariance=self._covariance,
+            margin=2.0,
+        )
+
+
+def body_pose(entity: str, pose: EntityPose) -> BodyPose:
+    """Return an entity's pose as it is published."""
+    return BodyPose(entity, pose.position, _quaternion_of(pose.rotation))
+
+
+def _triple(vector: Array) -> Vector3:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _rotation_of(quaternion: Quaternion, length: float) -> Array:
+    x, y, z, w = (value / length for value in quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _quaternion_of(rotation: Array) -> Quaternion:
+    """Return (w, x, y, z) of a rotation (3, 3), w not negative."""
+    roll, pitch, yaw = (angle / 2 for angle in euler_from_rotation(rotation))
+    cr, sr, cp, sp, cy, sy = (
+        math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch), math.cos(yaw), math.sin(yaw),
+    )  # fmt: skip
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    return (w, x, y, z) if w >= 0 else (-w, -x, -y, -z)

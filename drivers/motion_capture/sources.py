@@ -1,0 +1,205 @@
+"""Frames of a motion capture system: NatNet by our own client, other systems by the library `motioncapture`."""
+
+import importlib
+import select
+import socket
+import threading
+from collections import Counter, deque
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from drivers.motion_capture.settings import SystemAddress, SystemKind
+from drivers.motion_capture.wire import natnet
+from groundstation.bus import clock
+from groundstation.errors import SettingsError
+from groundstation.time_units import NS_PER_S
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+_ASK_AGAIN_NS = NS_PER_S
+_KEEP_ALIVE_NS = NS_PER_S
+_LARGEST = 65535
+_DATAGRAMS = 64
+_WAITING_FRAMES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class CapturedFrame:
+    """One frame: when it came, how long before its sending it was exposed [ns], and the tracked bodies by name.
+
+    poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
+    """
+
+    arrival_ns: int
+    processing_ns: int
+    poses: dict[str, tuple[Vector3, Quaternion]]
+    untracked: tuple[str, ...] = ()
+
+
+class Source(Protocol):
+    """Where frames come from; rejected: what was refused, by reason; detail: what is wrong, in words."""
+
+    rejected: Counter[str]
+    detail: str
+
+    def poll(self, wait_s: float) -> list[CapturedFrame]:
+        """Return the frames that came, the oldest first; waits for the first at most so long."""
+
+    def close(self) -> None:
+        """Release everything."""
+
+
+def open_source(address: SystemAddress) -> Source:
+    """Return the source of a system; raises SettingsError where its library is missing."""
+    return NatnetSource(address) if address.kind is SystemKind.NATNET else LibrarySource(address)
+
+
+class NatnetSource:
+    """A NatNet client: one socket for requests and for frames to this client alone, one more for multicast frames."""
+
+    def __init__(self, address: SystemAddress) -> None:
+        self.rejected: Counter[str] = Counter()
+        self.detail = f"no answer from {address.host}:{address.port}"
+        self._place = (address.host, address.port)
+        self._requests = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._requests.setblocking(False)
+        self._frames: socket.socket | None = None
+        self._server: natnet.Server | None = None
+        self._names: dict[int, str] = {}
+        self._asked_ns = self._alive_ns = 0
+
+    def poll(self, wait_s: float) -> list[CapturedFrame]:
+        """Return the frames that came, the oldest first; asks for whatever is missing once a second."""
+        self._ask(clock.now_ns())
+        sockets = [one for one in (self._requests, self._frames) if one is not None]
+        readable, _, _ = select.select(sockets, [], [], wait_s)
+        return [frame for one in readable for frame in self._read(one)]
+
+    def close(self) -> None:
+        """Close the sockets."""
+        self._requests.close()
+        if self._frames is not None:
+            self._frames.close()
+
+    def _ask(self, now_ns: int) -> None:
+        if now_ns - self._asked_ns >= _ASK_AGAIN_NS and not self._names:
+            self._asked_ns = now_ns
+            self._send(natnet.connect_request())
+            self._send(natnet.encode(natnet.REQUEST_DESCRIPTIONS))
+        if now_ns - self._alive_ns >= _KEEP_ALIVE_NS:
+            self._alive_ns = now_ns
+            self._send(natnet.encode(natnet.KEEP_ALIVE))
+
+    def _send(self, datagram: bytes) -> None:
+        with suppress(OSError):  # a network that is down now may be up later
+            self._requests.sendto(datagram, self._place)
+
+    def _read(self, one: socket.socket) -> list[CapturedFrame]:
+        frames = []
+        for _ in range(_DATAGRAMS):
+            try:
+                datagram, sender = one.recvfrom(_LARGEST)
+            except OSError:
+                break
+            if sender[0] != self._place[0]:
+                self.rejected["stranger"] += 1
+                continue
+            try:
+                frame = self._take(datagram)
+            except natnet.WireError as error:
+                self.rejected[error.reason] += 1
+                continue
+            if frame is not None:
+                frames.append(frame)
+        return frames
+
+    def _take(self, datagram: bytes) -> CapturedFrame | None:
+        kind, payload = natnet.message_of(datagram)
+        if kind == natnet.SERVER_INFO:
+            self._greet(natnet.decode_server(payload))
+        elif kind == natnet.DESCRIPTIONS and self._server is not None:
+            self._names = natnet.decode_descriptions(payload, self._server.version)
+        elif kind == natnet.FRAME and self._server is not None:
+            return self._captured(natnet.decode_frame(payload, self._server.version), self._server)
+        return None
+
+    def _greet(self, server: natnet.Server) -> None:
+        self._server, self.detail = server, ""
+        if server.group and self._frames is None:
+            self._frames = self._join(server.group, server.data_port)
+
+    def _join(self, group: str, port: int) -> socket.socket:
+        frames = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        frames.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        frames.setblocking(False)
+        frames.bind(("", port))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
+            route.connect(self._place)  # the interface that leads to the system
+            local = route.getsockname()[0]
+        frames.setsockopt(
+            socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + socket.inet_aton(local)
+        )
+        return frames
+
+    def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame:
+        ticks = frame.sent - frame.exposed
+        processing_ns = ticks * NS_PER_S // server.ticks_per_s if frame.exposed and server.ticks_per_s else 0
+        named = {self._names.get(body.id, str(body.id)): body for body in frame.bodies}
+        return CapturedFrame(
+            clock.now_ns(),
+            max(0, processing_ns),
+            {name: (body.position, body.rotation) for name, body in named.items() if body.tracked},
+            tuple(name for name, body in named.items() if not body.tracked),
+        )
+
+
+class LibrarySource:
+    """A system behind the library `motioncapture` (extra `mocap`), read in a thread: its calls block."""
+
+    def __init__(self, address: SystemAddress) -> None:
+        self.rejected: Counter[str] = Counter()
+        self.detail = f"no answer from {address.host}"
+        try:
+            library: Any = importlib.import_module("motioncapture")
+        except ImportError:
+            remedy = "install it: pip install 'skein-groundstation[mocap]'"
+            raise SettingsError([f"{address.kind}://: the library motioncapture is missing; {remedy}"]) from None
+        self._library, self._address = library, address
+        self._frames: deque[CapturedFrame] = deque(maxlen=_WAITING_FRAMES)
+        self._came = threading.Event()
+        self._closing = False
+        threading.Thread(target=self._follow, name="motion capture", daemon=True).start()
+
+    def poll(self, wait_s: float) -> list[CapturedFrame]:
+        """Return the frames that came, the oldest first."""
+        self._came.wait(wait_s)
+        self._came.clear()
+        frames = []
+        while self._frames:
+            frames.append(self._frames.popleft())
+        return frames
+
+    def close(self) -> None:
+        """Let the thread end after its next frame; the process ends without it."""
+        self._closing = True
+
+    def _follow(self) -> None:
+        try:
+            system = self._library.connect(self._address.kind.value, {"hostname": self._address.host})
+            self.detail = ""
+            while not self._closing:
+                system.waitForNextFrame()
+                self._frames.append(_frame_of(system.rigidBodies))
+                self._came.set()
+        except Exception as error:  # noqa: BLE001 - what a foreign library raises is shown, and ends this thread only
+            self.detail = f"{type(error).__name__}: {error}"
+
+
+def _frame_of(bodies: Any) -> CapturedFrame:
+    poses = {}
+    for name, body in bodies.items():
+        x, y, z = (float(value) for value in body.position)
+        turn = body.rotation
+        poses[str(name)] = ((x, y, z), (float(turn.x), float(turn.y), float(turn.z), float(turn.w)))
+    return CapturedFrame(clock.now_ns(), 0, poses)

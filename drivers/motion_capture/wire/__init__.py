@@ -1,0 +1,1 @@
+"""Bytes of motion capture systems."""

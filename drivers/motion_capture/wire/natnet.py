@@ -1,0 +1,241 @@
+"""NatNet 3.0 to 4.2, the stream of OptiTrack's Motive: requests, server information, descriptions, frames.
+
+WIRE (docs/reference/natnet.md 1): little endian; a datagram is message id, size of its payload, payload.
+"""
+
+import struct
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+COMMAND_PORT = 1510
+CONNECT, SERVER_INFO, REQUEST_DESCRIPTIONS, DESCRIPTIONS, FRAME, KEEP_ALIVE = 0, 1, 4, 5, 7, 10
+Version = tuple[int, int]
+_OLDEST, _SIZED = (3, 0), (4, 1)
+"""Since 4.1 each section is preceded by its size."""
+_HEAD, _COUNT = struct.Struct("<HH"), struct.Struct("<i")
+_BODY = struct.Struct("<i3f4ffh")
+_SERVER = struct.Struct("<256s4B4BQH?4B")
+_TAIL = {False: struct.Struct("<dQQQhi"), True: struct.Struct("<dQQQIIhi")}
+_NAME_BYTES, _POINT_BYTES, _LABEL_BYTES = 256, 12, 4
+_MARKER_SET, _RIGID_BODY = 0, 1
+_MOST = 10_000
+
+
+class WireError(ValueError):
+    """A datagram that is not what it says; `reason` is a word to count it by."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+@dataclass(frozen=True, slots=True)
+class Server:
+    """Who answers: its name, the version of its stream, ticks per second of its stamps, and where it sends frames.
+
+    group: the multicast address, "" for frames to each client's own port.
+    """
+
+    name: str
+    version: Version
+    ticks_per_s: int
+    data_port: int
+    group: str
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A rigid body: streaming id, position [m; the system's axes], quaternion (x, y, z, w), whether it is tracked."""
+
+    id: int
+    position: tuple[float, float, float]
+    rotation: tuple[float, float, float, float]
+    tracked: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """All rigid bodies of one exposure; exposed, sent: the server's ticks at the middle of the exposure, at sending."""
+
+    number: int
+    bodies: tuple[Body, ...]
+    exposed: int = 0
+    sent: int = 0
+
+
+def message_of(datagram: bytes) -> tuple[int, bytes]:
+    """Return message id and payload; raises WireError for what is cut short."""
+    if len(datagram) < _HEAD.size:
+        raise WireError("short")
+    kind, size = _HEAD.unpack_from(datagram)
+    if kind in (FRAME, DESCRIPTIONS, SERVER_INFO) and len(datagram) < _HEAD.size + size:
+        raise WireError("short")
+    return kind, datagram[_HEAD.size :]
+
+
+def encode(kind: int, payload: bytes = b"") -> bytes:
+    """Return a datagram."""
+    return _HEAD.pack(kind, len(payload)) + payload
+
+
+def connect_request(version: Version = (4, 1)) -> bytes:
+    """Return the datagram that asks for frames in a version of the stream; the server may answer with another one."""
+    payload = bytearray(271)
+    payload[:4] = b"Ping"
+    payload[265:267] = bytes(version)
+    return encode(CONNECT, bytes(payload))
+
+
+def decode_server(payload: bytes) -> Server:
+    """Return what a server says of itself; raises WireError for what is cut short, and for versions before 3.0."""
+    if len(payload) < _SERVER.size:
+        raise WireError("short")
+    name, *rest = _SERVER.unpack_from(payload)
+    version, ticks, port, multicast, group = (rest[4], rest[5]), rest[8], rest[9], rest[10], rest[11:15]
+    if version < _OLDEST:
+        raise WireError("version")
+    address = ".".join(map(str, group)) if multicast else ""
+    return Server(name.partition(b"\0")[0].decode("utf-8", "replace"), version, ticks, port, address)
+
+
+def encode_server(server: Server) -> bytes:
+    """Return the datagram with which a server answers."""
+    group = [int(part) for part in server.group.split(".")] if server.group else [0, 0, 0, 0]
+    named = server.name.encode()[: _NAME_BYTES - 1]
+    payload = _SERVER.pack(
+        named, *(1, 0, 0, 0), *server.version, 0, 0, server.ticks_per_s, server.data_port, bool(server.group), *group
+    )
+    return encode(SERVER_INFO, payload)
+
+
+class _Reader:
+    """Walks through a payload; everything beyond its end is a WireError."""
+
+    def __init__(self, payload: bytes, version: Version) -> None:
+        self.payload, self.version, self.at = payload, version, 0
+
+    def count(self) -> int:
+        """Return the next whole number, which counts something."""
+        (value,) = self.take(_COUNT)
+        if not 0 <= value <= _MOST:
+            raise WireError("count")
+        return int(value)
+
+    def take(self, form: struct.Struct) -> tuple[int, ...]:
+        """Return the next values of a form."""
+        if self.at + form.size > len(self.payload):
+            raise WireError("short")
+        values = form.unpack_from(self.payload, self.at)
+        self.at += form.size
+        return values
+
+    def skip(self, size: int) -> None:
+        """Leave out bytes."""
+        if size < 0 or self.at + size > len(self.payload):
+            raise WireError("short")
+        self.at += size
+
+    def text(self) -> str:
+        """Return the next text, which ends with a zero."""
+        end = self.payload.find(b"\0", self.at)
+        if end < 0:
+            raise WireError("short")
+        text = self.payload[self.at : end].decode("utf-8", "replace")
+        self.at = end + 1
+        return text
+
+    def section(self) -> int:
+        """Return how many entries a section of a frame has; its size is left out."""
+        entries = self.count()
+        if self.version >= _SIZED:
+            self.take(_COUNT)
+        return entries
+
+
+def decode_frame(payload: bytes, version: Version) -> Frame:
+    """Return the rigid bodies of a frame; raises WireError for what is cut short, or ends otherwise than frames do."""
+    reader = _Reader(payload, version)
+    (number,) = reader.take(_COUNT)
+    for _ in range(reader.section()):
+        reader.text()
+        reader.skip(reader.count() * _POINT_BYTES)
+    reader.skip(reader.section() * _POINT_BYTES)
+    bodies = tuple(_body(reader) for _ in range(reader.section()))
+    tail = _TAIL[version >= _SIZED]
+    if len(payload) - reader.at < tail.size:
+        raise WireError("short")
+    # What lies between (skeletons, labelled markers, devices) differs by version; the end is the same.
+    *_, end = values = tail.unpack_from(payload, len(payload) - tail.size)
+    if end != 0:
+        raise WireError("end")
+    return Frame(number, bodies, values[1], values[3])
+
+
+def _body(reader: _Reader) -> Body:
+    identity, x, y, z, qx, qy, qz, qw, _, flags = reader.take(_BODY)
+    return Body(identity, (x, y, z), (qx, qy, qz, qw), bool(flags & 1))
+
+
+def encode_frame(frame: Frame, version: Version) -> bytes:
+    """Return the datagram of a frame with rigid bodies only."""
+    sized = version >= _SIZED
+    bodies = b"".join(
+        _BODY.pack(body.id, *body.position, *body.rotation, 0.0, int(body.tracked)) for body in frame.bodies
+    )
+    # Marker sets, other markers, rigid bodies, skeletons, assets (since 4.1), labelled markers, force plates, devices.
+    entries = [(0, b""), (0, b""), (len(frame.bodies), bodies), *[(0, b"")] * (5 if sized else 4)]
+    sections = b"".join(
+        _COUNT.pack(count) + (_COUNT.pack(len(content)) if sized else b"") + content for count, content in entries
+    )
+    timecode = struct.pack("<II", 0, 0)
+    precision = (0, 0) if sized else ()
+    tail = _TAIL[sized].pack(frame.number / 100, frame.exposed, frame.exposed, frame.sent, *precision, 0, 0)
+    return encode(FRAME, _COUNT.pack(frame.number) + sections + timecode + tail)
+
+
+def decode_descriptions(payload: bytes, version: Version) -> dict[int, str]:
+    """Return the name of each rigid body by its streaming id.
+
+    Before 4.1 nothing behind a kind of description other than marker set and rigid body can be read, and is left out.
+    """
+    reader, names = _Reader(payload, version), dict[int, str]()
+    for _ in range(reader.count()):
+        (kind,) = reader.take(_COUNT)
+        size = reader.count() if version >= _SIZED else -1
+        begin = reader.at
+        if kind == _RIGID_BODY:
+            name = reader.text()
+            (identity,) = reader.take(_COUNT)
+            names[int(identity)] = name
+            reader.skip(_COUNT.size + _POINT_BYTES)
+            _skip_markers(reader)
+        elif kind == _MARKER_SET:
+            reader.text()
+            for _ in range(reader.count()):
+                reader.text()
+        elif size < 0:
+            break
+        if size >= 0:
+            reader.at = begin
+            reader.skip(size)
+    return names
+
+
+def _skip_markers(reader: _Reader) -> None:
+    markers = reader.count()
+    reader.skip(markers * (_POINT_BYTES + _LABEL_BYTES))
+    if reader.version >= (4, 0):
+        for _ in range(markers):
+            reader.text()
+
+
+def encode_descriptions(names: Mapping[int, str], version: Version) -> bytes:
+    """Return the datagram that names rigid bodies by their streaming ids."""
+    return encode(DESCRIPTIONS, _COUNT.pack(len(names)) + b"".join(_described(names.items(), version)))
+
+
+def _described(names: Iterable[tuple[int, str]], version: Version) -> Iterable[bytes]:
+    for identity, name in names:
+        own = name.encode() + b"\0" + struct.pack("<ii3fi", identity, -1, 0.0, 0.0, 0.0, 0)
+        size = _COUNT.pack(len(own)) if version >= _SIZED else b""
+        yield _COUNT.pack(_RIGID_BODY) + size + own

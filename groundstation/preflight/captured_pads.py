@@ -1,0 +1,51 @@
+"""Where a motion capture system has the standing drones, against their pads. Pure."""
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+from groundstation.doctor.finding import Finding, Level
+from groundstation.field.drones import FieldDrone
+from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.stand import PadSighting
+
+# A person sets a drone on its cross to a centimetre; who is farther off stands somewhere else.
+_ASIDE_M, _TURNED_RAD = 0.25, math.radians(25.0)
+
+
+def captured_pad_findings(
+    field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
+) -> Iterator[Finding]:
+    """Yield what motion capture says of drones on their pads: not followed, elsewhere, or well."""
+    for system in field.sensing_capture:
+        known = {s.drone: s for s in sightings if s.camera == system and s.drone in field.drones}
+        if not known and not flew:
+            remedy = "check that it streams rigid bodies, their names, up, position_m and yaw_deg in the field file"
+            yield Finding(Level.MUST, system, "follows none of the drones", remedy)
+            continue
+        for name in field.drones:
+            if name in known:
+                yield _judged(name, known[name], field.drones)
+            elif name not in flew:
+                remedy = "check its body's name in the system, and what hides its markers"
+                yield Finding(Level.SHOULD, name, f"{system} does not follow it", remedy)
+
+
+def _judged(name: str, seen: PadSighting, drones: Mapping[str, FieldDrone]) -> Finding:
+    pad = drones[name]
+    aside_m = _aside_m(seen, pad)
+    others = [other for other, drone in drones.items() if other != name and _aside_m(seen, drone) < _ASIDE_M]
+    if aside_m >= _ASIDE_M:
+        where = f", on the pad of {others[0]}" if others else ""
+        found = f"{seen.camera} has it {aside_m:.2f} m from its pad{where}"
+        remedy = "check whose body has its name in the system, where it stands, and the system's axes in the field file"
+        return Finding(Level.MUST, name, found, remedy)
+    turned = math.remainder(seen.yaw_rad - math.radians(pad.pad_yaw_deg), math.tau)
+    if abs(turned) >= _TURNED_RAD:
+        found = f"{seen.camera} has its heading {math.degrees(turned):.0f} deg off that of its pad"
+        remedy = "turn it, or define its body anew while it looks along the system's x axis (or give bodies.yaw_deg)"
+        return Finding(Level.MUST, name, found, remedy)
+    return Finding(Level.OK, name, f"{seen.camera} has it {aside_m:.2f} m from its pad")
+
+
+def _aside_m(seen: PadSighting, drone: FieldDrone) -> float:
+    return math.dist(seen.position_m[:2], drone.pad_m)

@@ -1,0 +1,40 @@
+"""Where bodies really were on a flight that a motion capture system judges (`truth: {from: ...}` in the field)."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.bus.messages import BodyPoses, FlightState, VehicleStatus
+from groundstation.report.tracks import TimedMessage, TruthTrack
+
+_ALOFT = frozenset({FlightState.FLYING, FlightState.HOVERING, FlightState.TAKING_OFF, FlightState.LANDING})
+
+
+def captured_tracks(
+    poses: Iterable[TimedMessage[BodyPoses]], vehicles: Mapping[str, Sequence[TimedMessage[VehicleStatus]]]
+) -> dict[str, TruthTrack]:
+    """Return the track of each body: where the system had it, but for poses that cannot be true.
+
+    A drone is on the ground as long as it says so; a body without a driver always is.
+    """
+    rows: dict[str, list[tuple[float, ...]]] = {}
+    for item in poses:
+        for body in item.message.bodies:
+            if body.name not in item.message.refused:
+                rows.setdefault(body.name, []).append((item.time_s, *body.position_m, _yaw(*body.attitude)))
+    return {name: _track(np.array(sorted(found)), vehicles.get(name, ())) for name, found in rows.items()}
+
+
+def _yaw(w: float, x: float, y: float, z: float) -> float:
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _track(table: Array, statuses: Sequence[TimedMessage[VehicleStatus]]) -> TruthTrack:
+    said = sorted((item.time_s, item.message.flight_state in _ALOFT) for item in statuses)
+    times = np.array([time_s for time_s, _ in said])
+    aloft = np.array([False, *(flies for _, flies in said)])
+    return TruthTrack(
+        table[:, 0], table[:, 1:4], table[:, 4], ~aloft[np.searchsorted(times, table[:, 0], side="right")]
+    )

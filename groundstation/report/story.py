@@ -72,5 +72,6 @@ def _reactions(data: RunData) -> Iterator[Moment]:
 def _warnings(data: RunData) -> Iterator[Moment]:
     for item in data.events:
         if item.message.severity in _LOUD and not item.message.injected:
-            text = f"{item.message.header.entity}: {item.message.text}"
+            about, said = item.message.header.entity, item.message.text
+            text = said if said.startswith(about) else f"{about}: {said}"
             yield Moment(item.time_s, _MARKS[item.message.severity], text)

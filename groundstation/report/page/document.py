@@ -11,12 +11,14 @@ from matplotlib.figure import Figure
 
 from groundstation.report.interval import tracking_interval
 from groundstation.report.judge import RunReport
+from groundstation.report.moment_pictures import MomentPicture, moment_pictures
 from groundstation.report.page import tables
 from groundstation.report.page.chart import Chart
 from groundstation.report.page.flight_charts import flight_charts
 from groundstation.report.page.health_charts import health_charts
 from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_style import STYLE
+from groundstation.report.story import story
 from groundstation.report.tracks import RunData
 from groundstation.report.wording import missed
 
@@ -24,11 +26,11 @@ from groundstation.report.wording import missed
 def write_page(data: RunData, report: RunReport, path: Path) -> None:
     """Write the page of a run."""
     start_s, end_s = tracking_interval(data) or (0.0, max(data.end_s, 1.0))
-    findings = report.findings
+    findings, moments = report.findings, story(data)
     flight, health = flight_charts(data, start_s, end_s), health_charts(data, start_s, end_s)
     sections = [
         ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report)),
-        ("What happened", tables.story_table(data)),
+        ("What happened", tables.story_table(moments) + _pictures(moment_pictures(report.run_dir, data, moments))),
         ("Room", f'<div class="map">{_room(data)}</div>'),
         ("Flight", holders(flight, 0)),
         ("Topology", tables.switches_table(findings)),
@@ -95,6 +97,17 @@ def _reasons(report: RunReport) -> str:
     if report.rerun or report.passed:
         return ""
     return "".join(f"<p>{escape(missed(one))}.</p>" for one in report.criteria if not one.ok)
+
+
+def _pictures(pictures: list[MomentPicture]) -> str:
+    """Return a strip of pictures, each with its moment, "" without any."""
+    figures = "".join(
+        f'<figure><img src="{one.uri}" alt="{escape(one.camera)} at {one.moment.time_s:.1f} s">'
+        f"<figcaption><b>{one.moment.time_s:.1f} s</b> {escape(one.moment.text)} "
+        f'<span class="dim">{escape(one.camera)}</span></figcaption></figure>'
+        for one in pictures
+    )
+    return f'<div class="moments">{figures}</div>' if figures else ""
 
 
 def rerun_note(report: RunReport) -> str:

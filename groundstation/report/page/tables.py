@@ -7,7 +7,7 @@ from groundstation.report.criteria import Value
 from groundstation.report.findings import Findings
 from groundstation.report.judge import RunReport
 from groundstation.report.load import process_loads
-from groundstation.report.story import story
+from groundstation.report.story import Moment
 from groundstation.report.tracks import RunData
 from groundstation.report.wording import bound, quantity, title
 
@@ -98,9 +98,8 @@ def happenings_table(findings: Findings) -> str:
     return table(("time [s]", "about", "cause", "what"), rows, "No fault was injected, and no failsafe acted.")
 
 
-def story_table(data: RunData) -> str:
+def story_table(moments: Sequence[Moment]) -> str:
     """Return the story of the run, a line for each moment."""
-    moments = story(data)
     rows = [(f"{item.time_s:.1f}", item.kind, item.text) for item in moments[:_EVENTS_SHOWN]]
     return table(("time [s]", "kind", "what happened"), rows, "Nothing happened.")
 

@@ -151,7 +151,7 @@ def test_a_repeated_warning_stands_once_and_each_flight_is_told():
 
 
 def test_the_page_marks_what_was_bad():
-    assert '<td class="bad">failsafe</td>' in story_table(LANDED_BY_FAILSAFE)
+    assert '<td class="bad">failsafe</td>' in story_table(story(LANDED_BY_FAILSAFE))
 
 
 def test_criteria_are_told_in_words_with_units():

@@ -8,6 +8,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from groundstation import plug_ins
 from groundstation.geometry.board import VALID_CODES, Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.tag import SquareTag
@@ -24,6 +25,7 @@ class SourceKind(StrEnum):
     RTSP = "rtsp"
     DEVICE = "device"
     FILE = "file"
+    PLUG_IN = "plug-in"
 
 
 _PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554}
@@ -33,7 +35,8 @@ _PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554}
 class SourceAddress:
     """A source taken apart.
 
-    path: of the stream with its query, of the device, of the file or folder; login: "user:password", or "" for none.
+    path: of the stream with its query, of the device, of the file or folder; host: of a plug-in, its scheme; login:
+    "user:password", or "" for none.
     """
 
     kind: SourceKind
@@ -51,7 +54,10 @@ def parse_source(text: str) -> SourceAddress:
         return SourceAddress(SourceKind.FILE, path=text.removeprefix("file://"))
     kinds = {kind.value: kind for kind in _PORTS}
     scheme, mark, rest = text.partition("://")
-    if not mark or scheme not in kinds or not rest or any(character.isspace() for character in text):
+    unusable = not mark or not rest or any(character.isspace() for character in text)
+    if not unusable and scheme not in kinds and scheme in plug_ins.names(plug_ins.CAMERAS):
+        return SourceAddress(SourceKind.PLUG_IN, host=scheme, path=rest)
+    if unusable or scheme not in kinds:
         raise ValueError(
             "must be an address such as http://192.168.1.50:8080/video.mjpg, ardrone://192.168.1.1, "
             "rtsp://192.168.1.60/stream, /dev/video0 or /a/video.mp4"

@@ -19,6 +19,7 @@ class PlannerValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     rate_hz: int = 10
     mode: Literal["certified", "paper"] = "certified"
+    plug_in: str = ""
     horizon_steps: int = 10
     step_s: float = 0.2
     discount: float = 0.9

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import msgspec
 
+from groundstation import plug_ins
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Message, Severity
@@ -92,6 +93,9 @@ class Tracking:
         feed = feed or live_feed(bus, plan_hz)
         self.rate_hz: int = field.estimator.rate_hz
         self.tracker: Tracker = tracker_from_field(field, feed.clock, section.epoch * EPOCHS_PER_LIFE)
+        if field.planner.plug_in:
+            parameters = self.tracker.parameters
+            self.tracker.planner = plug_ins.planner(field.planner.plug_in, parameters.planner, parameters.sensors)
         self.inbox = feed.arrivals
         self.notices: list[Notice] = []
         self._bus = bus

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
+from groundstation import plug_ins
 from groundstation.settings.values import AddressOrNone, SettingsSection
 
 Height = Annotated[float, Field(ge=0.3, le=20)]
@@ -47,6 +48,14 @@ LevelHeights = Annotated[
 ]
 
 
+def _known_planner(name: str) -> str:
+    known = plug_ins.names(plug_ins.PLANNERS)
+    if name and name not in known:
+        told = {"known": ", ".join(known) or "none is installed"}
+        raise PydanticCustomError("planner", "must be an installed planner: {known}", told)
+    return name
+
+
 class PlannerSettings(SettingsSection):
     """The search over sensing topologies and velocities."""
 
@@ -55,6 +64,8 @@ class PlannerSettings(SettingsSection):
     mode: Literal["certified", "paper"] = "certified"
     """certified: several starting points per topology, hysteresis and a minimum stay. paper: as in the method's paper,
     each topology solved once, from rest, and the cheapest wins."""
+    plug_in: Annotated[str, AfterValidator(_known_planner)] = ""
+    """Name of a planner of another package (entry point `skein.planners`) that plans instead; empty: ours."""
     horizon_steps: Annotated[int, Field(ge=1, le=50)] = 10
     """Number of steps that a plan looks ahead. A change of topology must pay within horizon_steps x step_s."""
     step_s: Annotated[float, Field(gt=0, le=2)] = 0.2

@@ -3,14 +3,14 @@
 import pkgutil
 from collections.abc import Callable, Iterator
 from functools import cache
-from importlib import import_module, metadata
+from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
+from groundstation import plug_ins
 from groundstation.errors import SettingsError
 from groundstation.vehicles.kind import VehicleKind
 
-GROUP = "skein.vehicles"
 _OURS = "drivers"
 
 
@@ -62,9 +62,8 @@ def _ours() -> Iterator[tuple[str, str, Callable[[], object]]]:
 
 
 def _of_others() -> Iterator[tuple[str, str, Callable[[], object]]]:
-    for entry in sorted(metadata.entry_points(group=GROUP), key=lambda entry: entry.name):
-        package = entry.dist.name if entry.dist is not None else "?"
-        yield entry.name, f"{package} ({entry.value})", entry.load
+    for name, source, entry in plug_ins.entries(plug_ins.VEHICLES):
+        yield name, source, entry.load
 
 
 def _sound(name: str, kind: object, known: dict[str, VehicleKind]) -> VehicleKind:

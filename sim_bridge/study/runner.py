@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from groundstation import plug_ins
 from groundstation.bus.messages import Message
 from groundstation.field.resolved import ResolvedField
 from groundstation.tracker import Tracker, tracker_from_field
@@ -53,6 +54,9 @@ class Study:
         self.site = parse_site(msgspec.to_builtins(field))
         self.world = World(self.site, scenario, options.seed)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
+        if field.planner.plug_in:
+            parameters = self.tracker.parameters
+            self.tracker.planner = plug_ins.planner(field.planner.plug_in, parameters.planner, parameters.sensors)
         self.score = FlightScore(_SCORE_TICKS * TICK_NS / 1e9, field.estimator.gate_probability)
         self.spent_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(options.seed, "study")

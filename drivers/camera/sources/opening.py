@@ -7,6 +7,7 @@ from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import FrameSource
 from drivers.camera.sources.mjpeg import MjpegReader
 from drivers.camera.sources.reader_thread import Drain, Reader
+from groundstation import plug_ins
 from groundstation.errors import DriverError, without_password
 
 
@@ -33,3 +34,6 @@ def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -
             return device(address.path, size)
         case SourceKind.FILE:
             return FileReader(address.path)
+        case SourceKind.PLUG_IN:
+            reader: Reader = plug_ins.load(plug_ins.CAMERAS, address.host)(source, size)
+            return reader

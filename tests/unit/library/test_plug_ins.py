@@ -1,0 +1,113 @@
+"""Planners and camera sources of other packages: found by name, used, and named when they cannot be loaded."""
+
+import sys
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.sources.opening import open_source
+from groundstation import plug_ins
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.errors import DriverError, SettingsError
+from groundstation.library import Topology, belief_of, field_named, plan_step, planner_of
+from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
+
+CODE = '''
+from collections import Counter
+
+import numpy as np
+
+from drivers.camera.sources.frames import Matrix, Unit
+from drivers.camera.sources.raw import Decoded
+from groundstation.planning.planner import Planner
+
+
+class Calm(Planner):
+    """Plans as ours does, and says who it is."""
+
+
+class Static:
+    decoder = Decoded()
+
+    def __init__(self, source, size):
+        self.name, self.rejected = source, Counter()
+
+    def read(self, drain):
+        drain.opened()
+        while not drain.wait(0.01):
+            drain.keep([Unit(b"", 1, 1, picture=Matrix(np.full((4, 6), 7, np.uint8)))])
+
+    def interrupt(self):
+        pass
+'''
+ENTRIES = """[skein.planners]
+calm = lab_plug_ins:Calm
+broken = no_such_module:Planner
+[skein.cameras]
+static = lab_plug_ins:Static
+torn = no_such_module:Reader
+"""
+
+
+@pytest.fixture(autouse=True)
+def _installed(tmp_path, monkeypatch):
+    (tmp_path / "lab_plug_ins.py").write_text(CODE)
+    info = tmp_path / "lab_plug_ins-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-plug-ins\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRIES)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield
+    sys.modules.pop("lab_plug_ins", None)
+
+
+def test_plug_ins_are_listed_without_loading_any():
+    assert {"calm", "broken"} <= set(plug_ins.names(plug_ins.PLANNERS))
+    assert "lab_plug_ins" not in sys.modules
+
+
+def test_a_planner_of_another_package_plans():
+    field = field_named("lab", ["planner.plug_in=calm"])
+    worker_of = Mock()
+    feed = TrackerFeed(Mock(), worker_of, "here")
+    tracking = Tracking(MemoryBus(MemoryExchange(), "lab", "tracker"), TrackerSection(field, epoch=1), feed)
+    worker_of.assert_called_once_with(tracking.tracker.planner)
+    assert type(tracking.tracker.planner).__name__ == "Calm"
+
+
+def test_a_planner_that_is_not_installed_is_refused_at_its_line():
+    with pytest.raises(SettingsError, match=r"planner.plug_in: must be an installed planner: .*calm"):
+        field_named("lab", ["planner.plug_in=hasty"])
+
+
+def test_a_planner_that_cannot_be_loaded_is_named():
+    with pytest.raises(SettingsError, match=r"planner.plug_in: broken cannot be used: lab-plug-ins .*no_such_module"):
+        plug_ins.planner("broken", None, None)
+
+
+def test_a_source_of_another_package_is_read():
+    assert parse_source("static://north/3").kind is SourceKind.PLUG_IN
+    source = open_source("static://north/3")
+    try:
+        frame = source.take_newest(5.0)
+        assert frame is not None and frame.picture is not None and np.all(frame.picture.grey() == 7)
+    finally:
+        source.close()
+
+
+def test_a_source_that_cannot_be_loaded_is_named_and_others_work():
+    with pytest.raises(DriverError, match=r"torn cannot be used: lab-plug-ins .*no_such_module"):
+        open_source("torn://a")
+    assert parse_source("http://127.0.0.1/a").kind is SourceKind.HTTP
+    with pytest.raises(ValueError, match="must be an address"):
+        parse_source("unheard://a")
+
+
+def test_the_library_plans_a_step_of_the_shipped_field():
+    planner = planner_of(field_named("lab"))
+    robots = {"drone_1": (-0.8, 0.4, 1.2, 0.0), "drone_2": (-0.8, -0.5, 1.2, 0.2)}
+    plan = plan_step(planner, belief_of(robots, {"turtlebot": (0.4, 0.0, 0.3, 0.0)}))
+    assert set(plan.controls) == set(robots) and 0.0 < plan.uncertainty < 1.0
+    assert plan.topology.robots == Topology.flat(robots).robots

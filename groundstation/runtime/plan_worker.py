@@ -10,6 +10,7 @@ import msgspec
 
 from groundstation.errors import EstimatorFault
 from groundstation.planning.planner import Planner
+from groundstation.planning.time_budget import TimeBudget
 from groundstation.process.priority import Rank, go_first
 from groundstation.runtime.journal import Adoption
 from groundstation.tracker import PlanRequest
@@ -20,7 +21,7 @@ _log = logging.getLogger(__name__)
 class PlanWorker:
     """One request at a time: `submit` while `idle`, `poll` each tick for the result.
 
-    budget_s: wall time after which the planner is asked to stop with the best plan so far.
+    budget_s: wall time within which the planner is asked to stop with the best plan so far.
     """
 
     def __init__(self, planner: Planner, budget_s: float, clock: Callable[[], float] = time.monotonic) -> None:
@@ -75,11 +76,9 @@ class PlanWorker:
 
     def _plan(self, tick: int, request: PlanRequest) -> Adoption:
         began = self._clock()
-        deadline = began + self._budget_s
+        budget = TimeBudget(self._budget_s, self._clock)
         try:
-            plan = self._planner.plan(
-                request.belief, request.topology, request.warm_start, lambda: self._clock() > deadline
-            )
+            plan = self._planner.plan(request.belief, request.topology, request.warm_start, budget.must_stop)
         except EstimatorFault as fault:
             _log.error("planning failed: %s", fault)
             return Adoption(tick, None)

@@ -94,8 +94,8 @@ def teams(robots: str, strategies: str, starts: str, seeds: int, **world: Any) -
 def figure_eight(robots: str, strategies: str, seeds: int, **world: Any) -> None:
     """The target walks a figure of eight at 0.3 m/s, as in the authors' program.
 
-    `certified` fuses whatever is in view, needs a gain of 15 % to switch and is drawn towards a lost target; the others
-    fuse the topology's edges only, as the paper does.
+    `certified` fuses whatever is in view and needs a gain of 15 % to switch; the others fuse the topology's edges only,
+    as the paper does.
     """
     sizes = numbers(robots, "--robots", 1, 100)
     chosen = choices(strategies, _STRATEGIES, "--strategies")

@@ -37,7 +37,7 @@ FIGURE_EIGHT = PlanarParameters(
 class Task:
     """One seeded run; equal tasks give equal results, bit for bit.
 
-    experiment: figure1, teams or figure-eight; start: first topology; hysteresis, tail, starts, fuse_all: departures
+    experiment: figure1, teams or figure-eight; start: first topology; hysteresis, fuse_all: departures
     from the paper (none for strategy `paper`); range_m, noise_growth, dropout, kidnap: the world (None: the setup's).
     """
 
@@ -47,7 +47,6 @@ class Task:
     seed: int
     start: str = "string"
     hysteresis: float = 0.0
-    tail: float = 0.0
     fuse_all: bool = False
     steps: int | None = None
     range_m: float | None = None
@@ -94,7 +93,7 @@ _SCATTER_M = 0.05
 DEPARTURES: dict[str, dict[str, Any]] = {
     "figure1": {"hysteresis": 0.005},
     "teams": {"hysteresis": 0.005},
-    "figure-eight": {"hysteresis": 0.15, "tail": 1e-3, "fuse_all": True},
+    "figure-eight": {"hysteresis": 0.15, "fuse_all": True},
 }
 
 
@@ -108,9 +107,8 @@ def simulate(task: Task) -> list[SimulatedStep]:
     place = np.linspace(0.0, setup.distance_m, task.robots + 2)[1:-1]
     ray = np.array([np.cos(angle), np.sin(angle)])
     start = np.outer(place, ray) + generator.normal(0.0, _SCATTER_M, (task.robots, 2))
-    parameters = replace(setup.parameters, tail=task.tail)
-    strategy = Strategy(task.strategy, task.robots, parameters, generator, task.start, task.hysteresis)
-    return run(strategy, start, setup.path(float(angle)), parameters, _settings(task, setup), generator)
+    strategy = Strategy(task.strategy, task.robots, setup.parameters, generator, task.start, task.hysteresis)
+    return run(strategy, start, setup.path(float(angle)), setup.parameters, _settings(task, setup), generator)
 
 
 def _settings(task: Task, setup: ExperimentSetup) -> SimulationSettings:

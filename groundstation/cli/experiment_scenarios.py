@@ -29,7 +29,10 @@ _BATCH = 5
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each scenario.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the first flight.")
 @click.option(
-    "--strategies", default="ours", show_default=True, help="By commas: ours,string,flat,two-level,relay,chase."
+    "--strategies",
+    default="ours",
+    show_default=True,
+    help="Of ours,string,reversed,flat,two-level,relay,chase.",
 )
 @click.option(
     "--seconds", type=FiniteRange(5, 3600), default=None, help="Tracked in each flight; default: as its file."
@@ -44,32 +47,34 @@ def scenarios(
     """Fly scenario files at message level and compare what comes of them with what each file expects.
 
     NAMES: files, or names of shipped ones; none: all shipped ones that say what they expect. Drivers, watchdogs,
-    estimator and planner are those that fly. Strategies beside ours: fixed topologies (string, flat, two-level), the
+    estimator and planner are those that fly. Strategies beside ours: fixed topologies (string, the same reversed, flat,
+    two-level), the best of which the others are compared with afterwards, the
     relay rule (the drone nearest to the target stays 0.9 m from it on the side of the ceiling camera's view, the others
     look at it from there) and the chase (the nearest drone goes there from its own side). Figures count from when the
     target was found; lost is an error above 0.5 m.
     """
     from groundstation.experiments.faults import flights_of
     from groundstation.experiments.runner import write_atomically
-    from groundstation.experiments.scenarios import rows_of, table
+    from groundstation.experiments.scenarios import against_best_fixed, comparison, rows_of, table
 
     planned, began = _planned(names, _known(strategies), **flown), time.monotonic()
     found = fly_all([batch for _, batch in planned], scheduler, workers, single=len(planned) == 1)
     flights = [
         {"scenario": name, **one} for (name, _), row in zip(planned, found, strict=True) for one in flights_of([row])[0]
     ]
-    rows = rows_of(flights)
+    rows, best = rows_of(flights), against_best_fixed(flights)
     document = {
         "experiment": "scenarios",
         "elapsed_s": round(time.monotonic() - began, 1),
         "rows": rows,
+        "against_best_fixed": best,
         "flights": flights,
     }
     write_atomically(out / "scenarios.json", json.dumps(document, indent=1) + "\n")
     if as_json:
         click.echo(json.dumps(document, indent=1))
     else:
-        _tell(table(rows), rows, out)
+        _tell([*table(rows), *comparison(best)], rows, out)
     return ExitCode.FAILED if any(row["missed"] for row in rows) else ExitCode.OK
 
 

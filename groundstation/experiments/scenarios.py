@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-STRATEGIES = ("ours", "string", "flat", "two-level", "relay", "chase")
+STRATEGIES = ("ours", "string", "reversed", "flat", "two-level", "relay", "chase")
+FIXED = ("string", "reversed", "flat", "two-level")
 # Student's factor at 95 % by its expansion in 1 / degrees of freedom.
 _NORMAL_95 = 1.96
 _SUMS = ("landings", "switches")
@@ -57,6 +58,48 @@ def paired(own: Iterable[Mapping[str, Any]], other: Iterable[Mapping[str, Any]])
         return None
     factor = _NORMAL_95 + 2.37 / freedom + 2.82 / freedom**2
     return float(np.mean(gaps)), float(factor * np.std(gaps, ddof=1) / math.sqrt(len(gaps)))
+
+
+def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return how each other strategy compares with the best fixed topology of its scenario.
+
+    Best: least mean rmse over the seeds that found the target, chosen afterwards, which favours it. Entries: scenario,
+    strategy, best, share (mean rmse over that of the best, less 1, over the seeds of both), gap_m (mean difference and
+    half width of its 95 % interval; None with fewer than two seeds).
+    """
+    errors: dict[str, dict[str, dict[int, float]]] = {}
+    for one in flights:
+        if one.get("rmse_m") is not None:
+            errors.setdefault(one["scenario"], {}).setdefault(one["strategy"], {})[one["seed"]] = one["rmse_m"]
+    entries: list[dict[str, Any]] = []
+    for scenario, known in errors.items():
+        fixed = {name: float(np.mean(list(own.values()))) for name, own in known.items() if name in FIXED}
+        if not fixed:
+            continue
+        best = min(fixed, key=lambda name: fixed[name])
+        for strategy, own in known.items():
+            shared = sorted(own.keys() & known[best].keys())
+            if strategy in FIXED or not shared:
+                continue
+            mean, other = (float(np.mean([rows[seed] for seed in shared])) for rows in (own, known[best]))
+            gap = paired(_as_flights(own), _as_flights(known[best]))
+            entries.append(
+                {"scenario": scenario, "strategy": strategy, "best": best, "share": mean / other - 1.0, "gap_m": gap}
+            )
+    return entries
+
+
+def _as_flights(errors: Mapping[int, float]) -> list[dict[str, float]]:
+    return [{"seed": seed, "rmse_m": error} for seed, error in errors.items()]
+
+
+def comparison(entries: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return what `against_best_fixed` found as lines of text."""
+    lines = []
+    for one in entries:
+        interval = "" if one["gap_m"] is None else " ({:+.3f} +- {:.3f} m)".format(*one["gap_m"])
+        lines.append(f"{one['scenario']} {one['strategy']}: {one['share']:+.0%} against {one['best']}{interval}")
+    return lines
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -21,7 +21,7 @@ _GAIN, _TURN_GAIN, _FASTEST_M_S = 0.8, 1.5, 0.6
 
 
 class FixedPlanner(Planner):
-    """Optimises the motion of one topology only: flat, string, or two levels, over whoever flies."""
+    """Optimises the motion of one topology only: flat, string (also reversed), or two levels, over whoever flies."""
 
     def __init__(self, planner: Planner, shape: str) -> None:
         super().__init__(planner.parameters, planner.sensors)
@@ -47,6 +47,8 @@ class FixedPlanner(Planner):
         match self._shape:
             case "string":
                 return Topology.string(robots)
+            case "reversed":
+                return Topology.string(robots[::-1])
             case "two-level" if len(robots) > 1:
                 half = (len(robots) + 1) // 2
                 return Topology((frozenset(robots[:half]), frozenset(robots[half:])))
@@ -139,6 +141,7 @@ def _control(mean: Array, stand: Point, looked_at: Point, ahead: Array) -> Array
 STRATEGIES: Mapping[str, Callable[[Planner], Planner]] = {
     "ours": lambda planner: planner,
     "string": lambda planner: FixedPlanner(planner, "string"),
+    "reversed": lambda planner: FixedPlanner(planner, "reversed"),
     "flat": lambda planner: FixedPlanner(planner, "flat"),
     "two-level": lambda planner: FixedPlanner(planner, "two-level"),
     "relay": lambda planner: RulePlanner(planner, relay=True),

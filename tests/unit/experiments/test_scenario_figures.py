@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from groundstation.experiments.scenarios import STRATEGIES, paired, rows_of, table
+from groundstation.experiments.scenarios import STRATEGIES, against_best_fixed, comparison, paired, rows_of, table
 from groundstation.settings.files import SHIPPED
 from sim_bridge.study.scenarios.figures import TrackingErrors, shortfalls
 from sim_bridge.surroundings import ScenarioExpectation
@@ -60,6 +60,27 @@ def test_strategies_are_compared_seed_by_seed() -> None:
     assert first["against"] is None
     assert second["rmse_m"] == pytest.approx([(0.03 + 0.05 + 9.0) / 3, 0.05, 9.0])
     assert "+0.010" in table([first, second])[2]
+
+
+def test_the_best_fixed_topology_is_compared_with_over_the_seeds_of_both() -> None:
+    flown = {
+        "ours": (0.02, 0.03, 0.5), "relay": (0.03, 0.06),
+        "string": (0.03, 0.05), "reversed": (0.02, 0.04), "flat": (0.5, None),
+    }  # fmt: skip
+    flights = [flight(seed, rmse, name) for name, errors in flown.items() for seed, rmse in enumerate(errors)]
+    ours, relay = against_best_fixed(flights)
+    assert (ours["strategy"], ours["best"], relay["strategy"]) == ("ours", "reversed", "relay")
+    assert ours["share"] == pytest.approx(0.05 / 0.06 - 1.0)
+    assert ours["gap_m"][0] == pytest.approx(-0.005)
+    assert relay["share"] == pytest.approx(0.5)
+    assert comparison([ours])[0].startswith("walk ours: -17% against reversed (-0.005 +- ")
+
+
+def test_without_a_fixed_topology_or_a_second_seed_there_is_less_to_say() -> None:
+    assert against_best_fixed([flight(1, 0.02), flight(1, 0.03, "relay")]) == []
+    (one,) = against_best_fixed([flight(1, 0.02), flight(1, 0.04, "flat")])
+    assert (one["share"], one["gap_m"]) == (pytest.approx(-0.5), None)
+    assert comparison([one]) == ["walk ours: -50% against flat"]
 
 
 def test_a_scenario_that_never_found_its_target_has_a_row() -> None:

@@ -33,7 +33,8 @@ class Tables(NamedTuple):
     """Everything that stays the same while the filter runs.
 
     entities (m, e): a row per mode, since modes differ in parameters; priors (e); sensors (s); transition (m, m): the
-    chances of going from one mode to another within a step.
+    chances of going from one mode to another within a step; headings: which entries of the state are headings (a row of
+    `entities` for each would be read at each correction, from 31 places with 30 robots).
     """
 
     entities: RowsStack[EntityRow]
@@ -41,6 +42,7 @@ class Tables(NamedTuple):
     sensors: Rows[SensorRow]
     settings: Settings
     transition: Matrix
+    headings: IntVector
 
     @property
     def modes(self) -> int:

@@ -125,7 +125,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         excess, out.joined = 1.0, 1
     for m in range(modes):
         if used.innovations[m].nis >= 0.0:
-            correct(belief_of(state, tables, m), used.innovations[m], used.HP[m], excess)
+            correct(belief_of(state, tables, m), tables.headings, used.innovations[m], used.HP[m], excess)
     weigh(state.weights, used.innovations, rows, excess)
     forget_lie(subject, event.at)
     subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at

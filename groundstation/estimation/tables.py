@@ -51,8 +51,10 @@ def tables_from_parameters(parameters: EstimatorParameters) -> Tables:
     if len(teams) > MOST_MODES:
         raise ValueError(f"{len(teams)} joint beliefs are needed for all modes of all targets (at most {MOST_MODES})")
     gates = np.array([0.0, *(gate(parameters.gate_probability, rows) for rows in range(1, MAX_ROWS + 1))])
+    entities = _entities(teams, len(models))
+    starts, yaws = entities["start"][0], entities["at_yaw"][0]
     return Tables(
-        entities=_entities(teams, len(models)),
+        entities=entities,
         priors=_priors(models),
         sensors=_sensors(sensors),
         settings=Settings(
@@ -63,6 +65,7 @@ def tables_from_parameters(parameters: EstimatorParameters) -> Tables:
             gates,
         ),
         transition=_transition(models, parameters.step_s),
+        headings=(starts + yaws)[yaws >= 0],
     )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.arrays import Matrix, Vector
+from groundstation.arrays import IntVector, Matrix, Vector
 from groundstation.estimation.correction import (
     apply,
     bound_precision,
@@ -131,17 +131,15 @@ def linearise(
 
 
 @kernel(inlined=True)
-def correct(belief: Belief, innovation: Innovation, HP: Matrix, factor: float) -> None:
+def correct(belief: Belief, headings: IntVector, innovation: Innovation, HP: Matrix, factor: float) -> None:
     """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
     rows = innovation.prediction.size
     if factor > 1.0:
         inflate(innovation.HPH, innovation.R, rows, factor)
         surprise(innovation.HPH, innovation.R, innovation.y, rows, innovation.factor)
     apply(belief.mean, belief.P, rows, HP, innovation.factor, innovation.y)
-    for e in range(belief.entities.shape[0]):
-        if belief.entities[e].at_yaw >= 0:
-            yaw = belief.entities[e].start + belief.entities[e].at_yaw
-            belief.mean[yaw] = wrap(belief.mean[yaw])
+    for i in range(headings.shape[0]):
+        belief.mean[headings[i]] = wrap(belief.mean[headings[i]])
 
 
 @kernel(inlined=True)

@@ -1,7 +1,8 @@
 """The true pose of a vehicle from the simulator behind its firmware: a UDP port that it sends MAVLink to.
 
-SIM_STATE (ArduPilot, asked for) and HIL_STATE_QUATERNION (PX4's SIH) are exact; where neither arrives,
-LOCAL_POSITION_NED with ATTITUDE counts, which a vehicle that finds its own way sends as well.
+SIM_STATE (ArduPilot, asked for) and HIL_STATE_QUATERNION (PX4's SIH) are exact; until one of them arrives,
+LOCAL_POSITION_NED with ATTITUDE counts, which a vehicle that finds its own way sends as well, and PX4's SIH before it
+has been placed on its globe. The vehicle does not move when its source changes.
 """
 
 import math
@@ -68,11 +69,9 @@ class AutopilotTruth:
     def _state(self, message: Message) -> TrueState | None:
         match message:
             case SimState():
-                self._exact = True
-                return self._of_ardupilot(message)
+                return self._exactly(self._of_ardupilot(message))
             case HilStateQuaternion():
-                self._exact = True
-                return self._of_px4(message)
+                return self._exactly(self._of_px4(message))
             case Attitude():
                 self._attitude = message
             case LocalPositionNed() if self._attitude is not None and not self._exact:
@@ -80,6 +79,12 @@ class AutopilotTruth:
                 rates = (a.rollspeed, a.pitchspeed, a.yawspeed)
                 return TrueState((m.x, m.y, m.z), (m.vx, m.vy, m.vz), (a.roll, a.pitch, a.yaw), rates)
         return None
+
+    def _exactly(self, state: TrueState) -> TrueState:
+        if not self._exact and _is_finite(state):
+            self._exact = True
+            self._placement.go_on_from(state)
+        return state
 
     def _ask(self, source: Address, now_ns: int) -> None:
         if now_ns - self._asked_ns < _ASK_NS:

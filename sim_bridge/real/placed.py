@@ -1,10 +1,12 @@
 """From the local frame of a firmware's simulator to the room: it starts on the vehicle's pad, as the field says."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
 from sim_bridge.world.puppet import OutsidePose, Vector3
+
+_WANDERS_M = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,10 +25,28 @@ class Placement:
     def __init__(self, pad_m: tuple[float, float], pad_yaw_rad: float) -> None:
         self._pad_m, self._pad_yaw = pad_m, pad_yaw_rad
         self._first: TrueState | None = None
+        self._last: TrueState | None = None
+
+    def go_on_from(self, state: TrueState) -> None:
+        """Take a state in another frame, such as that of a globe: the vehicle is still where it was last.
+
+        One that seems to have moved a little still stands on its pad: its own estimate wandered.
+        """
+        if self._first is None or self._last is None:
+            return
+        moved = [a - b for a, b in zip(self._last.position, self._first.position, strict=True)]
+        if math.hypot(*moved) < _WANDERS_M:
+            self._first = None
+            return
+        north, east, down = (a - b for a, b in zip(state.position, moved, strict=True))
+        turned = state.attitude[2] - self._last.attitude[2] + self._first.attitude[2]
+        attitude = (*self._first.attitude[:2], turned)
+        self._first = replace(self._first, position=(north, east, down), attitude=attitude)
 
     def pose(self, state: TrueState) -> OutsidePose:
         """Return the pose in the room [world, FLU]."""
         first = self._first = self._first or state
+        self._last = state
         turn = self._pad_yaw + first.attitude[2]
         north, east, down = (a - b for a, b in zip(state.position, first.position, strict=True))
         x, y = _turned(north, -east, turn)

@@ -149,6 +149,47 @@ def test_a_puppet_follows_a_firmware_s_true_state_from_its_pad_on(
     assert [event for event in process.events if event[2] == "is followed"]
 
 
+def hil_state(north_m: float, up_m: float) -> HilStateQuaternion:
+    lat = 47.4 + north_m / 111_194.927
+    zeros = (0,) * 3
+    return HilStateQuaternion(0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, round(lat * 1e7), round(8.5e7),
+                              round(1000 * (488.0 + up_m)), *zeros, 0, 0, *zeros)  # fmt: skip
+
+
+def test_a_vehicle_does_not_move_when_its_simulator_is_placed_on_its_globe(
+    firmware: tuple[Harness, Process, socket.socket],
+) -> None:
+    harness, _, teller = firmware
+    mind = FrameEncoder(SYSTEM, 1)
+    still = (0.0, 0.0, 0.0)
+    teller.send(mind.encode(Attitude(1, *still, *still)))
+    for place in ((0.0, 0.0, 0.0), (1.0, 0.0, -1.0)):  # what it reports itself, before and after it has flown
+        teller.send(mind.encode(LocalPositionNed(2, *place, *still)))
+        turn(harness, 0.05)
+    before = harness.world.states()[0][:3].copy()
+    assert before == pytest.approx([1.0, 1.5, 1.06], abs=0.01)
+    teller.send(mind.encode(hil_state(5.0, 0.0)))
+    turn(harness, 0.05)
+    assert harness.world.states()[0][:3] == pytest.approx(before, abs=0.02)
+    teller.send(mind.encode(hil_state(6.0, 0.9)))
+    turn(harness, 0.05)
+    assert harness.world.states()[0][:3] == pytest.approx(np.add(before, (0.0, 1.0, 0.9)), abs=0.02)
+
+
+def test_an_estimate_that_wanders_on_the_pad_moves_nobody(
+    firmware: tuple[Harness, Process, socket.socket],
+) -> None:
+    harness, _, teller = firmware
+    mind, still = FrameEncoder(SYSTEM, 1), (0.0, 0.0, 0.0)
+    teller.send(mind.encode(Attitude(1, *still, *still)))
+    for place in (still, (0.1, 0.0, 0.2)):
+        teller.send(mind.encode(LocalPositionNed(2, *place, *still)))
+        turn(harness, 0.05)
+    teller.send(mind.encode(hil_state(0.0, 0.0)))
+    turn(harness, 0.05)
+    assert harness.world.states()[0][:3] == pytest.approx([1.0, 0.5, 0.06], abs=0.01)
+
+
 def test_a_body_without_fresh_pose_is_nowhere_and_an_event_says_so(
     firmware: tuple[Harness, Process, socket.socket],
 ) -> None:

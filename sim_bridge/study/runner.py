@@ -4,14 +4,15 @@ import heapq
 import itertools
 import time
 from collections import defaultdict
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import msgspec
 import numpy as np
 
 from groundstation import plug_ins
-from groundstation.bus.messages import Message
+from groundstation.bus.messages import EntityEstimate, Message, Odometry, VehicleStatus
 from groundstation.field.resolved import ResolvedField
 from groundstation.tracker import Tracker, tracker_from_field
 from sim_bridge.scenario import Scenario
@@ -28,7 +29,6 @@ from sim_bridge.world.world import TICK_NS, World
 CLOCK = "study"
 _START_NS = 1_000_000_000_000
 _ODOMETRY_LATENCY_NS = 4_000_000
-_TAKE_OFF_S = 6.5  # after this much of simulated time the drones hover and tracking begins
 _PILOT_TICKS = 6
 _STATUS_TICKS = 40
 _SCORE_TICKS = 20
@@ -37,22 +37,45 @@ _SCORE_TICKS = 20
 @dataclass(frozen=True, slots=True)
 class StudyOptions:
     """duration_s: tracking after take-off; outliers: share of grossly wrong sightings; plan: False leaves the drones
-    hovering; detector_ms: what the camera process adds to the video delay."""
+    hovering; detector_ms: what the camera process adds to the video delay; take_off_s: simulated time until the
+    drones hover and tracking begins."""
 
     seed: int = 1
     duration_s: float = 60.0
     outliers: float = 0.0
     plan: bool = True
     detector_ms: tuple[float, float] = (10.0, 50.0)
+    take_off_s: float = 6.5
+
+
+class FlownLink(Protocol):
+    """What a study needs of the driver of one drone."""
+
+    def obey(self, velocity: tuple[float, float, float], yaw_rate: float, now_s: float) -> None:
+        """Take a setpoint [base_stabilized]."""
+
+    def step(self, now_s: float, estimates: tuple[EntityEstimate, ...]) -> None:
+        """Do what is due at a tick."""
+
+    def odometry(self, stamp_ns: int) -> Odometry | None:
+        """Return the reading of this tick, if one is due."""
+
+    def status(self, stamp_ns: int) -> VehicleStatus:
+        """Return the vehicle's state."""
 
 
 class Study:
-    """A run in progress; `run` flies it to its end and returns the figures."""
+    """A run in progress; `run` flies it to its end and returns the figures.
 
-    def __init__(self, field: ResolvedField, scenario: Scenario, options: StudyOptions) -> None:
+    real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver.
+    """
+
+    def __init__(
+        self, field: ResolvedField, scenario: Scenario, options: StudyOptions, real: Collection[str] = ()
+    ) -> None:
         self.options = options
         self.site = parse_site(msgspec.to_builtins(field))
-        self.world = World(self.site, scenario, options.seed)
+        self.world = World(self.site, scenario, options.seed, real, real)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
         if field.planner.plug_in:
             parameters = self.tracker.parameters
@@ -69,8 +92,8 @@ class Study:
         for onboard in world.onboard.values():
             onboard.trim()  # as the driver does at connect
         lifetime = field.safety.setpoint_lifetime_ms / 1000
-        self._links = {n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.copters.items()}
-        self._telemetry: dict[str, TelemetryPublisher | CopterLink] = {
+        self._links: dict[str, FlownLink] = {n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.copters.items()}
+        self._telemetry: dict[str, TelemetryPublisher | FlownLink] = {
             n: TelemetryPublisher(n, d, world.onboard[n], CLOCK) for n, d in world.ardrones.items()
         }
         self._telemetry |= self._links
@@ -86,6 +109,10 @@ class Study:
         self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])
         self.fence_violation_m = 0.0
 
+    def attach(self, name: str, link: FlownLink) -> None:
+        """Give a real drone its driver."""
+        self._links[name] = self._telemetry[name] = link
+
     @property
     def now_ns(self) -> int:
         """Return the manual clock."""
@@ -96,7 +123,7 @@ class Study:
         cpu, wall = time.process_time(), time.perf_counter()
         for drone in self.world.ardrones.values():
             drone.autopilot.take_off()
-        ticks = round((_TAKE_OFF_S + self.options.duration_s) * 1e9) // TICK_NS
+        ticks = round((self.options.take_off_s + self.options.duration_s) * 1e9) // TICK_NS
         for _ in range(ticks):
             self.step()
         report = self.score.report()
@@ -119,7 +146,7 @@ class Study:
                 link.step(world.time_s, estimates)
         self._sense()
         self.spent_s["world"] += time.perf_counter() - mark
-        tracking = world.time_s >= _TAKE_OFF_S
+        tracking = world.time_s >= self.options.take_off_s
         if world.ticks % self._tick_every == 0:
             self._tick(tracking)
         if world.ticks % _PILOT_TICKS == 0:

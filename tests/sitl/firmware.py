@@ -27,10 +27,15 @@ def ports_of(flavour: str, system: int) -> tuple[int, int]:
 
 
 class Firmware:
-    """One running binary; parameters: set before the first start. `end` keeps what was set since."""
+    """One running binary; parameters: set before the first start; speed: of its clock beside the real one, at most.
 
-    def __init__(self, flavour: str, folder: Path, system: int, parameters: Mapping[str, float] | None = None) -> None:
-        self.flavour, self.folder, self.system = flavour, folder, system
+    `end` keeps what was set since.
+    """
+
+    def __init__(
+        self, flavour: str, folder: Path, system: int, parameters: Mapping[str, float] | None = None, speed: float = 1.0
+    ) -> None:
+        self.flavour, self.folder, self.system, self.speed = flavour, folder, system, speed
         self.parameters = dict(parameters or {})
         self.port, self.truth_port = ports_of(flavour, system)
         self._starts = 0
@@ -56,6 +61,7 @@ class Firmware:
         binary = binary_of("px4")
         environment = dict(os.environ)
         environment |= {"PX4_SYS_AUTOSTART": "10040", "PX4_SIM_MODEL": "sihsim_quadx", "PX4_SIMULATOR": "sihsim"}
+        environment["PX4_SIM_SPEED_FACTOR"] = f"{self.speed:g}"
         presets = {"SENS_EN_GPSSIM": 0.0} | self.parameters
         environment |= {f"PX4_PARAM_{name}": f"{value:g}" for name, value in presets.items()}
         return [binary, "-i", str(self.system - 1), "-d", str(Path(binary).parents[1] / "etc")], environment
@@ -65,7 +71,7 @@ class Firmware:
         defaults.write_text("".join(f"{name} {value:g}\n" for name, value in (_COPTER | self.parameters).items()))
         quiet = [item for n in range(2, 9) for item in (f"--serial{n}", "none:")]
         command = [binary_of("ardupilot"), "--model", "quad", "--home", "47.4,8.5,488,0", "-I", str(self.system)]
-        command += ["--sysid", str(self.system), "--defaults", str(defaults), "--speedup", "1"]
+        command += ["--sysid", str(self.system), "--defaults", str(defaults), "--speedup", f"{self.speed:g}"]
         command += [
             "--serial0",
             f"udpclient:127.0.0.1:{self.port}",

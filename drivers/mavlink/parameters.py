@@ -59,13 +59,15 @@ _PX4 = (
     Needed("EKF2_MAG_TYPE", 5, "no compass near steel"),
     Needed("EKF2_EV_DELAY", 0, "poses are sent as predicted to now", REAL32, accepted=(0, 50)),
     Needed("EKF2_EVP_NOISE", 0.03, "lower bound of the error of our positions, 1 to 3 cm", REAL32, (0.01, 0.06)),
+    Needed("EKF2_IMU_CTRL", 3, "it must not take its thrust for gravity while no position comes", others=(0, 1, 2)),
     Needed("SYS_HAS_GPS", 0, "arm without GPS"),
-    Needed("COM_OF_LOSS_T", 1.0, "time without set-points before the failsafe", REAL32, accepted=(0.3, 1.0)),
+    Needed("COM_OF_LOSS_T", 0.5, "time without set-points before the failsafe", REAL32, accepted=(0.3, 1.0)),
     Needed("COM_OBL_RC_ACT", 4, "that failsafe: land"),
     Needed(
         "COM_RC_IN_MODE", 0, "a transmitter's kill and mode switches stay alive: 1 and 4 ignore them", others=(2, 3)
     ),
     Needed("COM_RCL_EXCEPT", 4, "offboard flight needs no stick", others=(5, 6, 7)),
+    Needed("MPC_LAND_CRWL", 0.6, "the last metre of a landing, on which it may have no position", REAL32, (0.3, 1.0)),
     Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),
 )
 _ARDUPILOT = (

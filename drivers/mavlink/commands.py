@@ -99,7 +99,12 @@ class Orders:
         if not self.lift.lifted:
             self.drift.reset()
         believed = self.drift.place(now_ns)
-        return risen_m if believed is None else believed[2]
+        return risen_m if believed is None else believed[2] - self._floor_m
+
+    @property
+    def _floor_m(self) -> float:
+        """Where the tracker had it when it stood [m; world]: its own origin is some centimetres above the floor."""
+        return self.lift.stood[2] if self.lift.stood is not None else 0.0
 
     def _enter(self, now_ns: int, action: Action) -> None:
         self.drift.let_go()
@@ -151,6 +156,8 @@ class Orders:
     def _climb(self, now_ns: int, climbed_m: float) -> SetPositionTargetLocalNed | None:
         left_m = self._vehicle.take_off_m - climbed_m
         up = min(self._vehicle.limits.max_climb_m_s, max(_LEAST_CLIMB_M_S, _CLIMB_GAIN * left_m))
+        if self.lift.stood is not None:
+            self.drift.hold_at(self.lift.stood)
         forward, left, _ = self.drift.hold(now_ns)
         return self._send(now_ns, (forward, left, up), 0.0)
 
@@ -171,7 +178,7 @@ class Orders:
             return self._climb(now_ns, climbed_m)
         if not guided:
             return None
-        return self._stand(now_ns, self._vehicle.take_off_m if self._rises_to_take_off else None)
+        return self._stand(now_ns, self._floor_m + self._vehicle.take_off_m if self._rises_to_take_off else None)
 
     def _fly(self, now_ns: int, decision: WatchdogDecision, guided: bool) -> SetPositionTargetLocalNed | None:
         if not guided and now_ns < self._regain_until_ns:

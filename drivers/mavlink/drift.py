@@ -12,6 +12,8 @@ from groundstation.time_units import NS_PER_S
 
 # Velocities of the belief are noisy by 0.05 m/s.
 _SMOOTHING_S = 0.12
+# Climb rates of the belief are mostly the autopilot's own word, less an error that changes over seconds.
+_CLIMB_SMOOTHING_S, _MOST_CLIMB_M_S = 0.4, 0.3
 # Without the tracker an estimator's error of the velocity lasts for about that long.
 _FORGETS_S = 2.0
 _FRESH_NS = 300_000_000
@@ -24,7 +26,7 @@ _TRUSTED_AGAIN_NS = NS_PER_S
 # Up to here it does not matter whose word is wrong.
 _SMALL_M_S = 0.2
 _RESPONSE_S, _JUDGED_S, _EVEN_M_S = 0.6, 0.5, 0.1
-_HOLD_GAIN = 0.8
+_HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 1.3
 # Below what the control error tolerates of a vehicle that is told to stand still.
 _HOLD_M_S = 0.2
 _SEEN_S = 0.5
@@ -66,6 +68,7 @@ class DriftFeedback:
     def reset(self) -> None:
         """Forget everything: the vehicle is on the floor."""
         self._drift: Vector2 = (0.0, 0.0)
+        self._climb_drift_m_s = 0.0
         self._at_ns: int | None = None
         self._believed_ns: int | None = None
         self._doubted_until_ns = 0
@@ -88,6 +91,8 @@ class DriftFeedback:
         forward, left = reported_m_s[:2]
         vx, vy = estimate.velocity_m_s[:2]
         self._obeys = self._obedience.hear(now_ns, (forward, left), (c * vx + s * vy, c * vy - s * vx))
+        share = _share(now_ns - (self._at_ns or now_ns), _CLIMB_SMOOTHING_S)
+        self._climb_drift_m_s += share * (reported_m_s[2] - estimate.velocity_m_s[2] - self._climb_drift_m_s)
         self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
 
     def _correct(self, now_ns: int, error: Vector2) -> None:
@@ -103,9 +108,10 @@ class DriftFeedback:
         doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
         if self._at_ns is None or doubted:
             return _STILL
-        left_over = math.exp(-max(0.0, (now_ns - self._at_ns) / NS_PER_S - _SEEN_S) / _FORGETS_S)
-        left_over *= min(1.0, _MOST_M_S / max(size, _MOST_M_S))
-        return self._in_heading(left_over * self._drift[0], left_over * self._drift[1], 0.0)
+        fades = math.exp(-max(0.0, (now_ns - self._at_ns) / NS_PER_S - _SEEN_S) / _FORGETS_S)
+        left_over = fades * min(1.0, _MOST_M_S / max(size, _MOST_M_S))
+        up = max(-_MOST_CLIMB_M_S, min(_MOST_CLIMB_M_S, fades * self._climb_drift_m_s))
+        return self._in_heading(left_over * self._drift[0], left_over * self._drift[1], up)
 
     @property
     def size_m_s(self) -> float:
@@ -122,10 +128,14 @@ class DriftFeedback:
         """Hold no place any more: the next hover holds the one where it begins."""
         self._held = None
 
+    def hold_at(self, place: Vector3) -> None:
+        """Hold a place [world] from now on, rather than the one where the hover began."""
+        self._held = place
+
     def hold(self, now_ns: int, height_m: float | None = None) -> Vector3:
         """Return the velocity [base_stabilized] back to the place held, zero without a fresh belief.
 
-        height_m: the height to hold, None for that where the hover began.
+        height_m: the height to hold, None for that of the place.
         """
         place = self.place(now_ns)
         if place is None:
@@ -135,7 +145,7 @@ class DriftFeedback:
         wanted = (x - place[0], y - place[1], (z if height_m is None else height_m) - place[2])
         size = math.hypot(*wanted[:2])
         gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
-        up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_GAIN * wanted[2]))
+        up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * wanted[2]))
         return self._in_heading(gain * wanted[0], gain * wanted[1], up)
 
     def _in_heading(self, x: float, y: float, up: float) -> Vector3:

@@ -1,22 +1,41 @@
-"""Whether a vehicle that says that it flies has left the floor yet. Pure.
+"""Whether a vehicle that says that it flies has left the floor yet, and where it stood. Pure.
 
-WIRE (docs/reference/mavlink.md 2.1): PX4 says that it is in the air up to 3.5 s before it leaves the floor. Until it
-does, no camera's word counts and its pad is fed: its estimator would coast through the lift-off on nothing.
+WIRE (docs/reference/mavlink.md 2.1): PX4 says that it is in the air up to 3.5 s before it leaves the floor. What
+cameras see of its height decides, and its own word where they do not see it.
 """
 
 from drivers.mavlink.wire.names import Landed
+from groundstation.bus.messages import Vector3
 
 # An estimator that is told that it stands on its pad shows little of its height, and its climb sooner.
 _RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300_000_000
+# Three times the error of a height that cameras see.
+_SEEN_RISEN_M = 0.1
+_STANDING = 25  # estimates whose mean is the place where it stands
 
 
 class LiftOff:
-    """lifted: it is off the floor. A vehicle that was not asked to take off flies when it says so."""
+    """lifted: it is off the floor. A vehicle that was not asked to take off flies when it says so.
+
+    stood: where the tracker had it before it lifted off [world], None if it was not seen then.
+    """
 
     def __init__(self) -> None:
         self.lifted = False
+        self.stood: Vector3 | None = None
+        self._places = 0
         self._floor_m: float | None = None
         self._climbing_since_ns: int | None = None
+
+    def see(self, place: Vector3) -> None:
+        """Take where the tracker has it [world], while it has not lifted."""
+        stood = self.stood or place
+        if self._places < _STANDING:
+            self._places += 1
+            x, y, z = (old + (new - old) / self._places for old, new in zip(stood, place, strict=True))
+            stood = (x, y, z)
+        self.stood = stood
+        self.lifted = self.lifted or place[2] - stood[2] >= _SEEN_RISEN_M
 
     def hear(self, now_ns: int, starting: bool, landed: int, height_m: float, climb_m_s: float) -> float:
         """Take its own words, and whether it was asked to take off; return its height above the floor [m]."""
@@ -25,6 +44,8 @@ class LiftOff:
         risen_m = height_m - self._floor_m
         if landed == Landed.ON_GROUND:
             self.lifted, self._climbing_since_ns = False, None
+            if not starting:
+                self.stood, self._places = None, 0
             return risen_m
         if climb_m_s < _CLIMBING_M_S:
             self._climbing_since_ns = None

@@ -36,6 +36,7 @@ _EXPLAIN_NS = 700_000_000
 # ArduPilot repeats what keeps it from arming every 30 s.
 _COMPLAINTS_NS = 35_000_000_000
 _WARNING = 4
+_Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
 
@@ -75,9 +76,7 @@ class MavlinkVehicle:
         self._publisher = TelemetryPublisher(vehicle, bus)
         self._requests = Requests(self.system)
         self._acks: deque[flight.CommandAckMessage] = deque(maxlen=64)
-        self._values: deque[service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion] = deque(
-            maxlen=256
-        )
+        self._values: deque[_Value] = deque(maxlen=256)
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
         ours, known, pinned = settings.link.system_id, dict(vehicle.parameters), vehicle.serial_number
         self._session = MavlinkSession(self.system, self.flavour, rates, ours, settings.origin, known, pinned)
@@ -180,7 +179,9 @@ class MavlinkVehicle:
     def see(self, now_ns: int, estimate: Estimate) -> None:
         """Take the tracker's estimate."""
         good, known = self.vision.hear(now_ns, estimate), self.telemetry
-        if good is not None and self.orders.lift.lifted and now_ns - known.moved_ns < _FRESH_NS:
+        if good is not None and not self.orders.lift.lifted:
+            self.orders.lift.see((good.mean[0], good.mean[1], good.mean[2]))
+        elif good is not None and now_ns - known.moved_ns < _FRESH_NS:
             self.orders.drift.hear(now_ns, good, known.velocity_m_s)
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
 
@@ -206,8 +207,8 @@ class MavlinkVehicle:
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
         # What it is told holds its drift as well: that is no error of control.
-        (x, y, z), (drift_x, drift_y, _) = known.velocity_m_s, self.orders.drift.drift(now_ns)
-        return x - drift_x, y - drift_y, z
+        (x, y, z), (drift_x, drift_y, drift_z) = known.velocity_m_s, self.orders.drift.drift(now_ns)
+        return x - drift_x, y - drift_y, z - drift_z
 
     def _state(self, known: LatestTelemetry) -> FlightState:
         return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
@@ -301,10 +302,9 @@ class MavlinkVehicle:
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals; those of the link are shared by all vehicles on it."""
         rate_hz, quality = self._traffic.rates(now_ns)
-        lost_s = self.vision.lost_s(now_ns)
-        lost = f"no position from the cameras for {lost_s:.1f} s"
-        without = lost_s >= self._settings.vision.hover_after_s
-        detail = lost if without else self._session.detail(self._requests)
+        lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
+        lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
+        detail = lost or self._session.detail(self._requests)
         return LinkHealth(quality, rate_hz, dict(self._link.rejected + self._refused), detail)
 
     def flush(self) -> None:

@@ -1,6 +1,7 @@
 """Poses from the tracker's estimate for an autopilot, and the time without one. Pure.
 
-Before take-off no camera's word counts (landed robots are not in the belief): the pad of the field file is fed instead.
+On the floor the pad of the field file is fed, or where it landed last: the tracker has no estimate of a robot that is
+landed. Once the take-off has begun it has one, which is fed if it goes on from there.
 A position that observations do not keep sharp is not fed: it would be the autopilot's own dead reckoning. What counts
 is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well.
 """
@@ -64,19 +65,21 @@ class VisionFeed:
         return entity.converged and worst <= self._vision.max_std_m**2 and entity.age_s <= self._vision.max_age_s
 
     def pose(self, now_ns: int, aloft: bool) -> VisionPose | None:
-        """Return the pose to send now, or None; aloft: the vehicle reports flight."""
+        """Return the pose to send now, or None; aloft: the vehicle has left the floor."""
+        pose = self._newest
+        if pose is not None and now_ns - pose.stamp_ns > _FRESH_NS:
+            pose = self._newest = None
         if not aloft:
             self._aloft_ns = None
-            pose: VisionPose | None = replace(self._standing, stamp_ns=now_ns)
+            if pose is None or self._last is None or self._jumps(self._last, pose):
+                pose = replace(self._standing, stamp_ns=now_ns)
         else:
             if self._aloft_ns is None:
-                self._aloft_ns, self._newest, self._good_ns = now_ns, None, None
-            pose = self._newest
-            if pose is None or now_ns - pose.stamp_ns > _FRESH_NS:
+                self._aloft_ns, self._good_ns = now_ns, None if pose is None else self._good_ns
+            if pose is None:
                 return None
             # Where it will stand once it has landed.
             self._standing = replace(pose, position_m=(*pose.position_m[:2], 0.0), variances=_STANDING_VARIANCES)
-        assert pose is not None
         if self._last is not None and self._jumps(self._last, pose):
             self.resets += 1
         self._last = pose

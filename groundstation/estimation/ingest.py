@@ -64,6 +64,7 @@ class Intake:
         self._newest_status: dict[str, int] = {}
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
         self._attitudes = AttitudeIntake(joint.parameters.inertial)
+        self._joins_early = joint.parameters.joins_early
         self._standing: dict[str, tuple[int, bool]] = {}
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
@@ -91,6 +92,8 @@ class Intake:
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
         entity, airborne = message.header.entity, _AIRBORNE.get(message.flight_state)
+        if message.flight_state is FlightState.TAKING_OFF and entity in self._joins_early:
+            airborne = True
         if stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
         self._note_standing(entity, message.flight_state is FlightState.LANDED, stamp_ns)

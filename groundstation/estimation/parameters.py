@@ -55,7 +55,8 @@ class EstimatorParameters:
     step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
     wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
     over at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where
-    they publish one (inertial.py), with their velocity scale.
+    they publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to
+    take off.
     """
 
     entities: Mapping[str, MotionModel]
@@ -67,6 +68,7 @@ class EstimatorParameters:
     divergence_count: int = 5
     divergence_s: float = 0.6
     inertial: Mapping[str, float] = field(default_factory=dict)
+    joins_early: frozenset[str] = frozenset()
 
 
 def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
@@ -89,6 +91,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         inertial={
             n: d.odometry.velocity_scale for n, d in drones.items() if not kind_named(d.kind).habits.tells_attitude
         },
+        joins_early=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.flies_on_estimate),
     )
 
 

@@ -31,7 +31,8 @@ _NONE: Mapping[str, KindSection] = MappingProxyType({})
 class ErrorHabits:
     """How long a kind's errors last [s], and the error of its climb rate [m/s; of its highest: share].
 
-    tells_attitude: its own attitude is better than what we could make of its IMU.
+    tells_attitude: its own attitude is better than what we could make of its IMU. flies_on_estimate: it is told where
+    it is, so that the tracker has to know it before it lifts off.
     """
 
     velocity_s: float
@@ -41,6 +42,7 @@ class ErrorHabits:
     climb_share: float
     reports_climb: bool
     tells_attitude: bool
+    flies_on_estimate: bool = False
 
 
 @dataclass(frozen=True, slots=True)

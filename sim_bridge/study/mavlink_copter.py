@@ -69,8 +69,8 @@ class CopterLink:
 
     def _fly(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
         now_ns = round(now_s * 1e9)
-        (x, y, z), (drift_x, drift_y, _) = velocity, self._drift.drift(now_ns)
-        corrected = (x + drift_x, y + drift_y, z)
+        (x, y, z), (drift_x, drift_y, drift_z) = velocity, self._drift.drift(now_ns)
+        corrected = (x + drift_x, y + drift_y, z + drift_z)
         self._drift.tell(now_ns, corrected)
         self._copter.fly(corrected, yaw_rate)
 

@@ -2,7 +2,7 @@
 
 Cameras, target and the other drones are those of the study; driver, tracker and firmware are the real ones. The
 firmware's process is stopped while the room computes, and goes on for 10 ms of its own time at a time: a loaded machine
-makes the flight slower, never different. As a program: `FLAVOUR SEED SECONDS [dark|kill|guarded]`.
+makes the flight slower, never different.
 """
 
 import json
@@ -10,12 +10,10 @@ import math
 import os
 import signal
 import sys
-import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +26,6 @@ from firmware import Firmware, ports_of  # noqa: E402
 from mavlink_process import FakeProcess  # noqa: E402
 
 from drivers.mavlink.driver import Fleet, hosts_of  # noqa: E402
-from drivers.mavlink.failsafe import hover_and_land  # noqa: E402
 from drivers.mavlink.parameters import needed  # noqa: E402
 from drivers.mavlink.settings import MavlinkDriverSettings  # noqa: E402
 from drivers.mavlink.wire.names import Flavour  # noqa: E402
@@ -48,9 +45,7 @@ from sim_bridge.world.world import TICK_NS  # noqa: E402
 NAME = "drone_2"
 MIXED_TEAM = HERE.parents[1] / "config" / "mixed-team.yaml"
 SLICE_NS, ESTIMATE_NS = 10_000_000, 20_000_000
-RISEN_M, SETTLED_S = 0.5, 3.0  # hovering before the team tracks
-READY_S, START_S, SILENT_S = 120.0, 30.0, 20.0
-GUARDIAN_HOVER_S, GUARDIAN_LAND_S = 0.3, 3.0
+READY_S, SILENT_S = 120.0, 20.0
 
 
 def field_with(flavour: str, system: int, port: int) -> Any:
@@ -98,7 +93,7 @@ class Lean:
 
 
 class Room:
-    """One flight. `slice` is 10 ms of it; `fly` goes on until a condition holds; `close` ends the firmware."""
+    """One flight. `slice` is 10 ms of it; `until` goes on until a condition holds; `close` ends the firmware."""
 
     def __init__(self, flavour: str, seed: int, folder: Path, system: int = 8, speed: float = 1.0) -> None:
         self.flavour, self.system = flavour, system
@@ -291,88 +286,6 @@ class Room:
         assert self._zero_ns and self.puppet.poses, "neither its time nor its true pose is heard"
         self.until(lambda: False, 1.0)
 
-    def take_off(self) -> dict[str, float]:
-        """Bring the team into the air; returns height and drift of the real one until it tracks."""
-        self.study.start_ns, self.flying = self._now_ns, True
-        for drone in self.study.world.ardrones.values():
-            drone.autopilot.take_off()
-        body, (pad_x, pad_y) = self.puppet.airframe, self.drone.pad_m
-        drifts, heights = [0.0], [0.0]
-
-        def hovers_long() -> bool:
-            drifts.append(math.hypot(body.x - pad_x, body.y - pad_y))
-            heights.append(body.z - self._floor_m)
-            return self._hovered() > SETTLED_S
-
-        self._floor_m, self._hover_since = body.z, 0.0
-        up = self.until(hovers_long, START_S, Verb.TAKEOFF, "LANDED")
-        assert up, f"{self.mode}: {self.process.texts[-6:]}"
-        self.study.options = replace(self.study.options, take_off_s=self.study.world.time_s)
-        assert self.until(lambda: self.mode == "TRACK", 5.0, Verb.TRACK, "HOVER"), self.process.texts[-6:]
-        return {"highest_m": max(heights), "height_m": float(np.mean(heights[-100:])), "drift_m": max(drifts)}
-
-    def _hovered(self) -> float:
-        now_s = self.study.world.time_s
-        if self.mode != "HOVER" or self.puppet.airframe.z - self._floor_m < RISEN_M:
-            self._hover_since = now_s
-        return now_s - self._hover_since
-
-    def track(self, seconds: float) -> dict[str, Any]:
-        """Track for a while, as long as the driver does."""
-        errors, body = [], self.puppet.airframe
-
-        def ends() -> bool:
-            if self.study.world.ticks % 20 == 0:
-                errors.append(math.dist(self.belief()[:2], (body.x, body.y)))
-            return self.mode != "TRACK"
-
-        began_s = self.study.world.time_s
-        left = self.until(ends, seconds)
-        report = self.study.score.report()
-        return {
-            "tracked_s": round(self.study.world.time_s - began_s, 1),
-            "left": f"{self.mode}: {self.host.watchdog.reason}" if left else "",
-            "target_rmse_m": report["target_rmse_m"], "target_max_m": report["target_max_m"],
-            "belief_mean_m": float(np.mean(errors)), "belief_max_m": float(np.max(errors)),
-            "separation_m": report["min_separation_m"], "anees": report["anees"].get(NAME),
-        }  # fmt: skip
-
-    def belief(self) -> tuple[float, ...]:
-        """Return where the tracker has the real one."""
-        return next((one.mean for one in self.study.tracker.estimates() if one.name == NAME), (math.nan,) * 4)
-
-    def end_badly(self, fault: str, limit_s: float = 30.0) -> dict[str, Any]:
-        """Take its cameras (dark), its driver (kill), or its driver while a guardian speaks (guarded).
-
-        Returns time and distance to rest or floor.
-        """
-        body = self.puppet.airframe
-        start, began_s = (body.x, body.y), self.study.world.time_s
-        self.study.blind, self.killed = fault == "dark", fault != "dark"
-        slow_since, farthest = [began_s], [0.0]
-
-        def rests() -> bool:
-            now_s = self.study.world.time_s
-            if fault == "guarded":
-                self._guard(now_s - began_s)
-            farthest.append(math.dist(start, (body.x, body.y)))
-            if math.hypot(body.vx, body.vy) > 0.1:
-                slow_since[0] = now_s
-            return body.z < self._floor_m + 0.05 or now_s - slow_since[0] > 3.0
-
-        rested = self.until(rests, limit_s)
-        how = "floor" if body.z < self._floor_m + 0.05 else "rest" if rested else "flies on"
-        took_s = (self.study.world.time_s if how == "floor" else slow_since[0]) - began_s
-        return {"ends": how, "took_s": round(took_s, 2), "farthest_m": round(max(farthest), 3)}
-
-    def _guard(self, elapsed_s: float) -> None:
-        if self.study.world.ticks % 20:
-            return
-        hover, land = hover_and_land([self.system])
-        link: Any = self.fleet.link
-        if elapsed_s > GUARDIAN_HOVER_S:
-            link.send_raw(self.system, hover if elapsed_s < GUARDIAN_LAND_S else land)
-
     def close(self) -> None:
         """End driver and firmware."""
         os.kill(self.firmware.process.pid, signal.SIGCONT)
@@ -384,30 +297,3 @@ class Room:
 def _on_study_clock(message: Any) -> Any:
     header = msgspec.structs.replace(message.header, clock=CLOCK)
     return msgspec.structs.replace(message, header=header)
-
-
-def fly(flavour: str, seed: int, seconds: float, folder: Path, fault: str = "", **more: Any) -> dict[str, Any]:
-    """Fly once; returns the figures."""
-    room = Room(flavour, seed, folder, **more)
-    began = time.monotonic()
-    try:
-        with room.clocked():
-            room.get_ready()
-            figures: dict[str, Any] = {"flavour": flavour, "seed": seed, **room.take_off(), **room.track(seconds)}
-            if fault and not figures["left"]:
-                figures |= room.end_badly(fault)
-            figures["speed"] = round(room.study.world.time_s / (time.monotonic() - began), 2)
-            figures["texts"] = room.process.texts[-12:]
-            return figures
-    finally:
-        room.close()
-        (folder / "trace.jsonl").write_text("".join(json.dumps(row) + "\n" for row in room.trace))
-
-
-if __name__ == "__main__":
-    from groundstation.process import numba_cache
-
-    numba_cache.activate()
-    _flavour, _seed, _seconds, *_fault = sys.argv[1:]
-    _folder = Path(tempfile.mkdtemp(prefix=f"room-{_flavour}-{_seed}-"))
-    print(json.dumps(fly(_flavour, int(_seed), float(_seconds), _folder, *_fault) | {"trace": str(_folder)}, indent=1))

@@ -11,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 from firmware import VARIABLES, binary_of
-from firmware_room import fly
+from firmware_flight import fly
 
 from groundstation.process import numba_cache
 

@@ -120,7 +120,7 @@ def test_setpoints_are_clamped(rig):
     assert math.hypot(sent.vx - drift[0], sent.vy + drift[1]) == pytest.approx(0.6, abs=0.02)
     assert (
         math.hypot(*drift) < 0.15
-        and sent.vz == pytest.approx(-0.4)
+        and sent.vz == pytest.approx(-0.4 - drift[2], abs=0.02)
         and sent.yaw_rate == pytest.approx(-math.radians(60))
     )
 

@@ -1,6 +1,7 @@
 """What the estimator's intake refuses by itself, with the verdict that names why; nothing of it reaches the filter."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -191,3 +192,16 @@ def test_a_sensor_that_repeats_itself_is_frozen_and_thaws() -> None:
     assert sights[:6] == [Verdict.ACCEPTED] * 6
     assert sights[-1] is Verdict.FROZEN
     assert desk.take(desk.sight(position_m=(0.1, 0.2, 2.9001))) is Verdict.ACCEPTED
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_only_who_has_to_be_known_before_its_lift_off_joins_while_it_takes_off(early: bool) -> None:
+    desk = Desk()
+    joint = FixedLagFilter(replace(desk.filter.parameters, joins_early=frozenset(["drone"] if early else [])))
+    intake = Intake(joint, {"ceiling"}, "here")
+    status = VehicleStatus(
+        header=desk.header("drone", 100 * MS), flight_state=FlightState.TAKING_OFF, mode="TAKING_OFF"
+    )
+    intake.take("status/drone", status, NOW)
+    joint.advance(NOW)
+    assert joint.airborne("drone") is early

@@ -126,3 +126,20 @@ def test_on_the_floor_nothing_is_known():
     vehicle.feedback.reset()
     assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0)
     assert vehicle.feedback.place(vehicle.now_ns) is None
+
+
+def test_the_error_of_a_climb_rate_is_corrected_up_to_a_limit():
+    feedback = DriftFeedback()
+    for error, corrected in ((0.2, 0.2), (0.9, 0.3)):
+        for turn in range(150):
+            entity = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), (1e-4,) * 16, (0.0, 0.0, 0.1), True, 0.1)
+            feedback.hear(S + turn * STEP_NS, entity, (0.0, 0.0, 0.1 + error))
+        assert feedback.drift(S + 150 * STEP_NS)[2] == pytest.approx(corrected, abs=0.01)
+
+
+def test_a_place_that_is_given_is_held_instead_of_the_one_where_the_hover_began():
+    vehicle = Vehicle()
+    vehicle.fly(1.0)
+    vehicle.feedback.hold_at((0.3, -0.1, 0.8))
+    vehicle.fly(8.0)
+    assert vehicle.place[:2] == pytest.approx((0.3, -0.1), abs=0.03)

@@ -1,5 +1,7 @@
 """When a vehicle has left the floor: by its height or climb, not by its word that it flies."""
 
+import pytest
+
 from drivers.mavlink.lift_off import LiftOff
 from drivers.mavlink.wire.names import Landed
 
@@ -51,3 +53,30 @@ def test_it_stays_lifted_until_it_stands_again():
     assert lift.lifted
     assert lift.hear(4_000 * MS, False, Landed.ON_GROUND, 0.04, 0.0) == 0.0
     assert not lift.lifted
+
+
+def stands(lift, height_m, starting=True):
+    """The tracker has it on the floor for half a second, with errors of 3 cm."""
+    for turn in range(25):
+        lift.hear(turn * 20 * MS, starting, Landed.ON_GROUND, 0.0, 0.0)
+        lift.see((1.0, 2.0, height_m + (0.03 if turn % 2 else -0.03)))
+
+
+def test_what_cameras_see_of_its_height_counts_before_its_own_word():
+    lift = LiftOff()
+    stands(lift, 0.06)
+    assert lift.stood == pytest.approx((1.0, 2.0, 0.06), abs=0.002)
+    lift.hear(1_000 * MS, True, Landed.IN_AIR, 0.0, 0.0)
+    lift.see((1.0, 2.0, 0.14))
+    assert not lift.lifted, "sightings err by 3 cm"
+    lift.see((1.1, 2.0, 0.17))
+    assert lift.lifted and lift.stood == pytest.approx((1.0, 2.0, 0.06), abs=0.002)
+
+
+def test_where_it_stood_is_that_of_this_take_off():
+    lift = LiftOff()
+    stands(lift, 0.06)
+    lift.hear(2_000 * MS, False, Landed.ON_GROUND, 0.0, 0.0)  # it landed on a table
+    assert lift.stood is None
+    stands(lift, 0.7)
+    assert not lift.lifted and lift.stood == pytest.approx((1.0, 2.0, 0.7), abs=0.002)

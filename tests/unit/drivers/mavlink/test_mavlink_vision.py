@@ -1,0 +1,60 @@
+"""Which pose an autopilot is fed: its pad, the tracker's estimate through the lift-off, or none."""
+
+import pytest
+
+from drivers.mavlink.settings import VisionFeedback
+from drivers.mavlink.vision import VisionFeed
+from groundstation.bus import clock
+from groundstation.bus.messages import EntityEstimate, Estimate, Header
+
+MS = 1_000_000
+NOW = 1_000_000 * MS
+PAD = (1.0, -0.5)
+
+
+@pytest.fixture
+def feed() -> VisionFeed:
+    feed = VisionFeed("drone", clock.clock_id(), VisionFeedback(), PAD, 0.3)
+    feed.pose(NOW, aloft=False)
+    return feed
+
+
+def believe(feed: VisionFeed, now_ns: int, x: float, y: float, z: float) -> None:
+    covariance = tuple(4e-4 if place % 5 == 0 else 0.0 for place in range(16))
+    entity = EntityEstimate("drone", "robot", (x, y, z, 0.3), covariance, (0.0, 0.0, 0.0), True, 0.1)
+    header = Header(now_ns, clock.clock_id(), "team", "tracker", 1)
+    feed.hear(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
+
+
+def place(feed: VisionFeed, now_ns: int, aloft: bool) -> tuple[float, ...] | None:
+    pose = feed.pose(now_ns, aloft)
+    return None if pose is None else pose.position_m
+
+
+def test_a_standing_vehicle_is_fed_its_pad(feed: VisionFeed) -> None:
+    assert place(feed, NOW + 33 * MS, aloft=False) == (*PAD, 0.0)
+    assert feed.lost_s(NOW) == 0.0
+
+
+def test_the_estimate_is_fed_from_the_beginning_of_the_take_off_on(feed: VisionFeed) -> None:
+    resets = feed.resets
+    believe(feed, NOW, *PAD, 0.06)
+    assert place(feed, NOW, aloft=False) == (*PAD, 0.0), "the first of a tracker says nothing of where it goes on from"
+    for step, aloft in enumerate((False, False, True, True)):
+        now_ns = NOW + 33 * MS * (step + 1)
+        believe(feed, now_ns, PAD[0] + 0.02 * step, PAD[1], 0.06 + 0.03 * step)
+        assert place(feed, now_ns, aloft) == (PAD[0] + 0.02 * step, PAD[1], 0.06 + 0.03 * step)
+    assert feed.resets == resets + 1, "for the tracker's epoch alone"
+    assert feed.lost_s(now_ns + 100 * MS) == pytest.approx(0.1)
+
+
+def test_an_estimate_elsewhere_does_not_count_while_it_stands(feed: VisionFeed) -> None:
+    believe(feed, NOW + 33 * MS, PAD[0] + 1.0, PAD[1], 0.06)  # the marker of another drone
+    assert place(feed, NOW + 33 * MS, aloft=False) == (*PAD, 0.0)
+
+
+def test_a_vehicle_aloft_is_fed_no_old_estimate(feed: VisionFeed) -> None:
+    believe(feed, NOW + 33 * MS, *PAD, 0.06)
+    assert place(feed, NOW + 66 * MS, aloft=True) is not None
+    assert place(feed, NOW + 400 * MS, aloft=True) is None
+    assert feed.lost_s(NOW + 1033 * MS) == pytest.approx(1.0)

@@ -179,3 +179,27 @@ def test_the_plug_in_makes_a_test_of_each_check(tmp_path):
     result = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=100, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "18 passed" in result.stdout
+
+
+def test_no_check_passes_where_nothing_was_flown():
+    """A check that finds nothing to look at must not be green."""
+    empty = Record(failure="it fell")
+    passed = [one.name for one in CHECKS.values() if one.flight and verdict(empty, one.name).end != "failed"]
+    assert passed == []
+
+
+def test_no_check_passes_where_the_driver_said_nothing():
+    """The vehicle flew through all of it, and no message came."""
+    record, at_ns = flown(), 100 * S
+    record.messages.clear()
+    still = Moment(at_ns, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, True, 0.9)
+    record.moments += [replace(still, at_ns=at_ns + i * S // 100) for i in range(500)]
+    told = [
+        *("says_that_it_stands", "status_comes_five_times_a_second", "status_tells_the_charge", "odometry_is_fresh"),
+        *("odometry_comes_often", "heading_is_told", "track_is_answered", "hold_is_answered", "resume_is_answered"),
+        *("refusals_are_events", "datagrams_are_recorded", "operator_is_told_why", "unheard_vehicle_is_lost", "lands"),
+        *("commands_are_sent_often", "flight_states_follow", "take_off_ends_in_hover"),
+    ]
+    marks = ("standing", "still", "turn", "up", "down", "hover", "landed", "jumping", "silent vehicle")
+    record.marks |= dict.fromkeys(marks, (at_ns, at_ns + 4 * S))
+    assert {name: verdict(record, name).end for name in told} == dict.fromkeys(told, "failed")

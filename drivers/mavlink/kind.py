@@ -158,7 +158,7 @@ KIND = VehicleKind(
     name="mavlink",
     summary="vehicles with a PX4 or ArduPilot autopilot",
     driver="drivers.mavlink.driver:run",
-    habits=ErrorHabits(5.0, 10.0, 2.0, 0.15, 0.0, reports_climb=True, tells_attitude=True, flies_on_estimate=True),
+    habits=ErrorHabits(5.0, 10.0, 2.0, 0.05, 0.0, reports_climb=True, tells_attitude=True, flies_on_estimate=True),
     processes=_processes,
     stop=_stop,
     sections={"mavlink": Mavlink},

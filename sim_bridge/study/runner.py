@@ -129,7 +129,7 @@ class Study:
         report = self.score.report()
         report["max_fence_violation_m"] = round(self.fence_violation_m, 3)
         total_s = time.process_time() - cpu
-        # Of the parts the wall clock is read: asking for the CPU time so often took half of it.
+        # Of the parts the wall clock is read, and scaled by what the whole took.
         share = total_s / (time.perf_counter() - wall)
         report["cpu_s"] = {name: round(share * value, 2) for name, value in self.spent_s.items()}
         report["cpu_s"]["total"] = round(total_s, 2)

@@ -6,9 +6,10 @@ from pydantic import ValidationError
 
 from drivers.base import HostProcess
 from drivers.motion_capture.body_watch import BodyWatch
+from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.convert import EntityPose, Placement, body_pose
 from drivers.motion_capture.settings import MotionCaptureSection, parse_source
-from drivers.motion_capture.sources import CapturedFrame, Source, open_source
+from drivers.motion_capture.sources import Source, open_source
 from groundstation.bus import clock
 from groundstation.bus.messages import BodyPoses, CameraStatus, Severity
 from groundstation.bus.topics import BODY_POSES, CAMERA_STATUS, OBSERVATION

@@ -18,24 +18,38 @@ Span = tuple[float, float]
 
 
 class SystemKind(StrEnum):
-    """Which protocol a motion capture system speaks; all but NatNet through the library `motioncapture`."""
+    """Which protocol poses come by: NatNet, topics of ROS 2, or others through the library `motioncapture`."""
 
     NATNET = "natnet"
     VICON = "vicon"
     QUALISYS = "qualisys"
     VRPN = "vrpn"
+    ROS2 = "ros2"
 
 
-_PORTS = {SystemKind.NATNET: 1510, SystemKind.VICON: 801, SystemKind.QUALISYS: 22222, SystemKind.VRPN: 3883}
+# WIRE: DDS leaves ports for so many domains.
+_LAST_DOMAIN = 232
+_PORTS = {
+    SystemKind.NATNET: 1510,
+    SystemKind.VICON: 801,
+    SystemKind.QUALISYS: 22222,
+    SystemKind.VRPN: 3883,
+    SystemKind.ROS2: 7447,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class SystemAddress:
-    """Where a motion capture system listens, and what it speaks."""
+    """Where a motion capture system listens, and what it speaks.
+
+    path, domain: of ROS 2, the part of the topics before the body, and the domain.
+    """
 
     kind: SystemKind
     host: str
     port: int
+    path: str = ""
+    domain: int = 0
 
 
 def parse_source(text: str) -> SystemAddress:
@@ -44,16 +58,26 @@ def parse_source(text: str) -> SystemAddress:
     scheme, mark, rest = text.partition("://")
     if not mark or scheme not in kinds or not rest or any(character.isspace() for character in text):
         raise ValueError(
-            "must be an address such as natnet://192.168.1.5 (OptiTrack), vicon://, qualisys:// or vrpn://192.168.1.5"
+            "must be an address such as natnet://192.168.1.5 (OptiTrack), vicon://, qualisys:// or vrpn://192.168.1.5, "
+            "or ros2://192.168.1.5/vrpn_mocap?domain=0 for topics /vrpn_mocap/<body>/pose behind a ROS 2 Zenoh router"
         )
     parts = urlsplit(text)
     try:
         port = parts.port or _PORTS[kinds[scheme]]
     except ValueError:
         raise ValueError("the port is no number from 1 to 65535") from None
-    if not parts.hostname or parts.path.strip("/"):
+    if kinds[scheme] is SystemKind.ROS2 and parts.hostname:
+        return SystemAddress(SystemKind.ROS2, parts.hostname, port, parts.path.strip("/"), _domain(parts.query))
+    if not parts.hostname or parts.path.strip("/") or parts.query:
         raise ValueError(f"must name a host and nothing else, as in {scheme}://192.168.1.5")
     return SystemAddress(kinds[scheme], parts.hostname, port)
+
+
+def _domain(query: str) -> int:
+    name, _, value = (query or "domain=0").partition("=")
+    if name != "domain" or not value.isdecimal() or int(value) > _LAST_DOMAIN:
+        raise ValueError(f"behind ? there may be domain=0 to {_LAST_DOMAIN}, and nothing else")
+    return int(value)
 
 
 class BodySection(DriverSection):

@@ -6,35 +6,20 @@ import socket
 import threading
 from collections import Counter, deque
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, Protocol
 
+from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.settings import SystemAddress, SystemKind
 from drivers.motion_capture.wire import natnet
 from groundstation.bus import clock
 from groundstation.errors import SettingsError
 from groundstation.time_units import NS_PER_S
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 _ASK_AGAIN_NS = NS_PER_S
 _KEEP_ALIVE_NS = NS_PER_S
 _LARGEST = 65535
 _DATAGRAMS = 64
 _WAITING_FRAMES = 64
-
-
-@dataclass(frozen=True, slots=True)
-class CapturedFrame:
-    """One frame: when it came, how long before its sending it was exposed [ns], and the tracked bodies by name.
-
-    poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
-    """
-
-    arrival_ns: int
-    processing_ns: int
-    poses: dict[str, tuple[Vector3, Quaternion]]
-    untracked: tuple[str, ...] = ()
 
 
 class Source(Protocol):
@@ -52,6 +37,10 @@ class Source(Protocol):
 
 def open_source(address: SystemAddress) -> Source:
     """Return the source of a system; raises SettingsError where its library is missing."""
+    if address.kind is SystemKind.ROS2:
+        from drivers.motion_capture.ros2_source import Ros2Source
+
+        return Ros2Source(address)
     return NatnetSource(address) if address.kind is SystemKind.NATNET else LibrarySource(address)
 
 

@@ -45,7 +45,8 @@ class MotionCaptureSettings(SettingsSection):
     """A motion capture system: a sensor that is fixed in the world, as cameras are."""
 
     source: Annotated[str, AfterValidator(_is_system)]
-    """Where it listens: natnet:// (OptiTrack's Motive), vicon://, qualisys:// or vrpn:// with its host."""
+    """Where it listens: natnet:// (OptiTrack's Motive), vicon://, qualisys:// or vrpn:// with its host; or ros2:// with
+    the host of a ROS 2 Zenoh router and a path, for topics /PATH/BODY/pose."""
     volume_m: VolumeSettings
     """The box in which it sees bodies [m; world]. The planner counts on it; poses outside of it are not used."""
     bodies: dict[Name, RigidBodySettings] = Field(default_factory=dict)

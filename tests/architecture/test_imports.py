@@ -97,7 +97,14 @@ def test_settings_open_no_socket() -> None:
 @pytest.mark.parametrize(
     ("library", "owners"),
     [
-        ("zenoh", ("groundstation.bus.zenoh_bus", "groundstation.engineering_views.ros2.live")),
+        (
+            "zenoh",
+            (
+                "groundstation.bus.zenoh_bus",
+                "groundstation.engineering_views.ros2.live",
+                "drivers.motion_capture.ros2_source",
+            ),
+        ),
         ("ruamel", ("groundstation.settings", "groundstation.cli")),
         ("yaml", ()),
         ("cv2", ("drivers.camera", "sim_bridge.render", "sim_bridge.study.vision", "groundstation.recording.blurring")),

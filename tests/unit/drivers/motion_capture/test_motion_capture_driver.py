@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from drivers.motion_capture import driver as process
+from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.driver import MotionCaptureDriver
 from drivers.motion_capture.settings import MotionCaptureSection, parse_source
-from drivers.motion_capture.sources import CapturedFrame, LibrarySource, NatnetSource, open_source
+from drivers.motion_capture.sources import LibrarySource, NatnetSource, open_source
 from drivers.motion_capture.wire import natnet
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import BodyPoses, CameraStatus, RelativeObservation

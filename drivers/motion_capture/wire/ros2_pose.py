@@ -1,0 +1,51 @@
+"""Poses of ROS 2 in CDR, and the keys under which rmw_zenoh publishes them.
+
+WIRE (docs/reference/ros2.md 1): `<domain>/<topic>/<DDS type>/<type hash>`; numbers are aligned to their size, counted
+from behind the 4 bytes of the encapsulation.
+"""
+
+import struct
+
+from drivers.motion_capture.wire.natnet import WireError
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+_ENCAPSULATION = 4
+# DDS type -> texts before the pose: the frame, and of an Odometry that of the vehicle.
+_TEXTS = {
+    "geometry_msgs::msg::dds_::PoseStamped_": 1,
+    "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_": 1,
+    "nav_msgs::msg::dds_::Odometry_": 2,
+}
+
+
+def expression(domain: int, prefix: str) -> str:
+    """Return the key expression of all topics `<prefix>/<body>/pose`."""
+    return "/".join(part for part in (str(domain), prefix.strip("/"), "*", "pose", "*", "*") if part)
+
+
+def body_of(key: str) -> tuple[str, str]:
+    """Return body and DDS type of a key; raises WireError for another one."""
+    parts = key.split("/")
+    if len(parts) < 5 or parts[-3] != "pose":
+        raise WireError("key")
+    return parts[-4], parts[-2]
+
+
+def decode_pose(dds_type: str, payload: bytes) -> tuple[Vector3, Quaternion]:
+    """Return position [m] and quaternion (x, y, z, w); raises WireError for another type and what is cut short."""
+    if dds_type not in _TEXTS:
+        raise WireError("type")
+    if len(payload) < _ENCAPSULATION:
+        raise WireError("short")
+    order = "<" if payload[1] & 1 else ">"
+    content, at = payload[_ENCAPSULATION:], 8  # behind seconds and nanoseconds
+    try:
+        for _ in range(_TEXTS[dds_type]):
+            at += -at % 4
+            (length,) = struct.unpack_from(f"{order}I", content, at)
+            at += 4 + length
+        x, y, z, qx, qy, qz, qw = struct.unpack_from(f"{order}7d", content, at + -at % 8)
+    except struct.error:
+        raise WireError("short") from None
+    return (x, y, z), (qx, qy, qz, qw)

@@ -1,0 +1,112 @@
+"""Poses of ROS 2, written by a foreign encoder and published through a ROS-like router, arrive as frames."""
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rosbags")
+import zenoh
+
+from drivers.motion_capture.captured_frame import CapturedFrame
+from drivers.motion_capture.ros2_source import Ros2Source
+from drivers.motion_capture.settings import parse_source
+from drivers.motion_capture.sources import open_source
+from drivers.motion_capture.wire.natnet import WireError
+from drivers.motion_capture.wire.ros2_pose import body_of, decode_pose
+from groundstation.engineering_views.ros2 import graph
+from groundstation.engineering_views.ros2.codec import Ros2Codec
+
+PLACE, TURN = (1.0, -2.0, 1.5), (0.0, 0.0, 0.6, 0.8)
+KINDS = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry")
+
+
+def written(kind: str, frame: str) -> bytes:
+    """Return a pose as rosbags writes it."""
+    store: Any = Ros2Codec().store
+    types = store.types
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](5, 6), frame)
+    pose = types["geometry_msgs/msg/Pose"](
+        types["geometry_msgs/msg/Point"](*PLACE), types["geometry_msgs/msg/Quaternion"](*TURN)
+    )
+    import numpy as np
+
+    sure = types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36))
+    zero = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+    twist = types["geometry_msgs/msg/TwistWithCovariance"](types["geometry_msgs/msg/Twist"](zero, zero), np.zeros(36))
+    values = {KINDS[0]: (pose,), KINDS[1]: (sure,), KINDS[2]: (frame + "x", sure, twist)}[kind]
+    return bytes(store.serialize_cdr(types[kind](header, *values), kind))
+
+
+def dds(kind: str) -> str:
+    package, _, name = kind.split("/")
+    return f"{package}::msg::dds_::{name}_"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("frame", ["", "map", "world", "a_frame"])
+def test_a_pose_is_read_as_it_was_written(kind: str, frame: str) -> None:
+    payload = written(kind, frame)
+    assert decode_pose(dds(kind), payload) == (PLACE, TURN)
+    for length in range(60):
+        with pytest.raises(WireError, match="short"):
+            decode_pose(dds(kind), payload[:length])
+
+
+def test_other_types_and_keys_are_refused() -> None:
+    with pytest.raises(WireError, match="type"):
+        decode_pose(dds("std_msgs/msg/String"), written(KINDS[0], "map"))
+    with pytest.raises(WireError, match="key"):
+        body_of("0/cf1/odom/x/y")
+
+
+def opened(**settings: Any) -> Any:
+    silent = {"scouting": {"multicast": {"enabled": False}}}
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))
+
+
+@pytest.fixture
+def port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def source(port: int) -> Iterator[Ros2Source]:
+    source = open_source(parse_source(f"ros2://127.0.0.1:{port}/vrpn_mocap?domain=7"))
+    assert isinstance(source, Ros2Source)
+    yield source
+    source.close()
+
+
+def test_poses_come_through_a_router_that_starts_later(source: Ros2Source, port: int) -> None:
+    assert source.poll(0.01) == [] and "no pose" in source.detail
+    router = opened(mode="router", listen={"endpoints": [f"tcp/127.0.0.1:{port}"]})
+    node = opened(mode="client", connect={"endpoints": [f"tcp/127.0.0.1:{port}"]})
+    codec, frames = Ros2Codec(), list[CapturedFrame]()
+    try:
+        deadline = time.monotonic() + 10.0
+        while len(frames) < 3 and time.monotonic() < deadline:
+            for body, kind in (("cf1", KINDS[0]), ("cf2", KINDS[2])):
+                key = graph.topic_key(7, f"/vrpn_mocap/{body}/pose", kind, codec.hash_of(kind))
+                node.put(key, written(kind, "world"))
+            node.put("7/vrpn_mocap/cf3/pose/other_/hash", b"nothing that is known")
+            frames += source.poll(0.05)
+    finally:
+        node.close()
+        router.close()
+    assert len(frames) >= 3 and not source.detail and source.rejected["type"] >= 1
+    assert frames[-1].poses == {"cf1": (PLACE, TURN), "cf2": (PLACE, TURN)}
+
+
+def test_the_address_names_router_topics_and_domain() -> None:
+    address = parse_source("ros2://10.0.0.2:7450/a/b?domain=5")
+    assert (address.host, address.port, address.path, address.domain) == ("10.0.0.2", 7450, "a/b", 5)
+    assert parse_source("ros2://10.0.0.2").port == 7447
+    with pytest.raises(ValueError, match="domain"):
+        parse_source("ros2://10.0.0.2?domain=900")

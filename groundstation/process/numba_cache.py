@@ -18,7 +18,7 @@ FLIGHT = (".", "estimation", "estimation/models", "geometry", "planning", "sensi
 
 EVERYTHING = (*FLIGHT, "experiments", "experiments/planar", "bench", "bench/planner_peers")
 
-_KEPT = 12  # directories of older states that are not deleted
+_KEPT = 24  # directories of older states that are not deleted
 _COMPILE_LIMIT_S = 180.0
 
 

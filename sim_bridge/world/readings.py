@@ -10,7 +10,7 @@ Vector3 = tuple[float, float, float]
 class Readings:
     """Readings in SI units and FLU, as `Onboard` and `InertialEstimate` have them.
 
-    ticks: the vehicle's own clock. velocity [m/s]: of an AR.Drone base_stabilized, else in the frame of the position.
+    ticks: the vehicle's own clock. velocity [m/s]: in the frame in which the vehicle reports it.
     height, echo, rejected: of the ultrasound. status: what the vehicle says of its state, by its kind.
     """
 

@@ -28,8 +28,8 @@ def puffin(tmp_path):
     return os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
 
 
-def checked(env, only):
-    command = [sys.executable, "-m", "groundstation.cli.main", "vehicle", "check", "puffin", "--only", only]
+def checked(env, only, *settings):
+    command = [sys.executable, "-m", "groundstation.cli.main", "vehicle", "check", "puffin", "--only", only, *settings]
     return subprocess.run(command, env=env, capture_output=True, text=True, timeout=400, check=False)
 
 
@@ -38,6 +38,14 @@ def checked(env, only):
 @pytest.mark.timeout(420)
 def test_the_kind_of_the_page_keeps_the_contract(puffin):
     result = checked(puffin, "kind,stand,square,silence,killed")
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.sitl
+@pytest.mark.timeout(200)
+def test_its_fail_safe_goes_to_the_port_of_the_field_file(puffin):
+    result = checked(puffin, "killed", "--with", "puffin.port=9800")
     assert result.returncode == 0, result.stdout + result.stderr
 
 

@@ -6,6 +6,7 @@ from groundstation.cli.calibrate_camera import camera
 from groundstation.cli.calibrate_check import check
 from groundstation.cli.calibrate_delay import delay
 from groundstation.cli.calibrate_extrinsics import extrinsics
+from groundstation.cli.calibrate_team import team
 
 
 @click.group(
@@ -18,5 +19,5 @@ def calibrate() -> None:
     """Measure lenses, mountings and delays for a field file."""
 
 
-for command in (camera, extrinsics, delay, check):
+for command in (camera, extrinsics, delay, team, check):
     calibrate.add_command(command)

@@ -23,6 +23,7 @@ from sim_bridge.study.capture_model import CaptureEye, captures_of
 from sim_bridge.study.mavlink_copter import CopterLink
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
+from sim_bridge.study.wrong_figures import WrongFigures
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
@@ -38,7 +39,7 @@ _SCORE_TICKS = 20
 class StudyOptions:
     """duration_s: tracking after take-off; outliers: share of grossly wrong sightings; plan: False leaves the drones
     hovering; detector_ms: what the camera process adds to the video delay; take_off_s: simulated time until the
-    drones hover and tracking begins."""
+    drones hover and tracking begins; stand_s: before that; inertia: AR.Drones publish gyroscopes and accelerometers."""
 
     seed: int = 1
     duration_s: float = 60.0
@@ -46,6 +47,8 @@ class StudyOptions:
     plan: bool = True
     detector_ms: tuple[float, float] = (10.0, 50.0)
     take_off_s: float = 6.5
+    stand_s: float = 0.0
+    inertia: bool = False
 
 
 class FlownLink(Protocol):
@@ -67,14 +70,20 @@ class FlownLink(Protocol):
 class Study:
     """A run in progress; `run` flies it to its end and returns the figures.
 
-    real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver.
+    real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver. wrong: what the
+    field is told wrongly.
     """
 
     def __init__(
-        self, field: ResolvedField, scenario: Scenario, options: StudyOptions, real: Collection[str] = ()
+        self,
+        field: ResolvedField,
+        scenario: Scenario,
+        options: StudyOptions,
+        real: Collection[str] = (),
+        wrong: WrongFigures | None = None,
     ) -> None:
-        self.options = options
-        self.site = parse_site(msgspec.to_builtins(field))
+        self.options, self._wrong = options, wrong or WrongFigures({})
+        self.site = parse_site(msgspec.to_builtins(self._wrong.world(field)))
         self.world = World(self.site, scenario, options.seed, real, real)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
         if field.planner.plug_in:
@@ -121,6 +130,8 @@ class Study:
     def run(self) -> dict[str, Any]:
         """Fly until the duration is over; returns the figures, with the CPU time of each part."""
         cpu, wall = time.process_time(), time.perf_counter()
+        for _ in range(round(self.options.stand_s * 1e9) // TICK_NS):
+            self.step()
         for drone in self.world.ardrones.values():
             drone.autopilot.take_off()
         ticks = round((self.options.take_off_s + self.options.duration_s) * 1e9) // TICK_NS
@@ -146,7 +157,7 @@ class Study:
                 link.step(world.time_s, estimates)
         self._sense()
         self.spent_s["world"] += time.perf_counter() - mark
-        tracking = world.time_s >= self.options.take_off_s
+        tracking = world.time_s >= self.options.take_off_s + self.options.stand_s
         if world.ticks % self._tick_every == 0:
             self._tick(tracking)
         if world.ticks % _PILOT_TICKS == 0:
@@ -160,6 +171,8 @@ class Study:
         for name, telemetry in self._telemetry.items():
             if (odometry := telemetry.odometry(now_ns)) is not None:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"odometry/{name}", odometry)
+            if self.options.inertia and isinstance(telemetry, TelemetryPublisher):
+                self._send(now_ns + _ODOMETRY_LATENCY_NS, f"imu/{name}", telemetry.inertia(now_ns))
             if world.ticks % _STATUS_TICKS == 0:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
         for index, eye in enumerate(self._eyes):
@@ -173,7 +186,8 @@ class Study:
             seen = eye.look(world, now_ns, CLOCK)
             for sighting in seen:
                 # A later frame arrives with the delay that its stamp was corrupted by.
-                self._send(sighting.header.stamp_ns + round(delay_ms * 1e6), f"observation/{eye.name}", sighting)
+                arrival_ns = sighting.header.stamp_ns + round(delay_ms * 1e6)
+                self._send(arrival_ns, f"observation/{eye.name}", self._wrong.reported(sighting))
             if (searched := eye.searched(seen, now_ns, CLOCK)) is not None:
                 self._send(now_ns + round(delay_ms * 1e6), f"searched_picture/{eye.name}", searched)
 

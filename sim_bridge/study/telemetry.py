@@ -2,7 +2,7 @@
 
 import math
 
-from groundstation.bus.messages import FlightState, Header, Odometry, VehicleStatus
+from groundstation.bus.messages import FlightState, Header, ImuSample, Odometry, VehicleStatus
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_autopilot import Phase
 from sim_bridge.world.ardrone_sensors import Onboard
@@ -43,6 +43,14 @@ class TelemetryPublisher:
             pitch_rad=onboard.pitch,
             height_m=onboard.height if onboard.height > 0.0 else None,
             reset=self._reset,
+        )
+
+    def inertia(self, stamp_ns: int) -> ImuSample:
+        """Return what gyroscopes and accelerometers say at this tick."""
+        return ImuSample(
+            header=self._header(stamp_ns),
+            angular_velocity_rad_s=self._onboard.gyros,
+            specific_force_m_s2=self._onboard.accelerometers,
         )
 
     def status(self, stamp_ns: int) -> VehicleStatus:

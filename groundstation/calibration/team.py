@@ -1,0 +1,141 @@
+"""All figures of a team at once, from one recorded flight: what it shows, what is wrong, and which settings mend it."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.team_batch import TeamBatch
+from groundstation.calibration.team_causes import Cause, causes, freed, posterior
+from groundstation.calibration.team_figures import Suspicion
+from groundstation.calibration.team_gain import Gain, gain
+from groundstation.calibration.team_record import team_record
+from groundstation.calibration.team_settings import Path, changes, unit_of, with_changes
+from groundstation.field.resolved import ResolvedField
+
+# A figure whose deviation is worse than this, with all others in doubt as well, is not shown by a recording.
+_NEEDED = {
+    "print": 0.015,
+    "focal": 0.015,
+    "pan": math.radians(1.0),
+    "tilt": math.radians(1.0),
+    "ahead": 0.02,
+    "left": 0.02,
+    "up": 0.02,
+    "delay": 0.01,
+    "scale": 0.08,
+    "velocity_delay": 0.015,
+    "height_delay": 0.02,
+    "x": 0.04,
+    "y": 0.04,
+    "z": 0.05,
+    "roll": math.radians(0.5),
+    "pitch": math.radians(0.5),
+    "yaw": math.radians(1.5),
+}
+# Less than this does no harm, and is not proposed.
+_WORTH = {
+    "print": 0.01,
+    "focal": 0.012,
+    "pan": math.radians(0.8),
+    "tilt": math.radians(0.8),
+    "delay": 0.015,
+    "scale": 0.08,
+    "velocity_delay": 0.03,
+    "height_delay": 0.05,
+    "roll": math.radians(0.8),
+    "pitch": math.radians(0.8),
+    "yaw": math.radians(1.5),
+}
+_WORTH_M, _SIGMAS = 0.02, 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One figure: its error against the field and one sigma [unit], the same with all figures in doubt.
+
+    shown: whether the recording alone tells it well enough to be used.
+    """
+
+    who: str
+    part: str
+    unit: str
+    error: float
+    std: float
+    doubtful_std: float
+    shown: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A cause that is proposed: who ("": all), what, its largest error and one sigma [unit], and its rivals."""
+
+    who: str
+    what: str
+    error: float
+    std: float
+    unit: str
+    rivals: tuple[Suspicion, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TeamCalibration:
+    """figures: all, in the field's order; found: what is wrong, gravest first; settings: what mends it; gain of that.
+
+    sightings: used; misfit: their mean squared deviation (1: as expected or, with all that is allowed for, less).
+    """
+
+    figures: tuple[Measured, ...]
+    found: tuple[Found, ...]
+    settings: dict[Path, Any]
+    gain: Gain | None
+    sightings: int
+    misfit: float
+
+
+def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
+    """Return what a recording says of all figures; raises OperatorMistake where it has too little."""
+    batch = TeamBatch(team_record(flown, field), field)
+    figures = batch.figures
+    free = batch.fit(np.diag(figures.wide**2))
+    told, sigma = causes(free.information, free.pull, figures.surveyed, figures.suspicions())
+    final = batch.fit(sigma)
+    error, covariance = posterior(final.information, final.pull, sigma)
+    _, doubtful = posterior(free.information, free.pull, np.diag(figures.wide**2))
+    std, doubtful_std = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(doubtful))
+    rows = []
+    for index, (who, part) in enumerate(figures.keys):
+        factor, unit = unit_of(part)
+        shown = bool(doubtful_std[index] <= _NEEDED[part])
+        off, one, doubt = (float(factor * value[index]) for value in (error, std, doubtful_std))
+        rows.append(Measured(who, part, unit, off, one, doubt, shown))
+    kept = [one for one in told if _worth(one, figures.keys, error, std)]
+    settings = changes(figures, error, freed(kept)) if kept else {}
+    better = gain(flown, field, with_changes(field, settings), batch.targets) if settings else None
+    found = tuple(_found(one, figures.keys, error, std) for one in kept)
+    return TeamCalibration(tuple(rows), found, settings, better, final.used, final.misfit)
+
+
+def _largest(cause: Cause, error: Any) -> int:
+    moved = freed([cause])
+    return int(np.argmax(np.where(moved, np.abs(error), -1.0)))
+
+
+def _worth(cause: Cause, keys: tuple[tuple[str, str], ...], error: Any, std: Any) -> bool:
+    most = _largest(cause, error)
+    return bool(abs(error[most]) > max(_WORTH.get(keys[most][1], _WORTH_M), _SIGMAS * std[most]))
+
+
+def _found(cause: Cause, keys: tuple[tuple[str, str], ...], error: Any, std: Any) -> Found:
+    most = _largest(cause, error)
+    factor, unit = unit_of(keys[most][1])
+    return Found(
+        cause.suspicion.who,
+        cause.suspicion.what,
+        float(factor * error[most]),
+        float(factor * std[most]),
+        unit,
+        cause.rivals,
+    )

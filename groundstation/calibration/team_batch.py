@@ -1,0 +1,295 @@
+"""Paths of a team and figures of its field that together explain a recording best: Gauss and Newton, knots eliminated.
+
+The normal equations of the knots are banded in time; what is left after their elimination (Schur's complement) is the
+information that the recording holds on the figures.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array, IntArray, Vector
+from groundstation.calibration.team_elimination import Knots, eliminated
+from groundstation.calibration.team_figures import Figures
+from groundstation.calibration.team_paths import (
+    ROBOT,
+    TARGET,
+    RobotPath,
+    TargetPath,
+    grid_of,
+    robot_start,
+    target_start,
+)
+from groundstation.calibration.team_record import Sightings, TeamRecord
+from groundstation.calibration.team_rows import Columns, Rows, robot_rows, stand_rows, target_rows
+from groundstation.calibration.team_sight import Scene, looks_of, noise, off, predicted, slopes
+from groundstation.errors import OperatorMistake
+from groundstation.estimation.parameters import STAMP_STD_S
+from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.stand import PLACED_M, PLACED_RAD, stand_of
+
+LEAST_SEEN = 60
+"""Sightings of a drone by fixed cameras that its path needs, and of a target by drones."""
+_FREEDOM, _RATE_S = 8.0, 0.02
+# Sightings this near to a jump of the drone's own heading are left out [s].
+_JUMP_S = 0.4
+# First rounds forgive more, so that what is far off still draws.
+_FORGIVING = (30.0, 10.0, 4.0, 2.0)
+_ROUNDS, _SETTLED = 14, 0.02
+# Whole steps swing about the best common delay of all sensors, which little holds.
+_DAMPED = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """theta (n): the figures' errors; information (n, n), pull (n): of the recording alone, about zero; misfit: mean
+    squared deviation of a sighting's row; used: sightings."""
+
+    theta: Vector
+    information: Array
+    pull: Vector
+    misfit: float
+    used: int
+
+
+class TeamBatch:
+    """One recording, ready to be explained; raises OperatorMistake where no fixed camera saw a drone long enough."""
+
+    def __init__(self, record: TeamRecord, field: ResolvedField) -> None:
+        grid = grid_of(record.duration_s)
+        drones = [name for name in field.drones if name in record.own and _seen(record.sightings, field, name)]
+        if not drones:
+            raise OperatorMistake("no fixed camera saw any drone often enough: nothing to calibrate by")
+        self.field, self.figures, self._record = field, Figures(field, drones), record
+        known = {*drones, *field.cameras}
+        kept = [
+            i
+            for i, (o, s) in enumerate(zip(record.sightings.observers, record.sightings.subjects, strict=True))
+            if o in known and (s in drones or s in field.tracked) and _calm(record, (o, s), record.sightings.times[i])
+        ]
+        self._sightings = _only(record.sightings, kept)
+        self.robots = {
+            name: RobotPath(
+                record.own[name],
+                field.drones[name],
+                grid,
+                robot_start(field, name, record.own[name], record.sightings, grid),
+            )
+            for name in drones
+        }
+        self._looks = looks_of(field, self._sightings.observers, self._sightings.subjects)
+        self.targets: dict[str, TargetPath] = {}
+        self._stride, self._first = 0, dict[str, int]()
+        for name in drones:
+            self._first[name], self._stride = self._stride, self._stride + ROBOT
+        for name in field.tracked:
+            path = self._target_start(name)
+            if path is not None:
+                self.targets[name] = path
+                self._first[name], self._stride = self._stride, self._stride + TARGET
+        self._keep_tracked()
+
+    def _keep_tracked(self) -> None:
+        kept = [i for i, s in enumerate(self._sightings.subjects) if s in self._first]
+        self._sightings = _only(self._sightings, kept)
+        self._looks = looks_of(self.field, self._sightings.observers, self._sightings.subjects)
+
+    def _target_start(self, name: str) -> TargetPath | None:
+        s = self._sightings
+        rows = [i for i, subject in enumerate(s.subjects) if subject == name]
+        if len(rows) < LEAST_SEEN:
+            return None
+        places, headings = np.empty((len(rows), 2)), np.empty(len(rows))
+        looks = looks_of(self.field, [s.observers[i] for i in rows], [name] * len(rows))
+        for index, row in enumerate(rows):
+            pose = self._pose(s.observers[row], s.times[[row]])[0]
+            c, sine = np.cos(pose[3]), np.sin(pose[3])
+            turn = np.array([[c, -sine, 0.0], [sine, c, 0.0], [0.0, 0.0, 1.0]])
+            pan, tilt = looks.pan[index], looks.tilt[index]
+            mount = np.array(
+                [
+                    [np.cos(pan) * np.cos(tilt), -np.sin(pan), np.cos(pan) * np.sin(tilt)],
+                    [np.sin(pan) * np.cos(tilt), np.cos(pan), np.sin(pan) * np.sin(tilt)],
+                    [-np.sin(tilt), 0.0, np.cos(tilt)],
+                ]
+            )
+            seen = mount @ looks.level[index] @ s.seen[row, :3] + looks.eye[index]
+            places[index], headings[index] = (pose[:3] + turn @ seen)[:2], s.seen[row, 3] + pose[3]
+        grid = next(iter(self.robots.values())).grid
+        return TargetPath(grid, target_start(s.times[rows], places, headings, grid))
+
+    def _pose(self, name: str, times: Array) -> Array:
+        if name in self.field.cameras:
+            pose = np.zeros((len(times), 6))
+            pose[:, :3] = self.field.cameras[name].position_m
+            return pose
+        return self._path(name).poses(times)
+
+    def _path(self, name: str) -> RobotPath | TargetPath:
+        return self.robots[name] if name in self.robots else self.targets[name]
+
+    def fit(self, sigma: Array) -> Fit:
+        """Return the best explanation where the figures' errors have a prior with this covariance (n, n)."""
+        theta, precision = np.zeros(len(self.figures.keys)), np.linalg.inv(sigma)
+        rounds = (*_FORGIVING, *([1.0] * _ROUNDS))
+        for forgiving in rounds:
+            self._refresh(theta)
+            H, g, knots = self._eliminated(theta, forgiving)
+            step = np.asarray(np.linalg.solve(H + precision, g - precision @ theta))
+            if forgiving == 1.0:
+                step = _DAMPED * step
+            self._take(_DAMPED * knots.step(step / _DAMPED) if forgiving == 1.0 else knots.step(step))
+            theta = theta + step
+            if forgiving == 1.0 and float(np.max(np.abs(step) / self.figures.surveyed)) < _SETTLED:
+                break
+        self._refresh(theta)
+        H, g, _ = self._eliminated(theta, 1.0)
+        return Fit(theta, H, g + H @ theta, self._misfit, len(self._sightings.times))
+
+    def _refresh(self, theta: Vector) -> None:
+        for name, path in self.robots.items():
+            scale, later, height = (
+                theta[self.figures.place[name, part]] for part in ("scale", "velocity_delay", "height_delay")
+            )
+            path.refresh(float(scale), float(later), float(height))
+
+    def _eliminated(self, theta: Vector, forgiving: float) -> tuple[Array, Vector, "Knots"]:
+        rows = Rows()
+        for name, path in self.robots.items():
+            drone, columns = self.field.drones[name], self._columns(name)
+            scale, velocity, height = (
+                self.figures.place[name, part] for part in ("scale", "velocity_delay", "height_delay")
+            )
+            robot_rows(rows, path, drone, columns, (scale, velocity, height))
+            if name in self._record.stands:
+                stand_rows(rows, path, columns, self._record.stands[name], *_pad(self.field, name))
+        for name, target in self.targets.items():
+            target_rows(rows, target, self.field.tracked[name].max_acceleration_m_s2, self._columns(name))
+        self._sighting_rows(rows, theta, forgiving)
+        count = self._stride * len(next(iter(self.robots.values())).grid.times)
+        r, local, figures = rows.matrices(count, len(theta))
+        return eliminated(r, local, figures, 3 * self._stride)
+
+    def _columns(self, name: str) -> Columns:
+        return Columns(self._first[name], self._stride)
+
+    def _take(self, step: Vector) -> None:
+        table = step.reshape(-1, self._stride)
+        for name, first in self._first.items():
+            knots = self._path(name).knots
+            knots += table[:, first : first + knots.shape[1]]
+
+    def _scene(self, theta: Vector, times: Array) -> Scene:
+        s, figures = self._sightings, self.figures
+        observer, subject = np.zeros((len(times), 6)), np.zeros((len(times), 6))
+        for name in dict.fromkeys(s.observers):
+            rows = [i for i, o in enumerate(s.observers) if o == name]
+            observer[rows] = self._pose(name, times[rows])
+        for name in dict.fromkeys(s.subjects):
+            rows = [i for i, o in enumerate(s.subjects) if o == name]
+            subject[rows] = self._pose(name, times[rows])
+        for column, part in enumerate(("x", "y", "z", "yaw", "roll", "pitch")):
+            observer[:, column] += figures.of(theta, s.observers, part)
+        mounting = [figures.of(theta, s.observers, part) for part in ("pan", "tilt", "ahead", "left", "up")]
+        shares = [figures.of(theta, s.subjects, "print"), figures.of(theta, s.observers, "focal")]
+        return Scene(observer, subject, np.column_stack(mounting), np.column_stack(shares))
+
+    def _sighting_rows(self, rows: Rows, theta: Vector, forgiving: float) -> None:
+        s, figures = self._sightings, self.figures
+        times = s.times - figures.of(theta, s.observers, "delay")
+        scene = self._scene(theta, times)
+        here = predicted(self._looks, scene)
+        after, before = (predicted(self._looks, self._scene(theta, times + step)) for step in (_RATE_S, -_RATE_S))
+        rates = off(after, before) / (2.0 * _RATE_S)
+        gap = self._nearer(here)
+        factor = np.linalg.inv(np.linalg.cholesky(noise(s.covariance, s.seen, rates, STAMP_STD_S)))
+        squares = (np.einsum("nij,nj->ni", factor, gap) ** 2).sum(axis=1)
+        weight = np.sqrt((_FREEDOM + 4.0) / (_FREEDOM + squares / forgiving**2))
+        self._misfit = float(np.mean(np.minimum(squares, 50.0)) / 4.0)
+        factor = factor * weight[:, None, None]
+        at, _ = rows.add(np.einsum("nij,nj->ni", factor, gap).ravel(), 1.0)
+        at = at.reshape(-1, 4)
+        by = {
+            part: np.einsum("nij,njc->nic", factor, table) for part, table in slopes(self._looks, scene, here).items()
+        }
+        by["rates"] = np.einsum("nij,nj->ni", factor, -rates)[:, :, None]
+        self._by_figures(rows, at, by)
+        for names, part in ((s.observers, "observer"), (s.subjects, "subject")):
+            self._by_knots(rows, at, by[part], names, times)
+
+    def _nearer(self, here: Array) -> Array:
+        """Return seen minus predicted, of the pose that is nearer where the detector gave two."""
+        first, second = off(self._sightings.seen, here), off(self._sightings.other, here)
+        nearer = np.linalg.norm(second, axis=1) < np.linalg.norm(first, axis=1)  # NaN is not
+        return np.where(nearer[:, None], second, first)
+
+    def _by_figures(self, rows: Rows, at: IntArray, by: Mapping[str, Array]) -> None:
+        s, figures = self._sightings, self.figures
+        for channel, part in enumerate(("x", "y", "z", "yaw", "roll", "pitch")):
+            _figure(rows, at, figures.columns(s.observers, part), by["observer"][:, :, channel])
+        for channel, part in enumerate(("pan", "tilt", "ahead", "left", "up")):
+            _figure(rows, at, figures.columns(s.observers, part), by["mounting"][:, :, channel])
+        _figure(rows, at, figures.columns(s.subjects, "print"), by["shares"][:, :, 0])
+        _figure(rows, at, figures.columns(s.observers, "focal"), by["shares"][:, :, 1])
+        _figure(rows, at, figures.columns(s.observers, "delay"), by["rates"][:, :, 0])
+
+    def _by_knots(self, rows: Rows, at: IntArray, slopes_: Array, names: tuple[str, ...], times: Array) -> None:
+        for name, first_column in self._first.items():
+            mine = np.array([i for i, other in enumerate(names) if other == name], dtype=np.intp)
+            if not len(mine):
+                continue
+            knot, share = self._path(name).grid.between(times[mine])
+            if name in self.robots:
+                self._by_bulge(rows, at[mine], slopes_[mine], name, times[mine])
+            channels = (0, 1, 2, 3, 4, 5) if name in self.robots else (0, 1, 3)
+            for entry, channel in enumerate(channels):
+                values = slopes_[mine, :, channel]
+                for step, part in ((0, 1.0 - share), (1, share)):
+                    columns = np.repeat(first_column + entry + self._stride * (knot + step), 4)
+                    rows.by_knots(at[mine].ravel(), columns, (values * part[:, None]).ravel())
+
+    def _by_bulge(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
+        """Add how the way between knots bends with the velocity's scale and delay, and with the heading."""
+        path, place = self.robots[name], self.figures.place
+        bulge, later = path.bulge(times)
+        turned = np.column_stack((-bulge[:, 1], bulge[:, 0]))
+        knot, _ = path.grid.between(times)
+        for part, change in (("scale", bulge), ("velocity_delay", later)):
+            values = np.einsum("nic,nc->ni", slopes_[:, :, :2], change)
+            rows.by_figures(at.ravel(), np.full(at.size, place[name, part]), values.ravel())
+        values = 0.5 * np.einsum("nic,nc->ni", slopes_[:, :, :2], turned)
+        for step in (0, 1):
+            columns = np.repeat(self._first[name] + 3 + self._stride * (knot + step), 4)
+            rows.by_knots(at.ravel(), columns, values.ravel())
+
+
+def _figure(rows: Rows, at: IntArray, columns: IntArray, values: Array) -> None:
+    rows.by_figures(at.ravel(), np.repeat(columns, 4), values.ravel())
+
+
+def _seen(sightings: Sightings, field: ResolvedField, name: str) -> bool:
+    found = sum(s == name and o in field.cameras for o, s in zip(sightings.observers, sightings.subjects, strict=True))
+    return found >= LEAST_SEEN
+
+
+def _calm(record: TeamRecord, names: tuple[str, str], at_s: float) -> bool:
+    """Return whether no heading of those who take part jumps about that time."""
+    for name in names:
+        if name in record.own:
+            own = record.own[name]
+            first, last = np.searchsorted(own.times, (at_s - _JUMP_S, at_s + _JUMP_S))
+            if first < last and own.resets[first] != own.resets[min(last, len(own.times) - 1)]:
+                return False
+    return True
+
+
+def _only(s: Sightings, kept: list[int]) -> Sightings:
+    names = tuple(s.observers[i] for i in kept), tuple(s.subjects[i] for i in kept)
+    return Sightings(s.times[kept], *names, s.seen[kept], s.covariance[kept], s.other[kept])
+
+
+def _pad(field: ResolvedField, name: str) -> tuple[Array, Array]:
+    pad = stand_of(field).pads[name]
+    pose = np.array([*pad.place_m, pad.height_m, pad.yaw_rad])
+    return pose, np.array([PLACED_M, PLACED_M, pad.height_std_m, PLACED_RAD])

@@ -1,0 +1,165 @@
+"""Where drones and targets were, as knots in time between which their own sensors tell the way."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array, IntArray
+from groundstation.calibration.team_record import OwnMotion, Sightings
+from groundstation.field.drones import FieldDrone
+from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.rotations import world_from_downward_optical
+
+ROBOT, TARGET = 6, 3
+"""Entries of a knot: (x, y, z, correction of the heading, errors of roll and pitch); (x, y, heading)."""
+_SPACING_S = 0.2
+_STEP_S = 0.002
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Times of the knots [s], evenly spaced."""
+
+    times: Array
+    spacing_s: float
+
+    def between(self, times: Array) -> tuple[IntArray, Array]:
+        """Return the knot before each time, and the share of the way to the next."""
+        steps = np.clip((times - self.times[0]) / self.spacing_s, 0.0, len(self.times) - 1.000001)
+        first = steps.astype(np.int64)
+        return first, steps - first
+
+
+def grid_of(duration_s: float) -> Grid:
+    """Return the knots of a recording."""
+    count = max(3, math.ceil(duration_s / _SPACING_S) + 1)
+    return Grid(np.asarray(_SPACING_S * np.arange(count)), _SPACING_S)
+
+
+class RobotPath:
+    """A drone's path: `knots` (k, 6); between them the way that its odometry tells."""
+
+    def __init__(self, own: OwnMotion, drone: FieldDrone, grid: Grid, knots: Array) -> None:
+        self.own, self.grid, self.knots = own, grid, knots
+        self._scale, self._delay_s = drone.odometry.velocity_scale, drone.odometry.velocity_delay_ms / 1000
+        self._height_delay_s = drone.odometry.height_delay_ms / 1000
+        self.refresh(0.0, 0.0, 0.0)
+
+    def refresh(self, scale: float, later_s: float, height_later_s: float) -> None:
+        """Add up the reported velocities anew, under errors of their scale (a share) and of the delays [s]."""
+        self.height_delay_s = self._height_delay_s + height_later_s
+        self._now, self._later = self._way(scale, later_s), self._way(scale, later_s + _STEP_S)
+        self.at_knots, self.later_at_knots = self._told(self.grid.times), self._told_later(self.grid.times)
+
+    def _way(self, scale: float, later_s: float) -> tuple[Array, Array]:
+        """Return times (n) and the way until then (n, 2)."""
+        own, grid = self.own, self.grid
+        times = own.times - self._delay_s - later_s
+        heading = np.interp(times, own.times, own.yaw) + np.interp(times, grid.times, self.knots[:, 3])
+        c, s = np.cos(heading), np.sin(heading)
+        vx, vy = self._scale * (1.0 + scale) * own.velocities.T
+        velocity = np.column_stack((c * vx - s * vy, s * vx + c * vy))
+        steps = 0.5 * np.diff(times)[:, None] * (velocity[1:] + velocity[:-1])
+        return times, np.vstack((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
+
+    def _told(self, times: Array) -> Array:
+        return _along(self._now, times)
+
+    def _told_later(self, times: Array) -> Array:
+        """Return the derivative of the way by the delay of the velocity."""
+        return (_along(self._later, times) - _along(self._now, times)) / _STEP_S
+
+    def bulge(self, times: Array) -> tuple[Array, Array]:
+        """Return how far the way between two knots is from their line (n, 2), and its derivative by the delay."""
+        first, share = self.grid.between(times)
+        return (
+            self._told(times) - _between(self.at_knots, first, share),
+            self._told_later(times) - _between(self.later_at_knots, first, share),
+        )
+
+    def poses(self, times: Array) -> Array:
+        """Return (x, y, z, yaw, roll, pitch) at times (n, 6)."""
+        own, (first, share) = self.own, self.grid.between(times)
+        poses = _between(self.knots, first, share)
+        poses[:, :2] += self.bulge(times)[0]
+        for column, angle in ((3, own.yaw), (4, own.roll), (5, own.pitch)):
+            poses[:, column] += np.interp(times, own.times, angle)
+        return np.asarray(poses)
+
+
+class TargetPath:
+    """A target's path: `knots` (k, 3), joined by lines."""
+
+    def __init__(self, grid: Grid, knots: Array) -> None:
+        self.grid, self.knots = grid, knots
+
+    def poses(self, times: Array) -> Array:
+        """Return (x, y, 0, yaw, 0, 0) at times (n, 6)."""
+        first, share = self.grid.between(times)
+        poses = np.zeros((len(times), 6))
+        poses[:, [0, 1, 3]] = _between(self.knots, first, share)
+        return poses
+
+
+def _along(way: tuple[Array, Array], times: Array) -> Array:
+    return np.column_stack([np.interp(times, way[0], column) for column in way[1].T])
+
+
+def _between(table: Array, first: IntArray, share: Array) -> Array:
+    part = share[:, None]
+    return np.asarray((1.0 - part) * table[first] + part * table[first + 1])
+
+
+def robot_start(field: ResolvedField, name: str, own: OwnMotion, sightings: Sightings, grid: Grid) -> Array:
+    """Return first knots of a drone, from what fixed cameras saw of it."""
+    rows = [i for i, s in enumerate(sightings.subjects) if s == name and sightings.observers[i] in field.cameras]
+    times, seen = sightings.times[rows], sightings.seen[rows]
+    headings = np.unwrap(seen[:, 3])
+    places = np.empty((len(rows), 3))
+    for index, row in enumerate(rows):
+        camera = field.cameras[sightings.observers[row]]
+        places[index] = world_from_downward_optical(camera.rotation_deg) @ seen[index, :3] + camera.position_m
+    marker = np.array(field.drones[name].marker.position_m)
+    c, s = np.cos(headings), np.sin(headings)
+    ahead, left, up = marker
+    places -= np.column_stack((c * ahead - s * left, s * ahead + c * left, np.full(len(rows), up)))
+    knots = np.zeros((len(grid.times), ROBOT))
+    for column in range(3):
+        knots[:, column] = _smooth(times, places[:, column], grid)
+    knots[:, 3] = _heading_start(own, times, headings, grid)
+    return knots
+
+
+def _heading_start(own: OwnMotion, times: Array, headings: Array, grid: Grid) -> Array:
+    """Return the correction of the heading at the knots, one value between two resets of the drone's own."""
+    gap = headings - np.interp(times, own.times, own.yaw)
+    block = np.interp(times, own.times, own.resets).round()
+    at_knots = np.interp(grid.times, own.times, own.resets).round()
+    known = {float(one): _mean_angle(gap[block == one]) for one in np.unique(block)}
+    if not known:
+        return np.zeros(len(grid.times))
+    blocks = np.array(sorted(known))
+    nearest = blocks[np.argmin(np.abs(at_knots[:, None] - blocks[None, :]), axis=1)]
+    return np.array([known[float(one)] for one in nearest])
+
+
+def _mean_angle(angles: Array) -> float:
+    return math.atan2(float(np.median(np.sin(angles))), float(np.median(np.cos(angles))))
+
+
+def target_start(times: Array, places: Array, headings: Array, grid: Grid) -> Array:
+    """Return first knots of a target, from where drones told it to be (n, 2) and its headings (n)."""
+    turned = np.unwrap(headings)
+    columns = [_smooth(times, values, grid) for values in (places[:, 0], places[:, 1], turned)]
+    return np.column_stack(columns)
+
+
+def _smooth(times: Array, values: Array, grid: Grid) -> Array:
+    """Return medians of values about the knots, with lines across what nobody saw."""
+    first, share = grid.between(times)
+    nearest = first + (share > 0.5)
+    order = np.argsort(nearest, kind="stable")
+    knots, starts = np.unique(nearest[order], return_index=True)
+    medians = np.array([np.median(part) for part in np.split(values[order], starts[1:])])
+    return np.asarray(np.interp(np.arange(len(grid.times)), knots, medians))

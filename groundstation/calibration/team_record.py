@@ -1,0 +1,144 @@
+"""What a recording holds for the calibration of a team: own motion of each drone, sightings, and who stood where."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.bus.messages import (
+    FlightState,
+    ImuSample,
+    Message,
+    Odometry,
+    RelativeObservation,
+    VehicleStatus,
+)
+from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.estimation.attitude_intake import AttitudeIntake
+from groundstation.estimation.parameters import parameters_from_field
+from groundstation.field.resolved import ResolvedField
+from groundstation.time_units import NS_PER_S
+
+_STANDING = frozenset({FlightState.LANDED})
+_UNKNOWN_YAW = 1e6
+# A stand shorter than this may be a drone that somebody still sets down.
+_LEAST_STAND_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class OwnMotion:
+    """A drone by its own sensors, n samples.
+
+    times [s]; velocities (n, 2) [m/s; base_stabilized]; yaw [rad; odom], roll, pitch [rad]; height [m] or NaN; resets
+    of the heading; attitude_std [rad], yaw_std [rad per root second], 0: as the field has them.
+    """
+
+    times: Array
+    velocities: Array
+    yaw: Array
+    roll: Array
+    pitch: Array
+    height: Array
+    resets: Array
+    attitude_std: Array
+    yaw_std: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """n sightings: stamps [s], names of observers and subjects, centre [m; camera_optical] and heading (n, 4).
+
+    covariance: (n, 4, 4); where no heading is known its variance is large. other: the second pose, or NaN.
+    """
+
+    times: Array
+    observers: tuple[str, ...]
+    subjects: tuple[str, ...]
+    seen: Array
+    covariance: Array
+    other: Array
+
+
+@dataclass(frozen=True, slots=True)
+class TeamRecord:
+    """A recording; stands: from when to when [s] a drone stood before it first flew."""
+
+    own: Mapping[str, OwnMotion]
+    sightings: Sightings
+    stands: Mapping[str, tuple[float, float]]
+    duration_s: float
+
+
+def team_record(flown: Flown, field: ResolvedField) -> TeamRecord:
+    """Return the record of a flight; times count from its first tick."""
+    zero_ns = flown.ticks[0][0]
+    intake = AttitudeIntake(parameters_from_field(field).inertial)
+    standing = dict.fromkeys(field.drones, True)
+    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in field.drones}
+    stands: dict[str, list[float]] = {name: [] for name in field.drones}
+    flew: set[str] = set()
+    for message in _messages(flown):
+        name, stamp_ns = message.header.entity, message.header.stamp_ns
+        at_s = (stamp_ns - zero_ns) / NS_PER_S
+        if name not in rows:
+            continue
+        if isinstance(message, VehicleStatus) and message.flight_state is not FlightState.UNKNOWN:
+            standing[name] = message.flight_state in _STANDING
+            if not standing[name]:
+                flew.add(name)
+            elif name not in flew:  # later it may stand anywhere
+                stands[name].append(at_s)
+        elif isinstance(message, ImuSample):
+            intake.imu(message, stamp_ns, standing[name])
+        elif isinstance(message, Odometry):
+            rows[name].append(_row(intake, message, at_s))
+    own = {name: _own(found) for name, found in rows.items() if len(found) > 1}
+    spans = {name: (times[0], times[-1]) for name, times in stands.items() if times}
+    stood = {name: span for name, span in spans.items() if span[1] - span[0] >= _LEAST_STAND_S}
+    return TeamRecord(own, _sightings(flown, field, zero_ns), stood, flown.duration_s)
+
+
+def _row(intake: AttitudeIntake, message: Odometry, at_s: float) -> tuple[float, ...]:
+    sample = intake.motion(message, message.header.stamp_ns)
+    height = np.nan if sample.height_m is None else sample.height_m
+    vx, vy, _ = sample.velocity_m_s
+    attitude = (sample.yaw_rad, sample.roll_rad, sample.pitch_rad)
+    return (at_s, vx, vy, *attitude, height, sample.reset, sample.attitude_std_rad, sample.yaw_std_rad)
+
+
+def _own(rows: list[tuple[float, ...]]) -> OwnMotion:
+    table = np.array(rows, dtype=np.float64)
+    table = table[np.unique(table[:, 0], return_index=True)[1]]
+    at, vx, vy, yaw, roll, pitch, height, resets, attitude_std, yaw_std = np.ascontiguousarray(table.T)
+    return OwnMotion(at, np.column_stack((vx, vy)), np.unwrap(yaw), roll, pitch, height, resets, attitude_std, yaw_std)
+
+
+def _messages(flown: Flown) -> Iterator[Message]:
+    for _, inputs in flown.ticks:
+        for _, message in inputs:
+            if message.header.clock == flown.clock:
+                yield message
+
+
+def _sightings(flown: Flown, field: ResolvedField, zero_ns: int) -> Sightings:
+    observers = {*field.cameras, *field.drones}
+    subjects = {*field.drones, *field.tracked}
+    found = [
+        m
+        for m in _messages(flown)
+        if isinstance(m, RelativeObservation) and m.observer in observers and m.subject in subjects
+    ]
+    found.sort(key=lambda m: m.header.stamp_ns)
+    n = len(found)
+    seen, other, covariance = np.full((n, 4), np.nan), np.full((n, 4), np.nan), np.zeros((n, 4, 4))
+    for i, m in enumerate(found):
+        seen[i, :3], seen[i, 3] = m.position_m, 0.0 if m.yaw_rad is None else m.yaw_rad
+        rows = 3 if m.yaw_rad is None else 4
+        covariance[i, 3, 3] = _UNKNOWN_YAW
+        covariance[i, :rows, :rows] = np.reshape(m.covariance, (rows, rows))
+        if m.alternative is not None:
+            yaw = m.alternative.yaw_rad
+            other[i, :3], other[i, 3] = m.alternative.position_m, seen[i, 3] if yaw is None else yaw
+    times = np.array([(m.header.stamp_ns - zero_ns) / NS_PER_S for m in found])
+    return Sightings(times, tuple(m.observer for m in found), tuple(m.subject for m in found), seen, covariance, other)

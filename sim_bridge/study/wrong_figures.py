@@ -1,0 +1,68 @@
+"""A lab whose field file is wrong: the world is built with other figures than the ground station is told."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from groundstation.bus.messages import RelativeObservation
+from groundstation.field.resolved import ResolvedField
+
+_FIXED = {"x": ("position_m", 0), "y": ("position_m", 1), "z": ("position_m", 2)}
+_FIXED |= {"roll": ("rotation_deg", 0), "pitch": ("rotation_deg", 1), "yaw": ("rotation_deg", 2)}
+_ONBOARD = {"pan": "pan_left_deg", "tilt": "tilt_down_deg"}
+_PLACES = ("ahead", "left", "up")
+
+
+@dataclass(frozen=True, slots=True)
+class WrongFigures:
+    """True minus told, by (who, part): m, deg, ms, shares.
+
+    Parts: x, y, z, roll, pitch, yaw of a fixed camera; pan, tilt, ahead, left, up of a drone's; focal and delay of any;
+    print of a drone or target.
+    """
+
+    errors: Mapping[tuple[str, str], float]
+
+    def world(self, field: ResolvedField) -> ResolvedField:
+        """Return the field as the world really is; lenses, prints and delays are in the sightings instead."""
+        cameras, drones = dict(field.cameras), dict(field.drones)
+        for (who, part), error in self.errors.items():
+            if who in cameras and part in _FIXED:
+                name, axis = _FIXED[part]
+                moved = list(getattr(cameras[who], name))
+                moved[axis] += error
+                cameras[who] = _with(cameras[who], name, tuple(moved))
+            elif who in drones and (part in _ONBOARD or part in _PLACES):
+                drones[who] = _with(drones[who], "camera", _mounted(drones[who].camera, part, error))
+        return msgspec.structs.replace(field, cameras=cameras, drones=drones)
+
+    def reported(self, o: RelativeObservation) -> RelativeObservation:
+        """Return a sighting as a detector reports it that believes the field."""
+        printed, focal, late_ms = (
+            self._of(o.subject, "print"),
+            self._of(o.observer, "focal"),
+            self._of(o.observer, "delay"),
+        )
+        turned = math.radians(self._of(o.observer, "pan") + self._of(o.observer, "yaw"))
+        x, y, z = (value / (1.0 + printed) for value in o.position_m)
+        yaw = None if o.yaw_rad is None else math.remainder(o.yaw_rad - turned, math.tau)
+        header = msgspec.structs.replace(o.header, stamp_ns=o.header.stamp_ns + round(late_ms * 1e6))
+        return msgspec.structs.replace(o, header=header, position_m=(x, y, z / (1.0 + focal)), yaw_rad=yaw)
+
+    def _of(self, who: str, part: str) -> float:
+        return self.errors.get((who, part), 0.0)
+
+
+def _with(struct: Any, name: str, value: Any) -> Any:
+    return msgspec.structs.replace(struct, **{name: value})
+
+
+def _mounted(camera: Any, part: str, error: float) -> Any:
+    if part in _ONBOARD:
+        return _with(camera, _ONBOARD[part], getattr(camera, _ONBOARD[part]) + error)
+    place = list(camera.position_m)
+    place[_PLACES.index(part)] += error
+    return _with(camera, "position_m", tuple(place))

@@ -68,7 +68,7 @@ class Watchdog:
         return self.lease.accept(now_ns, lease)
 
     def see(self, vehicle: VehicleView, upstream: Upstream) -> None:
-        """Remember the last word of the vehicle and of those above, by which commands are judged."""
+        """Keep the newest view of the vehicle and of those above, by which commands are judged."""
         self.vehicle, self.upstream = vehicle, upstream
 
     def accept_command(self, now_ns: int, command: Command) -> tuple[Ack, ...]:

@@ -1,4 +1,4 @@
-"""What the rest of the system knows that helps a camera: attitudes and heights of vehicles, and the belief."""
+"""Context for a camera from the bus: attitudes and heights of vehicles, and the belief."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Whose marker is it? Reads the bar of eight cells beside the board; unsure is unknown, never a guess."""
+"""Identifies a marker by the bar of eight cells beside the board; an unsure reading counts as unknown."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The full search: where in a whole picture could boards be? Saddle points, in clusters that look like a lattice.
+"""The full search for boards in a whole picture: saddle points in clusters that look like a lattice.
 
 Inner corners of a checkerboard are saddle points of brightness, and direct neighbours are turned by 90 degrees against
 each other, which carpets, cables and furniture seldom imitate. Only the best clusters are worth the slow board finder.

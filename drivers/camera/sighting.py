@@ -1,4 +1,4 @@
-"""What the detector hands on: an identified marker with its pose, and what an operator should hear."""
+"""Results of the detector: an identified marker with its pose, and notices for the operator."""
 
 from dataclasses import dataclass
 

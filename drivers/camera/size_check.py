@@ -1,4 +1,4 @@
-"""Is a marker as large as the field says? Its distance by size against its distance by height sensors."""
+"""Compares a marker's distance by its size with that by height sensors, to find a wrong print size."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""Is the stream alive? A pure state machine over arrival times; the driver turns its changes into events."""
+"""State of a stream by arrival times, as a pure state machine; the driver turns its changes into events."""
 
 from dataclasses import dataclass
 from enum import StrEnum

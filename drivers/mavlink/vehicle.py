@@ -31,7 +31,7 @@ _FRESH_NS = 300_000_000
 _HEARTBEAT_NS = 4_000_000_000
 # Asked for twice a second; a charge this old is unknown.
 _BATTERY_NS = 10_000_000_000
-# A refusal is told once the vehicle has said why: its acknowledgement overtakes its texts.
+# Report a refusal only after its STATUSTEXT: the COMMAND_ACK arrives first.
 _EXPLAIN_NS = 700_000_000
 # ArduPilot repeats what keeps it from arming every 30 s.
 _COMPLAINTS_NS = 35_000_000_000

@@ -1,4 +1,4 @@
-"""A recorded flight, lived again by today's filter under delays of choice: how likely does it find what was seen?
+"""Re-runs the filter on a recorded flight with given delays and returns the likelihood of its measurements.
 
 No planner, no truth: only what the tracker took in, tick by tick.
 """

@@ -1,4 +1,4 @@
-"""Who is let in: pages of this server in a browser of its own user, or of one who has the code; no other site."""
+"""Access control: same-origin pages of this host's own user, of a user with the code, of invited devices."""
 
 import hmac
 import os

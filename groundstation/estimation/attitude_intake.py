@@ -1,4 +1,4 @@
-"""Which attitude counts for each robot: by its IMU where it has one in use, else as it reports."""
+"""The attitude used for each robot: from its IMU where that is in use, else as reported."""
 
 import math
 from collections.abc import Mapping
@@ -75,7 +75,7 @@ class AttitudeIntake:
 
 
 class _HeadingSource:
-    """Counts the resets of a heading that comes now from one source, now from another."""
+    """Counts the resets of a heading whose source changes."""
 
     def __init__(self) -> None:
         self._count, self._source, self.newest_ns = 0, (False, 0), 0

@@ -1,4 +1,4 @@
-"""How much older a camera's pictures are than their stamps say, found in flight by the headings of the robots in them.
+"""Error of each camera's calibrated delay, estimated in flight from the headings of the robots that it sees.
 
 Gyroscopes tell at once how far a robot turned within a second; a picture that is older than its stamp tells it of
 another second. Only headings: what is wrong with velocities lasts, and controls react to it. Nothing here acts on the
@@ -30,7 +30,7 @@ _FOLLOWED, _GONE_S = 4, 5.0
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """By how much longer a camera's way to us is than its calibrated delay, and one sigma [s]."""
+    """Excess of a camera's delay over the calibrated one, and its standard deviation [s]."""
 
     sensor: str
     offset_s: float

@@ -1,4 +1,4 @@
-"""Which one figure of the field, if it were wrong, explains why the loops of sightings do not close? Pure.
+"""Tests which single wrong figure of the field explains that loops of sightings do not close. Pure.
 
 Normal equations over all figures, fed with one mean a second for each loop, because what disturbs a loop (how a vehicle
 leans, by its own account) lasts for seconds. Each suspicion frees the figures of one thing and holds all others at

@@ -1,4 +1,4 @@
-"""What the compiled filter is handed: tables, state and inputs, several arrays in one value each.
+"""Arguments of the compiled filter: tables, state and inputs, each a value of several arrays.
 
 m modes (joint beliefs that are kept side by side), n entries of the state, e entities, s sensors, r steps of the ring.
 """
@@ -61,7 +61,7 @@ class Tables(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the filter knows: means (m, n), covariances (m, n, n), the modes' probabilities (m), memory (e).
+    """State of the filter: means (m, n), covariances (m, n, n), the modes' probabilities (m), memory (e).
 
     used_at (s, e): when a sensor's reading of a subject was last used.
     """
@@ -84,7 +84,7 @@ class Checkpoints(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What arrived: odometry by step (r, e), and events in a pool, of which `order` lists rows by time."""
+    """Inputs: odometry by step (r, e), and events in a pool, of which `order` lists rows by time."""
 
     odometry: RowsStack[CondensedOdometry]
     events: Rows[EventRow]

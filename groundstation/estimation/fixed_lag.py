@@ -143,7 +143,7 @@ class FixedLagFilter:
         self._report()
 
     def take_corrections(self) -> list[Correction]:
-        """Return and forget what became of the observations that were reached since the last call."""
+        """Return and clear the corrections made since the last call."""
         corrections, self._corrections = self._corrections, []
         return corrections
 
@@ -157,7 +157,7 @@ class FixedLagFilter:
         return bool(is_distribution(Belief(*self._moments, self._tables.entities[0], self._state.memory)))
 
     def restart(self) -> None:
-        """Forget the belief and everything that arrived; who may join is kept, who is where must be seen again."""
+        """Clear the belief and all inputs; which entities may join is kept."""
         now_ns = self._now_ns
         self._build_state(self._state.memory["admitted"].tolist())
         self._start(now_ns)

@@ -1,4 +1,4 @@
-"""Sensors that freeze: the same numbers to the last bit, for longer than any sensor that still measures."""
+"""Detects frozen sensors: values that repeat to the last bit for longer than any working sensor's do."""
 
 from dataclasses import dataclass
 

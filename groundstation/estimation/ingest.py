@@ -1,4 +1,4 @@
-"""From bus messages to the filter: clocks, duplicates, what can be used, and a verdict for what cannot."""
+"""From bus messages to the filter: clocks, duplicates, checks of shape, and a verdict for each refusal."""
 
 import math
 from collections.abc import Container

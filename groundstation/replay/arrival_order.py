@@ -1,4 +1,4 @@
-"""A recording in the order in which the console got it, from any moment on, forwards or from before.
+"""Iterates a recording in arrival order from any time; also the last message of each key before it.
 
 A message is recorded at its time of measurement, and came later. The recorder wrote in order of arrival: what stands
 before it in the file had come before it, so it came at the latest time that any message had until then.

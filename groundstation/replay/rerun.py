@@ -105,7 +105,7 @@ class JournalWorker:
 
 
 class Rerun:
-    """One life of the tracker, lived again with a field of choice."""
+    """One run of the tracker, repeated with a given field."""
 
     def __init__(self, field: ResolvedField, site: str, first: JournalEntry, epoch: int) -> None:
         self._arrivals = JournalArrivals()

@@ -39,7 +39,7 @@ class RerunFinding:
 
 @dataclass(slots=True)
 class Lived:
-    """One tick lived again: when [s since the recording began], and all that was said."""
+    """One tick of a re-run: its time [s since the recording began], and its messages."""
 
     tick: Tick
     time_s: float

@@ -229,7 +229,7 @@ class Supervisor:
         process.silent_since_ns = process.judge_silence(now_ns, self._awake_since_ns, limit_ns)
         if not process.silent_since_ns:
             if self._last_words.end(process.spec.name):
-                self.events.event(Severity.INFO, process, "has the word again")
+                self.events.event(Severity.INFO, process, "is back in control of its drone")
             return
         self._speak_for(process, f"silent for {heard_s:.2f} s", now_ns)
         self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s", heard_s >= process.spec.hang_limit_s)

@@ -1,4 +1,4 @@
-"""A TCP server that hands pictures to several clients at set times, none of which can hold up another.
+"""A TCP server that sends pictures to several clients at set times; a slow client delays no other.
 
 What is said to a client that comes, and what is made of its words, is up to the kinds of streams built on it.
 """

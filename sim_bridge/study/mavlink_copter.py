@@ -1,4 +1,4 @@
-"""What driver and autopilot make of a MAVLink vehicle at message level: odometry, setpoints, and poses fed back.
+"""A MAVLink vehicle with driver and autopilot at message level: odometry, setpoints, poses fed back.
 
 The loop is closed as in flight: what the tracker believes aids the vehicle's estimate, whose velocity comes back as
 odometry. Of the driver's code only the feedback of the drift is used here, and what it makes of the attitude's doubt.

@@ -83,7 +83,7 @@ class FlightScore:
         self.diverged_s[name] += self.period_s * (nees > _DIVERGED)
 
     def note(self, correction: Correction) -> None:
-        """Count what became of an observation; NIS of those that were used, as they were used."""
+        """Count an observation by its verdict, with the NIS of one that was used."""
         self.verdicts[str(correction.verdict)] += 1
         if correction.nis is not None and not correction.joined and correction.verdict in _USED:
             edge = f"{correction.observer}>{correction.subject}"

@@ -1,4 +1,4 @@
-"""What a driver publishes of one drone, from the readings of its onboard sensors."""
+"""Messages of one drone's driver, made from the readings of its onboard sensors."""
 
 import math
 

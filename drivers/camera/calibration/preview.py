@@ -1,4 +1,4 @@
-"""What the detector makes of a camera's pictures, for people: text and annotated pictures."""
+"""Preview of the detector's results on a camera's pictures: text and annotated pictures."""
 
 import math
 import time

@@ -1,4 +1,4 @@
-"""Is this picture of the board worth keeping? If not, why, in a word that an operator can act upon."""
+"""Decides whether a picture of the board is kept, and names the flaw that an operator can mend."""
 
 from collections import Counter
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a source hands to the camera driver, and the seam that all kinds of sources share."""
+"""Pictures of a source, and the interface that all kinds of sources share."""
 
 from collections import Counter
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What hangs fixed in the world (a ceiling camera): its mounting errors are states, as they are in every picture."""
+"""A camera fixed in the world: its mounting errors are states, because every picture shares them."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""What stands still at a known place: it can be observed, and is no part of the state."""
+"""A marker at a surveyed place: observed, but not part of the state."""
 
 from dataclasses import dataclass
 from typing import ClassVar

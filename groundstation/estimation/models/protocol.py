@@ -1,4 +1,4 @@
-"""What a model is: the figures that Python holds, and the kernels that do the work.
+"""Interface of a model: its parameters in Python, and its kernels.
 
 A new model is one file: a frozen dataclass of its figures with these members, its kernels as model_kernels.py declares
 them, and a Record of what they read. Nothing else has to know it (docs/how-to/add-a-sensor-model.md 1).

@@ -11,7 +11,7 @@ from groundstation.bus.topics import Topic
 
 
 class LocalSubscription(Subscription):
-    """What a subscriber has not taken yet: messages, no bytes."""
+    """Messages that a subscriber has not taken yet, not encoded."""
 
     def __init__(self, entity: str, newest: bool, capacity: int) -> None:
         super().__init__(capacity, newest)

@@ -1,4 +1,4 @@
-"""What takes the place of clock, threads and sockets while the code that flies is hosted in one thread."""
+"""Stand-ins for clock, threads and sockets while the flight code runs in one thread."""
 
 import socket
 import threading

@@ -31,7 +31,7 @@ BusOf = Callable[[str], Bus]
 
 
 class HostedProcess:
-    """What a driver asks of its process; `said` keeps its events."""
+    """The process interface of a driver; `said` keeps its events."""
 
     def __init__(self, name: str, bus: Bus, said: list[tuple[str, str]]) -> None:
         self.name, self.section = name, "{}"

@@ -1,4 +1,4 @@
-"""What a flight of a scenario comes to, and whether that is what its file expects."""
+"""Figures of a flight of a scenario, compared with the expectations of its file."""
 
 import math
 from collections import defaultdict

@@ -1,4 +1,4 @@
-"""What coding does to a picture: JPEG, or H.264 as AR.Drones send it."""
+"""Pictures after coding: JPEG, or H.264 as AR.Drones send it."""
 
 from fractions import Fraction
 

@@ -181,19 +181,20 @@ class ArDrone:
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
         commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
         self._link.send(commands, restart=self._session.phase is SessionPhase.SEARCHING)
-        self._watch_rate(now_ns)
+        self._watch_link(now_ns)
 
-    def _watch_rate(self, now_ns: int) -> None:
+    def _watch_link(self, now_ns: int) -> None:
         if self._session.phase is not SessionPhase.READY:
             self._rate_watch.reset()
             self._uplink.reset()
-        elif now_ns >= self._next_rate_ns:
+            return
+        heard, notices = self.telemetry, []
+        if heard.obeyed is not None and now_ns - heard.moved_ns < _FRESH_NS:
+            notices.append(self._uplink.step(now_ns, heard.obeyed, heard.flight_state in UP))
+        if now_ns >= self._next_rate_ns:
             self._next_rate_ns = now_ns + _RATE_PERIOD_NS
-            heard = self.telemetry
-            notices = [self._rate_watch.step(now_ns, self._link.rates(now_ns)[0])]
-            if heard.obeyed is not None and now_ns - heard.moved_ns < _FRESH_NS:
-                notices.append(self._uplink.step(now_ns, heard.obeyed, heard.flight_state in UP))
-            self._session.news.extend(notice for notice in notices if notice is not None)
+            notices.append(self._rate_watch.step(now_ns, self._link.rates(now_ns)[0]))
+        self._session.news.extend(notice for notice in notices if notice is not None)
 
     def news(self) -> list[Notice]:
         """Return the events for the operator, once."""

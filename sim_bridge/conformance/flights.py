@@ -88,12 +88,17 @@ def _square(bench: Bench) -> None:
     bench.end()
 
 
-@script()
-def _silence(bench: Bench) -> None:
-    """The tracker falls silent in flight: for a moment, for longer, for good."""
+def _track_ahead(bench: Bench) -> None:
+    """Track, and fly ahead until it is fast."""
     bench.track()
     bench.up.wanted = ((SPEED_M_S, 0.0, 0.0), 0.0)
     time.sleep(1.2)
+
+
+@script()
+def _silence(bench: Bench) -> None:
+    """The tracker falls silent in flight: for a moment, for longer, for good."""
+    _track_ahead(bench)
     bench.up.speaks = False
     bench.spend("a pause", 0.4)
     bench.up.speaks = True
@@ -155,9 +160,7 @@ def _epochs(bench: Bench) -> None:
 @script()
 def _killed(bench: Bench) -> None:
     """kill -9 of the driver in flight: others hover for it, a new life lands it; killed again, others land it."""
-    bench.track()
-    bench.up.wanted = ((SPEED_M_S, 0.0, 0.0), 0.0)
-    time.sleep(1.2)
+    _track_ahead(bench)
     bench.driver.send(signal.SIGKILL)
     time.sleep(0.1)
     bench.speak("hover", 2.5)
@@ -185,9 +188,7 @@ def _killed(bench: Bench) -> None:
 @script()
 def _orphaned(bench: Bench) -> None:
     """The supervisor stands still for a moment, then dies."""
-    bench.track()
-    bench.up.wanted = ((SPEED_M_S, 0.0, 0.0), 0.0)
-    time.sleep(1.2)
+    _track_ahead(bench)
     bench.up.beats = False
     bench.spend("supervisor frozen", 0.8)
     bench.up.beats = True
@@ -202,9 +203,7 @@ def _orphaned(bench: Bench) -> None:
 @script()
 def _unheard(bench: Bench) -> None:
     """The vehicle says nothing any more, and still hears."""
-    bench.track()
-    bench.up.wanted = ((SPEED_M_S, 0.0, 0.0), 0.0)
-    time.sleep(1.2)
+    _track_ahead(bench)
     bench.emulator.silent = True
     bench.spend("silent vehicle", 1.5)
     bench.await_landing("landing unheard")

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from groundstation.errors import SettingsError
 from sim_bridge.conformance import checks_failsafe, checks_flight, checks_ground, checks_kind, checks_measured
 from sim_bridge.conformance.check import CHECKS, Case, Check, NotApplicable
 from sim_bridge.conformance.flights import SCRIPTS
@@ -11,6 +12,7 @@ from sim_bridge.conformance.script import fly
 from sim_bridge.conformance.subject import subject_of
 
 DAMAGED = 2000
+_OBJECT = "kind"
 SOURCES = (checks_kind, checks_ground, checks_flight, checks_measured, checks_failsafe)
 
 
@@ -59,6 +61,15 @@ class Kit:
 
 
 def chosen(words: str = "") -> list[Check]:
-    """Return the checks whose name or flight is one of some words by commas; all without any."""
+    """Return the checks whose name or flight is one of some words by commas; all without any.
+
+    Raises SettingsError, with all words that there are, for one that is neither.
+    """
     wanted = {word.strip() for word in words.split(",") if word.strip()}
-    return [one for one in CHECKS.values() if not wanted or {one.name, one.flight or "kind"} & wanted]
+    flights = dict.fromkeys(one.flight or _OBJECT for one in CHECKS.values())
+    unknown = ", ".join(sorted(wanted - set(CHECKS) - set(flights)))
+    if unknown:
+        names = ", ".join(sorted(CHECKS))
+        raise SettingsError([f"--only: no flight and no check is called {unknown}", f"flights: {', '.join(flights)}",
+                             f"checks: {names}"])  # fmt: skip
+    return [one for one in CHECKS.values() if not wanted or {one.name, one.flight or _OBJECT} & wanted]

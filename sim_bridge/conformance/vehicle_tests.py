@@ -2,13 +2,17 @@
 
 import pytest
 
+from groundstation.errors import SettingsError
 from sim_bridge.conformance.check import Check
 from sim_bridge.conformance.kit import Kit, chosen
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Make a test of each check, those of one flight together."""
-    checks = chosen(metafunc.config.getoption("--skein-only"))
+    try:
+        checks = chosen(metafunc.config.getoption("--skein-only"))
+    except SettingsError as error:
+        raise pytest.UsageError("\n".join(error.problems).replace("--only", "--skein-only")) from None
     metafunc.parametrize("check", checks, ids=[one.name for one in checks])
 
 

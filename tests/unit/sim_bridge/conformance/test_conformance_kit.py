@@ -150,6 +150,14 @@ def test_damage_is_of_many_kinds_and_repeatable():
     assert min(lengths) < len(data) < max(lengths)
 
 
+def test_an_unknown_word_is_refused_with_those_that_there_are():
+    with pytest.raises(SettingsError) as refused:
+        chosen("square,wings")
+    said = "\n".join(refused.value.problems)
+    assert "called wings" in said and "silence" in said and "hover_datagram_stops_it" in said
+    assert {one.flight for one in chosen("square, lands,kind")} == {"square", ""}
+
+
 def test_a_vehicle_is_made_as_its_kind_s_example_says_and_otherwise():
     other = subject_of("mavlink", ["mavlink.flavour=ardupilot"])
     assert other.sections["mavlink"].model_dump()["flavour"] == "ardupilot"

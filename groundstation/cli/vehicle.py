@@ -39,7 +39,7 @@ def list_() -> None:
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def check(kind: str, options: tuple[str, ...], only: str, damaged: int, as_json: bool) -> int:
-    """Judge KIND: its driver flies its emulator, in real time on loopback addresses, for four minutes or so."""
+    """Judge KIND: its driver flies its emulator, in real time on loopback addresses, for six minutes or so."""
     # The simulator is never imported by what flies.
     command = [sys.executable, "-m", "sim_bridge.conformance", kind, "--only", only, "--damaged", str(damaged)]
     for option in options:

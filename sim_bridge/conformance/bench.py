@@ -227,6 +227,13 @@ class Bench:
             landed = self.wait(lambda: self.now.on_ground and not self.now.motors, limit_s, must=False)
             self.record.facts[mark] = time.monotonic() - begin if landed else float("inf")
 
+    def land(self, mark: str = "landing") -> None:
+        """Order LAND, wait until it stands, and end the driver."""
+        self.order(mark, Verb.LAND)
+        self.await_landing(mark)
+        time.sleep(0.5)
+        self.end()
+
     def end(self) -> None:
         """Ask the driver of a standing vehicle to stop, and wait for that."""
         self.driver.send(signal.SIGTERM)

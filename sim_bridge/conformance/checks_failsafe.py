@@ -6,9 +6,11 @@ import numpy as np
 
 from groundstation.bus.messages import AckStage
 from groundstation.bus.topics import COMMAND_ACK, EVENT, VEHICLE_STATUS
+from groundstation.time_units import NS_PER_S
 from sim_bridge.conformance.check import Case, check
+from sim_bridge.conformance.record import turned
 
-_STILL_M_S = 0.2
+_STILL_M_S, _STILL_RAD_S = 0.2, 0.15
 _LANDED_S = 14.0
 
 
@@ -24,6 +26,8 @@ def _still(case: Case, mark: str, skip_s: float = 0.0) -> None:
     assert motion, f"nothing was seen of: {mark}"
     speed = max(one.speed for one in motion)
     assert speed < _STILL_M_S, f"{speed:.2f} m/s"
+    turns = abs(turned(motion)) / max(1e-9, (motion[-1].at_ns - motion[0].at_ns) / NS_PER_S)
+    assert turns < _STILL_RAD_S, f"it turns by {turns:.2f} rad/s"
 
 
 def _lands(case: Case, mark: str, limit_s: float = _LANDED_S) -> None:

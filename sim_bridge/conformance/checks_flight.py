@@ -1,6 +1,5 @@
 """Checks of a flight by orders and set-points: units, signs, rates, answers."""
 
-import itertools
 import math
 
 import numpy as np
@@ -10,7 +9,7 @@ from groundstation.bus.topics import COMMAND_ACK, VEHICLE_STATUS
 from groundstation.time_units import NS_PER_S
 from sim_bridge.conformance.check import Case, check
 from sim_bridge.conformance.flights import CLIMB_M_S, CLIMB_S, LEG_S, SPEED_M_S, TURN_RAD_S
-from sim_bridge.conformance.record import Moment
+from sim_bridge.conformance.record import Moment, turned
 from sim_bridge.conformance.subject import LIMITS
 
 _LEGS = {"forward": (1, 0), "left": (0, 1), "back": (-1, 0), "right": (0, -1)}
@@ -95,13 +94,8 @@ def down_is_down(case: Case) -> None:
 @check("square")
 def turn_is_counter_clockwise(case: Case) -> None:
     """A positive turn is counter-clockwise, by radians per second."""
-    motion = case.record.motion("turn")
-    turned = sum(
-        math.remainder(later.attitude[2] - earlier.attitude[2], math.tau)
-        for earlier, later in itertools.pairwise(motion)
-    )
-    ideal = 2.0 * TURN_RAD_S
-    assert _LEAST * ideal < turned < _MOST * ideal, f"{turned:.2f} rad of {ideal:.2f} rad"
+    came, ideal = turned(case.record.motion("turn")), 2.0 * TURN_RAD_S
+    assert _LEAST * ideal < came < _MOST * ideal, f"{came:.2f} rad of {ideal:.2f} rad"
 
 
 @check("square")

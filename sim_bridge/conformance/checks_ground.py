@@ -162,7 +162,7 @@ def damaged_datagrams_end_no_driver(case: Case) -> None:
     sent = case.record.facts["sent damaged"]
     assert case.record.facts["alive"], f"it ended after {sent:.0f}: {case.record.log[-400:]}"
     if not sent:
-        raise NotApplicable("the emulator does not send by socket.sendto")
+        raise NotApplicable("the emulator sends no datagrams by sockets of Python")
 
 
 @check("damaged")

@@ -1,6 +1,5 @@
 """The kit's flights: scripts that bring a vehicle to where checks look. A script judges nothing."""
 
-import random
 import signal
 import time
 
@@ -17,7 +16,7 @@ FAULT_S = 22.0
 LOW_BATTERY = 0.05
 _DAMAGED_S = 6.0
 
-__all__ = ["CLIMB_M_S", "CLIMB_S", "FAULT_S", "LEG_S", "SCRIPTS", "SPEED_M_S", "TURN_RAD_S"]
+__all__ = ["CLIMB_M_S", "CLIMB_S", "FAULT_S", "LEG_S", "SCRIPTS", "SPEED_M_S", "TURN_RAD_S", "track_ahead"]
 
 
 @script()
@@ -88,7 +87,7 @@ def _square(bench: Bench) -> None:
     bench.end()
 
 
-def _track_ahead(bench: Bench) -> None:
+def track_ahead(bench: Bench) -> None:
     """Track, and fly ahead until it is fast."""
     bench.track()
     bench.up.wanted = ((SPEED_M_S, 0.0, 0.0), 0.0)
@@ -98,7 +97,7 @@ def _track_ahead(bench: Bench) -> None:
 @script()
 def _silence(bench: Bench) -> None:
     """The tracker falls silent in flight: for a moment, for longer, for good."""
-    _track_ahead(bench)
+    track_ahead(bench)
     bench.up.speaks = False
     bench.spend("a pause", 0.4)
     bench.up.speaks = True
@@ -160,7 +159,7 @@ def _epochs(bench: Bench) -> None:
 @script()
 def _killed(bench: Bench) -> None:
     """kill -9 of the driver in flight: others hover for it, a new life lands it; killed again, others land it."""
-    _track_ahead(bench)
+    track_ahead(bench)
     bench.driver.send(signal.SIGKILL)
     time.sleep(0.1)
     bench.speak("hover", 2.5)
@@ -188,7 +187,7 @@ def _killed(bench: Bench) -> None:
 @script()
 def _orphaned(bench: Bench) -> None:
     """The supervisor stands still for a moment, then dies."""
-    _track_ahead(bench)
+    track_ahead(bench)
     bench.up.beats = False
     bench.spend("supervisor frozen", 0.8)
     bench.up.beats = True
@@ -203,7 +202,7 @@ def _orphaned(bench: Bench) -> None:
 @script()
 def _unheard(bench: Bench) -> None:
     """The vehicle says nothing any more, and still hears."""
-    _track_ahead(bench)
+    track_ahead(bench)
     bench.emulator.silent = True
     bench.spend("silent vehicle", 1.5)
     bench.await_landing("landing unheard")
@@ -244,15 +243,14 @@ def _damaged(bench: Bench) -> None:
     """Damaged datagrams between the good ones, on the ground; then a flight."""
     bench.connect()
     time.sleep(0.5)
-    room, before = bench.room, len(bench.record.heard(RAW_RX))
+    wire, before = bench.room.wire, len(bench.record.heard(RAW_RX))
     wanted = round(bench.record.facts["damaged"])
     status = bench.newest(VEHICLE_STATUS)
-    room.damaged_per_datagram = max(1, min(200, round(wanted / (_DAMAGED_S * max(5.0, status.rate_hz)))))
-    room.do(lambda: setattr(room, "damage", random.Random(1)))
+    wire.copies = max(1, min(200, round(wanted / (_DAMAGED_S * max(5.0, status.rate_hz)))))
     with bench.mark("damaged"):
-        bench.wait(lambda: room.damaged >= wanted or not bench.driver.alive, 120.0, must=False)
-    room.do(lambda: setattr(room, "damage", None))
-    bench.record.facts["sent damaged"] = room.damaged
+        bench.wait(lambda: wire.damaged >= wanted or not bench.driver.alive, 120.0, must=False)
+    wire.copies = 0
+    bench.record.facts["sent damaged"] = wire.damaged
     bench.record.facts["alive"] = float(bench.driver.alive)
     bench.record.facts["heard before"] = before
     bench.spend("after the damage", 3.0)

@@ -4,7 +4,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from groundstation.errors import SettingsError
-from sim_bridge.conformance import checks_failsafe, checks_flight, checks_ground, checks_kind, checks_measured
+from sim_bridge.conformance import (
+    checks_failsafe,
+    checks_flight,
+    checks_ground,
+    checks_kind,
+    checks_limits,
+    checks_measured,
+    checks_wire,
+)
 from sim_bridge.conformance.check import CHECKS, Case, Check, NotApplicable
 from sim_bridge.conformance.flights import SCRIPTS
 from sim_bridge.conformance.record import Record
@@ -13,7 +21,7 @@ from sim_bridge.conformance.subject import subject_of
 
 DAMAGED = 2000
 _OBJECT = "kind"
-SOURCES = (checks_kind, checks_ground, checks_flight, checks_measured, checks_failsafe)
+SOURCES = (checks_kind, checks_ground, checks_flight, checks_limits, checks_measured, checks_failsafe, checks_wire)
 
 
 @dataclass(frozen=True, slots=True)

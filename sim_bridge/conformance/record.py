@@ -1,8 +1,10 @@
 """What one flight of the kit left behind: true motion, messages, marked spans of time. Times are monotonic ns."""
 
 import bisect
+import itertools
 import math
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,6 +36,12 @@ class Moment:
         c, s = math.cos(self.attitude[2]), math.sin(self.attitude[2])
         vx, vy, _ = self.velocity
         return c * vx + s * vy, c * vy - s * vx
+
+
+def turned(motion: Sequence[Moment]) -> float:
+    """Return how far the heading turned over a motion [rad; counter-clockwise], whole turns counted."""
+    pairs = itertools.pairwise(motion)
+    return sum(math.remainder(later.attitude[2] - earlier.attitude[2], math.tau) for earlier, later in pairs)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,13 @@
 """The emulated vehicle in its room, turned in real time by a thread; its true motion is written down."""
 
-import random
-import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import Callable
 
 from groundstation.process.priority import go_first
 from sim_bridge.conformance.record import Moment, Record
-from sim_bridge.conformance.subject import NAME
+from sim_bridge.conformance.subject import NAME, stranger_to
+from sim_bridge.conformance.wire import Wire
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
@@ -34,9 +31,8 @@ class Room:
         self._wishes: list[Callable[[], None]] = []
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._turn, name="room", daemon=True)
-        self.damage: random.Random | None = None
-        self.damaged_per_datagram = 0
-        self.damaged = 0
+        address = launch.addresses[NAME]
+        self.wire = Wire(address, stranger_to(address))
 
     def __enter__(self) -> "Room":
         self._thread.start()
@@ -55,7 +51,7 @@ class Room:
         go_first()
         clock = Clockwork(time.monotonic_ns())
         last_ns = time.monotonic_ns()
-        with self._damaging():
+        with self.wire:
             while not self._ended.is_set():
                 deadline_ns = clock.next_deadline()
                 time.sleep(max(0.0, (deadline_ns - time.monotonic_ns()) / 1e9))
@@ -82,42 +78,3 @@ class Room:
                 self.body.battery,
             )
         )
-
-    @contextmanager
-    def _damaging(self) -> Iterator[None]:
-        """Let damaged copies follow each datagram of the vehicle, from the vehicle's own port, when asked to."""
-        honest: Any = socket.socket.sendto
-        mine = threading.get_ident()
-
-        def sendto(self_: socket.socket, data: Any, *where: Any) -> int:
-            sent: int = honest(self_, data, *where)
-            if self.damage is not None and threading.get_ident() == mine:
-                for _ in range(self.damaged_per_datagram):
-                    honest(self_, damaged(bytes(data), self.damage), *where)
-                    self.damaged += 1
-            return sent
-
-        socket.socket.sendto = sendto  # type: ignore[assignment,method-assign]
-        try:
-            yield
-        finally:
-            socket.socket.sendto = honest  # type: ignore[method-assign]
-
-
-def damaged(datagram: bytes, draw: random.Random) -> bytes:
-    """Return a datagram with bits turned, bytes cut out, doubled or replaced."""
-    data = bytearray(datagram)
-    for _ in range(draw.randint(1, 6)):
-        place = draw.randrange(len(data) + 1)
-        match draw.randrange(5):
-            case 0 if place < len(data):
-                data[place] ^= 1 << draw.randrange(8)
-            case 1 if place < len(data):
-                data[place] = draw.choice((0, 0x7F, 0x80, 0xFF, draw.randrange(256)))
-            case 2:
-                del data[place : place + draw.randint(1, 16)]
-            case 3:
-                data[place:place] = draw.randbytes(draw.randint(1, 16))
-            case _:
-                del data[place:]
-    return bytes(data)

@@ -1,11 +1,12 @@
 """What a flight of the kit is, the list of all, and how one is flown."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from groundstation.field.drones import DroneLimits
 from sim_bridge.conformance.bench import Bench, FlightFailed
 from sim_bridge.conformance.record import Record
-from sim_bridge.conformance.subject import Subject
+from sim_bridge.conformance.subject import LIMITS, Subject
 from sim_bridge.fault_kinds import Fault
 
 _TRIES = 3
@@ -14,22 +15,25 @@ _STOOD_MS = 150.0
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """One flight: what is done, and the faults of the vehicle's own reports in it."""
+    """One flight: what is done, the faults of the vehicle's own reports in it, and the limits of its field file."""
 
     name: str
     run: Callable[[Bench], None]
     faults: tuple[Fault, ...] = ()
+    limits: DroneLimits = LIMITS
 
 
 SCRIPTS: dict[str, Script] = {}
 
 
-def script(*faults: Fault) -> Callable[[Callable[[Bench], None]], Callable[[Bench], None]]:
+def script(
+    *faults: Fault, limits: DroneLimits = LIMITS
+) -> Callable[[Callable[[Bench], None]], Callable[[Bench], None]]:
     """Return a decorator that adds a flight to the list, under its function's name."""
 
     def added(run: Callable[[Bench], None]) -> Callable[[Bench], None]:
         name = run.__name__.removeprefix("_")
-        SCRIPTS[name] = Script(name, run, faults)
+        SCRIPTS[name] = Script(name, run, faults, limits)
         return run
 
     return added
@@ -43,7 +47,7 @@ def fly(script: Script, subject: Subject, damaged: int) -> Record:
     record = Record()
     for _ in range(_TRIES):
         try:
-            bench = Bench(subject, script.faults)
+            bench = Bench(replace(subject, limits=script.limits), script.faults)
         except OSError as error:
             return Record(failure=f"the room could not be opened: {error}")
         record = bench.record

@@ -39,6 +39,7 @@ class Subject:
     kind: VehicleKind
     address: str
     sections: Mapping[str, KindSection]
+    limits: DroneLimits = LIMITS
 
     @property
     def local_address(self) -> str:
@@ -50,7 +51,7 @@ class Subject:
         drone = FieldDrone(
             kind=self.kind.name,
             address=self.address,
-            limits=LIMITS,
+            limits=self.limits,
             marker=DroneMarker(code=1, square_mm=_SQUARE_MM),
             camera=OnboardCamera(source="", calibration=_LENS),
             odometry=OdometryErrors(),
@@ -101,6 +102,12 @@ def subject_of(name: str, options: Iterable[str] = (), number: int = 0) -> Subje
     pid = os.getpid()
     address = f"127.{60 + pid % 180}.{pid // 180 % 250}.{11 + number}"
     return _moved(Subject(kind, address, {key: _section(kind, key, values) for key, values in written.items()}))
+
+
+def stranger_to(address: str) -> str:
+    """Return an address in a vehicle's network at which nobody is."""
+    network, _, host = address.rpartition(".")
+    return f"{network}.{int(host) + 100}"
 
 
 def _value(text: str) -> object:

@@ -14,10 +14,10 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(300)]
 @pytest.mark.parametrize(
     ("kind", "options", "flights"),
     [
-        ("tello", [], "stand,square,cut,kind"),
+        ("tello", [], "stand,square,cut,stranger,kind"),
         ("ardrone", [], "silence,killed,damaged"),
-        ("mavlink", [], "epochs,unheard"),
-        ("mavlink", ["--with", "mavlink.flavour=ardupilot"], "orphaned"),
+        ("mavlink", [], "epochs,unheard,lossy"),
+        ("mavlink", ["--with", "mavlink.flavour=ardupilot"], "orphaned,limits,damaged_aloft"),
     ],
     ids=["tello", "ardrone", "px4", "ardupilot"],
 )

@@ -2,7 +2,6 @@
 
 import math
 import os
-import random
 import subprocess
 import sys
 from dataclasses import replace
@@ -20,7 +19,6 @@ from sim_bridge.conformance.check import CHECKS, Case
 from sim_bridge.conformance.flights import LEG_S, SCRIPTS, SPEED_M_S
 from sim_bridge.conformance.kit import Kit, chosen
 from sim_bridge.conformance.record import Heard, Moment, Record
-from sim_bridge.conformance.room import damaged
 from sim_bridge.conformance.subject import NAME, subject_of
 
 ROOT = Path(__file__).parents[4]
@@ -141,20 +139,50 @@ def test_a_driver_that_is_silent_for_long_fails():
     assert verdict(record, "driver_goes_on_speaking_under_damage").end == "failed"
 
 
-def test_damage_is_of_many_kinds_and_repeatable():
-    data = b"AT*REF=1,290718208\r"
-    made = [damaged(data, random.Random(7)) for _ in range(2)]
-    assert made[0] == made[1]
-    draw = random.Random(1)
-    lengths = {len(damaged(data, draw)) for _ in range(300)}
-    assert min(lengths) < len(data) < max(lengths)
+def hovering(rate_rad_s):
+    """Return what is seen of a vehicle that stands in the air and turns on the spot."""
+    still = Moment(S, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, True, 0.9)
+    turns = [(0.0, 0.0, math.remainder(rate_rad_s * i / 100, math.tau)) for i in range(250)]
+    moments = [replace(still, at_ns=S + i * S // 100, attitude=one) for i, one in enumerate(turns)]
+    return Record(moments=moments, marks={"told to hover": (S, S + 5 * S // 2)})
+
+
+def test_a_hover_that_spins_is_no_hover():
+    assert verdict(hovering(0.02), "hover_datagram_stops_it").end == "passed"
+    spun = verdict(hovering(-4.0), "hover_datagram_stops_it")
+    assert (spun.end, spun.why) == ("failed", "it turns by 4.00 rad/s")
+
+
+def limited(share):
+    """Return the flight under low limits by a vehicle that goes to a share of each."""
+    record, at_ns, yaw = Record(), S, 0.0
+    speed, climb, turn = 0.3 * share, 0.2 * share, math.radians(30.0) * share
+    for mark, velocity, rate in (
+        ("too fast ahead", (speed, 0.0, 0.0), 0.0),
+        ("too fast aslant", (-0.7 * speed, 0.7 * speed, 0.0), 0.0),
+        ("too fast up", (0.0, 0.0, climb), 0.0),
+        ("too fast down", (0.0, 0.0, -climb), 0.0),
+        ("too fast a turn", (0.0, 0.0, 0.0), turn),
+    ):
+        begin = at_ns
+        for _ in range(240):
+            at_ns, yaw = at_ns + S // 100, math.remainder(yaw + rate / 100, math.tau)
+            record.moments.append(Moment(at_ns, (0.0, 0.0, 1.0), velocity, (0.0, 0.0, yaw), False, True, 0.9))
+        record.marks[mark] = (begin, at_ns)
+    return record
+
+
+@pytest.mark.parametrize("name", ["speed_limit_is_flown", "climb_limit_is_flown", "turn_limit_is_flown"])
+def test_limits_are_flown(name):
+    ends = {share: verdict(limited(share), name).end for share in (0.3, 0.95, 2.0)}
+    assert ends == {0.3: "failed", 0.95: "passed", 2.0: "failed"}
 
 
 def test_an_unknown_word_is_refused_with_those_that_there_are():
     with pytest.raises(SettingsError) as refused:
         chosen("square,wings")
     said = "\n".join(refused.value.problems)
-    assert "called wings" in said and "silence" in said and "hover_datagram_stops_it" in said
+    assert "called wings" in said and "lossy" in said and "hover_datagram_stops_it" in said
     assert {one.flight for one in chosen("square, lands,kind")} == {"square", ""}
 
 

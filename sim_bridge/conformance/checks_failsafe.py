@@ -1,39 +1,11 @@
 """Checks of everything that stops a vehicle without an order, and of what must not start it again."""
 
-import math
-
 import numpy as np
 
 from groundstation.bus.messages import AckStage
 from groundstation.bus.topics import COMMAND_ACK, EVENT, VEHICLE_STATUS
-from groundstation.time_units import NS_PER_S
 from sim_bridge.conformance.check import Case, check
-from sim_bridge.conformance.record import turned
-
-_STILL_M_S, _STILL_RAD_S = 0.2, 0.15
-_LANDED_S = 14.0
-
-
-def _brakes(case: Case, mark: str, after_s: float) -> None:
-    """The vehicle has less than half of its speed after a while, and stands at the end of the span."""
-    begin, _ = case.record.span(mark)
-    before, later = case.record.at(begin).speed, case.record.at(begin + round(after_s * 1e9)).speed
-    assert later < max(_STILL_M_S, 0.5 * before), f"{later:.2f} m/s after {after_s} s, {before:.2f} before"
-
-
-def _still(case: Case, mark: str, skip_s: float = 0.0) -> None:
-    motion = case.record.motion(mark, skip_s)
-    assert motion, f"nothing was seen of: {mark}"
-    speed = max(one.speed for one in motion)
-    assert speed < _STILL_M_S, f"{speed:.2f} m/s"
-    turns = abs(turned(motion)) / max(1e-9, (motion[-1].at_ns - motion[0].at_ns) / NS_PER_S)
-    assert turns < _STILL_RAD_S, f"it turns by {turns:.2f} rad/s"
-
-
-def _lands(case: Case, mark: str, limit_s: float = _LANDED_S) -> None:
-    case.record.span(mark)
-    took = case.record.facts[mark]
-    assert took < limit_s, f"it stood after {took:.1f} s" if math.isfinite(took) else "it did not land"
+from sim_bridge.conformance.motions import brakes, lands, still, stops_without_positions
 
 
 def _modes(case: Case, mark: str) -> set[str]:
@@ -43,13 +15,13 @@ def _modes(case: Case, mark: str) -> set[str]:
 @check("silence")
 def silence_brakes(case: Case) -> None:
     """Without set-points it hovers: 0.3 s later it brakes, after 0.9 s it has lost half of its speed."""
-    _brakes(case, "silence", 0.95)
+    brakes(case, "silence", 0.95)
 
 
 @check("silence")
 def silence_ends_in_hover(case: Case) -> None:
     """1.3 s after the last set-point it stands."""
-    _still(case, "silence", 1.35)
+    still(case, "silence", 1.35)
 
 
 @check("silence")
@@ -62,7 +34,7 @@ def moment_of_silence_is_survived(case: Case) -> None:
 @check("silence")
 def long_silence_needs_resume(case: Case) -> None:
     """After a longer silence set-points move nothing until RESUME."""
-    _still(case, "set-points without RESUME", 0.2)
+    still(case, "set-points without RESUME", 0.2)
     assert _modes(case, "set-points without RESUME") == {"HOVER"}
 
 
@@ -84,7 +56,7 @@ def lasting_silence_lands(case: Case) -> None:
 @check("silence")
 def landing_is_latched(case: Case) -> None:
     """Set-points do not stop a landing."""
-    _lands(case, "landing")
+    lands(case, "landing")
     heights = [one.position[2] for one in case.record.motion("latched")]
     assert max(heights) - heights[0] < 0.15, f"it rose by {max(heights) - heights[0]:.2f} m"
 
@@ -106,7 +78,7 @@ def landed_stays_down(case: Case) -> None:
 @check("epochs")
 def new_epoch_moves_nothing(case: Case) -> None:
     """Set-points of a new epoch move nothing before RESUME."""
-    _still(case, "new epoch without RESUME")
+    still(case, "new epoch without RESUME")
 
 
 @check("epochs")
@@ -125,19 +97,19 @@ def new_epoch_counts_after_resume(case: Case) -> None:
 @check("epochs")
 def old_epoch_moves_nothing(case: Case) -> None:
     """Set-points of an older epoch move nothing."""
-    _still(case, "old epoch")
+    still(case, "old epoch")
 
 
 @check("epochs")
 def old_sequence_moves_nothing(case: Case) -> None:
     """Set-points with an older sequence number move nothing."""
-    _still(case, "old sequence")
+    still(case, "old sequence")
 
 
 @check("epochs")
 def other_source_moves_nothing(case: Case) -> None:
     """Set-points of anybody but the tracker move nothing, and are counted."""
-    _still(case, "other source")
+    still(case, "other source")
     counted = case.record.heard(VEHICLE_STATUS, "epoch far ahead")[-1].message.rejected
     assert counted.get("setpoint_other_source"), f"refused: {counted}"
 
@@ -145,27 +117,30 @@ def other_source_moves_nothing(case: Case) -> None:
 @check("epochs")
 def epoch_far_ahead_moves_nothing(case: Case) -> None:
     """A set-point of an epoch far ahead does not make the true ones look old."""
-    _still(case, "epoch far ahead")
+    still(case, "epoch far ahead")
     assert _modes(case, "epoch far ahead") == {"TRACK"}, f"{_modes(case, 'epoch far ahead')}"
 
 
 @check("epochs")
 def unconverged_moves_nothing(case: Case) -> None:
     """Set-points of a tracker that does not know where the vehicle is move nothing."""
-    _still(case, "not converged")
+    still(case, "not converged")
 
 
 @check("epochs")
 def stop_in_the_air_lands(case: Case) -> None:
     """SIGTERM in the air lands the vehicle; then the driver ends with exit code 0."""
-    _lands(case, "stopped in the air")
+    lands(case, "stopped in the air")
     assert case.record.exits == [0], f"exit code {case.record.exits}"
 
 
 @check("killed")
 def hover_datagram_stops_it(case: Case) -> None:
     """After kill -9 of its driver the kind's hover datagram stops the vehicle."""
-    _still(case, "told to hover", 1.8)
+    if case.subject.kind.habits.flies_on_estimate:
+        stops_without_positions(case, "told to hover")
+    else:
+        still(case, "told to hover", 1.8)
 
 
 @check("killed")
@@ -178,7 +153,7 @@ def hover_datagram_keeps_its_height(case: Case) -> None:
 @check("killed")
 def new_life_lands(case: Case) -> None:
     """A driver that starts while the vehicle flies lands it."""
-    _lands(case, "landing by a new life")
+    lands(case, "landing by a new life")
 
 
 @check("killed")
@@ -210,7 +185,7 @@ def supervisor_is_obeyed_again(case: Case) -> None:
 @check("orphaned")
 def orphan_lands(case: Case) -> None:
     """When the supervisor dies the driver lands the vehicle."""
-    _lands(case, "orphaned")
+    lands(case, "orphaned")
 
 
 @check("orphaned")
@@ -223,7 +198,7 @@ def orphan_ends(case: Case) -> None:
 @check("unheard")
 def unheard_vehicle_brakes(case: Case) -> None:
     """A vehicle that falls silent is told to hover: after 1.2 s it has lost half of its speed."""
-    _brakes(case, "silent vehicle", 1.2)
+    brakes(case, "silent vehicle", 1.2)
 
 
 @check("unheard")
@@ -236,7 +211,7 @@ def unheard_vehicle_is_lost(case: Case) -> None:
 @check("unheard")
 def unheard_vehicle_lands(case: Case) -> None:
     """A vehicle that stays silent is landed."""
-    _lands(case, "landing unheard")
+    lands(case, "landing unheard")
 
 
 @check("unheard")
@@ -271,7 +246,7 @@ def cut_needs_a_new_take_off(case: Case) -> None:
 @check("cut")
 def low_battery_lands(case: Case) -> None:
     """A charge below the limit lands it."""
-    _lands(case, "landing with a low battery")
+    lands(case, "landing with a low battery")
 
 
 @check("frozen")
@@ -279,13 +254,13 @@ def frozen_telemetry_stops_it(case: Case) -> None:
     """When its reports repeat themselves it is stopped within 2.5 s, and landed."""
     speeds = [one.speed for one in case.record.motion("frozen", 2.5)]
     assert not speeds or float(np.median(speeds[:100])) < 0.25, f"{np.median(speeds[:100]):.2f} m/s"
-    _lands(case, "landing frozen")
+    lands(case, "landing frozen")
 
 
 @check("jumping")
 def impossible_velocity_stops_it(case: Case) -> None:
     """When it reports a velocity that cannot be true it is stopped and landed."""
-    _lands(case, "landing jumping")
+    lands(case, "landing jumping")
 
 
 @check("jumping")

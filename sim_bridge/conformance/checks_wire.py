@@ -7,6 +7,7 @@ from groundstation.bus.topics import VEHICLE_STATUS
 from sim_bridge.conformance.bench import Bench
 from sim_bridge.conformance.check import Case, NotApplicable, check
 from sim_bridge.conformance.flights import LEG_S, SPEED_M_S, TURN_RAD_S, track_ahead
+from sim_bridge.conformance.motions import lands
 from sim_bridge.conformance.record import turned
 from sim_bridge.conformance.script import script
 
@@ -88,7 +89,7 @@ def loss_changes_no_way(case: Case) -> None:
 @check("lossy")
 def loss_keeps_no_vehicle_up(case: Case) -> None:
     """Over such a wire LAND lands it."""
-    _lands(case, "lossy landing")
+    lands(case, "lossy landing")
 
 
 @check("stranger")
@@ -108,7 +109,7 @@ def stranger_is_not_taken_for_it(case: Case) -> None:
         raise NotApplicable(_UNSEEN)
     said = [one.message.flight_state for one in case.record.heard(VEHICLE_STATUS, "a stranger alone")]
     assert said and said[-1] == "LOST", f"said: {said[-3:]}"
-    _lands(case, "landing beside a stranger")
+    lands(case, "landing beside a stranger")
 
 
 @check("stranger")
@@ -152,10 +153,4 @@ def damage_aloft_keeps_the_failsafe(case: Case) -> None:
     """Without set-points it stands 1.35 s later, and LAND lands it, all under damage."""
     speed = max(one.speed for one in case.record.motion("silence under damage", 1.35))
     assert speed < 0.2, f"{speed:.2f} m/s"
-    _lands(case, "landing under damage")
-
-
-def _lands(case: Case, mark: str) -> None:
-    case.record.span(mark)
-    took = case.record.facts[mark]
-    assert took < 14.0, f"it stood after {took:.1f} s" if math.isfinite(took) else "it did not land"
+    lands(case, "landing under damage")

@@ -153,6 +153,32 @@ def test_a_hover_that_spins_is_no_hover():
     assert (spun.end, spun.why) == ("failed", "it turns by 4.00 rad/s")
 
 
+def drifting(gathers_m_s2, stands=True):
+    """Return what is seen of a vehicle that is told to hover, brakes from 0.4 m/s, and gathers speed again."""
+    moments = []
+    for i in range(250):
+        speed = abs(max(0.0 if stands else 0.3, 0.4 - 0.004 * i) - gathers_m_s2 * max(0.0, i / 100 - 1.0))
+        one = Moment(S + i * S // 100, (0.0, 0.0, 1.0), (speed, 0.0, 0.0), (0.0, 0.0, 0.0), False, True, 0.9)
+        moments.append(one)
+    return Record(moments=moments, marks={"told to hover": (S, S + 5 * S // 2)})
+
+
+@pytest.mark.parametrize(
+    ("kind", "record", "end"),
+    [
+        ("mavlink", drifting(0.0), "passed"),
+        ("mavlink", drifting(0.17), "passed"),
+        ("mavlink", drifting(0.4), "failed"),
+        ("mavlink", drifting(0.0, stands=False), "failed"),
+        ("mavlink", hovering(0.5), "failed"),
+        ("tello", drifting(0.0), "passed"),
+        ("tello", drifting(0.17), "failed"),
+    ],
+)
+def test_only_who_flies_on_our_positions_may_gather_speed_without_them(kind, record, end):
+    assert verdict(record, "hover_datagram_stops_it", kind).end == end
+
+
 def limited(share):
     """Return the flight under low limits by a vehicle that goes to a share of each."""
     record, at_ns, yaw = Record(), S, 0.0

@@ -133,7 +133,7 @@ def measure(count: int, rounds: int) -> dict[str, Any]:
 @click.option(
     "--rounds", type=click.IntRange(1, 1000), default=7, show_default=True, help="Number of rounds; the median counts."
 )
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def ardrone(count: int, rounds: int, as_json: bool) -> int:
     """Time the AR.Drone codec in CPU time of one core.
 

@@ -18,7 +18,7 @@ _LIMITS = {
 
 
 @click.command(epilog="Example: groundstation bench console --seconds 20 --json")
-@click.option("--seconds", type=FiniteRange(2, 600), default=20.0, show_default=True, help="Length of the run [s].")
+@click.option("--seconds", type=FiniteRange(2, 600), default=20.0, show_default=True, help="How long to run [s].")
 @click.option("--drones", type=click.IntRange(1, 20), default=4, show_default=True, help="Number of drones that send.")
 @click.option("--no-browser", is_flag=True, help="Leave out what needs Chromium.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")

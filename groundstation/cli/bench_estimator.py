@@ -22,12 +22,12 @@ from groundstation.cli.exits import ExitCode
     show_default=True,
     help="Number of rounds; the fastest counts.",
 )
-@click.option("--duration", "duration_ms", type=click.IntRange(200, 60_000), default=1000, show_default=True,
+@click.option("--flight-ms", type=click.IntRange(200, 60_000), default=1000, show_default=True,
               help="Milliseconds of flight through the product's path.")  # fmt: skip
 @click.option("--field", "field_name", default="lab", show_default=True, help="Field file whose first drone is copied.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of beliefs and noise.")
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
-def estimator(robots: str, rounds: int, duration_ms: int, field_name: str, seed: int, as_json: bool) -> int:
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: int, as_json: bool) -> int:
     """Time the joint filter: a prediction of the team, a correction per edge, and an observation from bytes to bytes.
 
     CPU time of one core, least of all rounds; a busy machine adds to it. Exit code 1 when 30 robots were timed and a
@@ -52,7 +52,7 @@ def estimator(robots: str, rounds: int, duration_ms: int, field_name: str, seed:
         if terminal:
             click.echo(f"\r\033[K{text}", err=True, nl=False)
 
-    result = run_bench(sizes, resolved, rounds, duration_ms, seed, tell)
+    result = run_bench(sizes, resolved, rounds, flight_ms, seed, tell)
     tell("")
     click.echo(json.dumps(result, indent=1) if as_json else _table(result))
     agree = all(

@@ -13,7 +13,7 @@ _LIMITS = {"discovery_s": 2.0, "cores": 0.6, "telemetry_to_bus_ms": 3.0, "setpoi
 
 @click.command(epilog="Example: groundstation bench mavlink --link mavsdk --json")
 @click.option("--vehicles", type=click.IntRange(1, 50), default=10, show_default=True, help="Number of vehicles.")
-@click.option("--seconds", type=FiniteRange(1, 600), default=10.0, show_default=True, help="Length of the run [s].")
+@click.option("--seconds", type=FiniteRange(1, 600), default=10.0, show_default=True, help="How long to run [s].")
 @click.option(
     "--link",
     type=click.Choice(["pymavlink", "mavsdk"]),

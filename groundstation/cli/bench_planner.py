@@ -61,7 +61,7 @@ def numbers(value: str, option: str, low: int, high: int) -> list[int]:
     show_default=True,
     help="The planner of the experiments, or that which flies.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Write JSON to standard output.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def planner(
     robots: str, layout: str, peer: str, repeats: int, seed: int, limit_s: float, model: str, as_json: bool
 ) -> None:

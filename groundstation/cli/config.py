@@ -27,7 +27,10 @@ def config() -> None:
 @_OPTION
 @click.option("--scenario", metavar="S", help="Check a scenario (a name or a path) as well.")
 @click.option(
-    "--json", "as_json", is_flag=True, help='Print {"ok", "problems", "findings": [{file, line, path, level, text}]}.'
+    "--json",
+    "as_json",
+    is_flag=True,
+    help='Print JSON: {"ok", "problems", "findings": [{file, line, path, level, text}]}.',
 )
 def check(field: str, options: tuple[str, ...], scenario: str | None, as_json: bool) -> int:
     """Name every mistake in a field file (a path, or `lab`), each with its line, and what is legal but foolish.

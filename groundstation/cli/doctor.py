@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @click.command(epilog="\b\nExamples:\n  groundstation doctor\n  groundstation doctor my_lab/lab.yaml --json")
 @click.argument("field", default="lab")
-@click.option("--json", "as_json", is_flag=True, help="Print a list of {level, subject, found, remedy}.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: [{level, subject, found, remedy}].")
 def doctor(field: str, as_json: bool) -> int:
     """Say what this machine lacks for flying a field file, and the remedy; nothing is started.
 

@@ -29,7 +29,7 @@ def _option(*names: str, **settings: Any) -> Callable[[Callable[..., None]], Cal
 def _world(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options every experiment of runs has."""
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Write the summary to standard output."),
+        click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON."),
         click.option("--figures/--no-figures", default=True, help="Draw pictures and an animation."),
         _option(
             "-o",

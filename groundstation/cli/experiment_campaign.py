@@ -39,7 +39,7 @@ def campaign_options(name: str) -> Callable[[Command], Command]:
             show_default=True,
             help="Folder of the results.",
         ),
-        click.option("--json", "as_json", is_flag=True, help="Write all flights to standard output."),
+        click.option("--json", "as_json", is_flag=True, help="Print all flights as JSON."),
     )
 
     def decorated(command: Command) -> Command:

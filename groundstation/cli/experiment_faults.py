@@ -23,7 +23,12 @@ from groundstation.cli.numbers import FiniteRange
 )
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
 @click.option(
-    "--seconds", type=FiniteRange(12, 600), default=20.0, show_default=True, help="Seconds of tracking in each flight."
+    "--duration",
+    "seconds",
+    type=FiniteRange(12, 600),
+    default=20.0,
+    show_default=True,
+    help="Seconds of tracking in each flight.",
 )
 @click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
 @click.option("--scenario", default="realistic", show_default=True, help="Scenario without faults: sensor errors.")

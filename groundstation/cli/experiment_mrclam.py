@@ -27,7 +27,7 @@ _FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
     show_default=True,
     help="Part of the data set, as shares of its length.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Write the results to standard output as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
 def mrclam(folder: Path, seed: int, span: tuple[float, float], as_json: bool) -> None:
     """Run the joint filter over a set of the UTIAS multi-robot localisation data (plain .dat files or .dat.xz).
 

@@ -27,15 +27,15 @@ _BATCH = 5
 )
 @click.argument("names", nargs=-1)
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each scenario.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the first flight.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
 @click.option(
     "--strategies",
     default="ours",
     show_default=True,
-    help="Of ours,string,reversed,flat,two-level,relay,chase.",
+    help="Strategies, of ours,string,reversed,flat,two-level,relay,chase.",
 )
 @click.option(
-    "--seconds", type=FiniteRange(5, 3600), default=None, help="Tracked in each flight; default: as its file."
+    "--duration", "seconds", type=FiniteRange(5, 3600), help="Seconds of tracking in each (default: as its file)."
 )
 @click.option(
     "--field", default=None, help="Field file, or a shipped one's name; default: as the scenario's file says."

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from groundstation.cli.exits import ExitCode, exit_code_of
-from groundstation.cli.verbs import ELSEWHERE, VERBS
+from groundstation.cli.verbs import ELSEWHERE, RENAMED, VERBS
 from groundstation.errors import GroundStationError, SettingsError
 
 
@@ -107,12 +107,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
             args=None if arguments is None else list(arguments), prog_name="groundstation", standalone_mode=False
         )
     except click.ClickException as error:
-        error.show()
+        (_with_new_spelling(error) if isinstance(error, click.NoSuchOption) else error).show()
         return exit_code_of(error)
     except (GroundStationError, click.Abort, KeyboardInterrupt, OSError) as error:
         _tell(error)
         return exit_code_of(error)
     return result if isinstance(result, int) else ExitCode.OK
+
+
+def _with_new_spelling(error: click.NoSuchOption) -> click.NoSuchOption:
+    """Answer an old spelling with the new one, in place of those whose letters are alike."""
+    command = error.ctx.command_path.removeprefix("groundstation ") if error.ctx else ""
+    new = RENAMED.get(command, {}).get(error.option_name)
+    return click.NoSuchOption(error.option_name, f"{error.option_name} is {new} here.", ctx=error.ctx) if new else error
 
 
 def _tell(error: BaseException) -> None:

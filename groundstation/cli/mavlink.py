@@ -30,7 +30,7 @@ def mavlink() -> None:
     "Exit codes: 0 somebody answered, 2 wrong usage, 4 nobody did."
 )
 @click.argument("link")
-@click.option("--seconds", type=FiniteRange(0.5, 60), default=3.0, show_default=True, help="How long to listen.")
+@click.option("--seconds", type=FiniteRange(0.5, 60), default=3.0, show_default=True, help="How long to listen [s].")
 @click.option("--key-file", default="", help="Signing key, for a signed link.")
 @click.option("--mavsdk", "with_mavsdk", is_flag=True, help="Look through MAVSDK instead of pymavlink.")
 def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:

@@ -26,8 +26,10 @@ def init(name: str) -> None:
 @click.argument("name", metavar="SITE")
 @click.argument("host", metavar="HOST")
 @click.argument("address", metavar="ADDRESS")
-@click.option("--port", type=click.IntRange(1024, 65535), default=4717, show_default=True, help="The field's bus.port.")
-@click.option("--output", type=click.Path(path_type=Path), help="Where to (default: HOST.admission).")
+@click.option(
+    "--port", type=click.IntRange(1024, 65535), default=4717, show_default=True, help="Port that the run serves on."
+)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Where to (default: HOST.admission).")
 def admit(name: str, host: str, address: str, port: int, output: Path | None) -> None:
     """Admit HOST to SITE: write the file with which it joins. ADDRESS: the ground station's, as in `bus.listen`.
 

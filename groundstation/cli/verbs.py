@@ -92,3 +92,11 @@ ELSEWHERE = {
     "setup": "'mavlink setup'",
 }
 """Words of other ground stations, and those that stand one level down here: the likeness of letters would mislead."""
+
+RENAMED = {
+    "replay": {"--headless": "--until-end"},
+    "bench estimator": {"--duration": "--flight-ms"},
+    "experiment faults": {"--seconds": "--duration"},
+    "experiment scenarios": {"--seconds": "--duration"},
+}
+"""Old spellings of options by command: each had another meaning, or another name, elsewhere."""

@@ -169,7 +169,7 @@ def test_the_fastest_replay_loses_nothing(replay: Callable[..., Seen], recorded:
 
 
 def test_an_operator_leaves_it_with_ctrl_c(recorded: Recorded, free_port: int) -> None:
-    command = [sys.executable, "-m", "groundstation.cli.main", "replay", str(recorded.folder), "--headless"]
+    command = [sys.executable, "-m", "groundstation.cli.main", "replay", str(recorded.folder), "--until-end"]
     options = ["--port", str(free_port), "--speed", "20"]
     done = subprocess.run([*command, *options], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

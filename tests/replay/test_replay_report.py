@@ -20,7 +20,7 @@ def done(*arguments: object) -> str:
     return result.output
 
 
-KINDS = {"re-run": ("--rerun", "tracker"), "what-if": ("--set", CHANGE)}
+KINDS = {"re-run": ("--recompute",), "what-if": ("--set", CHANGE)}
 
 
 @pytest.fixture(scope="module")

@@ -31,17 +31,17 @@ def code_of(*arguments: object) -> tuple[int, str]:
 
 
 @pytest.fixture
-def verdict(tmp_path: Path) -> Any:
+def verdict() -> Any:
     def read(*arguments: object) -> tuple[int, dict[str, Any]]:
-        code, output = code_of(*arguments, "--json", tmp_path / "verdict.json")
+        code, output = code_of(*arguments, "--json")
         assert code >= 0, output
-        return code, dict(json.loads((tmp_path / "verdict.json").read_text()))
+        return code, dict(json.loads(output))
 
     return read
 
 
 def test_a_recording_is_repeated_to_the_bit(flown: Path, verdict: Any) -> None:
-    code, said = verdict(flown, "--rerun", "tracker")
+    code, said = verdict(flown, "--recompute")
     assert code == 0 and said["identical"]
     compared = said["comparison"]
     assert set(compared["same"]) == SAID and compared["same"]["estimate"] == compared["ticks"] == 400
@@ -61,7 +61,7 @@ def test_one_measurement_changed_by_a_nanometre_is_noticed(flown: Path, tmp_path
         message["position_m"][0] += 1e-9
         return json.dumps(message).encode()
 
-    code, said = verdict(rewritten(flown, tmp_path / "changed", change), "--rerun", "tracker")
+    code, said = verdict(rewritten(flown, tmp_path / "changed", change), "--recompute")
     assert code == 1 and not said["identical"]
     first = said["first_differences"][0]
     at_s = float(first.split(", ")[1].split(" s")[0])
@@ -79,7 +79,7 @@ def test_an_input_that_was_not_recorded_is_named(flown: Path, tmp_path: Path) ->
             return None
         return record.data
 
-    code, output = code_of(rewritten(flown, tmp_path / "lost", lose), "--rerun", "tracker")
+    code, output = code_of(rewritten(flown, tmp_path / "lost", lose), "--recompute")
     assert code == 1
     assert "1 messages that the tracker took in are not recorded" in output
     assert f"{lost[0].key} number 1000" in output
@@ -91,7 +91,7 @@ def test_what_was_lost_of_the_outputs_is_no_difference(flown: Path, tmp_path: Pa
         tmp_path / "some",
         lambda r: None if r.key.topic.name in ("innovation", "plan") and r.sequence % 7 == 0 else r.data,
     )
-    code, said = verdict(some, "--rerun", "tracker")
+    code, said = verdict(some, "--recompute")
     assert code == 0
     assert set(said["comparison"]["unrecorded"]) == {"innovation", "plan"}
 
@@ -99,7 +99,7 @@ def test_what_was_lost_of_the_outputs_is_no_difference(flown: Path, tmp_path: Pa
 def test_a_cut_recording_is_repeated_as_far_as_it_goes(flown: Path, tmp_path: Path, verdict: Any) -> None:
     whole = (flown / "state.mcap").read_bytes()
     (tmp_path / "state.mcap").write_bytes(whole[: len(whole) * 2 // 3])
-    code, said = verdict(tmp_path / "state.mcap", "--rerun", "tracker")
+    code, said = verdict(tmp_path / "state.mcap", "--recompute")
     assert 100 < said["comparison"]["ticks"] < 400
     assert said["comparison"]["damage"] and said["comparison"]["differing"] == 0
     assert code == 0
@@ -110,7 +110,7 @@ def test_a_journal_that_begins_late_proves_nothing(flown: Path, tmp_path: Path) 
         early = record.key.topic.name == "journal" and json.loads(record.data)["tick"] < 30
         return None if early else record.data
 
-    code, output = code_of(rewritten(flown, tmp_path / "late", change), "--rerun", "tracker")
+    code, output = code_of(rewritten(flown, tmp_path / "late", change), "--recompute")
     assert code == 1
     assert "the journal begins, or goes on after a gap, at tick 30" in output
 
@@ -126,7 +126,7 @@ def test_other_settings_are_computed_the_same_twice(flown: Path, tmp_path: Path,
     assert (inflated["after"] or 0) > (inflated["before"] or 0)
     assert 0.0 < figures["target rmse [m]"]["after"] < 0.5  # judged by the recorded truth
     # What was written is a run of its own: with its settings in it, it is repeated to the bit.
-    assert code_of(tmp_path / "what-if", "--rerun", "tracker")[0] == 0
+    assert code_of(tmp_path / "what-if", "--recompute")[0] == 0
     assert open_source([tmp_path / "what-if"]).resolved.planner.horizon_steps == 3
 
 
@@ -146,8 +146,8 @@ def test_the_estimator_of_another_file(flown: Path, tmp_path: Path, verdict: Any
 
 def test_the_truth_is_for_judging_only(flown: Path, tmp_path: Path, verdict: Any) -> None:
     blind = rewritten(flown, tmp_path / "blind", without("state"))
-    _, seeing = verdict(flown, "--rerun", "tracker")
-    _, unseeing = verdict(blind, "--rerun", "tracker")
+    _, seeing = verdict(flown, "--recompute")
+    _, unseeing = verdict(blind, "--recompute")
     assert seeing["output_sha256"] == unseeing["output_sha256"]
 
 
@@ -159,7 +159,7 @@ def test_the_truth_is_for_judging_only(flown: Path, tmp_path: Path, verdict: Any
     ],
 )
 def test_what_cannot_be_repeated_says_why(flown: Path, tmp_path: Path, topics: tuple[str, ...], reason: str) -> None:
-    code, output = code_of(rewritten(flown, tmp_path / "less", without(*topics)), "--rerun", "tracker")
+    code, output = code_of(rewritten(flown, tmp_path / "less", without(*topics)), "--recompute")
     assert code == -1 and reason in output
 
 

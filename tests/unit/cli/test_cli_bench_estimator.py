@@ -63,7 +63,7 @@ def test_the_path_explains_every_observation(late_ms):
 
 
 def test_the_command_reports_rows_and_agreement():
-    arguments = ["--robots", "3", "--rounds", "2", "--duration", "200", "--json"]
+    arguments = ["--robots", "3", "--rounds", "2", "--flight-ms", "200", "--json"]
     result = CliRunner().invoke(bench_estimator.estimator, arguments)
     assert result.exception is None or result.exit_code == 0, result.output
     found = json.loads(result.stdout)
@@ -88,7 +88,7 @@ def test_the_path_of_blocks_as_flown_is_judged_on_its_own():
 
 def test_without_filterpy_the_rest_is_timed_and_the_remedy_named(monkeypatch):
     monkeypatch.setattr(estimator_peers, "find_spec", lambda name: None)
-    result = CliRunner().invoke(bench_estimator.estimator, ["--robots", "2", "--rounds", "2", "--duration", "200"])
+    result = CliRunner().invoke(bench_estimator.estimator, ["--robots", "2", "--rounds", "2", "--flight-ms", "200"])
     assert "pip install" in result.stdout
     assert "numpy" in result.stdout
 

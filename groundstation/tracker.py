@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, SearchedPicture, Severity, Verdict
+from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
 from groundstation.control.lookout import Lookout
@@ -122,8 +122,7 @@ class Tracker:
         Never raises for what a message holds. Refused observations are also among `take_corrections`.
         """
         verdict = self._intake.take(key, message, now_ns)
-        if isinstance(message, SearchedPicture) and message.header.clock == self._clock:
-            self.lookout.take(message)
+        self.lookout.take(message, message.header.clock == self._clock)
         if verdict is Verdict.ACCEPTED:
             return None
         self.rejected[f"{type(message).__name__} {verdict}"] += 1

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from groundstation.bus.messages import SearchedPicture, Severity, TargetSearch
+from groundstation.bus.messages import Message, SearchedPicture, Severity, TargetSearch, VehicleStatus
 from groundstation.bus.notice import Notice
 from groundstation.control.excursion import Excursions
 from groundstation.control.missing_robots import MissingRobots
@@ -14,12 +14,13 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import SensorSuite
 from groundstation.time_units import NS_PER_S
 
+_OBEYS = "TRACK"  # a driver's mode in which setpoints move the drone
 _CALL_REMEDY = "check its marker and the light; drive it into the middle of the room; or land the team"
 _ROBOT_REMEDY = "check its marker and that camera; land it if it strays"
 
 
 class Lookout:
-    """Use: `take` pictures, `advance` with each belief; read `targets`, `missing`, `missed_s`, `take_notices`."""
+    """Use: `take` messages, `advance` with each belief; read `targets`, `missing`, `missed_s`, `take_notices`."""
 
     def __init__(
         self, search: SearchParameters, control: ControlParameters, sensors: SensorSuite,
@@ -29,6 +30,8 @@ class Lookout:
         self._search = Search(search, control.lost_after_s, sensors, targets, self._excursions)
         self._robots = MissingRobots(sensors, robots)
         self._names = tuple(robots)
+        self._modes: dict[str, str] = {}
+        self._told = dict.fromkeys(targets, SearchMode.SEARCH)
         self._notices: list[Notice] = []
 
     @property
@@ -46,10 +49,14 @@ class Lookout:
         """Return since when cameras should see which robots and do not [s]."""
         return self._robots.missed_s
 
-    def take(self, picture: SearchedPicture) -> None:
-        """Take a picture that was searched all over."""
-        self._search.take(picture)
-        self._robots.take(picture)
+    def take(self, message: Message, in_our_time: bool = True) -> None:
+        """Take in the mode of a driver, or a picture that was searched all over; one in foreign time does not count."""
+        match message:
+            case VehicleStatus():
+                self._modes[message.header.entity] = message.mode
+            case SearchedPicture() if in_our_time:
+                self._search.take(message)
+                self._robots.take(message)
 
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
         """Count all pictures; returns the targets that are not where the belief has them any more.
@@ -60,20 +67,20 @@ class Lookout:
         for name in self._robots.advance(belief, self._excursions.unseen_s):
             text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))
-        before = {name: state.mode for name, state in self.targets.items()}
-        gone = self._search.advance(belief, {name: age_s for name, age_s in ages_s.items() if name in before})
-        self._tell(before)
+        gone = self._search.advance(belief, {name: age_s for name, age_s in ages_s.items() if name in self.targets})
+        self._tell()
         return gone
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
         """Return where robots look for targets."""
-        before = {name: state.mode for name, state in self.targets.items()}
         found = self._search.stands(robots, targets, belief)
-        self._tell(before)
+        self._tell()
         return found
 
     def searches(self, now_ns: int) -> tuple[TargetSearch, ...]:
-        """Return how the search for each target that is searched for stands, for people."""
+        """Return how the search for each target that is searched for stands, for people; none while nobody searches."""
+        if not self._obeyed:
+            return ()
         return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
 
     def take_notices(self) -> list[Notice]:
@@ -81,11 +88,17 @@ class Lookout:
         notices, self._notices = self._notices, []
         return notices
 
-    def _tell(self, before: Mapping[str, SearchMode]) -> None:
-        """Say of each target that a search for it began, ended, or became hopeless."""
+    @property
+    def _obeyed(self) -> bool:
+        """Whether any robot flies where the search wants it: not while all hold or land."""
+        return _OBEYS in self._modes.values()
+
+    def _tell(self) -> None:
+        """Say of each target that a search for it began, ended, or became hopeless, once there is one who searches."""
         for name, state in self.targets.items():
-            if state.mode is before[name]:
+            if state.mode is self._told[name] or (state.mode is not SearchMode.TRACK and not self._obeyed):
                 continue
+            self._told[name] = state.mode
             if state.mode is SearchMode.LOST:
                 text = f"{name} is not found: {state.excluded:.0%} of the room was searched"
                 self._notices.append(Notice(Severity.ERROR, text, _CALL_REMEDY, name))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from groundstation.bus.messages import Header, SearchedPicture, Severity
+from groundstation.bus.messages import FlightState, Header, SearchedPicture, Severity, VehicleStatus
 from groundstation.control.lookout import Lookout
 from groundstation.control.parameters import control_from_field
 from groundstation.control.search_parameters import search_from_field
@@ -25,13 +25,18 @@ def belief(stamp_s: float) -> JointBelief:
     return JointBelief(mean, np.diag(variances), layout, round(stamp_s * 1e9))
 
 
-def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() -> None:
-    lookout = Lookout(
+def driver_in(mode: str) -> VehicleStatus:
+    return VehicleStatus(header=Header(0, "c", "drone_1", "driver", 1), flight_state=FlightState.FLYING, mode=mode)
+
+
+def lookout_of_the_lab() -> Lookout:
+    return Lookout(
         search_from_field(LAB), control_from_field(LAB), sensors_from_field(LAB), ("drone_1",), ("turtlebot",)
     )
-    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1})
-    lookout.take_notices()
-    assert lookout.searches(0) == ()
+
+
+def look_in_vain(lookout: Lookout) -> None:
+    """Take 1.6 s of pictures without the target."""
     for tick in range(1, 80):
         now_s = 0.02 * (tick + 1)
         header = Header(round(now_s * 1e9), "c", "drone_1", "drone_1_camera", tick)
@@ -39,6 +44,15 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
             lookout.take(SearchedPicture(header=header, observer="drone_1", camera="drone_1_camera"))
         lookout.advance(belief(now_s), {"drone_1": 0.1, "turtlebot": now_s})
         lookout.stands(("drone_1",), lookout.missing, belief(now_s))
+
+
+def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() -> None:
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1})
+    lookout.take_notices()
+    assert lookout.searches(0) == ()
+    look_in_vain(lookout)
     (notice,) = lookout.take_notices()
     assert notice.severity is Severity.WARNING
     assert notice.entity == "turtlebot"
@@ -53,3 +67,20 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     lookout.advance(belief(1.7), {"drone_1": 0.1, "turtlebot": 0.1})
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     assert lookout.searches(round(1.7e9)) == ()
+
+
+def test_nobody_is_said_to_search_who_lands_or_holds() -> None:
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1})
+    assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
+    lookout.take(driver_in("LANDING"))
+    look_in_vain(lookout)
+    assert lookout.missing == ("turtlebot",)
+    assert lookout.take_notices() == []
+    assert lookout.searches(round(1.6e9)) == ()
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(1.64), {"drone_1": 0.1, "turtlebot": 1.6})
+    (notice,) = lookout.take_notices()
+    assert "the team searches around" in notice.text
+    assert [search.target for search in lookout.searches(round(1.64e9))] == ["turtlebot"]

@@ -20,12 +20,12 @@ _FORGOTTEN_S = 1.0
 
 @dataclass(slots=True)
 class _Track:
-    """One body: its last pose, since when it repeats, and the sum of its jumps [m]."""
+    """One body: its last pose, since when it has been there to the bit, and the sum of its jumps [m]."""
 
     stamp_ns: int
     position: Vector3
+    since_ns: int
     repeats: int = 0
-    since_ns: int = 0
     offset: Vector3 = (0.0, 0.0, 0.0)
     jumped_m: float = 0.0
 
@@ -63,16 +63,15 @@ class BodyWatch:
         self._exchanged = {pair for pair in self._exchanged if not pair & set(gone)}
 
     def _reach_m(self, track: _Track, stamp_ns: int) -> float:
-        """Return how far a body may have moved since its last pose [m]."""
-        return self.max_speed_m_s * max(0, stamp_ns - track.stamp_ns) / NS_PER_S + _MARGIN_M
+        """Return how far a body may have moved since its pose was new [m]: behind a frozen one it flies on."""
+        return self.max_speed_m_s * max(0, stamp_ns - track.since_ns) / NS_PER_S + _MARGIN_M
 
     def _follow(self, name: str, stamp_ns: int, position: Vector3, jump: Vector3 | None) -> None:
-        track = self._tracks.setdefault(name, _Track(stamp_ns, position))
+        track = self._tracks.setdefault(name, _Track(stamp_ns, position, stamp_ns))
         if position == track.position:
             track.repeats += 1
         else:
             track.repeats, track.since_ns = 0, stamp_ns
-        track.since_ns = track.since_ns or stamp_ns
         if jump is not None:
             x, y, z = track.offset
             track.offset = (x + jump[0], y + jump[1], z + jump[2])

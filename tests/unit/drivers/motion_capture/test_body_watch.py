@@ -45,6 +45,16 @@ def test_a_pose_that_repeats_to_the_last_bit_is_frozen_after_a_fifth_of_a_second
     assert hall.look()["b"] == ""
 
 
+def test_a_body_that_flew_on_while_its_stream_was_frozen_is_believed_at_once() -> None:
+    hall = Hall()
+    hall.fly()
+    frozen = {"a": hall.at("a"), "b": hall.at("b")}
+    told = [hall.look(**frozen) for _ in range(150)]
+    assert "frozen" in told[-1]["a"] and "frozen" in told[-1]["b"]
+    assert math.dist(frozen["a"], hall.at("a")) > 0.5
+    hall.fly()
+
+
 def test_a_jump_is_refused_until_the_body_is_back() -> None:
     hall = Hall()
     hall.fly()

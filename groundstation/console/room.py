@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone, camera_name
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import WorldCamera
+from groundstation.field.room import MotionCapture, WorldCamera
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
 
@@ -26,6 +26,7 @@ def scene_from_field(field: ResolvedField, truth: bool) -> Json:
         "room": msgspec.to_builtins(field.room),
         "drones": [_drone(name, drone) for name, drone in field.drones.items()],
         "cameras": [_world_camera(name, camera) for name, camera in field.cameras.items()],
+        "volumes": [_volume(name, one, name in field.truth.values()) for name, one in field.motion_capture.items()],
         "targets": [{"name": name, "height_m": target.marker.height_m} for name, target in field.tracked.items()],
         "horizon": {"steps": planner.horizon_steps, "step_s": planner.step_s},
         "hysteresis": planner.hysteresis,
@@ -42,6 +43,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
         "room": {"size_m": [8.0, 6.0, 4.5], "fence": None},
         "drones": [{"name": name, "battery_min": 0.15} for name in drones],
         "cameras": [],
+        "volumes": [],
         "targets": [],
         "horizon": {"steps": 10, "step_s": 0.3},
         "hysteresis": 0.0,
@@ -75,6 +77,10 @@ def _drone(name: str, drone: FieldDrone) -> Json:
 def _world_camera(name: str, camera: WorldCamera) -> Json:
     rays = _rays(intrinsics_of(camera.calibration), world_from_downward_optical(camera.rotation_deg))
     return {"name": name, "position_m": camera.position_m, "rays": rays, "observes": camera.observes}
+
+
+def _volume(name: str, system: MotionCapture, is_truth: bool) -> Json:
+    return {"name": name, "truth": is_truth, **msgspec.to_builtins(system.volume_m)}
 
 
 def _rays(lens: CameraIntrinsics, rotation: Array) -> list[list[float]]:

@@ -10,7 +10,7 @@ from foxglove import messages as fm
 
 from groundstation.arrays import Array
 from groundstation.bus import messages as m
-from groundstation.engineering_views.scene import LINK_COLOUR, Body, Rgb, SensingLink, ViewScene
+from groundstation.engineering_views.scene import LINK_COLOUR, VOLUME_COLOUR, Body, Rgb, SensingLink, ViewScene
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.time_units import NS_PER_S
@@ -32,7 +32,8 @@ class FoxgloveScene:
 
     def __init__(self, field: ResolvedField | None) -> None:
         self._scene = ViewScene(field)
-        self._static = _static(field)
+        volumes = [_box(sides, VOLUME_COLOUR) for sides in self._scene.volumes.values()]
+        self._static = [*_static(field), *(line for box in volumes for line in box)]
         self._links: list[SensingLink] = []
         self._arrows: dict[str, tuple[Array, Array]] = {}
         self._next_ns = 0

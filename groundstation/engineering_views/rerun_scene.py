@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 
 from groundstation.bus import messages as m
 from groundstation.bus.topics import Topic
-from groundstation.engineering_views.scene import LINK_COLOUR, TARGET_COLOUR, Body, ViewScene
+from groundstation.engineering_views.scene import LINK_COLOUR, TARGET_COLOUR, VOLUME_COLOUR, Body, Rgb, Sides, ViewScene
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Room
 from groundstation.geometry.angles import quaternion_from_euler
@@ -89,17 +89,22 @@ class RerunScene:
         if field is None:
             return
         self._log_room(field.room)
+        for name, sides in self._scene.volumes.items():
+            self._log_box(f"world/{name}", sides, VOLUME_COLOUR, name)
         for camera in self._scene.cameras:
             self._log_camera(camera, field)
 
     def _log_room(self, room: Room) -> None:
         x, y, z = room.size_m
+        self._log_box("world/room", ((-x / 2, x / 2), (-y / 2, y / 2), (0.0, z)), (90, 90, 90))
+        self._log_box("world/fence", (room.fence.x_m, room.fence.y_m, room.fence.z_m), TARGET_COLOUR)
+
+    def _log_box(self, path: str, sides: Sides, colour: Rgb, label: str = "") -> None:
+        low, high = np.array(sides).T
+        labels = [label] if label else None
         wire = rr.components.FillMode.MajorWireframe
-        walls = rr.Boxes3D(sizes=[[x, y, z]], centers=[[0, 0, z / 2]], colors=[[90] * 3], fill_mode=wire)
-        low, high = np.array([room.fence.x_m, room.fence.y_m, room.fence.z_m]).T
-        fence = rr.Boxes3D(mins=[low], sizes=[high - low], colors=[TARGET_COLOUR], fill_mode=wire)
-        self._log("world/room", walls, static=True)
-        self._log("world/fence", fence, static=True)
+        box = rr.Boxes3D(mins=[low], sizes=[high - low], colors=[colour], fill_mode=wire, labels=labels)
+        self._log(path, box, static=True)
 
     def _log_camera(self, camera: Transform, field: ResolvedField) -> None:
         name = camera.child

@@ -13,6 +13,7 @@ from groundstation.recording.derived import camera_frames
 from groundstation.recording.viewers import Transform
 
 Rgb = tuple[int, int, int]
+Sides = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 _RING_POINTS = 40
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
@@ -20,6 +21,7 @@ _CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
 ROBOT_COLOURS: tuple[Rgb, ...] = ((0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233))
 TARGET_COLOUR: Rgb = (213, 94, 0)
 LINK_COLOUR: Rgb = (130, 130, 130)
+VOLUME_COLOUR: Rgb = (140, 150, 110)
 # An arrow is as long as the way in this time.
 ARROW_S = 2.0
 
@@ -47,7 +49,7 @@ class SensingLink:
 
 
 class ViewScene:
-    """Where everything is, as far as the messages so far say."""
+    """Where everything is, as far as the messages so far say; volumes: what motion capture systems see [m; world]."""
 
     def __init__(self, field: ResolvedField | None) -> None:
         self.field = field
@@ -55,7 +57,9 @@ class ViewScene:
         targets = field.tracked if field else {}
         self._target_heights_m = {name: target.marker.height_m for name, target in targets.items()}
         self._names = sorted(field.drones) if field else []
+        self.volumes: dict[str, Sides] = _volumes(field) if field else {}
         self._places = {one.child: one.position_m for one in self.cameras if one.parent == "world"}
+        self._places |= {name: (sum(x) / 2, sum(y) / 2, z[1]) for name, (x, y, z) in self.volumes.items()}
         self.bodies: dict[str, Body] = {}
 
     def colour(self, name: str) -> Rgb:
@@ -103,6 +107,11 @@ class ViewScene:
         c, s = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
         vector = np.array([c * forward - s * left, s * forward + c * left, up])
         return np.array(body.position_m), ARROW_S * vector
+
+
+def _volumes(field: ResolvedField) -> dict[str, Sides]:
+    boxes = {name: system.volume_m for name, system in field.motion_capture.items()}
+    return {name: (box.x_m, box.y_m, box.z_m) for name, box in boxes.items()}
 
 
 def _ring(position_m: tuple[float, float, float], covariance: Array) -> Array:

@@ -54,6 +54,13 @@ def _draw_room(axes: Axes, data: RunData) -> None:
             side, ha = (1, "right") if index % 2 == 0 else (-1, "left")  # neighbours do not hide each other
             axes.annotate(f"{height:g} m", (x + side * half_x, y - half_y), xytext=(-3 * side, 3),
                           textcoords="offset points", ha=ha, va="bottom", fontsize=8, color=_CAMERA)  # fmt: skip
+    for name, system in data.resolved.motion_capture.items():
+        (x_low, x_high), (y_low, y_high) = system.volume_m.x_m, system.volume_m.y_m
+        box = Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fc=_CAMERA, alpha=0.06, lw=0, zorder=0)
+        axes.add_patch(box)
+        axes.add_patch(Rectangle(box.xy, x_high - x_low, y_high - y_low, fill=False, ec=_CAMERA, lw=0.7, ls=":"))
+        axes.annotate(name, (x_low, y_high), xytext=(3, -3), textcoords="offset points", va="top", fontsize=8,
+                      color=_CAMERA)  # fmt: skip
 
 
 def _footprint_half_m(camera: WorldCamera, height_m: float) -> tuple[float, float]:
@@ -104,5 +111,11 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
         Line2D([], [], color=MUTED, marker="o", mfc="white", lw=0, label="start of tracking"),
         Line2D([], [], color=MUTED, marker="s", lw=0, label="end"),
         Line2D([], [], color="#b03a2e", lw=1.0, ls="--", label="fence"),
-        Patch(fc="#eef2e4", ec=_CAMERA, ls=":", lw=0.7, label="ceiling view\nat slot heights"),
+        Patch(fc="#eef2e4", ec=_CAMERA, ls=":", lw=0.7, label=_world_view(data)),
     ]
+
+
+def _world_view(data: RunData) -> str:
+    """Return what the dotted boxes show."""
+    cameras = ["ceiling view\nat slot heights"] if data.resolved.cameras else []
+    return "\n".join([*cameras, *(["motion capture's\nvolume"] if data.resolved.motion_capture else [])])

@@ -24,6 +24,7 @@ from groundstation.console.snapshot import Snapshot
 from groundstation.console.state import ConsoleState
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.state import Cast
+from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.time_units import NS_PER_S
@@ -267,6 +268,13 @@ def test_footprints_are_true_to_scale(field: ResolvedField) -> None:
     assert onboard[:, 0].min() > 0  # tilted 45 degrees down with less than 90 of view: all of it lies ahead
     assert onboard[:, 2].max() < 0
     assert json.loads(json.dumps(scene))["targets"][0]["name"] == "turtlebot"
+
+
+@pytest.mark.parametrize(("name", "is_truth"), [("mocap-lab", False), ("mocap-truth", True)])
+def test_the_volume_of_motion_capture_is_in_the_scene(name: str, is_truth: bool) -> None:
+    (volume,) = scene_from_field(resolved_field(load_field(find_field(name))), truth=False)["volumes"]
+    assert volume["name"] == "mocap" and volume["truth"] is is_truth
+    assert volume["x_m"][0] < -3 and volume["y_m"][1] > 2 and volume["z_m"][1] > 2
 
 
 def test_a_scene_without_a_field() -> None:

@@ -18,15 +18,9 @@ export function drawFootprints(g, view) {
     const height = up.length ? Math.max(...up) : 0;
     const points = footprint(camera.rays, camera.position_m, 0, height);
     if (!points.length) continue;
-    path(g, view, points, true);
-    g.setLineDash([2, 4]);
-    g.strokeStyle = ink().axis;
-    g.lineWidth = 1.5;
-    g.stroke();
-    g.setLineDash([]);
-    const [x, y] = view.point(Math.min(...points.map((p) => p[0])), Math.min(...points.map((p) => p[1])));
-    label(g, `${camera.name} at ${height.toFixed(1)} m`, x, y + 13, ink().dim, 11, 400, "left");
+    drawWorldView(g, view, points, `${camera.name} at ${height.toFixed(1)} m`);
   }
+  for (const volume of store.scene.volumes) drawVolume(g, view, volume);
   for (const drone of store.scene.drones) {
     const body = entity(drone.name);
     if (!body || !drone.camera) continue;
@@ -46,14 +40,38 @@ export function drawFootprints(g, view) {
   g.restore();
 }
 
+function drawWorldView(g, view, points, words) {
+  path(g, view, points, true);
+  g.setLineDash([2, 4]);
+  g.strokeStyle = ink().axis;
+  g.lineWidth = 1.5;
+  g.stroke();
+  g.setLineDash([]);
+  const [x, y] = view.point(Math.min(...points.map((p) => p[0])), Math.min(...points.map((p) => p[1])));
+  label(g, words, x, y + 13, ink().dim, 11, 400, "left");
+}
+
+// The box in which a motion capture system sees bodies, at whatever height.
+function drawVolume(g, view, { name, truth, x_m: [x0, x1], y_m: [y0, y1], z_m: [, top] }) {
+  drawWorldView(g, view, [[x0, y0], [x1, y0], [x1, y1], [x0, y1]], `${name}${truth ? " (truth)" : ""} up to ${top.toFixed(1)} m`);
+}
+
+const middle = ([low, high]) => (low + high) / 2;
+
+// Where the fixed sensors stand: cameras, and motion capture in the middle of its volume.
+function worldSensors() {
+  const volumes = store.scene.volumes.filter((volume) => !volume.truth);
+  return [...store.scene.cameras, ...volumes.map(({ name, x_m, y_m, z_m }) => ({ name, position_m: [middle(x_m), middle(y_m), z_m[1]] }))];
+}
+
 function place(name) {
   const body = entity(name);
   if (body) return body.mean;
-  return store.scene.cameras.find((camera) => camera.name === name)?.position_m;
+  return worldSensors().find((sensor) => sensor.name === name)?.position_m;
 }
 
 export function drawGraph(g, view) {
-  for (const camera of store.scene.cameras) drawCamera(g, view, camera);
+  for (const sensor of worldSensors()) drawSensor(g, view, sensor);
   const plan = store.s.plan;
   if (!plan || ageS(plan.at) > 2) return;
   const alpha = g.globalAlpha;
@@ -73,13 +91,13 @@ export function drawGraph(g, view) {
   }
 }
 
-function drawCamera(g, view, camera) {
-  const [x, y] = view.point(camera.position_m[0], camera.position_m[1]);
+function drawSensor(g, view, sensor) {
+  const [x, y] = view.point(sensor.position_m[0], sensor.position_m[1]);
   g.fillStyle = ink().link;
   g.fillRect(x - 7, y - 5, 14, 10);
   g.beginPath();
   g.arc(x, y, 3, 0, 7);
   g.fillStyle = ink().floor;
   g.fill();
-  label(g, camera.name, x, y + 18, ink().dim, 11, 500);
+  label(g, sensor.name, x, y + 18, ink().dim, 11, 500);
 }

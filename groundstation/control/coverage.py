@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from groundstation.control.stand import Stand
 from groundstation.estimation.room_map import RoomGrid
 from groundstation.geometry.angles import difference
 from groundstation.sensing.footprint import HEADINGS, Footprint, seen_from
+
+_ANY_ORDER = 3  # of so many robots any may choose first
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +42,15 @@ def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """The chosen viewpoints, with the chance to see the target there, and the time of arrival [s]."""
+    """The chosen viewpoints, with the chance to see the target there, and the time of arrival [s].
+
+    value: sum of the chances, each the less worth the later.
+    """
 
     stands: Mapping[str, Stand]
     chance: float
     after_s: float
+    value: float = 0.0
 
 
 def choose_stands(
@@ -59,10 +66,28 @@ def choose_stands(
 
     poses: x, y, z, yaw; allowed_s: by stand, within how long a robot may be there (negative: not at all); held: the
     stands so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
+    Of few robots, whoever had better choose first does; the first in the order of `footprints` if that is the same.
     """
-    left = np.array(chances)
+    orders = permutations(footprints) if len(footprints) <= _ANY_ORDER else (tuple(footprints),)
+    outlooks = [
+        _chosen(np.array(chances), lattice, {n: footprints[n] for n in order}, poses, allowed_s, held, parameters)
+        for order in orders
+    ]
+    return max(outlooks, key=lambda outlook: outlook.value)
+
+
+def _chosen(
+    left: Array,
+    lattice: Lattice,
+    footprints: Mapping[str, Footprint],
+    poses: Mapping[str, Array],
+    allowed_s: Mapping[str, Array],
+    held: Mapping[str, Stand],
+    parameters: SearchParameters,
+) -> Outlook:
+    """Return what robots that choose in this order choose; left: of the chances, changed."""
     stands: dict[str, Stand] = {}
-    missed, soonest = 1.0, math.inf
+    missed, soonest, total = 1.0, math.inf, 0.0
     for name, footprint in footprints.items():
         cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
         seen = seen_from(left, lattice.rows, lattice.columns, *cells)
@@ -74,18 +99,17 @@ def choose_stands(
         if not free.any():
             continue
         value = np.where(free[:, None], value, -1.0)
-        best = divmod(int(np.argmax(value)), HEADINGS)
         if name in held:
             kept = _nearest(held[name], lattice)
-            if value[kept] * parameters.keep_gain >= value[best]:
-                best = kept
-        stand, heading = best
+            value[kept] *= parameters.keep_gain
+        stand, heading = divmod(int(np.argmax(value)), HEADINGS)
         x, y = lattice.places[stand].tolist()
         stands[name] = Stand(x, y, math.tau * heading / HEADINGS)
         missed *= 1.0 - float(seen[stand, heading])
         soonest = min(soonest, float(way_s[stand, heading]))
+        total += float(value[stand, heading])
         _take(left, lattice, footprint, stand, heading)
-    return Outlook(stands, 1.0 - missed, soonest if stands else math.inf)
+    return Outlook(stands, 1.0 - missed, soonest if stands else math.inf, total)
 
 
 def _way_s(pose: Array, places: Array, parameters: SearchParameters) -> Array:

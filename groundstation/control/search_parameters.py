@@ -1,18 +1,25 @@
 """Settings of the search for targets that are not seen."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
+from groundstation.sensing.from_field import TAG_SQUARES
 
 Interval = tuple[float, float]
+
+SEARCH_PX = 8.8
+"""So large a square is found in 86 % of the pictures that are searched all over (docs/reference/vision.md 2)."""
 
 
 @dataclass(frozen=True, slots=True)
 class SearchParameters:
     """How a target that is not seen is searched for.
 
-    room_m: size along x and y; observers: robots and world-fixed cameras that may see targets; height_m: of the search;
+    room_m: size along x and y; ranges_m: how far each robot's pictures are searched with success, farther than plans
+    count on; observers: robots and world-fixed cameras that may see targets; height_m: of the search;
     begin_after_s: unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is
     where it was predicted below which the search begins, though `lost_after_s` is not over; speed_m_s, yaw_rate_rad_s:
     as fast as pictures stay sharp and follow each other densely enough; patience_s: what is seen so much later counts
@@ -27,6 +34,7 @@ class SearchParameters:
     fence_y_m: Interval
     height_m: float
     observers: tuple[str, ...]
+    ranges_m: Mapping[str, float] = field(default_factory=dict)
     apart_m: float = 1.0
     fence_inset_m: float = 0.3
     begin_after_s: float = 0.6
@@ -45,16 +53,25 @@ class SearchParameters:
     lost_excluded: float = 0.85
 
 
-def search_from_field(field: ResolvedField) -> SearchParameters:
+def search_from_field(resolved: ResolvedField) -> SearchParameters:
     """Return the settings of a resolved field."""
-    room, planner = field.room, field.planner
-    fixed: dict[str, WorldCamera | MotionCapture] = {**field.cameras, **field.sensing_capture}
+    room, planner = resolved.room, resolved.planner
+    fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
     cameras = tuple(name for name, sensor in fixed.items() if "targets" in sensor.observes)
     return SearchParameters(
         room_m=(room.size_m[0], room.size_m[1]),
         fence_x_m=room.fence.x_m,
         fence_y_m=room.fence.y_m,
         height_m=planner.level_heights_m[0][0],
-        observers=(*field.drones, *cameras),
+        observers=(*resolved.drones, *cameras),
+        ranges_m={name: _range_m(drone, resolved) for name, drone in resolved.drones.items()},
         apart_m=max(1.0, planner.separation_m),
     )
+
+
+def _range_m(drone: FieldDrone, resolved: ResolvedField) -> float:
+    """Return how far a full search of a drone's pictures finds all targets, at least as far as plans go."""
+    markers = [target.marker for target in resolved.tracked.values()]
+    squares_mm = [m.square_mm if m.size_mm is None else m.size_mm / TAG_SQUARES for m in markers]
+    found_m = drone.camera.calibration.fx_px * min(squares_mm) / 1000 / SEARCH_PX
+    return max(resolved.planner.planned_range_m, found_m)

@@ -17,7 +17,7 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.footprint import footprint_of
-from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.models import OnboardCameraModel, SensorSuite
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
@@ -68,14 +68,14 @@ class Search:
         self.targets: dict[str, SearchState] = {name: SearchState(SearchMode.SEARCH, 0) for name in targets}
         self._lost_after_s, self._sensors, self._excursions = lost_after_s, sensors, excursions
         observers = [name for name in parameters.observers if name in sensors.onboard or name in sensors.world]
+        onboard = {name: _searching(camera, parameters.ranges_m.get(name)) for name, camera in sensors.onboard.items()}
         self._cameras = {
-            name: camera_rows([sensors.onboard.get(name) or sensors.world[name]], sensors.softness)
-            for name in observers
+            name: camera_rows([onboard.get(name) or sensors.world[name]], sensors.softness) for name in observers
         }
         marker_m = max((sensors.marker_height_m[name] for name in targets), default=0.0)
         self._footprints = {
             name: footprint_of(camera, self.grid.cell_m, parameters.height_m, marker_m, sensors.softness)
-            for name, camera in sensors.onboard.items()
+            for name, camera in onboard.items()
             if name in parameters.observers
         }
         self._lattice = lattice_of(self.grid, parameters)
@@ -226,3 +226,8 @@ class Search:
                 excluded=excluded,
                 expected_s=expected_s,
             )
+
+
+def _searching(camera: OnboardCameraModel, range_m: float | None) -> OnboardCameraModel:
+    """Return a camera with the range within which its pictures are searched."""
+    return camera if range_m is None else replace(camera, view=replace(camera.view, range_m=range_m))

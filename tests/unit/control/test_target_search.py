@@ -8,19 +8,23 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import Header, SearchedPicture
+from groundstation.control.coverage import choose_stands, lattice_of
 from groundstation.control.excursion import Excursions
 from groundstation.control.parameters import control_from_field
 from groundstation.control.search_parameters import SearchParameters, search_from_field
 from groundstation.control.target_search import Search, SearchMode
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.estimation.room_map import RoomGrid
 from groundstation.sensing.detection import detection
+from groundstation.sensing.footprint import footprint_of
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.visibility import camera_rows
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
-LAB = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml"))
+CONFIG = Path(__file__).parents[3] / "config"
+LAB = resolved_field(load_field(CONFIG / "lab.yaml"))
 SENSORS, CONTROL, SEARCH = sensors_from_field(LAB), control_from_field(LAB), search_from_field(LAB)
 NAMES = ("drone_1", "drone_2")
 TICK_S = 0.1
@@ -83,6 +87,37 @@ def test_a_target_at_rest_is_found_wherever_it_stands_and_stands_are_apart(place
     found_s, nearest, _ = fly(place)
     assert found_s < 45.0
     assert nearest >= SEARCH.apart_m - 1e-9
+
+
+def test_pictures_are_searched_as_far_as_a_full_search_finds_markers() -> None:
+    assert SEARCH.ranges_m["drone_1"] == pytest.approx(460 * 0.044 / 8.8)
+    far = resolved_field(load_field(CONFIG / "lab.yaml", ("planner.planned_range_m=3.0",)))
+    assert search_from_field(far).ranges_m["drone_1"] == 3.0
+    search, poses = new_search(), {"drone_1": np.array([0.0, 0.0, 1.6, 0.0])}
+    search.advance(belief(poses, 0.02), {"turtlebot": math.inf})
+    before = search.targets["turtlebot"].room
+    search.take(picture("drone_1", 0.02))
+    search.advance(belief(poses, 0.04), {"turtlebot": math.inf})
+    after = search.targets["turtlebot"].room
+    assert before is not None
+    assert after is not None
+    ahead, behind = (int(np.argmin(np.abs(search.grid.xs - x))) for x in (1.8, -1.8))
+    row = int(np.argmin(np.abs(search.grid.ys)))
+    assert after.chances[row, ahead] < 0.6 * before.chances[row, ahead]
+    assert after.chances[row, behind] > before.chances[row, behind]
+
+
+def test_each_searches_on_its_own_side_whoever_is_nearer_to_the_middle() -> None:
+    search, lattice = new_search(), lattice_of(RoomGrid.over(*SEARCH.room_m), SEARCH)
+    chances = np.zeros(search.grid.shape)
+    for x, share in ((-3.0, 0.6), (0.8, 0.4)):
+        chances[int(np.argmin(np.abs(search.grid.ys))), int(np.argmin(np.abs(search.grid.xs - x)))] = share
+    poses = {"near": np.array([-0.2, 0.0, 1.6, 0.0]), "far": np.array([-1.4, 0.0, 1.6, math.pi])}
+    view = footprint_of(SENSORS.onboard["drone_1"], search.grid.cell_m, 1.6, 0.4, SENSORS.softness)
+    anywhen = dict.fromkeys(poses, np.full(len(lattice.places), math.inf))
+    for names in (("near", "far"), ("far", "near")):
+        stands = choose_stands(chances, lattice, dict.fromkeys(names, view), poses, anywhen, {}, SEARCH).stands
+        assert stands["far"].x < -1.0 < stands["near"].x
 
 
 def test_a_target_that_is_nowhere_is_said_to_be_lost_when_the_room_was_searched() -> None:

@@ -211,7 +211,7 @@ class Tracker:
 
     def request(self) -> PlanRequest:
         """Return the snapshot for the next plan."""
-        warm = {} if self.current is None else {k: np.asarray(v) for k, v in self.current.controls.items()}
+        warm = {} if self.current is None else self.current.warm_start
         return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm)
 
     def adopt(self, plan: PlanResult) -> None:

@@ -71,8 +71,8 @@ class FrustumTeam:
 
     @property
     def warm_start(self) -> dict[str, Array] | None:
-        """Return the controls that are flown."""
-        return None if self.plan is None else dict(self.plan.controls)
+        """Return the controls that are flown, with the heights."""
+        return None if self.plan is None else self.plan.warm_start
 
     def fly(self, plan: PlanResult) -> None:
         """Follow a plan for one step, and see what can be seen."""
@@ -85,14 +85,13 @@ class FrustumTeam:
     def _move(self, plan: PlanResult) -> None:
         n, dt, noise = len(self.names), STEP_S, self.planner.parameters.noise
         F, q = np.eye(4 * n + 4), np.zeros(4 * n + 4)
-        heights = self._heights(plan.topology)
         for index, name in enumerate(self.names):
             pose = self._mean[4 * index : 4 * index + 4]
             vx, vy, rate = plan.controls[name]
             c, s = math.cos(pose[3]), math.sin(pose[3])
             step = dt * np.array([c * vx - s * vy, s * vx + c * vy])
             F[4 * index : 4 * index + 2, 4 * index + 3] = -step[1], step[0]
-            climb = max(-0.4 * dt, min(0.4 * dt, heights[name] - pose[2]))
+            climb = max(-0.4 * dt, min(0.4 * dt, plan.heights[name] - pose[2]))
             pose += [step[0], step[1], climb, rate * dt]
             q[4 * index : 4 * index + 4] = noise.robot_position, noise.robot_position, 1e-4, noise.robot_yaw
         F[4 * n, 4 * n + 2] = F[4 * n + 1, 4 * n + 3] = dt

@@ -15,7 +15,7 @@ class EstimatorValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
 
 class PlannerValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The search over topologies; row n of level_heights_m holds the n heights of a topology with n levels [m]."""
+    """The search over topologies; row n of level_heights_m: where it begins with n levels [m]."""
 
     rate_hz: int = 10
     mode: Literal["certified", "paper"] = "certified"

@@ -43,8 +43,9 @@ def most_information(
         width2 = camera.width_m * camera.width_m + SPREAD * (edge.blur_m2 + edge.turn_rad2 * most)
         likely = 1.0 / (1.0 + math.exp(min(-outside / math.sqrt(width2), 500.0))) + camera.tail_share
     single = camera.base_m * camera.base_m + camera.per_m2 * camera.per_m2 * square * square
-    lasting = camera.per_m * camera.per_m + turn_rad2
-    information: float = likely / (single / problem.options.readings + lasting * square)
+    lean = camera.per_m * camera.per_m
+    level = (square - upright * upright) * (turn_rad2 if edge.observer >= 0 else lean)
+    information: float = likely / (single / problem.options.readings + lean * upright * upright + level)
     return information
 
 
@@ -56,7 +57,7 @@ def lower_bound(problem: CostProblem, reach: Vector, low: Vector, high: Vector) 
     entities can reach; reach (n): of each robot per step [m], along the diagonal of its controls' box; low, high (n):
     between which heights it stays [m]. Penalties are at least 0. docs/explanation/planning.md 5.
     """
-    n, k, h, m = problem.poses.shape[0], problem.targets.shape[0], problem.heights.shape[0], problem.edges.shape[0]
+    n, k, h, m = problem.poses.shape[0], problem.targets.shape[0], problem.options.steps, problem.edges.shape[0]
     options, P, cameras, cost, discount = problem.options, problem.prior.copy(), problem.cameras, 0.0, 1.0
     turns = problem.yaw_variances.copy()
     sharper = np.empty(n)

@@ -126,7 +126,7 @@ class SearchState(NamedTuple):
 
 
 def search_state(start: Vector, report_size: int) -> SearchState:
-    """Return the state of a search that begins at a start in [-1, 1]^(3 n)."""
+    """Return the state of a search that begins at a start in [-1, 1]^(4 n)."""
     x: Vector = np.clip(start, -1.0, 1.0)
     n = x.size
     g, g_new, out, u = (np.empty(n) for _ in range(4))
@@ -139,7 +139,7 @@ def search_state(start: Vector, report_size: int) -> SearchState:
 
 @kernel()
 def solve(state: SearchState, problem: CostProblem, budget: int, limit: int, tolerance: float) -> bool:
-    """Minimise over x in [-1, 1]^(3 n), u = x * scale, for `budget` further evaluations; returns whether it is over.
+    """Minimise over x in [-1, 1]^(4 n), u = x * scale, for `budget` further evaluations; returns whether it is over.
 
     It is over when the projected gradient of cost / first cost is below the tolerance, when no step improves, or after
     `limit` evaluations in all; x is always the best point seen. A first cost that is not finite has no direction to go

@@ -51,9 +51,10 @@ class Weights:
 class PlannerParameters:
     """Settings of the planner.
 
-    level_heights_m: row n-1 holds the height slots of a topology with n levels, top first; more levels than rows are
-    not considered. hysteresis: relative gain a new topology must bring; within min_dwell_s of the last switch it must
-    bring urgent_gain. fence: drones' box in the floor plan, kept fence_margin_m away from (softly).
+    level_heights_m: row n-1 holds heights with which the search for a topology of n levels begins, top first; more
+    levels than rows are not considered, and heights are chosen between the lowest and the highest of all. hysteresis:
+    relative gain a new topology must bring; within min_dwell_s of the last switch it must bring urgent_gain. fence:
+    drones' box in the floor plan, kept fence_margin_m away from (softly).
     evaluation_budget and tolerance: of one solve. Of the starts of all topologies, at most `starts` of each, the
     `solves` cheapest get first_look evaluations, and the `finals` best of those go on to the end.
     target_weights: what a target's uncertainty counts in the cost beside the others', 1 where nothing is said.
@@ -90,8 +91,14 @@ class PlannerParameters:
         """Return a robot's motion limits."""
         return self.limits.get(robot, MotionLimits())
 
+    @property
+    def heights_m(self) -> tuple[float, float]:
+        """Return the lowest and the highest height that may be flown [m]."""
+        all_heights = [height for row in self.level_heights_m for height in row]
+        return min(all_heights), max(all_heights)
+
     def slots(self, levels: int) -> tuple[float, ...] | None:
-        """Return the heights of a topology with so many levels [m], or None when it has no slots."""
+        """Return the heights to begin with for so many levels [m], or None for more levels than may be flown."""
         return self.level_heights_m[levels - 1] if 0 < levels <= len(self.level_heights_m) else None
 
 

@@ -19,6 +19,7 @@ from groundstation.planning.problem import (
     Solution,
     scene_from_belief,
 )
+from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS
 from groundstation.planning.starts import Starts
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
@@ -29,7 +30,7 @@ class PlanResult:
     """The chosen topology with held controls.
 
     cost [m^2]: with penalties; uncertainty [m^2]: the discounted trace alone. controls: (vx, vy, yaw rate) per robot
-    [m/s, m/s, rad/s; base_stabilized]; heights: slot of each robot [m]. solver.status: complete | stopped (out of
+    [m/s, m/s, rad/s; base_stabilized]; heights: where each robot goes to [m]. solver.status: complete | stopped (out of
     time or evaluations: the best so far) | idle (no robot or no target). solver.gap: against a bound of all topologies
     and controls. solver.seconds is left 0: the core has no clock.
     """
@@ -44,6 +45,11 @@ class PlanResult:
     solver: SolverReport
     mode: str
     stamp_ns: int
+
+    @property
+    def warm_start(self) -> dict[str, Array]:
+        """Return the controls with the height after them (4 per robot), from which the next plan goes on."""
+        return {name: np.append(u, self.heights[name]) for name, u in self.controls.items()}
 
 
 @dataclass(slots=True)
@@ -138,28 +144,40 @@ class Planner:
         search = _Search(should_stop, max_evaluations, self.parameters)
         first = current if self.parameters.slots(len(current.levels)) else Topology.flat(current.robots)
         others = [t for t in self.options(current) if self.parameters.slots(len(t.levels)) and t != first]
-        self._optimise(search, scene, first, others, self._warm(scene, warm_start))
+        self._optimise(search, scene, first, others, warm_start)
         return self._result(belief.stamp_ns, scene, current, search, 1 + len(others))
 
     def options(self, current: Topology) -> tuple[Topology, ...]:
         """Return the other topologies that a step looks at."""
         return current.neighbours()
 
-    def _warm(self, scene: PlanningScene, warm_start: Mapping[str, Array] | None) -> Array:
+    def _warm(
+        self, scene: PlanningScene, warm_start: Mapping[str, Array] | None, rest: Array, starts: Starts, scale: Array
+    ) -> Array:
+        """Return the start that goes on with the last plan, as far as it is known and finite."""
         held = warm_start if warm_start and self.parameters.mode != "paper" else {}
-        scale = self._builder.scale(scene)
-        x = np.concatenate([np.asarray(held.get(name, np.zeros(3)), dtype=np.float64) for name in scene.robots]) / scale
-        return np.where(np.isfinite(x), np.clip(x, -1.0, 1.0), 0.0)
+        x = rest.copy().reshape(-1, ROBOT_CONTROLS)
+        for i, name in enumerate(scene.robots):
+            last = np.asarray(held.get(name, ()), dtype=np.float64)
+            x[i, : min(last.size, HEIGHT)] = (last / scale.reshape(x.shape)[i, : last.size])[:HEIGHT]
+            if last.size > HEIGHT:
+                x[i, HEIGHT] = starts.height(i, float(last[HEIGHT]))
+        return np.where(np.isfinite(x), np.clip(x, -1.0, 1.0), 0.0).ravel()
 
     def _optimise(
-        self, search: _Search, scene: PlanningScene, first: Topology, others: list[Topology], warm: Array
+        self,
+        search: _Search,
+        scene: PlanningScene,
+        first: Topology,
+        others: list[Topology],
+        warm_start: Mapping[str, Array] | None,
     ) -> None:
         """Solve the first topology, then the starts of all in the order of their costs, the likeliest first."""
         problem = self._builder.build(scene, first)
         search.least = self._builder.lower_bound(scene, problem)
-        search.solve(problem, warm)
+        starts = Starts(scene, self.parameters, self.sensors, problem.scale, self._builder.height_m)
+        search.solve(problem, self._warm(scene, warm_start, starts.rest(first), starts, problem.scale))
         best = search.solutions[first].controls / problem.scale
-        starts = Starts(scene, self.parameters, self.sensors, problem.scale)
         ranked: list[_Ranked] = []
         for topology in (first, *others):
             if search.must_stop():
@@ -168,7 +186,7 @@ class Planner:
             if search.must_stop():
                 return
             if self.parameters.mode == "paper":
-                ranked += [] if topology == first else [_Ranked(0.0, problem, np.zeros_like(best))]
+                ranked += [] if topology == first else [_Ranked(0.0, problem, starts.rest(topology))]
                 continue
             moved = {name for name in scene.robots if topology.level_of(name) != first.level_of(name)}
             own = starts.of(topology, None if topology == first else best, moved)
@@ -215,7 +233,7 @@ class Planner:
         best = search.solutions[choose(current, costs, self._required_gain(current, stamp_ns))]
         if not math.isfinite(best.cost):
             raise EstimatorFault("the expected uncertainty is not finite")
-        slots = self.parameters.slots(len(best.topology.levels)) or ()
+        heights, rows = self._builder.heights(best.controls), best.controls.reshape(-1, ROBOT_CONTROLS)
         status = "stopped" if search.stopped else "complete"
         gap = max(0.0, 1.0 - search.least / best.cost)
         report = SolverReport(status, search.evaluations, 0.0, considered, len(costs), gap)
@@ -224,8 +242,8 @@ class Planner:
             topology=best.topology,
             cost=best.cost,
             uncertainty=float(best.report[0]),
-            controls={name: best.controls[3 * i : 3 * i + 3] for i, name in enumerate(scene.robots)},
-            heights={name: slots[best.topology.level_of(name)] for name in scene.robots},
+            controls={name: row[:HEIGHT] for name, row in zip(scene.robots, rows, strict=True)},
+            heights=dict(zip(scene.robots, heights, strict=True)),
             edges=tuple(Edge(a, b, float(w)) for (a, b), w in zip(names, best.report[1:], strict=False)),
             alternatives=tuple(Alternative(str(t), cost) for t, cost in costs.items() if t != best.topology),
             solver=report,

@@ -13,12 +13,12 @@ from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
 from groundstation.planning.lbfgs import search_state, solve
 from groundstation.planning.parameters import PlannerParameters
-from groundstation.planning.records import TARGET_STATES, CostOptions, CostProblem, EdgeRow
+from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, TARGET_STATES, CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 from groundstation.sensing.visibility import camera_rows
 
-_BELOW_M = 0.1  # what is not so far below a robot's camera is never in its picture
+_LEAST_BAND_M = 1e-3  # of heights to choose from, where the field names one only
 _FLOPS_PER_CHECK = 1.5e6  # some 0.3 ms: how much is computed between two questions for the time
 _FLOPS_PER_EDGE = 300.0
 
@@ -66,7 +66,7 @@ def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> PlanningSc
 
 @dataclass(frozen=True, slots=True)
 class PlanningProblem:
-    """One topology's optimisation: minimise over x in [-1, 1]^(3 n), u = x * scale.
+    """One topology's optimisation: minimise over x in [-1, 1]^(4 n), u = x * scale.
 
     wanted: how many of the edges, which come first, are the topology's.
     """
@@ -77,13 +77,13 @@ class PlanningProblem:
 
     @property
     def scale(self) -> Array:
-        """Return the bounds of the controls (3 n)."""
+        """Return the bounds of the controls (4 n)."""
         return self.cost.scale
 
     @property
     def evaluations_at_once(self) -> int:
         """Return how many evaluations may pass between two questions for the time."""
-        steps, d = self.cost.heights.shape[0], self.cost.prior.shape[0]
+        steps, d = self.cost.options.steps, self.cost.prior.shape[0]
         flops = steps * (12.0 * d**3 + _FLOPS_PER_EDGE * len(self.cost.edges))
         return max(1, min(10, int(_FLOPS_PER_CHECK / flops)))
 
@@ -129,7 +129,7 @@ class LocalSearch:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Controls u (3 n) with their cost; report (1 + m): the uncertainty alone, each edge's mean information."""
+    """Controls u (4 n) with their cost; report (1 + m): the uncertainty alone, each edge's mean information."""
 
     topology: Topology
     cost: float
@@ -157,22 +157,24 @@ class ProblemBuilder:
         self.eyes = (*sensors.world, *sensors.onboard)
         self._cameras = camera_rows([*sensors.world.values(), *sensors.onboard.values()], sensors.softness)
         p, low, high = parameters, parameters.fence_margin_m, -parameters.fence_margin_m
+        bottom, top = parameters.heights_m
+        self.height_m, self._half_m = 0.5 * (bottom + top), max(0.5 * (top - bottom), _LEAST_BAND_M)
         self._options = CostOptions(
-            p.step_s, p.discount, p.noise.robot_position, p.noise.robot_yaw, p.noise.target_acceleration,
+            p.horizon_steps, p.step_s, p.discount,
+            p.noise.robot_position, p.noise.robot_yaw, p.noise.target_acceleration,
             p.weights.repulsion, p.separation_m, p.weights.fence,
             np.array([[p.fence.x_m[0] + low, p.fence.x_m[1] + high], [p.fence.y_m[0] + low, p.fence.y_m[1] + high]]),
-            p.weights.effort, p.weights.robots, max(1.0, sensors.sightings_per_s * p.step_s),
+            p.weights.effort, p.weights.robots, max(1.0, sensors.sightings_per_s * p.step_s), self.height_m,
         )  # fmt: skip
         self._of: PlanningScene | None = None
 
     def build(self, scene: PlanningScene, topology: Topology) -> PlanningProblem:
-        """Return the topology's problem; it must have height slots."""
+        """Return the topology's problem."""
         if scene is not self._of:
             self._share(scene)
-        heights = self._heights(scene, topology)
-        edges, wanted = self._edges(scene, topology, heights)
+        edges, wanted = self._edges(scene, topology)
         cost = CostProblem(
-            scale=self._scale, poses=scene.poses, targets=scene.moving, heights=heights, prior=scene.prior,
+            scale=self._scale, poses=scene.poses, targets=scene.moving, climbs=self._climbs, prior=scene.prior,
             yaw_variances=scene.yaw_variances, edges=edges, cameras=self._cameras, markers=self._markers,
             target_weights=self._target_weights, options=self._options,
         )  # fmt: skip
@@ -180,15 +182,21 @@ class ProblemBuilder:
 
     def lower_bound(self, scene: PlanningScene, problem: PlanningProblem) -> float:
         """Return what no topology and no controls can get below on this scene."""
-        reach = self._parameters.step_s * np.hypot(problem.scale[0::3], problem.scale[1::3])
-        slots = [height for row in self._parameters.level_heights_m for height in row]
-        low, high = np.minimum(scene.poses[:, 2], min(slots)), np.maximum(scene.poses[:, 2], max(slots))
+        held = problem.scale.reshape(-1, ROBOT_CONTROLS)
+        reach = self._parameters.step_s * np.hypot(held[:, 0], held[:, 1])
+        bottom, top = self._parameters.heights_m
+        low, high = np.minimum(scene.poses[:, 2], bottom), np.maximum(scene.poses[:, 2], top)
         return float(lower_bound(problem.cost._replace(edges=self._pairs.rows), reach, low, high))
 
     def scale(self, scene: PlanningScene) -> Array:
         """Return the bounds of the controls: any corner of the box respects the speed limit."""
         limits = [self._parameters.limits_of(name) for name in scene.robots]
-        return np.array([v for m in limits for v in (m.max_speed_m_s / 2**0.5,) * 2 + (m.max_yaw_rate_rad_s,)])
+        rows = [(m.max_speed_m_s / 2**0.5,) * 2 + (m.max_yaw_rate_rad_s, self._half_m) for m in limits]
+        return np.array(rows, dtype=np.float64).ravel()
+
+    def heights(self, controls: Array) -> list[float]:
+        """Return the heights of controls (4 n) [m]."""
+        return [self.height_m + float(height) for height in controls[HEIGHT::ROBOT_CONTROLS]]
 
     def edge_names(self, scene: PlanningScene, problem: PlanningProblem) -> list[tuple[str, str]]:
         """Return observer and subject of each edge of the topology."""
@@ -201,8 +209,7 @@ class ProblemBuilder:
         self._of, self._scale = scene, self.scale(scene)
         self._markers = np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets])
         self._target_weights = np.array([self._parameters.target_weights.get(name, 1.0) for name in scene.targets])
-        self._climb = np.array([self._parameters.limits_of(name).max_climb_m_s for name in scene.robots])
-        self._ahead = self._parameters.step_s * np.arange(1, self._parameters.horizon_steps + 1)[:, None]
+        self._climbs = np.array([self._parameters.limits_of(name).max_climb_m_s for name in scene.robots])
         self._pairs = self._all_pairs(scene)
 
     def _all_pairs(self, scene: PlanningScene) -> _Pairs:
@@ -225,30 +232,19 @@ class ProblemBuilder:
         rows["turn_rad2"] = np.where(fixed, 0.0, scene.yaw_variances[observer]) + self._cameras["per_m"][camera] ** 2
         return _Pairs(rows, observer, subject)
 
-    def _heights(self, scene: PlanningScene, topology: Topology) -> Array:
-        slots = self._parameters.slots(len(topology.levels))
-        if slots is None:
-            raise ValueError(f"no height slots for {topology}")
-        goal = np.array(slots)[self._levels(scene, topology)]
-        way = goal - scene.poses[:, 2]
-        heights: Array = scene.poses[:, 2] + np.clip(way, -self._climb * self._ahead, self._climb * self._ahead)
-        return heights
-
     def _levels(self, scene: PlanningScene, topology: Topology) -> IntArray:
         level = {name: index for index, names in enumerate(topology.levels) for name in names}
         return np.array([level[name] for name in scene.robots], dtype=np.int64)
 
-    def _edges(self, scene: PlanningScene, topology: Topology, heights: Array) -> tuple[Rows[EdgeRow], int]:
-        """Return all edges that may be seen on the way to these heights, those of the topology first; and how many."""
+    def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Rows[EdgeRow], int]:
+        """Return all edges from a level to any below it, those of the topology first; and how many these are."""
         n, last, level = len(scene.robots), len(topology.levels) - 1, self._levels(scene, topology)
         a, b, pairs = self._pairs.observer, self._pairs.subject, self._pairs.rows
         fixed, robot = a < 0, b < n
         above = np.where(fixed, -1, level[a])
         below = np.where(robot, level[np.minimum(b, n - 1)], last + 1)
         wanted = above + 1 == below
-        marker = np.where(robot, heights[:, np.minimum(b, n - 1)], 0.0) + self._markers[b]
-        seen = fixed | ((heights[:, a] - marker).max(axis=0) > _BELOW_M)
-        order = np.concatenate((np.flatnonzero(wanted), np.flatnonzero(seen & ~wanted)))
+        order = np.concatenate((np.flatnonzero(wanted), np.flatnonzero((above < below) & ~wanted)))
         edges: Any = cast(Any, pairs)[order]
         count = int(wanted.sum())
         edges["wanted"][:count] = 1

@@ -11,11 +11,12 @@ from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.kernel import Record, Rows
 from groundstation.sensing.visibility import CameraRow
 
-# Columns of a robot's controls and path, of a target's mean, and of a robot's pose.
-X, Y, YAW, COS, SIN = 0, 1, 2, 3, 4
+# Columns of a robot's path, of its controls (and of derivatives by its path), of a target's mean, of a robot's pose.
+X, Y, YAW, COS, SIN, Z = 0, 1, 2, 3, 4, 5
+HEIGHT = 3
 VX, VY = 2, 3
-POSE_YAW = 3
-ROBOT_CONTROLS, TARGET_STATES = 3, 2
+POSE_Z, POSE_YAW = 2, 3
+ROBOT_CONTROLS, TARGET_STATES = 4, 2
 
 
 class EdgeRow(Record):
@@ -37,9 +38,11 @@ class CostOptions(NamedTuple):
     """Settings of the cost that all topologies share.
 
     Noise densities: robot_position [m^2/s], robot_yaw [rad^2/s], target_acceleration [m^2/s^3]. The fence is where the
-    soft wall begins [m; world]. readings: sightings per step of what is in view.
+    soft wall begins [m; world]. readings: sightings per step of what is in view. height_m: what heights among
+    the controls are counted from.
     """
 
+    steps: int
     step_s: float
     discount: float
     robot_position_noise: float
@@ -52,20 +55,21 @@ class CostOptions(NamedTuple):
     effort_weight: float
     robot_weight: float
     readings: float
+    height_m: float
 
 
 class CostProblem(NamedTuple):
     """One topology's cost as a function of the held controls.
 
-    scale (3 n): bounds of the controls, for the effort; poses (n, 4): x, y, z, yaw; targets (k, 4): x, y, vx, vy;
-    heights (h, n): predicted z [m]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k): heights above
-    the robot's centre or the floor [m]; target_weights (k), in state order.
+    scale (4 n): bounds of the controls, for the effort; poses (n, 4): x, y, z, yaw; targets (k, 4): x, y, vx, vy;
+    climbs (n): how fast each may climb [m/s]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k):
+    heights above the robot's centre or the floor [m]; target_weights (k), in state order.
     """
 
     scale: Vector
     poses: Matrix
     targets: Matrix
-    heights: Matrix
+    climbs: Vector
     prior: Matrix
     yaw_variances: Vector
     edges: Rows[EdgeRow]
@@ -78,16 +82,18 @@ class CostProblem(NamedTuple):
 class EdgeTape(Record):
     """What one edge saw in one step: availability, its derivatives by relative position [world] and observer's yaw.
 
-    x, y, square: relative position [m] and its squared length; variance of a position per axis and w, the information;
-    v: information of the heading.
+    x, y: relative position [m]; square, z: squared distance from the camera, and its vertical part [m]; variance of a
+    position per axis and w, the information; v: information of the heading.
     """
 
     a: float
     a_x: float
     a_y: float
+    a_z: float
     a_yaw: float
     x: float
     y: float
+    z: float
     square: float
     variance: float
     w: float
@@ -97,9 +103,10 @@ class EdgeTape(Record):
 class Tape(NamedTuple):
     """Everything that the adjoint needs of a rollout.
 
-    path (h + 1, n, 5): x, y, yaw, its cosine and sine; motion (h, n, 3): displacement and direction; sightings (h m):
-    by step, then edge; informations (h, d, d) before and covariances (h, d, d) after each correction; yaws_before,
-    yaws_after (h, n): variances; penalties (h, n, 3): their derivatives by x, y.
+    path (h + 1, n, 6): x, y, yaw, its cosine and sine, z; motion (h, n, 4): displacement, direction, and the derivative
+    of z by the height that is gone to; sightings (h m): by step, then edge; informations (h, d, d) before and
+    covariances (h, d, d) after each correction; yaws_before, yaws_after (h, n): variances; penalties (h, n, 3): their
+    derivatives by x, y.
     """
 
     path: MatrixStack

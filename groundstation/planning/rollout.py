@@ -10,7 +10,9 @@ from groundstation.kernel import kernel
 from groundstation.planning.covariance import invert, predict
 from groundstation.planning.records import (
     COS,
+    HEIGHT,
     POSE_YAW,
+    POSE_Z,
     ROBOT_CONTROLS,
     SIN,
     TARGET_STATES,
@@ -24,6 +26,7 @@ from groundstation.planning.records import (
     Tape,
     X,
     Y,
+    Z,
 )
 from groundstation.sensing.visibility import SPREAD, CameraRow, available
 
@@ -36,7 +39,7 @@ def empty_tape(n: int, h: int, m: int, d: int) -> Tape:
     """Return a tape for n robots, h steps, m edges and d entries of the state."""
     sightings: Any = np.empty(h * m, _EDGE_TAPE)
     return Tape(
-        np.empty((h + 1, n, 5)), np.empty((h, n, 3)), sightings, np.empty((h, d, d)), np.empty((h, d, d)),
+        np.empty((h + 1, n, 6)), np.empty((h, n, 4)), sightings, np.empty((h, d, d)), np.empty((h, d, d)),
         np.empty((h, n)), np.empty((h, n)), np.empty((h, n, 3)),
     )  # fmt: skip
 
@@ -58,6 +61,17 @@ def move(u: Vector, before: Matrix, dt: float, after: Matrix, motion: Matrix) ->
 
 
 @kernel()
+def climb(u: Vector, problem: CostProblem, i: int, after: Matrix, motion: Matrix) -> None:
+    """Write the heights after step i of robots that go to those of their controls, ever slower as they get there."""
+    for r in range(after.shape[0]):
+        z = problem.poses[r, POSE_Z]
+        most = problem.climbs[r] * problem.options.step_s * (i + 1.0)
+        share = math.tanh((problem.options.height_m + u[ROBOT_CONTROLS * r + HEIGHT] - z) / most)
+        after[r, Z] = z + most * share
+        motion[r, HEIGHT] = 1.0 - share * share
+
+
+@kernel()
 def look(camera: CameraRow, edge: EdgeRow, x: float, y: float, z: float, c: float, s: float, tape: EdgeTape) -> None:
     """Record how likely a camera sees a subject at (x, y, z) from its observer (or from the world's origin if fixed).
 
@@ -66,12 +80,12 @@ def look(camera: CameraRow, edge: EdgeRow, x: float, y: float, z: float, c: floa
     tape.x, tape.y = x, y
     bx, by = c * x + s * y, -s * x + c * y
     rx, ry, rz = bx - camera.position[0], by - camera.position[1], z - camera.position[2]
-    tape.square = rx * rx + ry * ry + rz * rz
+    tape.z, tape.square = rz, rx * rx + ry * ry + rz * rz
     if edge.wanted == 0 and tape.square > camera.range_m * camera.range_m:
         width2 = camera.width_m * camera.width_m + SPREAD * (edge.blur_m2 + edge.turn_rad2 * tape.square)
         beyond = camera.range_m + _BEYOND * math.sqrt(width2)
         if tape.square > beyond * beyond:
-            tape.a = tape.a_x = tape.a_y = tape.a_yaw = 0.0
+            tape.a = tape.a_x = tape.a_y = tape.a_z = tape.a_yaw = 0.0
             return
     R = camera.rotation
     seen = available(
@@ -84,6 +98,7 @@ def look(camera: CameraRow, edge: EdgeRow, x: float, y: float, z: float, c: floa
     gx = R[0, 0] * seen.a_x + R[1, 0] * seen.a_y + R[2, 0] * seen.a_z
     gy = R[0, 1] * seen.a_x + R[1, 1] * seen.a_y + R[2, 1] * seen.a_z
     tape.a, tape.a_x, tape.a_y = seen.a, c * gx - s * gy, s * gx + c * gy
+    tape.a_z = R[0, 2] * seen.a_x + R[1, 2] * seen.a_y + R[2, 2] * seen.a_z
     tape.a_yaw = gx * by - gy * bx if edge.observer >= 0 else 0.0
 
 
@@ -117,20 +132,20 @@ def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
 @kernel(inlined=True)
 def look_around(problem: CostProblem, tape: Tape, i: int) -> None:
     """Record in the tape what all edges see in one step."""
-    edges, cameras, targets, heights, markers, path, sightings = (
-        problem.edges, problem.cameras, problem.targets, problem.heights, problem.markers, tape.path, tape.sightings
+    edges, cameras, targets, markers, path, sightings = (
+        problem.edges, problem.cameras, problem.targets, problem.markers, tape.path, tape.sightings
     )  # fmt: skip
     n, m, ahead = path.shape[1], edges.shape[0], (i + 1) * problem.options.step_s
     for e in range(m):
         edge, seen = edges[e], sightings[i * m + e]
         a, b, c, s = edge.observer, edge.subject, 1.0, 0.0
         if b < n:
-            x, y, z = path[i + 1, b, X], path[i + 1, b, Y], heights[i, b] + markers[b]
+            x, y, z = path[i + 1, b, X], path[i + 1, b, Y], path[i + 1, b, Z] + markers[b]
         else:
             t = b - n
             x, y, z = targets[t, X] + ahead * targets[t, VX], targets[t, Y] + ahead * targets[t, VY], markers[b]
         if a >= 0:
-            x, y, z = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - heights[i, a]
+            x, y, z = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - path[i + 1, a, Z]
             c, s = path[i + 1, a, COS], path[i + 1, a, SIN]
         look(cameras[edge.camera], edge, x, y, z, c, s, seen)
 
@@ -156,10 +171,11 @@ def weigh(problem: CostProblem, tape: Tape, i: int) -> None:
         after[r] = 1.0 / after[r]
     for e in range(m):
         edge, seen = edges[e], sightings[i * m + e]
-        camera, turn = cameras[edge.camera], after[edge.observer] if edge.observer >= 0 else 0.0
-        lasting = camera.per_m * camera.per_m + turn
+        camera, upright = cameras[edge.camera], seen.z * seen.z
+        lean = camera.per_m * camera.per_m
+        turn = after[edge.observer] if edge.observer >= 0 else lean
         single = camera.base_m * camera.base_m + camera.per_m2 * camera.per_m2 * seen.square * seen.square
-        seen.variance = single / readings + lasting * seen.square
+        seen.variance = single / readings + lean * upright + turn * (seen.square - upright)
         seen.w = seen.a / seen.variance
 
 
@@ -188,8 +204,8 @@ def fuse(P: Matrix, problem: CostProblem, tape: Tape, i: int) -> None:
 
 @kernel()
 def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]:
-    """Return (expected uncertainty of the targets, all other costs) of held controls u (3 n) and fill the tape."""
-    n, k, h = problem.poses.shape[0], problem.targets.shape[0], problem.heights.shape[0]
+    """Return (expected uncertainty of the targets, all other costs) of held controls u (4 n) and fill the tape."""
+    n, k, h = problem.poses.shape[0], problem.targets.shape[0], problem.options.steps
     options, P, weights = problem.options, problem.prior.copy(), problem.target_weights
     path, motion, penalties = tape.path, tape.motion, tape.penalties
     for r in range(n):
@@ -199,6 +215,7 @@ def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]
     discount = 1.0
     for i in range(h):
         move(u, path[i], options.step_s, path[i + 1], motion[i])
+        climb(u, problem, i, path[i + 1], motion[i])
         predict(P, n, options)
         look_around(problem, tape, i)
         weigh(problem, tape, i)

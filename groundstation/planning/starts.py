@@ -9,6 +9,7 @@ from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.problem import PlanningScene
+from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
@@ -18,10 +19,13 @@ SMALL_TEAM = 4
 
 
 class Starts:
-    """Starts in [-1, 1]^(3 n) on one scene."""
+    """Starts in [-1, 1]^(4 n) on one scene; scale: what 1 stands for, height_m: what a height of 0 does."""
 
-    def __init__(self, scene: PlanningScene, parameters: PlannerParameters, sensors: SensorSuite, scale: Array) -> None:
+    def __init__(
+        self, scene: PlanningScene, parameters: PlannerParameters, sensors: SensorSuite, scale: Array, height_m: float
+    ) -> None:
         self._scene, self._parameters, self._sensors, self._scale = scene, parameters, sensors, scale
+        self._height_m = height_m
         self._index = {name: i for i, name in enumerate(scene.robots)}
 
     def of(self, topology: Topology, known: Array | None, moved: Collection[str]) -> list[Array]:
@@ -32,13 +36,26 @@ class Starts:
         """
         found = [] if known is None else [known]
         if len(self._scene.robots) > SMALL_TEAM:
-            base = np.zeros(self._scale.size) if known is None else known
+            base = self.rest(topology) if known is None else known
             return [*found, self._towards(topology, base, moved or self._scene.robots, keep_root=True)]
-        rest = np.zeros(self._scale.size)
+        rest = self.rest(topology)
         going = [self._towards(topology, rest, self._scene.robots, keep_root) for keep_root in (True, False)]
-        turn = going[0].copy().reshape(-1, 3)
+        turn = going[0].copy().reshape(-1, ROBOT_CONTROLS)
         turn[:, :2] = 0.0
         return [*found, rest, *going, turn.ravel()]
+
+    def rest(self, topology: Topology) -> Array:
+        """Return controls with which the robots only go to the heights of their levels."""
+        slots = self._parameters.slots(len(topology.levels)) or ()
+        x = np.zeros((len(self._scene.robots), ROBOT_CONTROLS))
+        for name, i in self._index.items():
+            x[i, HEIGHT] = self.height(i, slots[topology.level_of(name)])
+        return x.ravel()
+
+    def height(self, i: int, height_m: float) -> float:
+        """Return a robot's height as a part of a start."""
+        share = (height_m - self._height_m) / float(self._scale[ROBOT_CONTROLS * i + HEIGHT])
+        return max(-1.0, min(1.0, share))
 
     def _towards(self, topology: Topology, base: Array, robots: Collection[str], keep_root: bool) -> Array:
         """Return controls with which the robots go where each would look at the middle of the level below."""
@@ -61,20 +78,22 @@ class Starts:
                     if views:
                         px, py = views[0].shrunk(0.2).nearest(px, py)
                     self._steer(x, self._index[name], (px, py, math.atan2(middle[1] - py, middle[0] - px)))
+                    x[ROBOT_CONTROLS * self._index[name] + HEIGHT] = self.height(self._index[name], height)
                 subjects.append((px, py, height + sensors.marker_height_m[name]))
         return x
 
     def _steer(self, x: Array, i: int, goal: Point) -> None:
         """Write the controls with which a robot gets to (x, y, yaw) within the horizon, or as near as it can."""
         px, py, yaw = goal
-        pose, scale, horizon_s = self._scene.poses[i], self._scale[3 * i : 3 * i + 3], self._parameters.horizon_s
+        at = ROBOT_CONTROLS * i
+        pose, scale, horizon_s = self._scene.poses[i], self._scale[at : at + HEIGHT], self._parameters.horizon_s
         rate = max(-1.0, min(1.0, difference(yaw, float(pose[3])) / horizon_s / scale[2]))
         middle = float(pose[3]) + 0.5 * rate * scale[2] * horizon_s
         vx, vy = (px - float(pose[0])) / horizon_s, (py - float(pose[1])) / horizon_s
         c, s = math.cos(middle), math.sin(middle)
         body = np.array([c * vx + s * vy, c * vy - s * vx]) / scale[:2]
-        x[3 * i : 3 * i + 2] = body / max(1.0, float(np.abs(body).max()))
-        x[3 * i + 2] = rate
+        x[at : at + 2] = body / max(1.0, float(np.abs(body).max()))
+        x[at + 2] = rate
 
 
 def _stand(pose: Array, subject: list[float], height: float, name: str, sensors: SensorSuite) -> tuple[float, float]:

@@ -60,11 +60,15 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Softness:
-    """Shape of the smooth availability: docs/explanation/planning.md 3."""
+    """Shape of the smooth availability: docs/explanation/planning.md 3.
+
+    caution: so many standard deviations of a relative place inside its limits a view is counted on.
+    """
 
     width_m: float = 0.08
     tail_share: float = 2e-3
     tail_m: float = 1.0
+    caution: float = 1.5
 
 
 @dataclass(frozen=True, slots=True)

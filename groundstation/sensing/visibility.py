@@ -20,7 +20,8 @@ class CameraRow(Record):
 
     position [m; world or base]; rotation: optical from world or from base_stabilized; tangents of half width and half
     height, cosines of the same angles, range and border [m] of the view; standard deviation of a position: base_m and
-    per_m, per_m2 (by distance); of a heading [rad]; softness of the view's edge: width, share and length of its tail.
+    per_m, per_m2 (by distance); of a heading [rad]; softness of the view's edge: width, share and length of its tail,
+    caution.
     """
 
     position: Annotated[Array, (3,)]
@@ -38,10 +39,11 @@ class CameraRow(Record):
     width_m: float
     tail_share: float
     tail_m: float
+    caution: float
 
 
 class Availability(NamedTuple):
-    """How likely one exposure shows a marker, and the derivatives by its optical position [1/m]."""
+    """In what share of exposures a marker counts as shown, and the derivatives by its optical position [1/m]."""
 
     a: float
     a_x: float
@@ -104,24 +106,29 @@ def margin(camera: CameraRow, x: float, y: float, z: float, distance: float) -> 
 def available(
     camera: CameraRow, x: float, y: float, z: float, blur_m2: float, turn_rad2: float, share: float
 ) -> Availability:
-    """Return the expected availability of a marker at an optical point [m] whose place is known with variances.
+    """Return the availability of a marker at an optical point [m] that is counted on if its place is in doubt.
 
-    blur_m2: of the relative position per axis; turn_rad2: of the direction of view; share: of the tail that attracts.
+    blur_m2: variance of the relative position per axis; turn_rad2: of the direction of view; share: of the tail that
+    attracts. Expected under these variances, `camera.caution` standard deviations farther out.
     """
     square = x * x + y * y + z * z + 1e-6
     m = margin(camera, x, y, z, math.sqrt(square))
+    error2 = blur_m2 + turn_rad2 * square
+    error = math.sqrt(error2 + 1e-12)
+    inside = m.a - camera.caution * error
     # A logistic edge, seen with a Gaussian error, is again nearly logistic (MacKay 1992): only wider.
-    width2 = camera.width_m * camera.width_m + SPREAD * (blur_m2 + turn_rad2 * square)
+    width2 = camera.width_m * camera.width_m + SPREAD * error2
     width = math.sqrt(width2)
-    logistic = 1.0 / (1.0 + math.exp(min(-m.a / width, 500.0)))
+    logistic = 1.0 / (1.0 + math.exp(min(-inside / width, 500.0)))
     flat, slope = 1.0, 0.0
-    if m.a < 0.0:
-        ratio = m.a / camera.tail_m
+    if inside < 0.0:
+        ratio = inside / camera.tail_m
         flat = 1.0 / (1.0 + ratio * ratio)
         slope = -2.0 * ratio / camera.tail_m * flat * flat
     steep = (1.0 - share) * logistic * (1.0 - logistic) / width
     inwards = steep + share * slope
-    widening = -steep * m.a / width2 * SPREAD * turn_rad2  # d width = SPREAD turn / width * (x, y, z)
+    # d width = SPREAD turn / width * (x, y, z), d error = turn / error * (x, y, z)
+    widening = -steep * inside / width2 * SPREAD * turn_rad2 - inwards * camera.caution * turn_rad2 / error
     return Availability(
         (1.0 - share) * logistic + share * flat,
         inwards * m.a_x + widening * x, inwards * m.a_y + widening * y, inwards * m.a_z + widening * z,

@@ -77,8 +77,9 @@ class PlannerSettings(SettingsSection):
     initial_topology: Literal["flat", "string"] = "flat"
     """Topology after take-off. flat: all drones in one level; string: one drone per level."""
     level_heights_m: LevelHeights
-    """Flying heights [m above the floor] of the levels. Row n holds n heights, top level first, for a topology with n
-    levels; one row per drone at least. All must lie above the target and inside the fence."""
+    """Heights [m above the floor] with which the search begins. Row n holds n heights, top level first, for a topology
+    with n levels; one row per drone at least. All must lie above the target and inside the fence; the planner chooses
+    between the lowest and the highest."""
     planned_range_m: Annotated[float, Field(gt=0, le=20)] = 1.9
     """Distance [m] up to which the planner expects a drone's camera to detect a marker."""
     separation_m: Annotated[float, Field(gt=0, le=10)] = 1.0

@@ -214,7 +214,7 @@ def fly(world: World, topology: Topology, sight_hz: float = 5.0) -> Trace:
         belief = world.belief(now)
         if k % 5 == 0:
             plan, topology = coming, coming.topology if coming else topology
-            coming = planner.plan(belief, topology, plan.controls if plan else None, lambda: False)
+            coming = planner.plan(belief, topology, plan.warm_start if plan else None, lambda: False)
         wanted = setpoints_from_plan(plan, belief, world.names, world.control, world.sensors, world.sight(belief, now))
         speeds = world.velocities()
         limited = {n: limit_setpoint(n, wanted[n], belief, belief.stamp_ns, world.safety, speeds) for n in world.names}

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from groundstation.sensing.models import (
     Softness,
     WorldCameraModel,
 )
-from groundstation.sensing.visibility import available, camera_rows
+from groundstation.sensing.visibility import available, camera_rows, margin
 
 CEILING = WorldCameraModel((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0, border_m=0.0))
 ONBOARD = OnboardCameraModel((0.09, 0.0, 0.0), Frustum.of_picture(640, 360, 460, 460, 1.9, border_m=0.0))
@@ -26,12 +27,15 @@ POINT = st.tuples(*[st.floats(-3, 3)] * 3)
 
 
 def availability(
-    camera: WorldCameraModel | OnboardCameraModel, point: Sequence[float], blur_m2: float = 0.0, turn_rad2: float = 0.0
+    camera: WorldCameraModel | OnboardCameraModel,
+    point: Sequence[float],
+    blur_m2: float = 0.0,
+    turn_rad2: float = 0.0,
+    soft: Softness = SUITE.softness,
 ) -> np.ndarray:
     """Return the availability of a marker at an optical point, then its derivatives."""
     x, y, z = point
-    share = SUITE.softness.tail_share
-    return np.array(available(camera_rows([camera], SUITE.softness)[0], x, y, z, blur_m2, turn_rad2, share))
+    return np.array(available(camera_rows([camera], soft)[0], x, y, z, blur_m2, turn_rad2, soft.tail_share))
 
 
 def test_the_ceiling_footprint_shrinks_with_height() -> None:
@@ -89,16 +93,28 @@ PLACES = [(0.0, 0.0, 1.2), (0.1, -0.1, 1.4), (0.3, 0.35, 1.5), (-0.9, 0.0, 1.5),
 
 
 @pytest.mark.parametrize("point", PLACES)
-def test_availability_is_expected_under_the_covariance(point: tuple[float, float, float]) -> None:
+def test_availability_without_caution_is_expected_under_the_covariance(point: tuple[float, float, float]) -> None:
     """Against sampling, for places and directions that are known so well."""
-    at_mean = availability(ONBOARD, point)[0]
+    at_mean, soft = availability(ONBOARD, point)[0], Softness(caution=0.0)
     for blur, turn, tolerance in ((0.01, 0.0, 0.07), (0.04, 0.01, 0.2)):
         std = math.sqrt(blur + turn * float(np.dot(point, point)))
         samples = np.array(point) + np.random.default_rng(2).normal(0.0, std, (1000, 3))
         mean = float(np.mean([availability(ONBOARD, sample)[0] for sample in samples]))
-        expected = availability(ONBOARD, point, blur, turn)[0]
+        expected = availability(ONBOARD, point, blur, turn, soft)[0]
         assert expected == pytest.approx(mean, abs=tolerance)
         assert abs(expected - mean) < abs(at_mean - mean)
+
+
+@pytest.mark.parametrize("point", PLACES)
+def test_a_view_is_counted_on_as_far_inside_as_its_place_is_in_doubt(point: tuple[float, float, float]) -> None:
+    """An error of place lasts: at the very edge a marker is seen all the time or never, not every other time."""
+    doubt_m, soft = 0.1, Softness(tail_share=0.0)
+    row, distance = camera_rows([ONBOARD], soft)[0], math.hypot(*point)
+    inside = margin(row, *point, distance).a - 1.5 * doubt_m
+    width = math.hypot(soft.width_m, math.sqrt(math.pi / 8) * doubt_m)
+    careful = availability(ONBOARD, point, doubt_m**2, soft=soft)[0]
+    assert careful == pytest.approx(1.0 / (1.0 + math.exp(-inside / width)), rel=1e-4)
+    assert careful < availability(ONBOARD, point, doubt_m**2, soft=replace(soft, caution=0.0))[0]
 
 
 def test_a_marker_seen_too_obliquely_is_not_found() -> None:

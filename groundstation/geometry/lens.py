@@ -6,12 +6,14 @@ Pixel (0, 0) is the centre of the top left pixel, as in OpenCV. Normalised coord
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.arrays import Array
+
+Scalars = TypeVar("Scalars", float, Array)
 
 # Newton converges quadratically from the distorted point; 12 steps are ample even for k1 = -0.5 at the corners.
 _NEWTON_STEPS = 12
@@ -60,6 +62,16 @@ class CameraIntrinsics:
         with np.errstate(divide="ignore", invalid="ignore"):
             normalised = np.where((depth > 1e-9)[..., None], points[..., :2] / depth[..., None], np.nan)
         return self.pixels_from_normalised(normalised)
+
+    def pixel(self, x: float, y: float, z: float) -> tuple[float, float] | None:
+        """Return the pixel of one point [optical] as `project` does, in a tenth of its time; None where it has NaN."""
+        if not z > 1e-9:
+            return None
+        x, y = x / z, y / z
+        if not x * x + y * y <= self.max_radius**2:
+            return None
+        x, y = _distort(x, y, self.distortion)
+        return self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px
 
     def pixels_from_normalised(self, normalised: Array) -> Array:
         """Return pixels (..., 2) of undistorted normalised coordinates (..., 2); NaN where the lens model folds."""
@@ -115,7 +127,7 @@ def _fold_radius(distortion: tuple[float, ...]) -> float:
     return float(radius[folds[0]]) if folds.size else _MAX_RADIUS
 
 
-def _distort(x: Array, y: Array, distortion: tuple[float, ...]) -> tuple[Array, Array]:
+def _distort(x: Scalars, y: Scalars, distortion: tuple[float, ...]) -> tuple[Scalars, Scalars]:
     k1, k2, p1, p2, k3 = distortion
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))

@@ -17,6 +17,7 @@ from groundstation.geometry.tag import SquareTag
 from sim_bridge.mounting import generator_of_eye, mounted, turned_about
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0
@@ -35,11 +36,18 @@ _FREEDOM = 18  # of the residuals of twelve corners about a pose
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A board on a body: where its centre is [base]."""
+    """A board on a body: where its centre is [base], its corners and the outline of its card [marker]."""
 
     body: str
     board: Checkerboard | SquareTag
     position: Array
+    corners: Array
+    outline: Array
+
+    @classmethod
+    def of(cls, body: str, board: Checkerboard | SquareTag, position_m: tuple[float, float, float]) -> "Carried":
+        """Return a board at a place on a body [m; base]."""
+        return cls(body, board, np.array(position_m), board.corners(), board.outline())
 
 
 def _square_m(printed: Checkerboard | SquareTag) -> float:
@@ -49,11 +57,9 @@ def _square_m(printed: Checkerboard | SquareTag) -> float:
 
 def boards_of(site: Site) -> tuple[Carried, ...]:
     """Return all boards of a site: drones' and targets'."""
-    drones = [
-        Carried(name, drone.marker.printed, np.array(drone.marker.position_m)) for name, drone in site.drones.items()
-    ]
+    drones = [Carried.of(name, drone.marker.printed, drone.marker.position_m) for name, drone in site.drones.items()]
     targets = [
-        Carried(name, target.marker.printed, np.array([0, 0, target.marker.height_m]))
+        Carried.of(name, target.marker.printed, (0.0, 0.0, target.marker.height_m))
         for name, target in site.tracked.items()
     ]
     return (*drones, *targets)
@@ -111,8 +117,8 @@ class Eye:
             own = states[self._carrier]
             base = rotation_from_euler(own[6], own[7], own[8])
             rotation, position = base @ rotation, own[:3] + base @ position
-            copter = world.copters.get(self._carrier)
-            onboard = copter.estimate if copter is not None else world.onboard[self._carrier]
+            carrier = world.drones.get(self._carrier)
+            onboard = carrier.estimate if isinstance(carrier, MavlinkCopter) else world.onboard[self._carrier]
             reported = (onboard.roll, onboard.pitch)
         jitter = self._rng.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
         seen = []
@@ -149,34 +155,36 @@ class Eye:
             return None
         facing = rotation.T @ base
         normal = facing[:, 2]
-        if -float(normal @ centre) < _STEEPEST_COS * float(np.linalg.norm(centre)):
-            return None
-        corners = carried.board.corners() @ facing.T
-        outline = self._lens.project(carried.board.outline() @ facing.T + centre)
-        size = (self._lens.width_px - _BORDER_PX, self._lens.height_px - _BORDER_PX)
-        if not bool(np.all((outline > _BORDER_PX) & (outline < size))):  # NaN is outside too
+        distance_m = float(np.linalg.norm(centre))
+        if -float(normal @ centre) < _STEEPEST_COS * distance_m:
             return None
         tracked = now_s - self._last_seen[carried.body] < _FORGET_S
-        pixels = self._lens.fx_px * _square_m(carried.board) / float(np.linalg.norm(centre))
-        if pixels < (_TRACKED_PX if tracked else _SEARCH_PX):
-            return None
         if not tracked and not self._searching:
             return None
+        pixels = self._lens.fx_px * _square_m(carried.board) / distance_m
+        if pixels < (_TRACKED_PX if tracked else _SEARCH_PX):
+            return None
+        if not self._is_framed(carried.outline @ facing.T + centre):
+            return None
         self._last_seen[carried.body] = now_s
-        return centre, self._covariance(corners, centre, rotation.T[:, 2])
+        return centre, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2])
+
+    def _is_framed(self, points: Array) -> bool:
+        """Return whether all points (n, 3) [optical] are in the picture, the border aside."""
+        right, low = self._lens.width_px - _BORDER_PX, self._lens.height_px - _BORDER_PX
+        pixels = (self._lens.pixel(*point) for point in points.tolist())
+        return all(at is not None and _BORDER_PX < at[0] < right and _BORDER_PX < at[1] < low for at in pixels)
 
     def _covariance(self, corners: Array, centre: Array, up: Array) -> Array:
         """Return the covariance (4, 4) of (centre, heading) for corners known to one pixel."""
-        points = corners + centre
-        f, z = self._lens.fx_px, points[:, 2]
-        by_point = np.zeros((len(points), 2, 3))
-        by_point[:, 0, 0] = by_point[:, 1, 1] = f / z
-        by_point[:, 0, 2], by_point[:, 1, 2] = -f * points[:, 0] / z**2, -f * points[:, 1] / z**2
-        turn = np.zeros((len(points), 3, 3))  # d(point) / d(rotation) = -[corner]x
-        turn[:, 0, 1], turn[:, 0, 2] = corners[:, 2], -corners[:, 1]
-        turn[:, 1, 0], turn[:, 1, 2] = -corners[:, 2], corners[:, 0]
-        turn[:, 2, 0], turn[:, 2, 1] = corners[:, 1], -corners[:, 0]
-        J = np.concatenate((by_point, by_point @ turn), axis=2).reshape(-1, 6)
+        (x, y, z), (a, b, c) = (corners + centre).T, corners.T
+        along, across, down = self._lens.fx_px / z, -self._lens.fx_px * x / z**2, -self._lens.fx_px * y / z**2
+        slopes = np.zeros((2, 6, len(corners)))  # by the centre, and by a turn: d(point) / d(rotation) = -[corner]x
+        slopes[0, 0] = slopes[1, 1] = along
+        slopes[0, 2], slopes[1, 2] = across, down
+        slopes[0, 3], slopes[0, 4], slopes[0, 5] = across * b, along * c - across * a, -along * b
+        slopes[1, 3], slopes[1, 4], slopes[1, 5] = down * b - along * c, -down * a, along * a
+        J = slopes.transpose(2, 0, 1).reshape(-1, 6)
         full = np.linalg.solve(J.T @ J, np.eye(6))
         T = np.zeros((4, 6))
         T[:3, :3] = np.eye(3)

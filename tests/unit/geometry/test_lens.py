@@ -86,3 +86,10 @@ def test_every_form_of_a_calibration_is_the_same_lens(kind):
     figures = {name: getattr(MIXED, name) for name in ("width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px")}
     calibration = kind(model="plumb_bob", distortion=MIXED.distortion, residual_px=0.3, **figures)
     assert intrinsics_of(calibration) == replace(MIXED, residual_px=0.3)
+
+
+@pytest.mark.parametrize("lens", [PLAIN, FRONT, STRONG, MIXED])
+def test_one_point_has_the_pixel_that_many_have(lens: CameraIntrinsics):
+    points = np.random.default_rng(1).normal(size=(200, 3)) * (0.6, 0.4, 1.0)
+    for point, pixel in zip(points.tolist(), lens.project(points).tolist(), strict=True):
+        assert lens.pixel(*point) == (None if math.isnan(pixel[0]) else tuple(pixel))

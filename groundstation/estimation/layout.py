@@ -1,6 +1,7 @@
 """The meaning of each entry of the joint state."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 
@@ -41,24 +42,22 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class StateLayout:
-    """Blocks in state order; names are unique."""
+    """Blocks in state order; names are unique. dim, robots, targets: of all blocks; names in state order."""
 
     blocks: tuple[Block, ...] = ()
+    dim: int = field(init=False, repr=False, compare=False)
+    robots: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    targets: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    _by_name: Mapping[str, Block] = field(init=False, repr=False, compare=False)
 
-    @property
-    def dim(self) -> int:
-        """Return the dimension of the state."""
-        return sum(block.size for block in self.blocks)
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """Return the names of all robots in state order."""
-        return tuple(block.name for block in self.blocks if block.kind is EntityKind.ROBOT)
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """Return the names of all targets in state order."""
-        return tuple(block.name for block in self.blocks if block.kind is EntityKind.TARGET)
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("dim", sum(block.size for block in self.blocks)),
+            ("robots", tuple(block.name for block in self.blocks if block.kind is EntityKind.ROBOT)),
+            ("targets", tuple(block.name for block in self.blocks if block.kind is EntityKind.TARGET)),
+            ("_by_name", {block.name: block for block in self.blocks}),
+        ):
+            object.__setattr__(self, name, value)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -66,14 +65,11 @@ class StateLayout:
         return tuple(f"{block.name}.{label}" for block in self.blocks for label in block.labels)
 
     def __contains__(self, name: str) -> bool:
-        return any(block.name == name for block in self.blocks)
+        return name in self._by_name
 
     def block(self, name: str) -> Block:
         """Return an entity's block; raises KeyError when it is not in the state."""
-        for block in self.blocks:
-            if block.name == name:
-                return block
-        raise KeyError(name)
+        return self._by_name[name]
 
     def with_entity(self, name: str, kind: EntityKind, labels: tuple[str, ...]) -> "StateLayout":
         """Return the layout with one more block at the end; raises ValueError when it is already there."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.estimation.measurement import OdometrySample
 from groundstation.estimation.records import CondensedOdometry
 
@@ -26,19 +27,20 @@ class OdometryRing:
     def __init__(self, steps: int, robots: int) -> None:
         self.rows = CondensedOdometry.rows(steps, robots)
         self._robots = robots
-        for step in range(steps):
-            self.clear(step)
-        # The same numbers in one row: Python reads and writes single ones there in half of numpy's time.
-        self._words = np.asarray(self.rows).view(np.float64).data.cast("B").cast("d")
+        empty = CondensedOdometry.rows(robots)
+        empty["newest_at"] = -1.0
+        self._empty: Array = np.asarray(empty).view(np.float64)
+        # The same numbers by step, and in one row: Python reads and writes single ones there in half of numpy's time.
+        self._steps: Array = np.asarray(self.rows).view(np.float64)
+        self._steps[:] = self._empty
+        self._words = self._steps.data.cast("B").cast("d")
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def clear(self, step: int) -> None:
         """Forget the odometry of a step."""
-        rows = np.asarray(self.rows)[step % len(self)]
-        rows[:] = 0
-        rows["newest_at"] = -1.0
+        self._steps[step % len(self._steps)] = self._empty
 
     def add_velocity(self, step: int, robot: int, motion: OdometrySample) -> None:
         """Take the velocity and turn rate of a sample."""

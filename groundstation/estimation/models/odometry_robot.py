@@ -311,10 +311,10 @@ class OdometryRobot:
 
     def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
         """Return the velocity [world] from the block's mean and the held odometry."""
-        state = dict(zip(self.labels, block, strict=True))
+        state = dict(zip(self.labels, block.tolist(), strict=True))
         rest = state.get("velocity_scale", 1.0) - 1.0
         vx = memory["held_vx"] + rest * memory["slow_vx"] - state.get("velocity_bias_x", 0.0)
         vy = memory["held_vy"] + rest * memory["slow_vy"] - state.get("velocity_bias_y", 0.0)
         forward, left = self.velocity_scale * vx, self.velocity_scale * vy
         climb = state.get("climb", 0.0) + float(self.reports_climb) * memory["held_vz"]
-        return world_velocity(block[YAW], forward, left, climb)
+        return world_velocity(state["yaw"], forward, left, climb)

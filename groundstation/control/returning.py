@@ -22,16 +22,17 @@ def is_lost(
 
     By its own uncertainty, the way and its time; without any world-fixed view, when it is known too badly.
     """
-    mean, spread = belief.mean_of(name), spread_m(belief, name)
-    view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
-    marker = sensors.marker(name, mean, is_robot=True)
-    seen = any(sensors.world_in_view(camera, marker) for camera in sensors.world)
-    if unseen_s <= parameters.return_soonest_s:
-        return spread > parameters.return_std_m and not seen
-    if unseen_s > parameters.return_within_s:
+    if unseen_s > max(parameters.return_soonest_s, parameters.return_within_s):
         return True
-    if seen or view is None:
-        return not seen and spread > parameters.return_std_m
+    mean, spread = belief.mean_of(name), spread_m(belief, name)
+    if spread <= parameters.return_std_m and unseen_s <= parameters.return_soonest_s:
+        return False
+    marker = sensors.marker(name, mean, is_robot=True)
+    if any(sensors.world_in_view(camera, marker) for camera in sensors.world):
+        return False
+    view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
+    if view is None or unseen_s <= parameters.return_soonest_s:
+        return spread > parameters.return_std_m
     way_m = way_back_m(float(mean[0]), float(mean[1]), view)
     return time_left_s(spread, unseen_s, parameters) < way_m / parameters.return_speed_m_s + parameters.return_margin_s
 

@@ -147,6 +147,7 @@ def _stands(
 
     Who searches and has nowhere to go waits in view.
     """
+    robots = [name for name in robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
     means = {name: belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
     views = {name: view_of(*places[name], name, parameters, sensors) for name in robots}

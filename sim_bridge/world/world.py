@@ -147,8 +147,8 @@ class World:
         return self.targets[name].row() if name in self.targets else _NOWHERE
 
     def _let_targets_depart(self) -> None:
-        if len(self.airborne) == len(self.drones) + len(self.puppets) and any(
-            target.parked for target in self.targets.values()
+        if any(target.parked for target in self.targets.values()) and (
+            len(self.airborne) == len(self.drones) + len(self.puppets)
         ):
             self._together_s += TICK_S
             for name, target in self.targets.items():

@@ -144,7 +144,8 @@ class Study:
         share = total_s / (time.perf_counter() - wall)
         report["cpu_s"] = {name: round(share * value, 2) for name, value in self.spent_s.items()}
         report["cpu_s"]["total"] = round(total_s, 2)
-        return {"seed": self.options.seed, "duration_s": self.options.duration_s, **report}
+        flown_s = round(self.world.time_s, 3)
+        return {"seed": self.options.seed, "duration_s": self.options.duration_s, "flown_s": flown_s, **report}
 
     def step(self) -> None:
         """Advance the world by one tick, and everything that is due."""

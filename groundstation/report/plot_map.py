@@ -118,4 +118,4 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
 def _world_view(data: RunData) -> str:
     """Return what the dotted boxes show."""
     cameras = ["ceiling view\nat slot heights"] if data.resolved.cameras else []
-    return "\n".join([*cameras, *(["motion capture's\nvolume"] if data.resolved.motion_capture else [])])
+    return "\n".join([*cameras, *(["motion capture"] if data.resolved.motion_capture else [])])

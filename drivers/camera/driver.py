@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from drivers.base import HostProcess
 from drivers.camera import convert
 from drivers.camera.context import Surroundings
+from drivers.camera.picture_quality import quality_of
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import FrameSource, Packet, Unit
@@ -71,6 +72,7 @@ class CameraDriver:
         self._watch = StreamWatch(settings.start_within_s, settings.stall_after_s, clock.now_ns())
         self._processed = self._detections = self._processed_then = 0
         self._exposure_ns = 0
+        self._newest: Image | None = None
         self._silence_s = settings.start_within_s
         self._next_image_ns = 0
         self._status_ns = clock.now_ns()
@@ -109,7 +111,7 @@ class CameraDriver:
             return
         if self._watch.usable(packet.arrival_ns):
             self._announce()
-        self._exposure_ns = exposure_ns
+        self._exposure_ns, self._newest = exposure_ns, picture
         self._publish_image(packet, exposure_ns)
         try:
             self._observe(picture, exposure_ns)
@@ -214,6 +216,7 @@ class CameraDriver:
     def _publish_status(self, now_ns: int) -> None:
         elapsed_s = (now_ns - self._status_ns) / NS_PER_S
         flowing = self._watch.state is StreamState.FLOWING
+        quality = quality_of(self._newest) if flowing and self._newest is not None else None
         status = CameraStatus(
             header=self._child.bus.header(self._settings.name),
             connected=flowing,
@@ -224,6 +227,8 @@ class CameraDriver:
             detections=self._detections,
             detail="" if flowing or self._watch.state is StreamState.WAITING else self._trouble(),
             rejected=dict(+(self.counts + self._source.rejected)),
+            brightness=None if quality is None else round(quality.brightness, 3),
+            edge_px=None if quality is None or quality.edge_px is None else round(quality.edge_px, 1),
         )
         self._child.bus.publish(CAMERA_STATUS, status)
         self._status_ns, self._processed_then = now_ns, self._processed

@@ -22,7 +22,8 @@ def judge(
     flew: Collection[str] = (),
 ) -> list[Finding]:
     """Return all findings, those that must be mended first; flew: who may stand anywhere by now."""
-    found = [*drone_findings(field, vehicles), *camera_findings(field, cameras)]
+    sees = {camera: sorted({s.drone for s in sightings if s.camera == camera}) for camera in field.world_sensors}
+    found = [*drone_findings(field, vehicles), *camera_findings(field, cameras, sees)]
     found += pad_findings(field, sightings, flew)
     return sorted(found, key=lambda one: _GRAVITY[one.level])
 

@@ -134,6 +134,10 @@ class CameraStatus(Message, frozen=True, kw_only=True):
     """What is wrong, in words."""
     rejected: dict[str, int] = msgspec.field(default_factory=dict)
     """What was refused since the start, by reason."""
+    brightness: float | None = None
+    """Mean grey value of the newest image, 0 to 1; none: there is no image."""
+    edge_px: float | None = None
+    """Width of its sharpest edges [px]; none: nothing in it has contrast."""
 
 
 class ClockOffset(Message, frozen=True, kw_only=True):

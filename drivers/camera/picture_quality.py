@@ -1,0 +1,38 @@
+"""How well a picture is exposed and focused, whatever it shows. Pure."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from groundstation.arrays import Image
+
+# Of so many pixels, evenly spaced rows of the picture: enough for shares of a thousandth.
+_PIXELS = 120_000
+# Between the darkest and the brightest hundredth: with less there is no edge to judge by, only noise.
+_CONTRAST = 60.0
+_EDGE_SHARE = 99.9
+
+
+@dataclass(frozen=True, slots=True)
+class PictureQuality:
+    """brightness: mean grey value, 0 to 1; edge_px: width of the sharpest edges [px], None without contrast."""
+
+    brightness: float
+    edge_px: float | None
+
+
+def quality_of(picture: Image) -> PictureQuality:
+    """Return the quality of a grey picture (rows, columns).
+
+    An edge from dark to bright that is w pixels wide has a slope of contrast / w: the steepest slopes tell its width.
+    """
+    step = max(1, picture.size // _PIXELS)
+    rows = np.ascontiguousarray(picture[::step])
+    low, high = np.percentile(rows, (1.0, 99.0))
+    brightness = float(rows.mean()) / 255.0
+    if high - low < _CONTRAST:
+        return PictureQuality(brightness, None)
+    slopes = np.abs(cv2.Sobel(rows, cv2.CV_16S, 1, 0, ksize=1)) / 2.0
+    steepest = float(np.percentile(slopes, _EDGE_SHARE))
+    return PictureQuality(brightness, float(high - low) / max(steepest, 1.0))

@@ -75,6 +75,8 @@ ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE, _TRACKER)
 """Tracker: mean and covariance of each robot and target, predicted to now."""
 BELIEF = Topic("belief", m.Belief, 5, Quality.STATE, _TRACKER)
 """Tracker: the whole joint belief."""
+SEARCH_MAP = Topic("search_map", m.SearchMap, 2, Quality.STATE, _TRACKER)
+"""Tracker: where a target may be that is searched for."""
 SETPOINT = Topic("setpoint", m.VelocitySetpoint, 50, Quality.CONTROL, _TRACKER)
 """Tracker to driver: velocity of one drone."""
 COMMAND = Topic("command", m.Command, 0, Quality.CONTROL, _ORDERING)
@@ -123,6 +125,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         CAMERA_STATUS,
         ESTIMATE,
         BELIEF,
+        SEARCH_MAP,
         SETPOINT,
         COMMAND,
         COMMAND_ACK,

@@ -32,6 +32,7 @@ class ConsoleState:
         self.history = History(cast.targets)
         self.setpoints: dict[str, StampedMessage[m.VelocitySetpoint]] = {}
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
+        self.search_maps: dict[str, m.SearchMap] = {}
         self._sample: dict[str, Any] | None = None
         self._airborne_since_ns: int | None = None
         self._flown = False
@@ -44,6 +45,8 @@ class ConsoleState:
                     self.setpoints[item.header.entity] = StampedMessage(item.header.stamp_ns, setpoint)
                 case m.TruthState() as truth:
                     self.truth[item.header.entity] = StampedMessage(item.header.stamp_ns, truth)
+                case m.SearchMap() as search_map:
+                    self.search_maps[item.header.entity] = search_map
                 case m.Innovation() as innovation:
                     self.health.take(innovation)
                 case m.RelativeObservation() as sighting:
@@ -106,12 +109,19 @@ class ConsoleState:
             for one in found
         ]
 
+    def _search_maps(self) -> dict[str, dict[str, Any]]:
+        """Return where each target may be that is searched for now."""
+        seen = self.monitor.estimate
+        wanted = {search.target for search in seen.message.searches} if seen else set()
+        return {name: _search_map(one) for name, one in self.search_maps.items() if name in wanted}
+
     def put_seldom(self, board: Snapshot, now_ns: int) -> None:
         """Put what may be a quarter of a second old."""
         known = self.monitor
         board.put("cameras", {name: _camera(seen) for name, seen in known.cameras.items()})
         board.put("processes", {name: _process(seen) for name, seen in known.processes.items()})
         board.put("standing", self._standing(now_ns))
+        board.put("search_maps", self._search_maps())
         alarms = [{"text": alarm.text, "grave": alarm.grave} for alarm in alarms_of(known, now_ns)]
         board.put("alarms", alarms)
         board.put("health", self.health.summary())
@@ -144,6 +154,10 @@ def _estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
     ]
     searches = {search.target: [search.mode, search.text] for search in seen.message.searches}
     return {"at": _ms(seen), "epoch": seen.message.epoch, "entities": entities, "searches": searches}
+
+
+def _search_map(seen: m.SearchMap) -> dict[str, Any]:
+    return {"first": seen.first_m, "cell": seen.cell_m, "columns": seen.columns, "chances": seen.chances}
 
 
 def _setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:

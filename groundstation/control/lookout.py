@@ -11,6 +11,7 @@ from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.control.target_search import Search, SearchMode, SearchState
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.room_map import RoomMap
 from groundstation.sensing.models import SensorSuite
 from groundstation.time_units import NS_PER_S
 
@@ -82,6 +83,11 @@ class Lookout:
         if not self._obeyed:
             return ()
         return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
+
+    def maps(self) -> Mapping[str, RoomMap]:
+        """Return where each target may be that is searched for."""
+        rooms = {name: self.targets[name].room for name in self.missing}
+        return {name: room for name, room in rooms.items() if room is not None}
 
     def take_notices(self) -> list[Notice]:
         """Return and clear the events for the operator."""

@@ -1,7 +1,7 @@
 """Room, drones, ellipses, links and arrows as a Foxglove SceneUpdate. Needs the extra [foxglove]."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,16 @@ from foxglove import messages as fm
 
 from groundstation.arrays import Array
 from groundstation.bus import messages as m
-from groundstation.engineering_views.scene import LINK_COLOUR, VOLUME_COLOUR, Body, Rgb, SensingLink, ViewScene
+from groundstation.engineering_views.scene import (
+    LINK_COLOUR,
+    TARGET_COLOUR,
+    VOLUME_COLOUR,
+    Body,
+    Rgb,
+    SearchCell,
+    SensingLink,
+    ViewScene,
+)
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.time_units import NS_PER_S
@@ -36,11 +45,14 @@ class FoxgloveScene:
         self._static = [*_static(field), *(line for box in volumes for line in box)]
         self._links: list[SensingLink] = []
         self._arrows: dict[str, tuple[Array, Array]] = {}
+        self._searched: dict[str, list[SearchCell]] = {}
         self._next_ns = 0
 
     def take(self, time_ns: int, message: m.Message) -> bytes | None:
         """Return an encoded SceneUpdate when an estimate asks for a new picture."""
         match message:
+            case m.SearchMap():
+                self._searched[message.header.entity] = self._scene.cells(message)
             case m.Plan():
                 self._links = self._scene.links(message)
             case m.VelocitySetpoint():
@@ -51,10 +63,10 @@ class FoxgloveScene:
                 bodies = self._scene.take_estimate(message)
                 if not self._next_ns - _PERIOD_NS <= time_ns < self._next_ns:
                     self._next_ns = time_ns + _PERIOD_NS
-                    return self._update(time_ns, bodies)
+                    return self._update(time_ns, bodies, {search.target for search in message.searches})
         return None
 
-    def _update(self, time_ns: int, bodies: list[Body]) -> bytes:
+    def _update(self, time_ns: int, bodies: list[Body], searched: Collection[str]) -> bytes:
         stamp = fm.Timestamp(*divmod(time_ns, NS_PER_S))
 
         def entity(name: str, **parts: Any) -> fm.SceneEntity:
@@ -63,7 +75,9 @@ class FoxgloveScene:
         links = [_line([link.begin_m, link.end_m], LINK_COLOUR, 2 * link.half_width_m) for link in self._links]
         arrows = [_arrow(*arrow, self._scene.colour(name)) for name, arrow in self._arrows.items()]
         drawn = [self._body(entity, body) for body in bodies]
+        cells = [_cell(cell) for name in searched for cell in self._searched.get(name, ())]
         parts = [entity("room", lines=self._static), *drawn, entity("links", lines=links)]
+        parts.append(entity("searched", cubes=cells))
         update: bytes = fm.SceneUpdate(entities=[*parts, entity("commanded", arrows=arrows)]).encode()
         return update
 
@@ -96,6 +110,13 @@ def _box(sides: Iterable[tuple[float, float]], colour: Rgb) -> list[fm.LinePrimi
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
     rings = [_line([(x, y, z) for x, y in corners], colour, 0.01) for z in (z0, z1)]
     return [*rings, *(_line([(x, y, z0), (x, y, z1)], colour, 0.01) for x, y in corners[:4])]
+
+
+def _cell(cell: SearchCell) -> fm.CubePrimitive:
+    size = fm.Vector3(x=cell.side_m, y=cell.side_m, z=0.02)
+    red, green, blue = (part / 255 for part in TARGET_COLOUR)
+    colour = fm.Color(r=red, g=green, b=blue, a=0.7 * cell.share)
+    return fm.CubePrimitive(pose=_pose(cell.centre_m, 0.0, 0.0), size=size, color=colour)
 
 
 def _line(points: Iterable[Iterable[float]], colour: Rgb, thickness_m: float) -> fm.LinePrimitive:

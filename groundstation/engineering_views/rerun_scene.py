@@ -37,8 +37,10 @@ class RerunScene:
         self._next_ns: dict[str, int] = {}
         self._camera_paths: dict[str, str] = {}
         self._topology = ""
+        self._searched: set[str] = set()
         self._takers: dict[type[m.Message], Callable[[Any], None]] = {
             m.Estimate: self._estimate,
+            m.SearchMap: self._search_map,
             m.Plan: self._plan,
             m.VelocitySetpoint: self._setpoint,
             m.Innovation: self._innovation,
@@ -123,6 +125,9 @@ class RerunScene:
         self._log(path, pose, pinhole, static=True)
 
     def _estimate(self, message: m.Estimate) -> None:
+        for name in self._searched - {search.target for search in message.searches}:
+            self._log(f"world/searched/{name}", rr.Clear(recursive=False))
+            self._searched.remove(name)
         for body in self._scene.take_estimate(message):
             self._log_body(body)
             self._log(f"plots/std/{body.name}", rr.Scalars(body.std_m))
@@ -136,6 +141,17 @@ class RerunScene:
         if not body.is_target:
             self._log(f"{path}/heading", rr.Arrows3D(vectors=[[2 * _ARM_M, 0, 0]], colors=[colour]))
         self._log(f"world/ellipse_95/{body.name}", rr.LineStrips3D([body.ring_m], radii=[0.008], colors=[colour]))
+
+    def _search_map(self, message: m.SearchMap) -> None:
+        cells = self._scene.cells(message)
+        shown = rr.Boxes3D(
+            centers=[cell.centre_m for cell in cells],
+            half_sizes=[[cell.side_m / 2, cell.side_m / 2, 0.01] for cell in cells],
+            colors=[[*TARGET_COLOUR, round(180 * cell.share)] for cell in cells],
+            fill_mode=rr.components.FillMode.Solid,
+        )
+        self._log(f"world/searched/{message.header.entity}", shown)
+        self._searched.add(message.header.entity)
 
     def _plan(self, message: m.Plan) -> None:
         links = self._scene.links(message)

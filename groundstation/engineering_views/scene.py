@@ -22,6 +22,7 @@ ROBOT_COLOURS: tuple[Rgb, ...] = ((0, 114, 178), (230, 159, 0), (0, 158, 115), (
 TARGET_COLOUR: Rgb = (213, 94, 0)
 LINK_COLOUR: Rgb = (130, 130, 130)
 VOLUME_COLOUR: Rgb = (140, 150, 110)
+_LIKELY_AT_ALL = 0.03
 # An arrow is as long as the way in this time.
 ARROW_S = 2.0
 
@@ -46,6 +47,15 @@ class SensingLink:
     begin_m: tuple[float, float, float]
     end_m: tuple[float, float, float]
     half_width_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SearchCell:
+    """A square of the floor where a target may be: centre and side [m; world], probability as share of the most."""
+
+    centre_m: tuple[float, float, float]
+    side_m: float
+    share: float
 
 
 class ViewScene:
@@ -83,6 +93,17 @@ class ViewScene:
         ring = _ring(position, covariance)
         std = math.sqrt(max(0.0, float(covariance[0, 0] + covariance[1, 1])))
         return Body(entity.name, not has_pose, position, mean[3] if has_pose else 0.0, ring, std)
+
+    def cells(self, message: m.SearchMap) -> list[SearchCell]:
+        """Return the cells of a map that a target is likely in at all."""
+        (x, y), side = message.first_m, message.cell_m
+        height = self._target_heights_m.get(message.header.entity, 0.0)
+        found = [(divmod(index, message.columns), chance / 255) for index, chance in enumerate(message.chances)]
+        return [
+            SearchCell((x + column * side, y + row * side, height), side, share)
+            for (row, column), share in found
+            if share > _LIKELY_AT_ALL
+        ]
 
     def links(self, plan: m.Plan) -> list[SensingLink]:
         """Return the edges of a plan between what has a known place."""

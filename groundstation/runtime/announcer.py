@@ -12,16 +12,18 @@ from groundstation.bus.messages import (
     Innovation,
     JournalEntry,
     Plan,
+    SearchMap,
     SensorLateness,
     VelocitySetpoint,
 )
-from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT
+from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN, SEARCH_MAP, SETPOINT
 from groundstation.control.output_limiter import Limited
 from groundstation.estimation.measurement import Correction
 from groundstation.planning.planner import PlanResult
 from groundstation.tracker import Tracker
 
 TEAM = "team"
+_SHADES = 255.0  # of the likeliest cell of a map
 
 
 class Announcer:
@@ -50,6 +52,19 @@ class Announcer:
             lateness=lateness,
         )
         self._bus.publish(BELIEF, message)
+
+    def search_maps(self, tracker: Tracker, now_ns: int) -> None:
+        """Publish where each target may be that is searched for."""
+        for name, room in tracker.lookout.maps().items():
+            grid, chances = room.grid, room.chances
+            message = SearchMap(
+                header=self._bus.header(name, now_ns),
+                first_m=(round(float(grid.xs[0]), 3), round(float(grid.ys[0]), 3)),
+                cell_m=round(grid.cell_m, 4),
+                columns=len(grid.xs),
+                chances=tuple(np.rint(_SHADES * chances / chances.max()).astype(int).ravel().tolist()),
+            )
+            self._bus.publish(SEARCH_MAP, message)
 
     def setpoints(self, tracker: Tracker, limited: Mapping[str, Limited], now_ns: int) -> None:
         """Publish one setpoint per airborne robot; one that is not localised hovers, as not converged."""

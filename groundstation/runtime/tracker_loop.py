@@ -12,6 +12,7 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Message, Severity
 from groundstation.bus.notice import Notice
+from groundstation.bus.topics import SEARCH_MAP
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner
 from groundstation.runtime.announcer import TEAM, Announcer
@@ -107,6 +108,7 @@ class Tracking:
         self._unseen = UnseenWatch(field.safety.unseen_land_after_s)
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
+        self._map_every = max(1, round(self.rate_hz / SEARCH_MAP.rate_hz))
         self._worker = feed.worker_of(self.tracker.planner)
         self._tick = feed.first_tick
         self._known_refusals: Counter[str] = Counter()
@@ -133,6 +135,8 @@ class Tracking:
         announcer.estimate(tracker, now_ns)
         if self._tick % self._belief_every == 0:
             announcer.belief(tracker, self._picture_age.lateness(), now_ns)
+        if self._tick % self._map_every == 0:
+            announcer.search_maps(tracker, now_ns)
         if adopted is not None and adopted.plan is not None:
             announcer.plan(adopted.plan, limited, "HOLD" if tracker.holding else adopted.plan.mode)
         corrections = tracker.take_corrections()

@@ -47,6 +47,19 @@ class TargetSearch(msgspec.Struct, frozen=True):
     """The same in words."""
 
 
+class SearchMap(Message, frozen=True, kw_only=True):
+    """Where in the room a target is that is searched for, in square cells over the floor (2 Hz during a search)."""
+
+    first_m: tuple[float, float]
+    """Centre of the first cell, that with the least x and y [m; world]."""
+    cell_m: float
+    """Side of a cell [m]."""
+    columns: int
+    """Cells along x."""
+    chances: tuple[int, ...]
+    """Probability of each cell in 255ths of the likeliest one's, row by row, y rising."""
+
+
 class Estimate(Message, frozen=True, kw_only=True):
     """All entities of the belief, predicted to the header's stamp (50 Hz)."""
 

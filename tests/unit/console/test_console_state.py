@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,6 +54,20 @@ def estimate(stamp_ns: int = NS_PER_S, age_s: float = 0.1) -> m.Estimate:
     )
     target = m.EntityEstimate("turtlebot", "target", (0.5, 0.0), (0.01, 0.0, 0.0, 0.01), (0.1, 0.0), True, age_s)
     return m.Estimate(header=header("team", stamp_ns), entities=(robot, target), epoch=3)
+
+
+def test_the_map_of_a_search_is_shown_as_long_as_it_lasts() -> None:
+    state, board = ConsoleState(Cast(), 0), Snapshot()
+    of_search = m.TargetSearch("turtlebot", "SEARCH", 2.0, (0.4, 0.0), 0.1, None, "searched for 2 s")
+    cells = m.SearchMap(header=header("turtlebot"), first_m=(-0.2, 0.0), cell_m=0.2, columns=3, chances=(0, 255, 9))
+    searching = msgspec.structs.replace(estimate(), searches=(of_search,))
+    shown = []
+    for message, topic in ((cells, t.SEARCH_MAP), (searching, t.ESTIMATE), (estimate(), t.ESTIMATE)):
+        state.ingest([received(topic, message)])
+        board.begin()
+        state.put_seldom(board, NS_PER_S)
+        shown.append(json.loads(board.since(-1))["search_maps"])
+    assert shown == [{}, {"turtlebot": {"first": [-0.2, 0.0], "cell": 0.2, "columns": 3, "chances": [0, 255, 9]}}, {}]
 
 
 def test_a_board_tells_what_changed_since() -> None:

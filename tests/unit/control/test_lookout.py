@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from groundstation.bus.messages import FlightState, Header, SearchedPicture, Severity, VehicleStatus
 from groundstation.control.lookout import Lookout
@@ -64,9 +65,11 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     assert search.expected_s is not None
     assert math.hypot(search.place_m[0] - 1.0, search.place_m[1]) > 0.2
     assert "of the room done" in search.text
+    assert lookout.maps()["turtlebot"].chances.sum() == pytest.approx(1.0)
     lookout.advance(belief(1.7), {"drone_1": 0.1, "turtlebot": 0.1})
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     assert lookout.searches(round(1.7e9)) == ()
+    assert lookout.maps() == {}
 
 
 def test_nobody_is_said_to_search_who_lands_or_holds() -> None:

@@ -9,6 +9,7 @@ from groundstation.bus import messages as m
 from groundstation.engineering_views.scene import ViewScene
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
+from groundstation.time_units import NS_PER_S
 
 FIELD = resolved_field(load_field(Path(__file__).parents[3] / "config/mocap-lab.yaml"))
 BOX = FIELD.motion_capture["mocap"].volume_m
@@ -37,3 +38,45 @@ def test_foxglove_draws_the_volume_beside_room_and_fence() -> None:
     bare = msgspec.structs.replace(FIELD, motion_capture={})
     whole, fewer = (FoxgloveScene(one)._static for one in (FIELD, bare))  # what is in every update
     assert len(whole) == len(fewer) + 6  # two rings and four edges
+
+
+def search_map() -> m.SearchMap:
+    header = m.Header(0, "c", "turtlebot", "tracker", 1)
+    return m.SearchMap(header=header, first_m=(-1.0, 2.0), cell_m=0.5, columns=2, chances=(255, 0, 3, 51))
+
+
+def test_the_likely_cells_of_a_search_are_drawn_where_they_are() -> None:
+    scene = ViewScene(FIELD)
+    height = FIELD.tracked["turtlebot"].marker.height_m
+    best, other = scene.cells(search_map())
+    assert (best.centre_m, best.side_m, best.share) == ((-1.0, 2.0, height), 0.5, 1.0)
+    assert (other.centre_m, other.share) == ((-0.5, 2.5, height), 0.2)
+
+
+def test_foxglove_shows_where_a_target_is_searched_while_it_is() -> None:
+    pytest.importorskip("foxglove")
+    from groundstation.engineering_views.foxglove_scene import FoxgloveScene
+
+    scene, header = FoxgloveScene(FIELD), m.Header(0, "c", "team", "tracker", 1)
+    search = m.TargetSearch("turtlebot", "SEARCH", 2.0, (0.4, 0.0), 0.1, None, "searched for 2 s")
+    assert scene.take(0, search_map()) is None
+    during, after = (
+        scene.take(at, m.Estimate(header=header, entities=(), epoch=0, searches=searches))
+        for at, searches in ((0, (search,)), (NS_PER_S, ()))
+    )
+    assert during is not None and after is not None
+    assert len(during) > len(after) + 2 * 40  # two cubes
+
+
+def test_rerun_shows_where_a_target_is_searched_while_it_is() -> None:
+    rr = pytest.importorskip("rerun")
+    from groundstation.engineering_views.rerun_scene import RerunScene
+
+    stream, header = rr.RecordingStream("test"), m.Header(0, "c", "team", "tracker", 1)
+    scene, logged = RerunScene(stream, FIELD, 0), []
+    scene._log = lambda path, *parts, static=False: logged.append((path, type(parts[0]).__name__))  # type: ignore[method-assign]
+    search = m.TargetSearch("turtlebot", "SEARCH", 2.0, (0.4, 0.0), 0.1, None, "searched for 2 s")
+    scene.take(0, search_map())
+    for at, searches in ((0, (search,)), (NS_PER_S, ()), (2 * NS_PER_S, ())):
+        scene.take(at, m.Estimate(header=header, entities=(), epoch=0, searches=searches))
+    assert logged == [("world/searched/turtlebot", "Boxes3D"), ("world/searched/turtlebot", "Clear")]

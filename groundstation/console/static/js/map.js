@@ -2,6 +2,7 @@
 
 import { drawBodies, drawEllipses, drawGhost, drawStanding, drawTrails, drawTruth, drawVelocities } from "./map_bodies.js";
 import { drawRoom } from "./map_room.js";
+import { drawSearchMaps } from "./map_search.js";
 import { drawFootprints, drawGraph } from "./map_sensing.js";
 import { estimateAge, store } from "./store.js";
 
@@ -19,6 +20,7 @@ export function drawMap(view, ghost) {
   drawRoom(g, view);
   const stale = estimateAge() > STALE_S || !store.connected;
   g.globalAlpha = stale ? 0.4 : 1;
+  drawSearchMaps(g, view);
   if (layers.footprints) drawFootprints(g, view);
   if (layers.trails) drawTrails(g, view);
   if (layers.graph) drawGraph(g, view);

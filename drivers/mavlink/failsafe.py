@@ -9,6 +9,10 @@ from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.verification import Signing
 from drivers.vehicle_settings import VehicleLimits
 
+# Its positions end with its driver: told to stand still it slides off ever faster (docs/reference/mavlink.md 2.1). By
+# itself it would land as soon: COM_OF_LOSS_T.
+HOVERS_S = 0.5
+
 
 def hover_and_land(systems: Sequence[int], our_system: int = 255, *, signed: bool = False) -> tuple[bytes, bytes]:
     """Return the datagrams that stop and that land the vehicles of a link; both are obeyed as often as repeated.

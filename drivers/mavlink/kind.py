@@ -117,12 +117,12 @@ def _vehicle(order: VehicleOrder) -> VehicleSettings:
 
 def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
     # Only here: pymavlink's dialect takes its time to load.
-    from drivers.mavlink.failsafe import hover_and_land
+    from drivers.mavlink.failsafe import HOVERS_S, hover_and_land
 
     mavlink = _own(orders[0])
     hover, land = hover_and_land([_own(order).system_id for order in orders], signed=bool(mavlink.key_file))
     way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file})
-    return StopDatagrams(mavlink.port, hover, land, _VOICE, way, mavlink.listen)
+    return StopDatagrams(mavlink.port, hover, land, _VOICE, way, mavlink.listen, HOVERS_S)
 
 
 def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:

@@ -20,8 +20,8 @@ class VisionFeedback(DriverSection):
     rate_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
     max_std_m: Positive = 0.07
     max_age_s: Positive = 10.0
-    hover_after_s: Positive = 0.5
-    land_after_s: Positive = 2.0
+    hover_after_s: Positive = 0.3
+    land_after_s: Positive = 0.7
     jump_m: Positive = 0.3
 
     @model_validator(mode="after")

@@ -18,12 +18,14 @@ from groundstation.time_units import NS_PER_S
 _FRESH_NS = 300_000_000
 _JUMP_RAD = math.radians(15.0)
 _STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
+# An autopilot that was told nothing for longer has coasted off by its own velocity, and refuses what it is told then.
+_COASTED_NS = 400_000_000
 # After lift-off cameras need a while to find it; autopilots coast for 4.8 s or more (docs/reference/mavlink.md 1.1, 2).
 _FIRST_SIGHT_NS = 4 * NS_PER_S
 
 
 class VisionFeed:
-    """The poses for one vehicle. resets: rises at each jump, as autopilots require."""
+    """The poses for one vehicle. resets: rises at each jump and after each pause in flight, as autopilots require."""
 
     def __init__(
         self, name: str, clock: str, vision: VisionFeedback, pad_m: tuple[float, float], pad_yaw_rad: float
@@ -80,7 +82,7 @@ class VisionFeed:
                 return None
             # Where it will stand once it has landed.
             self._standing = replace(pose, position_m=(*pose.position_m[:2], 0.0), variances=_STANDING_VARIANCES)
-        if self._last is not None and self._jumps(self._last, pose):
+        if self._last is not None and (self._jumps(self._last, pose) or (aloft and self._coasted(self._last, pose))):
             self.resets += 1
         self._last = pose
         return pose
@@ -91,6 +93,9 @@ class VisionFeed:
         allowed_m = self._vision.jump_m + 2.0 * elapsed_s
         turned = abs(difference(now.yaw_rad, before.yaw_rad))
         return math.dist(before.position_m, now.position_m) > allowed_m or turned > _JUMP_RAD + 2.0 * elapsed_s
+
+    def _coasted(self, before: VisionPose, now: VisionPose) -> bool:
+        return now.stamp_ns - before.stamp_ns > _COASTED_NS
 
     def lost_s(self, now_ns: int) -> float:
         """Return for how long a flying vehicle has been without a position from us."""

@@ -10,7 +10,8 @@ def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagram
     """Return what the vehicles of a driver are sent."""
     drone = field.drones[section.entity]
     stop = kind_named(drone.kind).stop([vehicle_order(field, name) for name in section.entities])
-    land_after_s = field.safety.land_after_s
+    # Who cannot hover for so long without its driver is landed sooner.
+    land_after_s = min(field.safety.land_after_s, stop.hovers_s)
     return FailsafeDatagrams(
         drone.address, stop.port, stop.hover, stop.land, land_after_s, stop.voice, stop.way, stop.called
     )

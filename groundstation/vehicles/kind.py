@@ -3,6 +3,7 @@
 The object is light: drivers and emulators are named as "module:attribute" and loaded by the process that runs them.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -75,6 +76,7 @@ class StopDatagrams:
     """What stops and lands vehicles whose driver is dead, in their own protocol, and the port that it is sent to.
 
     hover must never lift a vehicle that stands. voice, way, called: as in supervisor.process_spec.FailsafeDatagrams.
+    hovers_s: for how long it can hover without its driver [s]; land is said after that at the latest.
     """
 
     port: int
@@ -83,6 +85,7 @@ class StopDatagrams:
     voice: str = ""
     way: str = ""
     called: bool = False
+    hovers_s: float = math.inf
 
 
 def _no_findings(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:

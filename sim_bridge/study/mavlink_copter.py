@@ -7,6 +7,7 @@ odometry. Of the driver's code only the feedback of the drift is used here, and 
 import math
 
 from drivers.mavlink.drift import DriftFeedback
+from drivers.mavlink.settings import VisionFeedback
 from drivers.mavlink.uncertainty import StatedUncertainty
 from groundstation.bus.messages import EntityEstimate, FlightState, Header, Odometry, VehicleStatus
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
@@ -15,8 +16,8 @@ from sim_bridge.world.world import TICK_S
 Vector3 = tuple[float, float, float]
 _PERIOD_TICKS = 4  # 50 Hz
 _VISION_TICKS = 7  # 28.6 Hz
-_MAX_AGE_S, _MAX_STD_M = 10.0, 0.07
-_LAND_AFTER_S = 2.0  # without a pose
+_VISION = VisionFeedback()
+_COASTED_S = 0.4
 _STAND_S, _TAKE_OFF_M, _CLIMB_M_S = 2.0, 0.8, 0.4
 _COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.05)
 _ATTITUDE_STD_RAD = math.radians(0.3)
@@ -33,6 +34,7 @@ class CopterLink:
         self._climbing = True
         self.landed = False
         self._fed: Vector3 | None = None
+        self._fed_ns = 0
         self._doubt_rad = _ATTITUDE_STD_RAD
         self._drift, self._stated = DriftFeedback(), StatedUncertainty()
         body = copter.airframe
@@ -59,7 +61,7 @@ class CopterLink:
             self._fly((forward, left, _CLIMB_M_S), 0.0, now_s)
             if copter.estimate.position[2] > _TAKE_OFF_M:
                 self._climbing = False
-        elif copter.airborne and copter.estimate.aided_s > _LAND_AFTER_S:
+        elif copter.airborne and copter.estimate.aided_s > _VISION.land_after_s:
             copter.steer(Steering.LAND)
             self.landed = True
         elif not self._climbing and not self.landed and now_s > self._until_s:
@@ -84,9 +86,10 @@ class CopterLink:
             self._stated.see_drift(now_ns, self._drift.size_m_s)
             self._doubt_rad = max(_ATTITUDE_STD_RAD, self._stated.attitude_std_rad(now_ns))
             position, yaw = (mine[0].mean[0], mine[0].mean[1], mine[0].mean[2]), mine[0].mean[3]
-        if self._fed is not None and math.dist(position, self._fed) > 0.3:
+        coasted = self._copter.airborne and now_ns - self._fed_ns > _COASTED_S * 1e9
+        if self._fed is not None and (coasted or math.dist(position, self._fed) > 0.3):
             self._resets += 1
-        self._fed = position
+        self._fed, self._fed_ns = position, now_ns
         self._copter.estimate.aid(position, yaw, self._resets)
 
     def odometry(self, stamp_ns: int) -> Odometry | None:
@@ -122,4 +125,4 @@ class CopterLink:
 
 def _is_good(estimate: EntityEstimate) -> bool:
     worst = max(estimate.covariance[i] for i in (0, 5, 10))
-    return estimate.converged and estimate.age_s <= _MAX_AGE_S and worst <= _MAX_STD_M**2
+    return estimate.converged and estimate.age_s <= _VISION.max_age_s and worst <= _VISION.max_std_m**2

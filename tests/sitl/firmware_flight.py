@@ -17,11 +17,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 from firmware_room import NAME, Room
 
-from drivers.mavlink.failsafe import hover_and_land
+from drivers.mavlink.failsafe import HOVERS_S, hover_and_land
 from groundstation.bus.messages import Verb
 
 RISEN_M, SETTLED_S, START_S = 0.5, 3.0, 30.0  # hovering before the team tracks
-GUARDIAN_HOVER_S, GUARDIAN_LAND_S = 0.3, 3.0
+GUARDIAN_SPEAKS_S = 0.3
 
 
 class Flight(Room):  # type: ignore[misc]
@@ -106,8 +106,8 @@ class Flight(Room):  # type: ignore[misc]
             return
         hover, land = hover_and_land([self.system])
         link: Any = self.fleet.link
-        if elapsed_s > GUARDIAN_HOVER_S:
-            link.send_raw(self.system, hover if elapsed_s < GUARDIAN_LAND_S else land)
+        if elapsed_s > GUARDIAN_SPEAKS_S:
+            link.send_raw(self.system, hover if elapsed_s < HOVERS_S else land)
 
 
 def fly(flavour: str, seed: int, seconds: float, folder: Path, fault: str = "", **more: Any) -> dict[str, Any]:

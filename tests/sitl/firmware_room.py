@@ -120,6 +120,7 @@ class Room:
         self.fleet = Fleet(self.process, settings)
         (self.host,) = hosts_of(self.process, self.fleet, settings)
         self.vehicle = self.fleet.vehicles[self.system]
+        self.firmware_ns, self.killed = 0, False
         self.vehicle.hear = self._note_time(self.vehicle.hear)  # type: ignore[method-assign]
         self.truth = AutopilotTruth(
             NAME, ("127.0.0.1", truth_port), self.system, Placement(self.drone.pad_m, self.drone.pad_yaw_rad)
@@ -127,8 +128,8 @@ class Room:
         self.puppet = self.study.world.puppets[NAME]
         self.study.attach(NAME, self)
         self.study.world.onboard[NAME] = Lean(self.vehicle)  # type: ignore[assignment]
-        self.firmware_ns = self._zero_ns = self._now_ns = self._next_estimate_ns = self.orders = 0
-        self.flying = self.killed = False
+        self._zero_ns = self._now_ns = self._next_estimate_ns = self.orders = 0
+        self.flying = False
         self.trace: list[dict[str, Any]] = []
         self._newest: deque[Odometry] = deque()
         self._status: VehicleStatus | None = None

@@ -74,6 +74,16 @@ def test_each_kind_gets_last_words_of_its_own_protocol(field: Field, tmp_path: P
         assert words.hover.startswith(begin) and words.land.startswith(begin), name
 
 
+def test_who_flies_on_our_positions_is_landed_sooner_without_its_driver(tmp_path: Path) -> None:
+    def land_after_s(*options: str) -> dict[str, float]:
+        field = load_field(CONFIG / "mixed-team.yaml", options=options)
+        words = failsafe_datagrams(field, tmp_path)
+        return {field.drones[name].kind: one.land_after_s for name, one in words.items() if one is not None}
+
+    assert land_after_s() == {"ardrone": 3.0, "mavlink": 0.5}
+    assert land_after_s("safety.land_after_s=5") == {"ardrone": 5.0, "mavlink": 0.5}
+
+
 def test_an_unknown_kind_gets_no_process_no_last_words_and_no_place_in_a_simulation(
     unknown: Field, tmp_path: Path
 ) -> None:

@@ -53,6 +53,16 @@ def test_an_estimate_elsewhere_does_not_count_while_it_stands(feed: VisionFeed) 
     assert place(feed, NOW + 33 * MS, aloft=False) == (*PAD, 0.0)
 
 
+def test_a_pause_in_flight_is_a_reset_for_the_autopilot_has_coasted(feed: VisionFeed) -> None:
+    now_ns, resets = NOW, []
+    for pause_ms in (33, 33, 300, 33, 500, 33):
+        now_ns += pause_ms * MS
+        believe(feed, now_ns, *PAD, 0.5)
+        assert place(feed, now_ns, aloft=True) is not None
+        resets.append(feed.resets)
+    assert [one - resets[0] for one in resets] == [0, 0, 0, 0, 1, 1]
+
+
 def test_a_vehicle_aloft_is_fed_no_old_estimate(feed: VisionFeed) -> None:
     believe(feed, NOW + 33 * MS, *PAD, 0.06)
     assert place(feed, NOW + 66 * MS, aloft=True) is not None

@@ -115,10 +115,17 @@ class Watchdog:
         refusal = self._refusal(now_ns)
         if refusal:
             return refusal
+        if self.vehicle.clears and self.vehicle.flight_state is FlightState.EMERGENCY:
+            return self._clear(now_ns, command)
         self._clearing = self.vehicle.flight_state is FlightState.EMERGENCY
         self.gate.forget_epoch()
         self.evidence.forget()
         return self._enter(now_ns, DriverMode.TAKING_OFF, f"taking off for {command.issuer}")
+
+    def _clear(self, now_ns: int, command: Command) -> str:
+        self._enter(now_ns, DriverMode.LANDED, f"emergency cleared for {command.issuer}")
+        self._clearing = True
+        return "it was in an emergency: this order ends that and starts nothing; order TAKEOFF again"
 
     def _refusal(self, now_ns: int, *conditions: Condition) -> str:
         """Return why the table refuses a start now, or ""; conditions: those that count, if not all."""
@@ -177,7 +184,6 @@ class Watchdog:
         return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns)
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
-        cleared_in_time = self._clearing and now_ns - self._entered_ns < self.limits.clear_s * NS_PER_S
         return Situation(
             now_ns,
             self.mode,
@@ -188,9 +194,12 @@ class Watchdog:
             self._entered_ns,
             self._take_off_ended_ns,
             self._paused_ns,
-            cleared_in_time,
+            self._clears_in_time(now_ns),
             gap_s,
         )
+
+    def _clears_in_time(self, now_ns: int) -> bool:
+        return self._clearing and now_ns - self._entered_ns < self.limits.clear_s * NS_PER_S
 
     def _follow_vehicle(self, now_ns: int) -> None:
         """Enter the modes that the vehicle itself reaches."""
@@ -235,7 +244,8 @@ class Watchdog:
             case DriverMode.CONNECTING:
                 return Action.WAIT
             case DriverMode.LANDED:
-                return Action.IDLE
+                clears = self.vehicle.clears and self._clears_in_time(now_ns)
+                return Action.CLEAR if clears else Action.IDLE
             case DriverMode.TAKING_OFF:
                 return Action.TAKE_OFF
             case DriverMode.LANDING:

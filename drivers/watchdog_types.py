@@ -25,12 +25,13 @@ class DriverMode(StrEnum):
 class Action(StrEnum):
     """The command for the vehicle.
 
-    WAIT: say nothing that could start or end a flight; IDLE: stay on the ground with motors off; HOVER: stand still
-    if it flies, never take off.
+    WAIT: say nothing that could start or end a flight; IDLE: stay on the ground with motors off; CLEAR: likewise, and
+    end its emergency; HOVER: stand still if it flies, never take off.
     """
 
     WAIT = "WAIT"
     IDLE = "IDLE"
+    CLEAR = "CLEAR"
     TAKE_OFF = "TAKE_OFF"
     FLY = "FLY"
     HOVER = "HOVER"
@@ -95,7 +96,7 @@ class VehicleView:
     one that it reports, None if it reports none. speed_m_s, stray: what the host makes of that: horizontal speed, and
     how the vehicle strays from what it is told, or ""; unseen_s: for how long it may not have been where it is
     believed, as the tracker says; near: who in the air is too near to its pad, or "". lost_s: for how long it had no
-    position that it needs.
+    position that it needs. clears: an order of its own ends its emergency, and starts no motor.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -110,6 +111,7 @@ class VehicleView:
     unseen_s: float = 0.0
     near: str = ""
     lost_s: float = 0.0
+    clears: bool = False
 
     @property
     def plausible(self) -> "VehicleView":

@@ -34,8 +34,10 @@ def orders_from_decision(
 def _reference(action: Action, emergency: bool, flight_state: FlightState) -> AtCommand:
     match action:
         case Action.TAKE_OFF:
-            # After an emergency the button must be pressed once more before the drone starts.
-            return at.ref(start=not emergency, select=emergency)
+            return at.ref(start=not emergency)
+        case Action.CLEAR:
+            # The button is pressed once more, and the drone stays down.
+            return at.ref(start=False, select=emergency)
         case Action.FLY | Action.HOVER:
             # Stay up, but never take off: a drone that stands, or is told to land by others, is not lifted again.
             return at.ref(start=flight_state not in (FlightState.LANDED, FlightState.LANDING))

@@ -151,8 +151,9 @@ class ArDrone:
         if not unsound and now_ns - self._doubted_ns < _DOUBTED_NS:
             unsound = "its velocity contradicts what was asked for"
         not_ready = self._not_ready(heard)
+        velocity = self._true(heard.velocity_m_s)
         return VehicleView(
-            heard.flight_state, fresh, heard.battery, not_ready, configured, unsound, self._true(heard.velocity_m_s)
+            heard.flight_state, fresh, heard.battery, not_ready, configured, unsound, velocity, clears=True
         )
 
     def _true(self, velocity_m_s: Vector3) -> Vector3:

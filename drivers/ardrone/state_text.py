@@ -38,7 +38,7 @@ _WORDS: dict[StateBit, str] = {
 }
 
 _REMEDIES: dict[StateBit, str] = {
-    StateBit.EMERGENCY: "emergency: put it level on the floor; the next take-off clears it, if its cause is gone",
+    StateBit.EMERGENCY: "emergency: put it level on the floor; the next TAKEOFF ends it, if its cause is gone",
     StateBit.CUTOUT: "a motor was stopped: free the propellers",
     StateBit.MOTORS: "a motor does not answer: look at the propellers, gears and cables, then restart the drone",
     StateBit.SOFTWARE_FAULT: "restart the drone",

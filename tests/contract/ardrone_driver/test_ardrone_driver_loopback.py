@@ -108,6 +108,11 @@ def test_cut_presses_the_button_until_the_drone_reports_the_emergency(rig):
     assert rig.fake.said("REF")[-1] == "290717696"
     assert rig.decision.mode == "CUT"
     rig.order(Verb.TAKEOFF)
+    rig.until(lambda: not rig.fake.state & EMERGENCY)
+    for _ in range(10):
+        rig.turn()
+    assert rig.decision.mode == "LANDED" and not rig.fake.state & FLY, "clearing starts nothing"
+    rig.order(Verb.TAKEOFF)
     rig.until(lambda: rig.decision.mode == "HOVER")
 
 

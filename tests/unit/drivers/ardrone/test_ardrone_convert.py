@@ -211,7 +211,9 @@ EMERGENCY = int(StateBit.EMERGENCY)
     [
         (Action.IDLE, 0, FlightState.LANDED, 0),
         (Action.TAKE_OFF, 0, FlightState.LANDED, 1 << 9),
-        (Action.TAKE_OFF, EMERGENCY, FlightState.EMERGENCY, 1 << 8),
+        (Action.TAKE_OFF, EMERGENCY, FlightState.EMERGENCY, 0),
+        (Action.CLEAR, EMERGENCY, FlightState.EMERGENCY, 1 << 8),
+        (Action.CLEAR, 0, FlightState.LANDED, 0),
         (Action.HOVER, FLY, FlightState.HOVERING, 1 << 9),
         (Action.HOVER, 0, FlightState.LANDED, 0),
         (Action.HOVER, FLY, FlightState.LANDING, 0),

@@ -208,6 +208,28 @@ def test_a_new_take_off_clears_an_emergency(new_bench):
     assert bench.step().action is Action.CUT, "a second emergency is not cleared by the same order"
 
 
+def test_clearing_and_starting_are_two_orders_where_the_vehicle_can_tell_them_apart(new_bench):
+    bench = new_bench(state=FlightState.EMERGENCY, clears=True)
+    first = bench.order(Verb.TAKEOFF)
+    assert first.stage is AckStage.REFUSED and "order TAKEOFF again" in first.reason
+    assert bench.step().action is Action.CLEAR
+    bench.state = FlightState.LANDED
+    assert set(bench.run(3)) == {Action.IDLE}, "nothing starts by itself"
+    assert bench.order(Verb.TAKEOFF).stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.TAKE_OFF
+    bench.state = FlightState.EMERGENCY
+    assert bench.step().action is Action.CUT
+
+
+def test_an_emergency_whose_cause_stays_is_pressed_for_two_seconds_only(new_bench):
+    bench = new_bench(state=FlightState.EMERGENCY, clears=True)
+    bench.order(Verb.TAKEOFF)
+    assert set(bench.run(1.9)) == {Action.CLEAR}
+    assert bench.run(0.3)[-1] is Action.IDLE
+    assert bench.order(Verb.TAKEOFF).stage is AckStage.REFUSED
+    assert bench.step().action is Action.CLEAR
+
+
 def test_an_emergency_that_does_not_clear_ends_the_take_off(new_bench):
     bench = new_bench(state=FlightState.EMERGENCY)
     bench.order(Verb.TAKEOFF)

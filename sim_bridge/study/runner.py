@@ -20,6 +20,7 @@ from sim_bridge.site import parse_site
 from sim_bridge.study.ardrone_pilot import Pilot
 from sim_bridge.study.camera_model import Eye, eyes_of
 from sim_bridge.study.capture_model import CaptureEye, captures_of
+from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.mavlink_copter import CopterLink
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
@@ -114,6 +115,7 @@ class Study:
             *eyes_of(self.site, scenario.cameras, options.outliers, options.seed),
             *captures_of(self.site, scenario.cameras.mounting_errors, options.seed),
         ]
+        self._exposures = Exposures(self._eyes)
         fence = field.room.fence
         self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])
         self.fence_violation_m = 0.0
@@ -176,11 +178,7 @@ class Study:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"imu/{name}", telemetry.inertia(now_ns))
             if world.ticks % _STATUS_TICKS == 0:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
-        for index, eye in enumerate(self._eyes):
-            phase = eye.period_s * index / len(self._eyes)
-            frame, before = (int((t - phase) / eye.period_s) for t in (world.time_s, world.time_s - TICK_NS / 1e9))
-            if frame == before:
-                continue
+        for eye in self._exposures.due(world.time_s):
             delay_ms = eye.lateness_ms
             if delay_ms is None:
                 delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)

@@ -29,6 +29,7 @@ from sim_bridge.faults import FaultSchedule, described
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 from sim_bridge.study.camera_model import eyes_of
+from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.faults.ardrone_device import MemoryArDrone
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.judge import Judge
@@ -140,7 +141,7 @@ class FaultFlight:
         )
         self.tracking = Tracking(self._tracker_bus, section, feed)
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
-        self._eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
+        self._exposures = Exposures([WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)])
         controls = {name: one.control for name, one in self.devices.items() if isinstance(one, MemoryArDrone)}
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices, controls)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
@@ -200,11 +201,7 @@ class FaultFlight:
 
     def _look(self) -> None:
         world, now_ns = self.world, self.now_ns
-        for index, eye in enumerate(self._eyes):
-            phase = eye.period_s * index / len(self._eyes)
-            frame, before = (int((t - phase) / eye.period_s) for t in (world.time_s, world.time_s - TICK_NS / 1e9))
-            if frame == before:
-                continue
+        for eye in self._exposures.due(world.time_s):
             delay_ms = self._drawn.scenario.cameras.video_delay_ms + self._rng.uniform(*_DETECTOR_MS)
             seen = eye.look(world, now_ns, clock.clock_id())
             messages: list[tuple[Topic, Message]] = [(OBSERVATION, sighting) for sighting in seen]

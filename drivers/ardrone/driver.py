@@ -5,6 +5,7 @@ import threading
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -120,20 +121,19 @@ class ArDrone:
 
     def _hear(self, now_ns: int, packet: Navdata) -> None:
         motion = convert.motion_from_navdata(packet)
-        telemetry = replace(self.telemetry, heard_ns=now_ns, state=packet.state)
+        heard, moved = self.telemetry, dict[str, Any]()
         demo, references = packet.read(DEMO), packet.read(SPEED_REFERENCES)
         if demo is not None and motion is not None:
-            telemetry = replace(
-                telemetry,
-                moved_ns=now_ns,
-                velocity_m_s=motion.velocity_m_s,
-                obeyed=None if references is None else references.sequence,
-                control_state=demo.control_state,
-                battery=min(demo.battery_percent, 100) / 100,
-                model=self.telemetry.model if self.telemetry.model is not Model.UNKNOWN else model_from_navdata(packet),
-            )
-        flight_state = convert.flight_state_from_navdata(telemetry.state, telemetry.control_state)
-        self.telemetry = replace(telemetry, flight_state=flight_state)
+            moved = {
+                "moved_ns": now_ns,
+                "velocity_m_s": motion.velocity_m_s,
+                "obeyed": None if references is None else references.sequence,
+                "control_state": demo.control_state,
+                "battery": min(demo.battery_percent, 100) / 100,
+                "model": heard.model if heard.model is not Model.UNKNOWN else model_from_navdata(packet),
+            }
+        flight_state = convert.flight_state_from_navdata(packet.state, moved.get("control_state", heard.control_state))
+        self.telemetry = replace(heard, heard_ns=now_ns, state=packet.state, flight_state=flight_state, **moved)
         if motion is not None:
             sample = convert.sample_from_motion(now_ns, packet, motion)
             report = self._plausibility.update(sample, flight_state)

@@ -71,9 +71,8 @@ def limit_setpoint(
     velocity, met = project(velocity, np.array([wall.normal for wall in walls]), np.array([w.most for w in walls]))
     names += [walls[i].name for i in met]
     body = _within(stabilized_from_world(velocity, yaw), parameters.limits_of(robot))
-    limited = replace(
-        setpoint, velocity_m_s=(float(body[0]), float(body[1]), float(body[2])), yaw_rate_rad_s=float(rate)
-    )
+    vx, vy, vz = body.tolist()
+    limited = Setpoint((vx, vy, vz), float(rate), setpoint.phase, setpoint.blocked)
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
 
 

@@ -7,6 +7,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import MotionLimits, limits_from_field
 
 Interval = tuple[float, float]
+_USUAL_LIMITS = MotionLimits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class ControlParameters:
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
-        return self.limits.get(robot, MotionLimits())
+        return self.limits.get(robot, _USUAL_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ class SafetyParameters:
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
-        return self.limits.get(robot, MotionLimits())
+        return self.limits.get(robot, _USUAL_LIMITS)
 
 
 def control_from_field(field: ResolvedField) -> ControlParameters:

@@ -20,6 +20,8 @@ _ALWAYS = frozenset((str, bool, type(None)))  # types of values that cannot be o
 
 def _is_finite(value: Any) -> bool:
     kind = type(value)
+    if kind in _ALWAYS:
+        return True
     if kind is tuple and set(map(type, value)) == {float}:
         # Vectors and matrices are most of what is checked: no sum of them is finite if one of them is not.
         return math.isfinite(sum(value)) or all(map(math.isfinite, value))

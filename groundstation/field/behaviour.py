@@ -14,11 +14,15 @@ class EstimatorValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     lost_after_s: float = 3.0
 
 
+PlannerMode = Literal["multistart", "paper", "certified"]
+"""`certified` is what older recordings call `multistart`."""
+
+
 class PlannerValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The search over topologies; row n of level_heights_m: where it begins with n levels [m]."""
 
     rate_hz: int = 10
-    mode: Literal["certified", "paper"] = "certified"
+    mode: PlannerMode = "multistart"
     plug_in: str = ""
     horizon_steps: int = 10
     step_s: float = 0.2

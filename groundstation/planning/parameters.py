@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 from groundstation.estimation.parameters import usual_acceleration_m_s2
+from groundstation.field.behaviour import PlannerMode
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.targets import Target, WeightedTarget
 from groundstation.sensing.models import Rectangle
@@ -74,7 +74,7 @@ class PlannerParameters:
     noise: ProcessNoise = ProcessNoise()
     weights: Weights = Weights()
     target_weights: Mapping[str, float] = field(default_factory=dict)
-    mode: Literal["certified", "paper"] = "certified"
+    mode: PlannerMode = "multistart"
     evaluation_budget: int = 60
     tolerance: float = 2e-3
     starts: int = 2

@@ -197,7 +197,7 @@ class SyntheticRun:
             edges=tuple(m.Edge(name, _TARGET, 900.0 + self._noise(1)[0]) for name in DRONES),
             alternatives=(m.Alternative("drone_1,drone_2", 0.05), m.Alternative("drone_1/drone_2", 0.06, True)),
             solver=m.SolverReport("converged", 120, 0.01, 3, 2),
-            mode="certified",
+            mode="multistart",
         )
 
 

@@ -3,7 +3,7 @@
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
 from groundstation import plug_ins
@@ -56,13 +56,18 @@ def _known_planner(name: str) -> str:
     return name
 
 
+def _as_named_now(mode: object) -> object:
+    """Accept the name of older field files, which promised a proof that there is not in four degrees of freedom."""
+    return "multistart" if mode == "certified" else mode
+
+
 class PlannerSettings(SettingsSection):
     """The search over sensing topologies and velocities."""
 
     rate_hz: Annotated[int, Field(ge=1, le=50)] = 10
     """Plans per second; at most the estimator's rate."""
-    mode: Literal["certified", "paper"] = "certified"
-    """certified: several starting points per topology, hysteresis and a minimum stay. paper: as in the method's paper,
+    mode: Annotated[Literal["multistart", "paper"], BeforeValidator(_as_named_now)] = "multistart"
+    """multistart: several starting points per topology, hysteresis and a minimum stay. paper: as in the method's paper,
     each topology solved once, from rest, and the cheapest wins."""
     plug_in: Annotated[str, AfterValidator(_known_planner)] = ""
     """Name of a planner of another package (entry point `skein.planners`) that plans instead; empty: ours."""

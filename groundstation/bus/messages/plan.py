@@ -75,4 +75,4 @@ class Plan(Message, frozen=True, kw_only=True):
     solver: SolverReport
     """What the optimiser did."""
     mode: str
-    """`certified` or `paper`, or HOLD while the tracker's belief is broken."""
+    """`multistart` or `paper`, or HOLD while the tracker's belief is broken."""

@@ -36,7 +36,7 @@ def belief(first: np.ndarray, target: np.ndarray, target_std: float = 0.05) -> J
 def wanted(now: JointBelief, age_s: float | None, topology: str, missing: tuple[str, ...] = ()) -> dict[str, Setpoint]:
     report = SolverReport("complete", 1, 0.0, 1, 1)
     heights = {"drone_1": 1.6, "drone_2": 1.6}
-    plan = PlanResult(Topology.parse(topology), 0.1, 0.1, HELD, heights, (), (), report, "certified", 0)
+    plan = PlanResult(Topology.parse(topology), 0.1, 0.1, HELD, heights, (), (), report, "multistart", 0)
     return setpoints_from_plan(plan, now, ("drone_1", "drone_2"), CONTROL, SENSORS, Sight(age_s, missing=missing))
 
 

@@ -59,7 +59,7 @@ def plan(heights: tuple[float, float], topology: str = "drone_1/drone_2") -> Pla
         edges=(),
         alternatives=(),
         solver=SolverReport("complete", 1, 0.0, 1, 1),
-        mode="certified",
+        mode="multistart",
         stamp_ns=0,
     )
 

@@ -54,7 +54,7 @@ def _command(time_s: float, verb: m.Verb, *scope: str) -> TimedMessage[m.Command
 def _plan(time_s: float, text: str) -> TimedMessage[m.Plan]:
     solver = m.SolverReport("ok", 1, 0.01, 1, 1)
     plan = m.Plan(
-        header=HEADER, topology=text, cost=1.0, controls=(), edges=(), alternatives=(), solver=solver, mode="certified"
+        header=HEADER, topology=text, cost=1.0, controls=(), edges=(), alternatives=(), solver=solver, mode="multistart"
     )
     return TimedMessage(time_s, plan)
 

@@ -76,6 +76,10 @@ def test_options_reach_everything() -> None:
     assert (field.drones["drone_1"].limits.max_climb_m_s, field.drones["drone_1"].limits.max_speed_m_s) == (0.2, 0.6)
 
 
+def test_the_older_name_of_a_planner_mode_is_understood() -> None:
+    assert load_field(FIXTURE, ["planner.mode=certified"]).planner.mode == "multistart"
+
+
 def test_sections_may_be_left_out(tmp_path: Path) -> None:
     text = FIXTURE.read_text(encoding="utf-8")
     kept = text[: text.index("estimator:")] + text[text.index("planner:") : text.index("safety:")]

@@ -75,4 +75,4 @@ def _processes(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for seen in state.events:
         if seen.message.severity is Severity.ERROR and seen.age_s(now_ns) < _EVENT_SHOWN_S:
-            yield Alarm(f"{seen.message.header.entity}: {seen.message.text}")
+            yield Alarm(seen.message.sentence)

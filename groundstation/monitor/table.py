@@ -246,7 +246,7 @@ def _events(state: MonitorState, now_ns: int) -> list[Text]:
 def _event(seen: StampedMessage[Event], now_ns: int, style: str) -> Text:
     event = seen.message
     text = Text(f"{seen.age_s(now_ns):4.0f} s ago  ", style="dim", no_wrap=True, overflow="ellipsis")
-    text.append(f"{event.header.entity}: {event.text}", style=f"not dim {style}".strip())
+    text.append(event.sentence, style=f"not dim {style}".strip())
     if event.remedy:
         text.append(f"  ({event.remedy})", style="dim")
     return text

@@ -64,12 +64,7 @@ class Show:
             at_ms = math.ceil(self.playback.boot_ns(at_ns) / _MS)
             match message and message.message:
                 case Event() as event:
-                    text = (
-                        event.text
-                        if event.text.startswith(event.header.entity)
-                        else f"{event.header.entity}: {event.text}"
-                    )
-                    marks.append({"at_ms": at_ms, "kind": str(event.severity), "text": text})
+                    marks.append({"at_ms": at_ms, "kind": str(event.severity), "text": event.sentence})
                 case Command() as command:
                     name = (command.verb, command.issuer, *command.scope)
                     if name not in said:

@@ -71,7 +71,7 @@ def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     stage.flight.modes["drone_1"] = "LANDING"
     page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
-    page.wait(lambda s: page.there("team-mode").inner_text() == "ON THE GROUND")
+    page.wait(lambda s: page.there("team-mode").inner_text() == "ON GROUND")
     stage.flight.battery["drone_1"] = None
     page.wait(lambda s: page.there("worst-battery").inner_text() == "unknown drone_1")
 

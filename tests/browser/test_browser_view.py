@@ -156,6 +156,8 @@ def test_battery_colours_at_their_thresholds(stage: Any) -> None:
         levels[level] = becomes(page, "drone_1-battery", "data-battery", level)
     assert all(level == shown for level, shown in levels.items()), levels
     assert "land!" in page.there("drone_1-battery").inner_text()
+    stage.flight.modes["drone_1"] = "LANDED"
+    page.wait(lambda s: "charge!" in page.there("drone_1-battery").inner_text())
 
 
 # Elements whose content sticks out of them; inner_text returns what is cut off as well.

@@ -31,6 +31,12 @@ class Event(Message, frozen=True, kw_only=True):
     injected: bool = False
     """Whether a scenario of the simulator does it: a fault that begins, lasts or ends."""
 
+    @property
+    def sentence(self) -> str:
+        """Return the text with its entity before it, unless it begins with that."""
+        entity = self.header.entity
+        return self.text if self.text.startswith(entity) else f"{entity}: {self.text}"
+
 
 class Lifecycle(StrEnum):
     """States of every process."""

@@ -182,6 +182,14 @@ def test_nothing_wrong_raises_no_alarm(world: World) -> None:
     assert _alarms(world) == []
 
 
+@pytest.mark.parametrize("text", ["is not found", "drone_1 is not found"])
+def test_an_error_names_whom_it_is_about_once(world: World, text: str) -> None:
+    world.say(t.EVENT, m.Event(header=world.header("drone_1", 1.0), severity=m.Severity.ERROR, text=text))
+    (alarm,) = _alarms(world)
+    assert alarm in {"drone_1: is not found", "drone_1 is not found"} and alarm.count("drone_1") == 1
+    assert alarm in world.text()
+
+
 def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> None:
     world.vehicle("drone_1", battery=0.18)
     world.vehicle("drone_2", age_s=4.0)

@@ -22,7 +22,7 @@ export function teamMode() {
   if (all.includes("HOLD")) return ["HOLD", "warn"];
   if (all.includes("TRACK")) return targetAgeS() > (store.scene?.lost_after_s ?? 3) ? ["SEARCH", "warn"] : ["TRACK", "good"];
   if (all.includes("HOVER")) return ["HOVER", "warn"];
-  return all.length ? ["ON THE GROUND", "calm"] : ["–", "calm"];
+  return all.length ? ["ON GROUND", "calm"] : ["–", "calm"];
 }
 
 export function stage() {

@@ -90,8 +90,8 @@ function showLink(node, share) {
 
 function showBattery(node, name, value) {
   if (value === null || value === undefined) return text(node, "?");
-  const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)];
-  const words = `${(100 * value).toFixed(0)} %${level === "empty" ? " land!" : level === "low" ? " low" : ""}`;
+  const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
+  const words = `${(100 * value).toFixed(0)} %${level === "empty" ? (standing ? " charge!" : " land!") : level === "low" ? " low" : ""}`;
   if (node.dataset.words === words) return;
   node.dataset.words = words;
   node.className = level === "full" ? "" : level;

@@ -20,10 +20,12 @@ from groundstation.control.view import spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.entity_estimate import entity_estimate
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.ingest import REASONS, Intake
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
+from groundstation.estimation.mount_watch import MOVED, MountWatch
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning import parameters as planning
@@ -86,6 +88,7 @@ class Tracker:
         self.current: PlanResult | None = None
         self.rejected: Counter[str] = Counter()
         self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
+        self._mounts = MountWatch(parameters.estimator)
         self._topology = Topology(())
         self._plan_stale = False
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
@@ -121,15 +124,21 @@ class Tracker:
 
         Never raises for what a message holds. Refused observations are also among `take_corrections`.
         """
-        verdict = self._intake.take(key, message, now_ns)
-        self.lookout.take(message, message.header.clock == self._clock)
+        moved = self._mounts.distrusts(message.header.entity)
+        if not moved:
+            self.lookout.take(message, message.header.clock == self._clock)
+        refused = moved and isinstance(message, RelativeObservation)
+        verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if verdict is Verdict.ACCEPTED:
+            if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
+                self._mounts.see(message)
             return None
         self.rejected[f"{type(message).__name__} {verdict}"] += 1
         if isinstance(message, RelativeObservation):
-            latency_ms = (now_ns - message.header.stamp_ns) / 1e6
-            refused = Correction(message.observer, message.subject, verdict, REASONS[verdict], latency_ms=latency_ms)
-            self._corrections.append(refused)
+            reason, latency_ms = MOVED if moved else REASONS[verdict], (now_ns - message.header.stamp_ns) / 1e6
+            self._corrections.append(
+                Correction(message.observer, message.subject, verdict, reason, latency_ms=latency_ms)
+            )
         return verdict
 
     def advance(self, now_ns: int) -> JointBelief:
@@ -138,9 +147,12 @@ class Tracker:
         if not self.filter.is_sound():
             self._fault("the belief is not a distribution any more")
         self._belief = self.filter.belief()
-        for correction in self.filter.take_corrections():
-            self._corrections.append(correction)
+        corrections = self.filter.take_corrections()
+        self._corrections += corrections
+        for correction in corrections:
             self._report_joining(correction)
+        velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
+        self._notices += self._mounts.advance(now_ns, velocities, corrections, self.airborne)
         self._heed_absence(now_ns)
         self._topology = self._topology_now()
         if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):
@@ -159,8 +171,8 @@ class Tracker:
         return notices
 
     def converged(self, name: str) -> bool:
-        """Return whether an entity's position is known well enough to fly on."""
-        if name not in self._belief.layout:
+        """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
+        if name not in self._belief.layout or self._mounts.is_rootless:
             return False
         P = self._belief.covariance_of(name)
         return bool(max(P[0, 0], P[1, 1]) <= self.parameters.safety.max_position_std_m**2)
@@ -168,7 +180,10 @@ class Tracker:
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""
         layout, unlocalised_s = self._belief.layout, self.unlocalised_s()
-        return tuple(self._estimate(name, unlocalised_s.get(name, 0.0)) for name in layout.robots + layout.targets)
+        return tuple(
+            entity_estimate(self.filter, self._belief, name, self.converged(name), unlocalised_s.get(name, 0.0))
+            for name in layout.robots + layout.targets
+        )
 
     def target_age_s(self) -> float | None:
         """Return the time since any target was last observed; None if none is believed anywhere."""
@@ -297,23 +312,3 @@ class Tracker:
         severity = Severity.WARNING if again else Severity.INFO
         text = f"{correction.subject} {'re-initialised' if again else 'localised'} by {correction.observer}"
         self._notices.append(Notice(severity, text, entity=correction.subject))
-
-    def _estimate(self, name: str, unlocalised_s: float) -> EntityEstimate:
-        block = self._belief.layout.block(name)
-        mean, covariance = self._belief.mean_of(name), self._belief.covariance_of(name)
-        if block.kind is EntityKind.ROBOT:
-            size = 4
-            velocity: tuple[float, ...] = self.filter.velocity_of(name)
-        else:
-            size = 2
-            velocity = (float(mean[2]), float(mean[3]))
-        return EntityEstimate(
-            name=name,
-            kind=str(block.kind),
-            mean=tuple(mean[:size].tolist()),
-            covariance=tuple(covariance[:size, :size].ravel().tolist()),
-            velocity_m_s=velocity,
-            converged=self.converged(name),
-            age_s=self.filter.age_s(name),
-            unlocalised_s=unlocalised_s,
-        )

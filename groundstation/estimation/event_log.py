@@ -12,11 +12,12 @@ from groundstation.estimation import records as r
 from groundstation.estimation.measurement import Correction, Measurement, SensorReading
 
 # Reason of a sighting for which a belief would have been given up, had not others been for the same observer.
+FAR = "far beyond the gate"
 HASTY = "far beyond the gate, but its observer lately had others given up"
 _VERDICTS = {
     r.ACCEPTED: (Verdict.ACCEPTED, ""),
     r.INFLATED: (Verdict.INFLATED, "beyond the gate"),
-    r.IMPLAUSIBLE: (Verdict.IMPLAUSIBLE, "far beyond the gate"),
+    r.IMPLAUSIBLE: (Verdict.IMPLAUSIBLE, FAR),
     r.OUT_OF_VIEW: (Verdict.OUT_OF_VIEW, "behind the camera"),
     r.SINGULAR: (Verdict.SINGULAR, "covariance is not positive definite"),
     r.OBSERVER_UNKNOWN: (Verdict.UNKNOWN_ENTITY, "the observer has no belief yet"),

@@ -56,7 +56,7 @@ class EstimatorParameters:
     wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
     over at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where
     they publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to
-    take off.
+    take off. world_cameras: sensors that hang in the room, and can be bumped.
     """
 
     entities: Mapping[str, MotionModel]
@@ -69,6 +69,7 @@ class EstimatorParameters:
     divergence_s: float = 0.6
     inertial: Mapping[str, float] = field(default_factory=dict)
     joins_early: frozenset[str] = frozenset()
+    world_cameras: frozenset[str] = frozenset()
 
 
 def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
@@ -92,6 +93,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
             n: d.odometry.velocity_scale for n, d in drones.items() if not kind_named(d.kind).habits.tells_attitude
         },
         joins_early=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.flies_on_estimate),
+        world_cameras=frozenset(resolved.cameras),
     )
 
 

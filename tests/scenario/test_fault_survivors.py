@@ -27,6 +27,9 @@ BLIND = {
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
 
+# Bumped by 8.75 deg the ceiling camera saw nobody, then one drone half a metre aside, which the other saw where it was.
+BUMPED = (202, ["camera_bumped", "picture_frozen"])
+
 
 @pytest.fixture(scope="module")
 def order() -> dict[str, Any]:
@@ -56,3 +59,16 @@ def test_a_velocity_that_was_seen_to_drift_is_not_believed_again_in_the_dark(ord
     flown = fly(order, seed, events=False)
     assert flown["kinds"] == kinds, "the seed stands for another flight now"
     assert flown["unsafe"] == {}
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_bumped_ceiling_camera_is_named_and_not_believed(order: dict[str, Any]) -> None:
+    seed, kinds = BUMPED
+    flown = fly(order, seed, events=True)
+    assert flown["kinds"] == kinds, "the seed stands for another flight now"
+    assert flown["unsafe"] == {}
+    (told,) = [line for line in flown["events"] if "was bumped" in line]
+    size = float(told.split("turned by ")[1].split()[0])
+    assert size == pytest.approx(8.75, rel=0.25)
+    assert set(flown["modes"].values()) <= {"LANDING", "LANDED"}

@@ -1,0 +1,30 @@
+"""What is told of one entity of the joint belief."""
+
+from groundstation.bus.messages import EntityEstimate
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.layout import EntityKind
+
+
+def entity_estimate(
+    joint: FixedLagFilter, belief: JointBelief, name: str, converged: bool, unlocalised_s: float
+) -> EntityEstimate:
+    """Return a robot's x, y, z, yaw or a target's x, y with covariance and velocity [m, rad, m/s; world]."""
+    block = belief.layout.block(name)
+    mean, covariance = belief.mean_of(name), belief.covariance_of(name)
+    if block.kind is EntityKind.ROBOT:
+        size = 4
+        velocity: tuple[float, ...] = joint.velocity_of(name)
+    else:
+        size = 2
+        velocity = (float(mean[2]), float(mean[3]))
+    return EntityEstimate(
+        name=name,
+        kind=str(block.kind),
+        mean=tuple(mean[:size].tolist()),
+        covariance=tuple(covariance[:size, :size].ravel().tolist()),
+        velocity_m_s=velocity,
+        converged=converged,
+        age_s=joint.age_s(name),
+        unlocalised_s=unlocalised_s,
+    )

@@ -1,0 +1,78 @@
+"""Which fixed cameras were moved in flight: told, and not believed any more until everybody has landed. Pure."""
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+import numpy as np
+
+from groundstation.arrays import Matrix, Vector
+from groundstation.bus.messages import RelativeObservation, Severity
+from groundstation.bus.notice import Notice
+from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.measurement import Correction
+from groundstation.estimation.models import FixedMount, MountedCamera
+from groundstation.estimation.parameters import EstimatorParameters
+from groundstation.estimation.sight_jumps import SightJumps
+from groundstation.estimation.tied_contradictions import Pair, TiedContradictions
+from groundstation.geometry.camera_turn import CameraTurn
+from groundstation.time_units import NS_PER_S
+
+MOVED = "its camera was moved: what it sees counts for nothing until all have landed"
+# A camera that is off by less than this [m] is told of, and still believed: the rooms' margins are wider.
+_HARMS_M = 0.15
+_REMEDY = (
+    "land; fix the camera where the field file has it, or survey it anew (groundstation calibrate), then check again"
+)
+
+
+class MountWatch:
+    """Use: `see` each sighting, `advance` once a tick; ask `distrusts` and `is_rootless`."""
+
+    def __init__(self, parameters: EstimatorParameters) -> None:
+        fixed: dict[str, Matrix] = {
+            sensor.carrier: sensor.rotation
+            for sensor in parameters.sensors.values()
+            if isinstance(sensor, MountedCamera) and isinstance(parameters.entities[sensor.carrier], FixedMount)
+        }
+        mounts = {name: rotation for name, rotation in fixed.items() if name in parameters.world_cameras}
+        robots = [name for name, model in parameters.entities.items() if model.kind is EntityKind.ROBOT]
+        self._roots, self._cameras, self._robots = frozenset(fixed), frozenset(mounts), frozenset(robots)
+        self._jumps, self._ties = SightJumps(mounts), TiedContradictions(mounts, robots)
+        self._seen: dict[Pair, Vector] = {}
+        self._moved: set[str] = set()
+
+    @property
+    def is_rootless(self) -> bool:
+        """Return whether no fixed camera is left that tells where the team is in the room."""
+        return bool(self._moved) and self._moved == self._roots
+
+    def distrusts(self, observer: str) -> bool:
+        """Return whether a camera's sightings are to be refused."""
+        return observer in self._moved
+
+    def see(self, o: RelativeObservation) -> None:
+        """Take a sighting that the filter was given."""
+        if o.observer in self._cameras and o.subject in self._robots:
+            self._seen[o.observer, o.subject] = np.array(o.position_m)
+            self._jumps.see(o)
+
+    def advance(
+        self, now_ns: int, velocities: Mapping[str, Sequence[float]], corrections: Iterable[Correction],
+        airborne: Collection[str],
+    ) -> list[Notice]:  # fmt: skip
+        """Return what is to be told. velocities [m/s; world] of all robots that have joined."""
+        now_s = now_ns / NS_PER_S
+        if not airborne:
+            self._moved.clear()
+        self._jumps.fly(now_s, velocities)
+        self._ties.take(corrections, now_s)
+        return [self._tell(turn) for turn in (*self._jumps.turns(), *self._ties.turns(now_s, self._seen))]
+
+    def _tell(self, turn: CameraTurn) -> Notice:
+        angle = f"{math.degrees(turn.angle_rad):.1f} +- {math.degrees(turn.std_rad):.1f} deg"
+        what = f"was bumped: all that it sees is displaced at once by {turn.displaced_m:.2f} m, as if turned by {angle}"
+        if turn.displaced_m < _HARMS_M:
+            return Notice(Severity.WARNING, what, _REMEDY, turn.camera)
+        self._moved.add(turn.camera)
+        rest = "; no other camera tells where the team is, which hovers and lands" if self.is_rootless else ""
+        return Notice(Severity.ERROR, f"{what}; it is not believed any more{rest}", _REMEDY, turn.camera)

@@ -1,0 +1,144 @@
+"""Fixed cameras in whose pictures everything jumps from one picture to the next. Pure.
+
+A robot cannot jump. What it flew between two pictures is known from its own odometry, so a displacement that appears
+between two pictures, and stays, is the camera's. No belief of places is asked: it may have followed the jump already.
+"""
+
+import math
+from bisect import bisect_left
+from collections import defaultdict, deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array, Matrix, Vector
+from groundstation.bus.messages import RelativeObservation
+from groundstation.geometry.camera_turn import CameraTurn, Displacement, camera_turn
+from groundstation.time_units import NS_PER_S
+
+# Pictures before and after a jump; those of one side lie within so long, and the gap between is no longer [s].
+_BEFORE, _AFTER, _SIDE_S, _GAP_S = 3, 4, 0.6, 0.4
+# What is told: displacements from so far on [m], and more by the speed [m/s] at which a robot may be wrong about its
+# velocity in the gap. One robot alone may be as wrong as a robot can; not two in the same manner.
+_LEAST_M, _ALONE_M_S, _TOGETHER_M_S = 0.06, 1.2, 0.3
+# On each side of a jump sights stay within this share of it; of a robot that drifts off they do not.
+_STEADY = 0.3
+_PATH = 120  # moments
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """A marker in one picture [m; camera_optical], and the same less what its robot flew since the path began."""
+
+    at_s: float
+    seen: Vector
+    held: Vector
+
+
+class _Path:
+    """What a robot flew, by its velocities [m; world]."""
+
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=_PATH)
+        self._flown: deque[Array] = deque(maxlen=_PATH)
+
+    def step(self, now_s: float, velocity: Sequence[float]) -> None:
+        last = self._flown[-1] if self._flown else np.zeros(3)
+        elapsed_s = now_s - self._times[-1] if self._times else 0.0
+        self._times.append(now_s)
+        self._flown.append(last + elapsed_s * np.asarray(velocity))
+
+    def at(self, at_s: float) -> Array | None:
+        """Return what was flown until a time; None if that is not known."""
+        after = bisect_left(self._times, at_s)
+        if not 0 < after < len(self._times):
+            return None
+        early, late = self._times[after - 1], self._times[after]
+        share = (at_s - early) / (late - early)
+        return self._flown[after - 1] + share * (self._flown[after] - self._flown[after - 1])
+
+
+class SightJumps:
+    """Use: `see` sightings of robots, `fly` with their velocities, then take `turns`. mounts: world_from_optical."""
+
+    def __init__(self, mounts: Mapping[str, Matrix]) -> None:
+        self._mounts = mounts
+        self._paths: dict[str, _Path] = {}
+        self._sights: defaultdict[str, dict[str, deque[_Sight]]] = defaultdict(dict)
+        self._fresh: set[str] = set()
+
+    def see(self, o: RelativeObservation) -> None:
+        """Take a fixed camera's sighting of a robot."""
+        at_s, path = o.header.stamp_ns / NS_PER_S, self._paths.get(o.subject)
+        flown = None if path is None else path.at(at_s)
+        if flown is None:
+            return
+        seen = np.array(o.position_m)
+        rows = self._sights[o.observer].setdefault(o.subject, deque(maxlen=_BEFORE + _AFTER))
+        # A picture that hangs for a moment shows the same once more, and nothing new.
+        if not rows or (at_s > rows[-1].at_s and not np.array_equal(seen, rows[-1].seen)):
+            rows.append(_Sight(at_s, seen, seen - self._mounts[o.observer].T @ flown))
+            self._fresh.add(o.observer)
+
+    def fly(self, now_s: float, velocities: Mapping[str, Sequence[float]]) -> None:
+        """Take the robots' velocities [m/s; world] from now on."""
+        for name in self._paths.keys() - velocities.keys():
+            self._forget(name)
+        for name, velocity in velocities.items():
+            self._paths.setdefault(name, _Path()).step(now_s, velocity)
+
+    def turns(self) -> Iterator[CameraTurn]:
+        """Yield the cameras that were turned lately, each once."""
+        for camera in sorted(self._fresh):
+            turn = self._turn(camera)
+            if turn is not None:
+                self._sights[camera].clear()
+                yield turn
+        self._fresh.clear()
+
+    def _forget(self, robot: str) -> None:
+        del self._paths[robot]
+        for rows in self._sights.values():
+            rows.pop(robot, None)
+
+    def _turn(self, camera: str) -> CameraTurn | None:
+        sights = self._sights[camera]
+        for rows in sights.values():
+            jump = _jump(rows) if len(rows) == _BEFORE + _AFTER else None
+            if jump is None:
+                continue
+            began_s = rows[_BEFORE].at_s
+            displaced = [
+                Displacement(name, *shift) for name, others in sights.items() if (shift := _across(others, began_s))
+            ]
+            gap_s = began_s - rows[_BEFORE - 1].at_s
+            together_m, alone_m = (_LEAST_M + gap_s * speed for speed in (_TOGETHER_M_S, _ALONE_M_S))
+            # Who stays where he was beside one that jumps speaks for the camera: it hardly turned about his very sight.
+            together = len(displaced) > 1 and min(one.size_m for one in displaced) > together_m
+            if together or (len(displaced) == 1 and jump > alone_m):
+                return camera_turn(camera, displaced)
+        return None
+
+
+def _jump(rows: Sequence[_Sight]) -> float | None:
+    """Return by how much a sight jumped [m], if it did so between two pictures and stayed there."""
+    before, after = list(rows)[:_BEFORE], list(rows)[_BEFORE:]
+    gap_s = after[0].at_s - before[-1].at_s
+    if gap_s > _GAP_S or after[-1].at_s - after[0].at_s > _SIDE_S or before[-1].at_s - before[0].at_s > _SIDE_S:
+        return None
+    old, new = (np.median([one.held for one in side], axis=0) for side in (before, after))
+    size = math.hypot(*(new - old))
+    wide = max(math.hypot(*(one.held - at)) for side, at in ((before, old), (after, new)) for one in side)
+    return size if size > _LEAST_M and wide < _STEADY * size else None
+
+
+def _across(rows: Sequence[_Sight], began_s: float) -> tuple[Vector, Vector] | None:
+    """Return where a sight was to be expected after a time, and where it is; None if it was not seen on both sides."""
+    before = [one for one in rows if 0.0 < began_s - one.at_s <= _SIDE_S]
+    after = [one for one in rows if 0.0 <= one.at_s - began_s <= _SIDE_S]
+    if min(len(before), len(after)) < _BEFORE:
+        return None
+    old, new = (np.median([one.held for one in side], axis=0) for side in (before, after))
+    seen = np.asarray(after[len(after) // 2].seen)
+    return seen - (new - old), seen

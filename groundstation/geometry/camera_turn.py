@@ -1,0 +1,64 @@
+"""Was a fixed camera turned? The one rotation that explains how far all that it sees was displaced at once. Pure.
+
+A camera that turns by an angle a about an axis n displaces a point that it saw at p to q, with q - p = (p + q) x g and
+g = n tan(a / 2) (Cayley), in its own old axes: linear in g, however far it turns. Noise of detection and what a belief
+knows of its subjects are the same for all, so least squares will do.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Matrix, Vector
+
+# How well two sights of a drone that did not move agree [m]; and the share of a displacement that may stay unexplained.
+_SIGHT_M, _SHARE = 0.04, 0.25
+# A priori: about no axis more than this [rad]. It decides where one sight leaves an axis open.
+_LIKELY_RAD = math.radians(20.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Displacement:
+    """What one camera saw of one robot, against what was to be expected [m; camera_optical]."""
+
+    robot: str
+    expected_m: Vector
+    seen_m: Vector
+
+    @property
+    def size_m(self) -> float:
+        """Return how far it is [m]."""
+        return float(np.linalg.norm(self.seen_m - self.expected_m))
+
+
+@dataclass(frozen=True, slots=True)
+class CameraTurn:
+    """By how much a camera was turned, with one sigma [rad]; how far that displaces what it saw, at most [m]."""
+
+    camera: str
+    angle_rad: float
+    std_rad: float
+    displaced_m: float
+
+
+def camera_turn(camera: str, displaced: Sequence[Displacement]) -> CameraTurn | None:
+    """Return the rotation that explains all displacements of one camera, or None where none does."""
+    most_m = max(one.size_m for one in displaced)
+    A = np.vstack([_cross(one.expected_m + one.seen_m) for one in displaced])
+    b = np.concatenate([one.seen_m - one.expected_m for one in displaced])
+    information = A.T @ A / _SIGHT_M**2 + np.eye(3) / math.tan(_LIKELY_RAD / 2.0) ** 2
+    gibbs = np.linalg.solve(information, A.T @ b / _SIGHT_M**2)
+    left = np.linalg.norm((b - A @ gibbs).reshape(-1, 3), axis=1)
+    if float(left.max()) > _SIGHT_M + _SHARE * most_m:
+        return None
+    length = float(np.linalg.norm(gibbs))
+    along = gibbs / max(length, 1e-9)
+    std_rad = 2.0 * math.sqrt(float(along @ np.linalg.solve(information, along)))
+    return CameraTurn(camera, 2.0 * math.atan(length), std_rad, most_m)
+
+
+def _cross(p: Vector) -> Matrix:
+    """Return the matrix of g -> p x g."""
+    return np.array([[0.0, -p[2], p[1]], [p[2], 0.0, -p[0]], [-p[1], p[0], 0.0]])

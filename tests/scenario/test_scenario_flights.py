@@ -1,6 +1,9 @@
 """Flights of scenario files: the target is found and held, and what a strategy does not change stays the same."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -24,6 +27,26 @@ def fly(name: str, strategy: str, seconds: float = 8.0) -> dict[str, Any]:
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     drawn = as_drawn(msgspec.to_builtins(resolved_field(field)), scenario, 1)
     return ScenarioFlight(drawn, sections, seconds, strategy).fly()
+
+
+# Wind of 0.8 m/s^2 makes a drone's velocity contradict what was asked for: it hovers until RESUME. Along the walls the
+# target was found after 20 s, not 15.
+KNOWN_MISSES = {"wind", "along-walls"}
+
+
+@pytest.mark.timeout(1500)
+def test_scenarios_end_as_their_files_expect(tmp_path: Path) -> None:
+    """All of them, one seed each: found in time, held, nobody lands."""
+    command = [sys.executable, "-m", "groundstation.cli.main", "experiment", "scenarios"]
+    flown = subprocess.run(
+        [*command, "--scheduler", "none", "-o", str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    results = tmp_path / "scenarios.json"
+    assert results.exists(), flown.stderr
+    rows = json.loads(results.read_text())["rows"]
+    assert len(rows) >= 19
+    missed = {row["scenario"]: row["missed"] for row in rows if row["as_expected"] < row["flights"]}
+    assert missed.keys() <= KNOWN_MISSES, missed
 
 
 @pytest.mark.parametrize("strategy", ["ours", "string", "relay", "chase"])

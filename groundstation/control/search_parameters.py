@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
-from groundstation.sensing.from_field import TAG_SQUARES
+from groundstation.sensing.from_field import square_m
 
 Interval = tuple[float, float]
 
@@ -71,7 +71,6 @@ def search_from_field(resolved: ResolvedField) -> SearchParameters:
 
 def _range_m(drone: FieldDrone, resolved: ResolvedField) -> float:
     """Return how far a full search of a drone's pictures finds all targets, at least as far as plans go."""
-    markers = [target.marker for target in resolved.tracked.values()]
-    squares_mm = [m.square_mm if m.size_mm is None else m.size_mm / TAG_SQUARES for m in markers]
-    found_m = drone.camera.calibration.fx_px * min(squares_mm) / 1000 / SEARCH_PX
+    smallest_m = min(square_m(target.marker) for target in resolved.tracked.values())
+    found_m = drone.camera.calibration.fx_px * smallest_m / SEARCH_PX
     return max(resolved.planner.planned_range_m, found_m)

@@ -32,8 +32,8 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
     """Return the suite for a resolved field."""
     drones, targets = field.drones, field.tracked
     heights = {name: drone.marker.position_m[2] for name, drone in drones.items()}
-    square = min((_square_m(drone.marker) for drone in drones.values()), default=0.044)
-    smallest = min(square, *(_square_m(target.marker) for target in targets.values()))
+    square = min((square_m(drone.marker) for drone in drones.values()), default=0.044)
+    smallest = min(square, *(square_m(target.marker) for target in targets.values()))
     reach = field.planner.planned_range_m
     return SensorSuite(
         world={name: _world(camera, square) for name, camera in field.cameras.items()}
@@ -43,7 +43,7 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
     )
 
 
-def _square_m(marker: Marker) -> float:
+def square_m(marker: Marker) -> float:
     """Return the square of the checkerboard that is seen as far as a marker is."""
     return (marker.square_mm if marker.size_mm is None else marker.size_mm / TAG_SQUARES) / 1000
 

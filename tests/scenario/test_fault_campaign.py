@@ -51,7 +51,7 @@ def test_a_seed_ends_the_same_again(silent: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
-    flown = fly("mixed-team", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=12.0), seconds=5.0)
+    flown = fly("mixed-team", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=15.0), seconds=5.0)
     assert flown["tracking_since_s"] is not None
     assert flown["modes"]["drone_1"] == flown["modes"]["drone_3"] == "TRACK"
     assert flown["modes"]["drone_2"] != "TRACK"

@@ -17,17 +17,17 @@ _LIMITS = {"cpu_ms_per_flight_s": 25.0}
 
 
 @click.command(epilog="Example: groundstation bench study --runs 5 --json")
-@click.option("--seconds", type=FiniteRange(1, 600), default=45.0, show_default=True, help="Tracked in each flight.")
+@click.option("--duration", type=FiniteRange(1, 600), default=45.0, show_default=True, help="Seconds of tracking.")
 @click.option("--runs", type=click.IntRange(1, 100), default=3, show_default=True, help="Flights; the quickest counts.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
-def study(seconds: float, runs: int, as_json: bool) -> int:
+def study(duration: float, runs: int, as_json: bool) -> int:
     """Time flights of two drones at message level, one after the other: CPU time of world, filter, planner, setpoints.
 
     Compiled kernels are in their cache before the first one counts. Exit code 0 when the limit is kept, 1 when it is
     not.
     """
     _fly(1.0)
-    flights = [_fly(seconds) for _ in range(runs)]
+    flights = [_fly(duration) for _ in range(runs)]
     quickest = min(flights, key=lambda flight: float(flight["cpu_s"]["total"]))
     cpu_s, flown_s = quickest["cpu_s"], quickest["flown_s"]
     figures: dict[str, Any] = {

@@ -1,10 +1,12 @@
 # make demo, make test: each creates .venv if needed, installs what it uses (an extra of pyproject.toml), and runs.
+# Only files with a known hash are installed (requirements/), and nothing is built but the product itself.
 # make alone only installs the product.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
+INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --no-deps
+HASHED := --require-hashes --requirement
 DEMO_ARGS ?=
 # REPEAT=--last-failed repeats only what failed, in each of the test targets.
 REPEAT ?=
@@ -19,7 +21,7 @@ WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver te
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test test-waiting test-computing raise-floors test-slow slow-flights slow-studies fuzz test-firmware mutants wire-faults soak check format docs sbom audit interop clean
+.PHONY: install demo test test-waiting test-computing raise-floors test-slow slow-flights slow-studies fuzz test-firmware mutants wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)
 
@@ -89,6 +91,10 @@ format: $(STAMP)-check
 docs: $(STAMP)-docs
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
+# After a change of a pin: the hashes of all files of each pinned release, from the registry; needs uv.
+hashes:
+	$(PYTHON) .ci/pin_hashes.py
+
 # The bill of materials of what is installed and needed to run.
 sbom: $(STAMP)
 	$(BIN)/python .ci/supply_chain.py build/sbom.cdx.json
@@ -110,21 +116,22 @@ $(INTEROP)/node/.installed: tests/interop/package.json
 
 $(INTEROP)/%/.installed: tests/interop/%.txt
 	@test -x $(INTEROP)/$*/bin/python || $(PYTHON) -m venv $(INTEROP)/$*
-	$(INTEROP)/$*/bin/pip install --quiet --disable-pip-version-check --no-deps --requirement $<
+	$(INTEROP)/$*/bin/pip install --quiet --disable-pip-version-check --no-deps $(HASHED) $<
 	@mkdir -p $(INTEROP)/bin && for program in $(INTEROP)/$*/lib/python3*/site-packages/imageio_ffmpeg/binaries/ffmpeg-*; do \
 		test ! -x "$$program" || ln -sf "$$(pwd)/$$program" $(INTEROP)/bin/ffmpeg; done
 	@touch $@
 
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml requirements/run.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "Skein needs Python 3.11 or newer; this is %d.%d. Use: make PYTHON=python3.11 $(MAKECMDGOALS)" % v[:2])'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(INSTALL) .
+	$(INSTALL) --only-binary :all: $(HASHED) requirements/run.txt
+	$(INSTALL) --no-build-isolation --editable .
 	@echo "compiling the kernels, once: half a minute"
 	@$(BIN)/python -m groundstation.runtime.compile_kernels
 	@touch $@
 
-$(STAMP)-%: $(STAMP)
-	$(INSTALL) '.[$*]'
+$(STAMP)-%: $(STAMP) requirements/%.txt
+	$(INSTALL) --only-binary :all: $(HASHED) requirements/$*.txt
 	@touch $@
 
 clean:

@@ -16,7 +16,16 @@ import groundstation
 ROOT = Path(__file__).parents[2]
 TOP_LEVEL = {
     *("pyproject.toml", "README.md", "groundstation", "drivers", "sim_bridge", "tests", "config"),
-    *("Makefile", "constraints.txt", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "docs"),
+    *(
+        "Makefile",
+        "constraints.txt",
+        "requirements",
+        "LICENSE",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "docs",
+    ),
 }
 
 CI_TARGETS = [

@@ -1,7 +1,12 @@
-"""The bill of materials: all that the product needs to run, each part pinned and named as registries name it."""
+"""What is installed: each part pinned and in the bill of materials, and no file whose hash is not known."""
 
+import hashlib
 import importlib.util
 import re
+import shlex
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 from types import ModuleType
 
@@ -32,10 +37,80 @@ def test_each_part_that_runs_is_listed_with_its_version(tool: ModuleType) -> Non
     assert tool.sbom() == document, "the same parts give the same document"
 
 
-def test_each_part_that_runs_is_pinned(tool: ModuleType) -> None:
-    pins = {tool.canonical(line.split("==")[0]) for line in (ROOT / "constraints.txt").read_text().splitlines()}
-    assert {part["name"] for part in tool.sbom()["components"]} <= pins
+LISTS = sorted((ROOT / "requirements").glob("*.txt"))
+LISTS_OF_OTHERS = sorted((ROOT / "tests" / "interop").glob("*.txt"))
+
+
+def hashes_of(path: Path) -> dict[str, list[str]]:
+    """Return the pins of a list with the hashes of each; fails on anything else in it."""
+    found: dict[str, list[str]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        pin = re.fullmatch(r"([a-z0-9._-]+==[a-z0-9.+!]+)( ; [a-z_]+ [!<>=]+ '[\w.]+'( and .*)?)? \\", line, re.I)
+        digest = re.fullmatch(r"    --hash=(sha256:[0-9a-f]{64})( \\)?", line)
+        assert pin or digest or line.startswith("#"), f"{path.name}: {line}"
+        if pin:
+            found[pin[1].lower()] = []
+        elif digest:
+            found[list(found)[-1]].append(digest[1])
+    return found
+
+
+def pins() -> set[str]:
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    return {
+        "==".join((re.sub(r"[-_.]+", "-", name).lower(), version)) for name, version in (x.split("==") for x in lines)
+    }
+
+
+@pytest.mark.parametrize("path", LISTS + LISTS_OF_OTHERS, ids=lambda path: path.stem)
+def test_each_pin_has_the_hashes_of_its_files(path: Path) -> None:
+    found = hashes_of(path)
+    assert found
+    assert [pin for pin, digests in found.items() if not digests] == [], "make hashes"
+
+
+def test_the_lists_are_the_pins() -> None:
+    assert {path.stem for path in LISTS} == {"run", "test", "test-slow", "check", "docs"}
+    assert set().union(*map(hashes_of, LISTS)) == pins(), "make hashes"
+
+
+def test_each_part_that_runs_is_installed_by_its_hash(tool: ModuleType) -> None:
+    listed = {pin.split("==")[0] for pin in hashes_of(ROOT / "requirements" / "run.txt")}
+    assert {part["name"] for part in tool.sbom()["components"]} | {"hatchling", "editables"} <= listed
+
+
+def test_make_refuses_a_file_that_was_tampered_with(tmp_path: Path) -> None:
+    """The options of the Makefile, with a registry of one wheel."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (options,) = re.findall(r"^\t\$\(INSTALL\) (.*\$\(HASHED\)) requirements/run\.txt$", makefile, re.M)
+    for name in ("HASHED", "INSTALL"):
+        (value,) = re.findall(rf"^{name} := (.*)$", makefile, re.M)
+        options = options.replace(f"$({name})", value) if name in options else f"{value} {options}"
+    wheel = tmp_path / "part-1.0-py3-none-any.whl"
+    write_wheel(wheel)
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    listed = tmp_path / "run.txt"
+    listed.write_text(f"part==1.0 \\\n    --hash=sha256:{digest}\n", encoding="utf-8")
+    with zipfile.ZipFile(wheel, "a") as archive:
+        archive.writestr("more.py", "")
+    pip = [sys.executable, "-m", *shlex.split(options.replace("$(BIN)/", ""))]
+    registry = ["--no-index", "--find-links", str(tmp_path), "--target", str(tmp_path / "installed")]
+    done = subprocess.run([*pip, str(listed), *registry], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode != 0 and "DO NOT MATCH THE HASHES" in done.stderr, done.stderr
+    assert not (tmp_path / "installed").exists()
+
+
+def write_wheel(path: Path) -> None:
+    info = "part-1.0.dist-info"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("part.py", "")
+        archive.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: part\nVersion: 1.0\n")
+        archive.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
+        archive.writestr(f"{info}/RECORD", f"part.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
 
 
 def test_pins_hold_no_address() -> None:
-    assert not re.search(r"https?:|@|index", (ROOT / "constraints.txt").read_text())
+    for path in (ROOT / "constraints.txt", *LISTS, *LISTS_OF_OTHERS):
+        assert not re.search(r"https?:|@|index-url|find-links", path.read_text(encoding="utf-8")), path

@@ -7,7 +7,7 @@ from itertools import permutations
 
 import numpy as np
 
-from groundstation.arrays import Array, IntVector
+from groundstation.arrays import Array, BoolArray, IntVector
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.estimation.room_map import RoomGrid
@@ -68,40 +68,56 @@ def choose_stands(
     stands so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
     Of few robots, whoever had better choose first does; the first in the order of `footprints` if that is the same.
     """
-    orders = permutations(footprints) if len(footprints) <= _ANY_ORDER else (tuple(footprints),)
+    searchers = {
+        name: _searcher(footprint, lattice, poses[name], allowed_s[name], held.get(name), parameters)
+        for name, footprint in footprints.items()
+    }
+    orders = permutations(searchers) if len(searchers) <= _ANY_ORDER else (tuple(searchers),)
     outlooks = [
-        _chosen(np.array(chances), lattice, {n: footprints[n] for n in order}, poses, allowed_s, held, parameters)
-        for order in orders
+        _chosen(np.array(chances), lattice, {name: searchers[name] for name in order}, parameters) for order in orders
     ]
     return max(outlooks, key=lambda outlook: outlook.value)
 
 
-def _chosen(
-    left: Array,
+@dataclass(frozen=True, slots=True)
+class _Searcher:
+    """One robot that may look: how long it needs to each stand and heading [s], where it may be, where it looks now."""
+
+    footprint: Footprint
+    way_s: Array
+    free: BoolArray
+    kept: tuple[int, int] | None
+
+
+def _searcher(
+    footprint: Footprint,
     lattice: Lattice,
-    footprints: Mapping[str, Footprint],
-    poses: Mapping[str, Array],
-    allowed_s: Mapping[str, Array],
-    held: Mapping[str, Stand],
+    pose: Array,
+    allowed_s: Array,
+    held: Stand | None,
     parameters: SearchParameters,
-) -> Outlook:
+) -> _Searcher:
+    way_s = _way_s(pose, lattice.places, parameters)
+    free = way_s.min(axis=1) <= allowed_s
+    return _Searcher(footprint, way_s, free, None if held is None else _nearest(held, lattice))
+
+
+def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], parameters: SearchParameters) -> Outlook:
     """Return what robots that choose in this order choose; left: of the chances, changed."""
     stands: dict[str, Stand] = {}
     missed, soonest, total = 1.0, math.inf, 0.0
-    for name, footprint in footprints.items():
+    for name, searcher in searchers.items():
+        footprint, way_s, free = searcher.footprint, searcher.way_s, searcher.free.copy()
         cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
         seen = seen_from(left, lattice.rows, lattice.columns, *cells)
-        way_s = _way_s(poses[name], lattice.places, parameters)
         value = seen * np.exp(-way_s / parameters.patience_s)
-        free = way_s.min(axis=1) <= allowed_s[name]
         for other in stands.values():
             free &= np.hypot(*(lattice.places - (other.x, other.y)).T) >= parameters.apart_m
         if not free.any():
             continue
         value = np.where(free[:, None], value, -1.0)
-        if name in held:
-            kept = _nearest(held[name], lattice)
-            value[kept] *= parameters.keep_gain
+        if searcher.kept is not None:
+            value[searcher.kept] *= parameters.keep_gain
         stand, heading = divmod(int(np.argmax(value)), HEADINGS)
         x, y = lattice.places[stand].tolist()
         stands[name] = Stand(x, y, math.tau * heading / HEADINGS)

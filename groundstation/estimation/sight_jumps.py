@@ -127,7 +127,7 @@ def _jump(rows: Sequence[_Sight]) -> float | None:
     gap_s = after[0].at_s - before[-1].at_s
     if gap_s > _GAP_S or after[-1].at_s - after[0].at_s > _SIDE_S or before[-1].at_s - before[0].at_s > _SIDE_S:
         return None
-    old, new = (np.median([one.held for one in side], axis=0) for side in (before, after))
+    old, new = _middle(before), _middle(after)
     size = math.hypot(*(new - old))
     wide = max(math.hypot(*(one.held - at)) for side, at in ((before, old), (after, new)) for one in side)
     return size if size > _LEAST_M and wide < _STEADY * size else None
@@ -139,6 +139,11 @@ def _across(rows: Sequence[_Sight], began_s: float) -> tuple[Vector, Vector] | N
     after = [one for one in rows if 0.0 <= one.at_s - began_s <= _SIDE_S]
     if min(len(before), len(after)) < _BEFORE:
         return None
-    old, new = (np.median([one.held for one in side], axis=0) for side in (before, after))
+    old, new = _middle(before), _middle(after)
     seen = np.asarray(after[len(after) // 2].seen)
     return seen - (new - old), seen
+
+
+def _middle(side: Sequence[_Sight]) -> Vector:
+    """Return where a sight was on one side of a jump, less what its robot flew [m; camera_optical]."""
+    return np.asarray(np.median([one.held for one in side], axis=0))

@@ -42,32 +42,32 @@ def order() -> dict[str, Any]:
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
 
 
+def safely_flown(order: dict[str, Any], seed: int, kinds: list[str]) -> dict[str, Any]:
+    """Return the flight of a seed, which has the faults that it stands for, and did nothing unsafe."""
+    flown: dict[str, Any] = fly(order, seed, events=True)
+    assert flown["kinds"] == kinds, "the seed stands for another flight now"
+    assert flown["unsafe"] == {}
+    return flown
+
+
 @pytest.mark.slow
 @pytest.mark.study
 @pytest.mark.parametrize(("seed", "kinds"), BLIND.values(), ids=BLIND)
 def test_a_blind_drone_comes_to_rest(order: dict[str, Any], seed: int, kinds: list[str]) -> None:
-    flown = fly(order, seed, events=False)
-    assert flown["kinds"] == kinds, "the seed stands for another flight now"
-    assert flown["unsafe"] == {}
+    flown = safely_flown(order, seed, kinds)
     assert flown["rest_s"] <= 2.5
 
 
 @pytest.mark.slow
 @pytest.mark.study
 def test_a_velocity_that_was_seen_to_drift_is_not_believed_again_in_the_dark(order: dict[str, Any]) -> None:
-    seed, kinds = BELIEVED_AGAIN
-    flown = fly(order, seed, events=False)
-    assert flown["kinds"] == kinds, "the seed stands for another flight now"
-    assert flown["unsafe"] == {}
+    safely_flown(order, *BELIEVED_AGAIN)
 
 
 @pytest.mark.slow
 @pytest.mark.study
 def test_a_bumped_ceiling_camera_is_named_and_not_believed(order: dict[str, Any]) -> None:
-    seed, kinds = BUMPED
-    flown = fly(order, seed, events=True)
-    assert flown["kinds"] == kinds, "the seed stands for another flight now"
-    assert flown["unsafe"] == {}
+    flown = safely_flown(order, *BUMPED)
     (told,) = [line for line in flown["events"] if "was bumped" in line]
     size = float(told.split("turned by ")[1].split()[0])
     assert size == pytest.approx(8.75, rel=0.25)

@@ -10,6 +10,8 @@ from collections import deque
 from dataclasses import dataclass
 
 _SUBSTEPS = 4
+# How fast the commanded speed is corrected by the measured one in wind [1/s].
+_LEARN_WIND = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +24,10 @@ class Gains:
     drag_per_m [1/m]: of the air. accelerometer_gain: measured / true. bias_m_s2: bound of what the observer adds.
     still: speeds below this are zero [m/s, rad/s]. settle_s: after so long at zero the drone holds its place by itself.
     standing_s: time constant with which a standing drone learns what its accelerometers show at rest. overshoot_m_s,
-    disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone in still air, and how
-    much of a steady push (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m: difference between
-    the measured speed and that one which a wrong scale and gusts explain, and the integral of what exceeds it that
-    nothing does; answer_s: by how much the measured one is later.
+    disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone, and how much of a
+    steady push that only its speed shows (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m:
+    difference between the measured speed and that one which a wrong scale and gusts explain, and the integral of what
+    exceeds it that nothing does; answer_s: by how much the measured one is later.
     """
 
     proportional: float = 1.6
@@ -41,7 +43,7 @@ class Gains:
     drag: float = 0.15
     drag_per_m: float = 0.13
     accelerometer_gain: float = 0.92
-    bias_m_s2: float = 1.5
+    bias_m_s2: float = 2.0
     still: float = 0.02
     settle_s: float = 1.0
     standing_s: float = 2.0
@@ -57,7 +59,7 @@ class Axis:
 
     def __init__(self, gains: Gains) -> None:
         self._gains = gains
-        self.bias_m_s2 = self._rest_m_s2 = 0.0
+        self.bias_m_s2 = self._rest_m_s2 = self._wind_m_s2 = 0.0
         self.start(0.0)
 
     def start(self, speed_m_s: float) -> None:
@@ -96,6 +98,7 @@ class Axis:
         blind = force_m_s2 is None
         air = -self.drag(self.speed_m_s) if force_m_s2 is None else force_m_s2 / gains.accelerometer_gain
         outside = air + self.bias_m_s2
+        self._wind_m_s2 = 0.0 if blind or self.contradicted else self._wind(air)
         acceleration = self._answer(dt_s) + outside + turn_m_s2
         self.speed_m_s += acceleration * dt_s
         if measured_m_s is None:
@@ -104,10 +107,20 @@ class Axis:
         self._expected_m_s += (self.flown_m_s - self._expected_m_s) * min(1.0, dt_s / gains.answer_s)
         doubt = math.fabs(measured_m_s - self._expected_m_s) - gains.doubt_m_s
         self._unexplained_m = max(0.0, self._unexplained_m + doubt * dt_s)
-        bandwidth = gains.blind_observer_rad_s if blind else gains.observer_rad_s
+        # In wind nobody knows how far the firmware leans against it by itself: the speed tells.
+        bandwidth = gains.blind_observer_rad_s if blind or self._wind_m_s2 else gains.observer_rad_s
         self.speed_m_s += min(1.0, 2 * gains.observer_damping * bandwidth * dt_s) * error
         self.bias_m_s2 = _clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
         return outside
+
+    def _wind(self, air_m_s2: float) -> float:
+        """Return the push that the accelerometers show, if more than a wrong drag explains [m/s^2].
+
+        Whatever the odometry says has no part in it: what brakes a drone is judged by the speed it must have flown.
+        """
+        push = air_m_s2 + self._rest_m_s2 + self.drag(self.flown_m_s)
+        unexplained = push - _clamp(push, self._gains.disturbance_m_s2)
+        return _clamp(2.0 * unexplained, math.fabs(push))
 
     def _answer(self, dt_s: float) -> float:
         """Advance the model of the tilt by the command of a dead time ago; returns its mean acceleration."""
@@ -141,11 +154,15 @@ class Axis:
     def bounded(self, acceleration_m_s2: float, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
         """Return the permitted part of an acceleration: no more than the drag at the wanted speed.
 
-        What is asked makes a drone in still air fly `flown_m_s`, whatever is measured. It may exceed the wanted speed
-        by a little only, so that a measured speed of 0 does not wind up tilt.
+        What is asked makes a drone fly `flown_m_s` in the air around it, whatever speed is measured. It may exceed the
+        wanted speed by a little only, so that a measured speed of 0 does not wind up tilt.
         """
-        gains = self._gains
-        push = _clamp(outside_m_s2 + self.drag(self.speed_m_s), gains.disturbance_m_s2)
+        gains, wind, most_m_s2 = self._gains, self._wind_m_s2, self._gains.disturbance_m_s2
+        # The firmware may lean against the wind by itself: anything between none of it and all of it is left.
+        push = outside_m_s2 + self.drag(self.speed_m_s)
+        if wind:
+            push += _LEARN_WIND * (self.speed_m_s - self.flown_m_s)
+        push = min(max(push, min(wind, 0.0) - most_m_s2), max(wind, 0.0) + most_m_s2)
         slower = -self.drag(self.flown_m_s) + push
         fastest = max(wanted_m_s, self.reference_m_s, 0.0) + gains.overshoot_m_s
         slowest = min(wanted_m_s, self.reference_m_s, 0.0) - gains.overshoot_m_s

@@ -29,9 +29,8 @@ def fly(name: str, strategy: str, seconds: float = 8.0) -> dict[str, Any]:
     return ScenarioFlight(drawn, sections, seconds, strategy).fly()
 
 
-# Wind of 0.8 m/s^2 makes a drone's velocity contradict what was asked for: it hovers until RESUME. Along the walls the
-# target was found after 20 s, not 15.
-KNOWN_MISSES = {"wind", "along-walls"}
+# Along the walls the target was found after 20 s, not 15.
+KNOWN_MISSES = {"along-walls"}
 
 
 @pytest.mark.timeout(1500)

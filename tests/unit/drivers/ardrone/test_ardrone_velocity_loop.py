@@ -30,10 +30,14 @@ class Tilt:
         return self.angle
 
 
-def fly(wanted, seconds, gain=0.85, delay_s=0.03, drag=0.45, bias_deg=0.0, seed=0, scale=1.18, sensed=True, wall_s=0.0):
+def fly(
+    wanted, seconds, gain=0.85, delay_s=0.03, drag=0.45, bias_deg=0.0, seed=0,
+    scale=1.18, sensed=True, wall_s=0.0, wind=0.0, braced=0.0,
+):  # fmt: skip
     """Return the true velocities along x for a wanted velocity as a function of time.
 
-    sensed: the accelerometers are told, with their gain error and noise; wall_s: held back for so long at first.
+    sensed: the accelerometers are told, with their gain error and noise; wall_s: held back for so long at first; wind:
+    push of the air from second 3 on [m/s^2], of which the firmware leans against the share `braced` by itself.
     """
     rng, loop, tilt = random.Random(seed), VelocityLoop(ArDroneLimits()), Tilt()
     late = deque([0.0] * round(delay_s / TICK_S))
@@ -43,10 +47,12 @@ def fly(wanted, seconds, gain=0.85, delay_s=0.03, drag=0.45, bias_deg=0.0, seed=
         late.append(speed * gain + rng.gauss(0, 0.03))
         measured = late.popleft() * scale
         angle = tilt.step(pitch) + math.radians(bias_deg)
-        speed += (9.81 * math.tan(angle) - drag * speed) * TICK_S
+        push = wind * (1.0 - math.exp(3.0 - now_s)) if now_s > 3.0 else 0.0
+        outside = push - drag * speed
+        speed += (9.81 * math.tan(angle) + outside - braced * push) * TICK_S
         if now_s < wall_s:
             speed = 0.0
-        pull = -9.81 * math.tan(angle) if now_s < wall_s else -drag * speed
+        pull = -9.81 * math.tan(angle) if now_s < wall_s else outside
         air.append(0.92 * pull + rng.gauss(0, 0.045))
         if now_s >= next_s:
             next_s += 1 / 40
@@ -147,13 +153,16 @@ def test_left_is_negative_roll_and_forward_positive_pitch():
     assert out.pitch_rad > 0 > out.roll_rad
 
 
-def fly_blindly(wanted, seconds, reported, sensed=True, heeds=True, noise=0.0):
-    """Return the true speeds when the odometry says one thing for ever, and when the loop contradicted it [s]."""
+def fly_blindly(wanted, seconds, reported, sensed=True, heeds=True, noise=0.0, wind=0.0):
+    """Return the true speeds when the odometry says one thing for ever, and when the loop contradicted it [s].
+
+    wind: push of the air [m/s^2].
+    """
     rng, loop, tilt = random.Random(0), VelocityLoop(ArDroneLimits()), Tilt()
     speed, pitch, speeds, air, found_s = 0.0, 0.0, [], [], None
     for i in range(round(seconds / TICK_S)):
         angle = tilt.step(pitch)
-        brake = speed * (0.2 + 0.1 * abs(speed))  # slippery air
+        brake = speed * (0.2 + 0.1 * abs(speed)) - wind  # slippery air
         speed += (9.81 * math.tan(angle) - brake) * TICK_S
         air.append(-0.92 * brake + rng.gauss(0, 0.045))
         if i % 5 == 0:
@@ -180,8 +189,26 @@ def test_a_velocity_stuck_at_0_cannot_wind_up_tilt(wanted, noise, sensed):
     assert found_s is not None and found_s <= 3.0 and max(speeds) <= 0.95
 
 
-@pytest.mark.parametrize("sensed", [True, False])
-def test_a_healthy_flight_is_never_contradicted(sensed, monkeypatch):
+@pytest.mark.parametrize("wind", [-0.8, 0.8])
+def test_a_velocity_stuck_at_0_in_wind_is_noticed_in_time(wind):
+    speeds, found_s = fly_blindly(0.5, 20.0, 0.0, noise=0.03, wind=wind)
+    assert found_s <= 2.0
+    # Most of it is the wind's: nobody braces a drone that does not see its motion.
+    assert max(abs(speed) for speed in speeds[: round(found_s / TICK_S)]) <= 1.5
+
+
+@pytest.mark.parametrize("drag", [0.2, 0.5])
+@pytest.mark.parametrize("braced", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("wind", [-1.6, -0.8, 0.4, 0.8, 1.6])
+def test_wind_that_the_accelerometers_show_is_flown_against(wind, braced, drag, contradictions):
+    speeds = fly(lambda t: 0.3, 12.0, wind=wind, drag=drag, gain=0.83, braced=braced)
+    off = [abs(speed - 0.3) for speed in speeds]
+    assert max(off) <= 0.4 and max(off[round(8.0 / TICK_S) :]) <= 0.12
+    assert contradictions and not any(contradictions)
+
+
+@pytest.fixture
+def contradictions(monkeypatch):
     found = []
     step = VelocityLoop.step
 
@@ -191,9 +218,14 @@ def test_a_healthy_flight_is_never_contradicted(sensed, monkeypatch):
         return asked
 
     monkeypatch.setattr(VelocityLoop, "step", watched)
+    return found
+
+
+@pytest.mark.parametrize("sensed", [True, False])
+def test_a_healthy_flight_is_never_contradicted(sensed, contradictions):
     for seed in range(3):
         fly(lambda t: 0.5 * math.copysign(1.0, math.sin(0.8 * t)), 20.0, seed=seed, sensed=sensed, bias_deg=1.0)
-    assert len(found) > 2000 and not any(found)
+    assert len(contradictions) > 2000 and not any(contradictions)
 
 
 def stop_blindly(push, seen_s, wrong=0.0):

@@ -11,6 +11,7 @@ from drivers.control_error import ControlErrorMonitor, SeenVelocity
 from drivers.neighbours import Neighbours
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
+from groundstation.adapters import split_zone
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     Command,
@@ -232,7 +233,9 @@ class VehicleHost:
             self._silent = True
             if view.unsound:  # it does answer, and the watchdog's reason says what
                 return
-            remedy = f"check that it is switched on and that this computer is in its network: ping {address}"
+            host, interface = split_zone(address)
+            ping = f"ping -I {interface} {host}" if interface else f"ping {address}"
+            remedy = f"check that it is switched on and that this computer is in its network: {ping}"
             self._event(Severity.ERROR, f"{name} does not answer at {address}; trying on", remedy)
             self._child.degrade(f"{name} does not answer at {address}")
 

@@ -16,6 +16,7 @@ from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO
 from drivers.ardrone.wire.state import StateBit
+from groundstation.adapters import bind_to_adapter, split_zone
 from groundstation.errors import DriverError
 
 NAVDATA_PORT, AT_PORT, CONTROL_PORT, FTP_PORT = 5554, 5556, 5559, 5551
@@ -35,11 +36,11 @@ class NavdataStretch:
 
 
 class Conversation:
-    """Sockets to the drone, and the newest packet."""
+    """Sockets to the drone at ADDRESS or ADDRESS%ADAPTER, and the newest packet; raises DriverError for the adapter."""
 
     def __init__(self, address: str) -> None:
-        self._address = address
-        self._navdata, self._at = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self._shown, (self._address, interface) = address, split_zone(address)
+        self._navdata, self._at = _open(interface), _open(interface)
         self._sequence = 1
         self._numbers: list[int] = []
         self.packet: Navdata | None = None
@@ -116,7 +117,7 @@ class Conversation:
     def wait_for_answer(self) -> None:
         """Return once navdata came; raises DriverError when none does within 1.5 s."""
         if not self.listen(_ANSWER_S, lambda: self.packet is not None):
-            text = f"no AR.Drone answers at {self._address} (navdata, UDP {NAVDATA_PORT}) within {_ANSWER_S:g} s"
+            text = f"no AR.Drone answers at {self._shown} (navdata, UDP {NAVDATA_PORT}) within {_ANSWER_S:g} s"
             raise DriverError(text)
 
     def configure(self, key: str, value: str) -> None:
@@ -138,3 +139,9 @@ class Conversation:
         self.listen(_DUMP_S, lambda: inquirer.dump is not None)
         self.acknowledge()
         return parse_dump(inquirer.dump or b"")
+
+
+def _open(interface: str) -> socket.socket:
+    one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    bind_to_adapter(one, interface)
+    return one

@@ -33,6 +33,7 @@ from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import ARDRONE
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import UP, Action, VehicleView, WatchdogDecision
+from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
@@ -80,13 +81,13 @@ class ArDrone:
 
     def __init__(self, settings: ArDroneDriverSettings, bus: Bus) -> None:
         self.name = settings.name
-        self.address = settings.address
+        self.address = with_zone(settings.address, settings.interface)
         self.telemetry = LatestNavdata()
         self._settings = settings
         self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
         self._link = ArDroneLink(settings, self._log)
         self._publisher = NavdataPublisher(settings, bus)
-        inquirer = TcpInquirer(settings.address, settings.ftp_port, settings.control_port)
+        inquirer = TcpInquirer(self.address, settings.ftp_port, settings.control_port)
         self._session = ArdroneSession(
             partial(wishes, settings), ids_of(settings.name), inquirer, settings.flight.flat_trim
         )

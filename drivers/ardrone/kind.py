@@ -86,6 +86,7 @@ def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
     return ArDroneDriverSettings(
         name=order.name,
         address=drone.address,
+        interface=drone.interface,
         serial_number=drone.serial_number,
         limits=ArDroneLimits(**vehicle_limits(drone.limits).model_dump(), max_tilt_deg=drone.limits.max_tilt_deg),
         odometry=VelocityScale(
@@ -155,5 +156,6 @@ KIND = VehicleKind(
     standing_m=(0.06, 0.015),  # on its feet
     camera="ardrone",
     has_serial_number=True,
+    has_interface=True,
     emulator="sim_bridge.devices.ardrone_emulation:EMULATION",
 )

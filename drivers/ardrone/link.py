@@ -12,6 +12,7 @@ from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.datagrams import DatagramLog
+from groundstation.adapters import bind_to_adapter
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 from groundstation.process.ports import why_refused
@@ -67,9 +68,9 @@ class ArDroneLink:
         self._settings = settings
         self._log = log
         self._lock = threading.Lock()
-        self._navdata_socket = _open(settings.local_address, settings.local_navdata_port)
+        self._navdata_socket = _open(settings, settings.local_navdata_port)
         try:
-            self._at_socket = _open(settings.local_address, settings.local_at_port)
+            self._at_socket = _open(settings, settings.local_at_port)
         except DriverError:
             self._navdata_socket.close()
             raise
@@ -138,8 +139,9 @@ class ArDroneLink:
         self._at_socket.close()
 
 
-def _open(local_address: str, port: int) -> socket.socket:
-    channel = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+def _open(settings: ArDroneDriverSettings, port: int) -> socket.socket:
+    channel, local_address = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), settings.local_address
+    bind_to_adapter(channel, settings.interface)
     try:
         channel.bind((local_address, port))
     except OSError as error:

@@ -16,6 +16,7 @@ from drivers.ardrone.conversation import CONTROL_PORT, FTP_PORT, Conversation
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.state import StateBit
+from groundstation.adapters import bind_to_adapter, split_zone
 from groundstation.errors import DriverError
 
 UNPAIRED = "00:00:00:00:00:00"
@@ -45,15 +46,17 @@ def membership(name: str) -> dict[str, str]:
 
 
 def own_hardware_address(drone: str) -> str:
-    """Return the hardware address that this computer shows to a drone; raises DriverError."""
+    """Return the hardware address that this computer shows to a drone, ADDRESS or ADDRESS%ADAPTER; or DriverError."""
+    drone, adapter = split_zone(drone)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        bind_to_adapter(probe, adapter)
         try:
             probe.connect((drone, 9))
         except OSError as error:
             raise DriverError(f"{drone} cannot be reached: {error.strerror or error}") from error
         ours = probe.getsockname()[0]
         for _, interface in socket.if_nameindex():
-            if _address_of(probe, interface) == ours:
+            if adapter in ("", interface) and _address_of(probe, interface) == ours:
                 found = Path(f"/sys/class/net/{interface}/address").read_text(encoding="ascii").strip()
                 if found != UNPAIRED:
                     return found

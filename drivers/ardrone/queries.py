@@ -8,6 +8,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.ardrone.dump import END
+from groundstation.adapters import connected, split_zone
+from groundstation.errors import DriverError
 
 _LONGEST_VERSION = 64
 _LONGEST_DUMP = 65_536
@@ -16,8 +18,37 @@ _CONNECT_S = 1.0
 _DUMP_S = 2.0
 
 
+class _FtpThroughAdapter(ftplib.FTP):
+    """FTP whose connections go through one network adapter: the library's own takes any."""
+
+    def __init__(self, timeout_s: float, interface: str) -> None:
+        super().__init__(timeout=timeout_s)
+        self._timeout_s, self._interface = timeout_s, interface
+
+    def open(self, address: str, port: int) -> None:
+        """Connect and hear the greeting."""
+        self.host, self.port, self.af = address, port, socket.AF_INET
+        self.sock = connected((address, port), self._timeout_s, self._interface)
+        self.file = self.sock.makefile("r", encoding=self.encoding)
+        self.welcome = self.getresp()
+
+    def ntransfercmd(self, cmd: str, rest: int | str | None = None) -> tuple[socket.socket, int | None]:
+        """Open the passive connection of a transfer; restarting in the middle is not known here."""
+        stream = connected(self.makepasv(), self._timeout_s, self._interface)
+        try:
+            answer = self.sendcmd(cmd)
+            if not answer.startswith("1"):
+                raise ftplib.error_reply(answer)
+        except BaseException:
+            stream.close()
+            raise
+        return stream, None
+
+
 def read_version(address: str, port: int, timeout_s: float = _FTP_S) -> str:
     """Return version.txt of the drone, "" when it cannot be had; timeout_s is of each step.
+
+    address: also ADDRESS%ADAPTER.
 
     WIRE (docs/reference/ardrone.md 1): FTP on port 5551, anonymous, passive.
     """
@@ -28,24 +59,31 @@ def read_version(address: str, port: int, timeout_s: float = _FTP_S) -> str:
         if sum(map(len, parts)) > _LONGEST_VERSION:
             raise EOFError
 
-    with suppress(OSError, EOFError, ValueError, ftplib.Error), ftplib.FTP(timeout=timeout_s) as ftp:
-        ftp.connect(address, port)
+    host, interface = split_zone(address)
+    with (
+        suppress(OSError, EOFError, ValueError, ftplib.Error, DriverError),
+        _FtpThroughAdapter(timeout_s, interface) as ftp,
+    ):
+        ftp.open(host, port)
         ftp.login()
         ftp.retrbinary("RETR version.txt", take)
     return b"".join(parts)[:_LONGEST_VERSION].decode("latin-1").strip()
 
 
 def read_dump(
-    address: str, port: int, connected: Callable[[], None], wait_s: float = _DUMP_S, connect_s: float = _CONNECT_S
+    address: str, port: int, listening: Callable[[], None], wait_s: float = _DUMP_S, connect_s: float = _CONNECT_S
 ) -> bytes:
-    """Return the next configuration dump, without its NUL, b"" when none comes; `connected` is called in between.
+    """Return the next configuration dump, without its NUL, b"" when none comes; `listening` is called in between.
+
+    address: also ADDRESS%ADAPTER.
 
     WIRE (docs/reference/ardrone.md 5.2): the client connects first, then asks by CTRL 4; a NUL ends the text.
     """
     text = bytearray()
+    host, interface = split_zone(address)
     try:
-        with socket.create_connection((address, port), timeout=connect_s) as stream:
-            connected()
+        with connected((host, port), connect_s, interface) as stream:
+            listening()
             deadline_s = time.monotonic() + wait_s
             while END not in text and len(text) < _LONGEST_DUMP:
                 stream.settimeout(max(0.001, deadline_s - time.monotonic()))
@@ -53,13 +91,16 @@ def read_dump(
                 if not part:
                     return b""
                 text += part
-    except OSError:
+    except (OSError, DriverError):
         return b""
     return bytes(text.partition(END)[0])
 
 
 class TcpInquirer:
-    """Asks one thing at a time in a thread of its own; an answer to a question given up is dropped."""
+    """Asks one thing at a time in a thread of its own; an answer to a question given up is dropped.
+
+    address: also ADDRESS%ADAPTER.
+    """
 
     def __init__(self, address: str, ftp_port: int, control_port: int) -> None:
         self._address, self._ftp_port, self._control_port = address, ftp_port, control_port

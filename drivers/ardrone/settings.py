@@ -50,6 +50,7 @@ class Video(DriverSection):
 class ArDroneDriverSettings(DriverSection):
     """One AR.Drone: address, limits, published data.
 
+    interface: network adapter that it is behind ("": any).
     local_address: address to bind (empty: any); local_navdata_port, local_at_port: ports to bind there, 0: any free
     one, so that many drones fit on one host. video None: the drone's own setting is left alone. pad_m: where it takes
     off [x, y; world], None: unknown. serial_number: the only drone that may take off ("": any).
@@ -57,6 +58,7 @@ class ArDroneDriverSettings(DriverSection):
 
     name: Name
     address: str
+    interface: str = ""
     serial_number: str = ""
     navdata_port: Port = 5554
     at_port: Port = 5556

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from groundstation import plug_ins
+from groundstation.adapters import split_zone, with_zone
 from groundstation.geometry.board import VALID_CODES, Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.tag import SquareTag
@@ -36,7 +37,7 @@ class SourceAddress:
     """A source taken apart.
 
     path: of the stream with its query, of the device, of the file or folder; host: of a plug-in, its scheme; login:
-    "user:password", or "" for none.
+    "user:password", or "" for none; interface: the network adapter that it is behind, or "" for any.
     """
 
     kind: SourceKind
@@ -44,6 +45,7 @@ class SourceAddress:
     port: int = 0
     path: str = ""
     login: str = field(default="", repr=False)
+    interface: str = ""
 
 
 def parse_source(text: str) -> SourceAddress:
@@ -70,9 +72,20 @@ def parse_source(text: str) -> SourceAddress:
         raise ValueError(f"the port is no number from 1 to 65535{escape}") from None
     if not parts.hostname:
         raise ValueError(f"must name a host, as in {scheme}://192.168.1.50")
+    host, interface = split_zone(parts.hostname)
+    if interface and kinds[scheme] is SourceKind.RTSP:
+        raise ValueError(f"cannot be behind an adapter (%{interface}): the library that opens rtsp:// takes any")
     path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
     login = "" if parts.username is None else f"{unquote(parts.username)}:{unquote(parts.password or '')}"
-    return SourceAddress(kinds[scheme], parts.hostname, port, path, login)
+    return SourceAddress(kinds[scheme], host, port, path, login, interface)
+
+
+def behind_adapter(text: str, interface: str) -> str:
+    """Return a source's address with the network adapter that it is reached through, where it names none itself."""
+    parts = urlsplit(text)
+    login, at, place = parts.netloc.rpartition("@")
+    host, colon, port = place.partition(":")
+    return parts._replace(netloc=f"{login}{at}{with_zone(host, interface)}{colon}{port}").geturl()
 
 
 def _checked_source(text: str) -> str:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
 from drivers.vehicle_settings import Address, silence_limits, vehicle_limits
+from groundstation.adapters import with_zone
 from groundstation.errors import SettingsError
 from groundstation.vehicles import (
     DriverProcess,
@@ -71,7 +72,8 @@ def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
     links: dict[object, list[VehicleOrder]] = {}  # those that call the same port share a process
     for order in orders:
         mavlink = _own(order)
-        links.setdefault(mavlink.port if mavlink.listen else order.name, []).append(order)
+        shared = (mavlink.port, order.drone.interface)
+        links.setdefault(shared if mavlink.listen else order.name, []).append(order)
     return [
         DriverProcess(tuple(one.name for one in group), _settings(group).model_dump_json()) for group in links.values()
     ]
@@ -92,8 +94,8 @@ def _target(order: VehicleOrder, mavlink: Mavlink) -> str:
     if mavlink.serial:
         return f"serial:{mavlink.serial}"
     if mavlink.listen:
-        return f"udpin:{mavlink.local_address}:{mavlink.port}"
-    return f"udpout:{order.drone.address}:{mavlink.port}"
+        return f"udpin:{with_zone(mavlink.local_address, order.drone.interface)}:{mavlink.port}"
+    return f"udpout:{with_zone(order.drone.address, order.drone.interface)}:{mavlink.port}"
 
 
 def _vehicle(order: VehicleOrder) -> VehicleSettings:
@@ -121,22 +123,26 @@ def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
 
     mavlink = _own(orders[0])
     hover, land = hover_and_land([_own(order).system_id for order in orders], signed=bool(mavlink.key_file))
-    way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file})
+    interface = orders[0].drone.interface
+    way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file, "interface": interface})
     return StopDatagrams(mavlink.port, hover, land, _VOICE, way, mavlink.listen, HOVERS_S)
 
 
 def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
     systems: dict[int, str] = {}
-    shared: dict[int, tuple[str, tuple[str, str, str]]] = {}
+    shared: dict[tuple[int, str], tuple[str, tuple[str, str, str]]] = {}
     for order in orders:
         name, mavlink = order.name, _own(order)
         for key, text in _way(mavlink):
             yield name, (("mavlink", key), text)
+        if mavlink.serial and order.drone.interface:
+            yield name, (("interface",), "has no meaning on a serial line")
         if (other := systems.setdefault(mavlink.system_id, name)) != name:
             yield name, (("mavlink", "system_id"), f"system id {mavlink.system_id} is already that of {other}")
         how = (mavlink.link, mavlink.key_file, mavlink.local_address)
-        if mavlink.listen and shared.setdefault(mavlink.port, (name, how))[1] != how:
-            text = f"is shared with {shared[mavlink.port][0]}, which is reached otherwise"
+        port = (mavlink.port, order.drone.interface)
+        if mavlink.listen and shared.setdefault(port, (name, how))[1] != how:
+            text = f"is shared with {shared[port][0]}, which is reached otherwise"
             yield name, (("mavlink", "port"), text)
 
 
@@ -164,6 +170,7 @@ KIND = VehicleKind(
     sections={"mavlink": Mavlink},
     required=frozenset({"mavlink"}),
     has_serial_number=True,
+    has_interface=True,
     check=_check,
     moved=_moved,
     emulator="sim_bridge.devices.mavlink_emulation:EMULATION",

@@ -46,7 +46,8 @@ class LinkSettings(DriverSection):
     """How a port is reached.
 
     target: `udpout:ADDRESS:PORT` speaks first; `udpin:ADDRESS:PORT` waits there, for many vehicles at once;
-    `serial:DEVICE:BAUD`. key_file: 32 bytes, raw or as 64 hex digits; then only signed frames count (pymavlink alone).
+    `serial:DEVICE:BAUD`. ADDRESS%ADAPTER: through that network adapter only. key_file: 32 bytes, raw or as 64 hex
+    digits; then only signed frames count (pymavlink alone).
     """
 
     kind: Literal["pymavlink", "mavsdk"] = "pymavlink"

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from drivers.mavlink.links.tty import make_raw
 from drivers.mavlink.signing_key import read_key
 from drivers.mavlink.wire.signature import signed_anew, stamp_at
+from groundstation.adapters import bind_to_adapter
 from groundstation.errors import DriverError
 
 Address = tuple[str, int]
@@ -21,7 +22,8 @@ Address = tuple[str, int]
 class MavlinkVoice:
     """Says prepared frames; made before anything flies, since the key must be at hand when it is needed.
 
-    way: JSON with `serial` (DEVICE:BAUD, or "" for UDP) and `key_file` ("" for unsigned frames). speaker: a number of
+    way: JSON with `serial` (DEVICE:BAUD, or "" for UDP) `key_file` ("" for unsigned frames) and `interface`
+    (network adapter, "" for any). speaker: a number of
     its own for each process that may speak, used as the signature's link.
     """
 
@@ -32,6 +34,7 @@ class MavlinkVoice:
         self._speaker, self._stamp, self._fd = speaker, 0, -1
         self._socket = None if self._serial else socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         if self._socket is not None:
+            bind_to_adapter(self._socket, str(told.get("interface", "")))
             self._socket.setblocking(False)
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:

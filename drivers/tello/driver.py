@@ -31,6 +31,7 @@ from drivers.tello.wire.text import (
     rc,
 )  # fmt: skip
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from groundstation.adapters import bind_to_adapter, with_zone
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Odometry, Vector3
@@ -77,7 +78,7 @@ class Tello:
     """One Tello behind its two ports; `drivers.base.Vehicle`."""
 
     def __init__(self, settings: TelloDriverSettings, bus: Bus) -> None:
-        self.name, self.address = settings.name, settings.address
+        self.name, self.address = settings.name, with_zone(settings.address, settings.interface)
         self.heard = Heard()
         self._settings, self._bus = settings, bus
         self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
@@ -96,11 +97,12 @@ class Tello:
     def _open(self, port: int) -> socket.socket:
         # Connected, so that only this vehicle is heard: several share the state's port, and each socket gets its own.
         udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        bind_to_adapter(udp, self._settings.interface)
         try:
             if port:
                 udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             udp.bind((self._settings.local_address, port))
-            udp.connect((self.address, COMMAND_PORT))
+            udp.connect((self._settings.address, COMMAND_PORT))
         except OSError as error:
             udp.close()
             raise DriverError(f"{self.name}: UDP {self._settings.local_address}:{port}: {error.strerror}") from error

@@ -34,6 +34,7 @@ def _settings(order: VehicleOrder) -> TelloDriverSettings:
     return TelloDriverSettings(
         name=order.name,
         address=drone.address,
+        interface=drone.interface,
         pad_m=drone.pad_m,
         limits=vehicle_limits(drone.limits),
         safety=silence_limits(order.safety),
@@ -59,6 +60,7 @@ KIND = VehicleKind(
     stop=lambda orders: StopDatagrams(COMMAND_PORT, rc(0, 0, 0, 0), LAND),
     sections={"tello": Tello},
     required=frozenset({"tello"}),
+    has_interface=True,
     moved=_moved,
     emulator="sim_bridge.devices.tello:EMULATION",
     example={"tello": {}},

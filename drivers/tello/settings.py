@@ -8,6 +8,7 @@ class TelloDriverSettings(DriverSection):
 
     name: Name
     address: str
+    interface: str = ""
     local_address: str = "0.0.0.0"
     pad_m: tuple[float, float]
     limits: VehicleLimits = VehicleLimits()

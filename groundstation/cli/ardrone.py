@@ -23,14 +23,19 @@ def ardrone() -> None:
 
 
 def _address(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    address, percent, interface = value.partition("%")
     try:
-        return str(ipaddress.IPv4Address(value))
+        if bool(percent) is not bool(interface):
+            raise ValueError(value)
+        return f"{ipaddress.IPv4Address(address)}{percent}{interface}"
     except ValueError:
-        raise click.BadParameter(f"{value!r} is no IPv4 address, such as 192.168.1.1.") from None
+        like = "such as 192.168.1.1, or 192.168.1.1%wlan1 behind that network adapter"
+        raise click.BadParameter(f"{value!r} is no IPv4 address, {like}.") from None
 
 
 @ardrone.command(
     epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1\n"
+    "  groundstation ardrone probe 192.168.1.1%wlan1    (behind that network adapter)\n"
     "  groundstation ardrone probe 192.168.1.11 --json\n\n"
     "Exit codes: 0 it answered, 2 no address, 4 nobody answers there."
 )

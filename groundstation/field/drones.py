@@ -63,6 +63,7 @@ class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     enabled: bool = True
     address: str
+    interface: str = ""
     serial_number: str = ""
     limits: DroneLimits = DroneLimits()
     marker: DroneMarker

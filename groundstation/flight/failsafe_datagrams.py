@@ -13,5 +13,13 @@ def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagram
     # Who cannot hover for so long without its driver is landed sooner.
     land_after_s = min(field.safety.land_after_s, stop.hovers_s)
     return FailsafeDatagrams(
-        drone.address, stop.port, stop.hover, stop.land, land_after_s, stop.voice, stop.way, stop.called
+        drone.address,
+        stop.port,
+        stop.hover,
+        stop.land,
+        land_after_s,
+        stop.voice,
+        stop.way,
+        stop.called,
+        drone.interface,
     )

@@ -47,7 +47,7 @@ def onboard_camera(field: Field, name: str, drone: Drone, phase_s: float) -> Cam
     camera = drone.camera
     return CameraDriverSettings(
         name=camera_name(name),
-        source=camera.source,
+        source=drone.video_source,
         calibration=_lens(camera.calibration),
         mount=MountSettings(
             parent=name,

@@ -3,12 +3,14 @@
 import ipaddress
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from drivers.camera.settings import SourceKind, parse_source
+from groundstation.adapters import adapters, drops_strangers
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.checks import Finding
@@ -99,6 +101,17 @@ def _addresses(field: Field) -> Iterator[Finding]:
             yield ("drones", name, "address"), text
 
 
+def _adapters(field: Field) -> Iterator[Finding]:
+    known, shared = adapters(), Counter(drone.address for drone in field.drones.values())
+    for name, drone in field.drones.items():
+        path = ("drones", name, "interface")
+        if drone.interface and drone.interface not in known:
+            yield path, f"is no network adapter of this machine (got {drone.interface}); it has {', '.join(known)}"
+        elif drone.interface and shared[drone.address] > 1 and drops_strangers(drone.interface):
+            text = "drops what one of two vehicles with one address says (rp_filter is 1): "
+            yield path, text + "sudo sysctl -w net.ipv4.conf.all.rp_filter=2"
+
+
 def _lenses(field: Field) -> Iterator[Finding]:
     for name, camera in field.cameras.items():
         if _folds(camera.calibration):
@@ -140,6 +153,7 @@ _CHECKS: tuple[Callable[[Field], Iterator[Finding]], ...] = (
     _fence,
     _uncertainty,
     _addresses,
+    _adapters,
     _lenses,
     _places,
 )

@@ -7,6 +7,7 @@ from itertools import combinations
 
 from drivers.camera.settings import SourceKind, parse_source
 from groundstation.errors import without_password
+from groundstation.settings.adapter_checks import findings_of_adapters
 from groundstation.settings.behaviour import EstimatorSettings, PlannerSettings, SafetySettings
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
@@ -151,15 +152,15 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
     for path, (name, target) in parts.tracked.items():
         codes.append(((*path, "marker", _key_of(target.marker)), target.marker.identity, name))
     sources += [
-        (("drones", name, "camera", "source"), without_password(drone.camera.source), name)
+        (("drones", name, "camera", "source"), without_password(drone.video_source), name)
         for name, drone in parts.drones.items()
     ]
     yield from _unique(codes, "marker code")
     yield from _unique(sources, "camera source")
-    yield from _unique(((("drones", n, "address"), d.address, n) for n, d in parts.drones.items()), "address")
 
 
 def _kinds(parts: Parts) -> Iterator[Finding]:
+    yield from findings_of_adapters(parts.drones)
     yield from findings_of_kinds(parts.drones)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import AfterValidator, Field, create_model
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
+from drivers.camera.settings import behind_adapter, parse_source
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.values import Address, OnVehicle, SettingsSection, Source, Vector2, VideoDelay
@@ -123,7 +124,11 @@ class DroneOfAnyKind(SettingsSection):
     enabled: bool = True
     """false: the drone stays out of the run but keeps its entry in the file."""
     address: Address
-    """IPv4 address of the vehicle; each its own."""
+    """IPv4 address of the vehicle; each its own, or behind an `interface` of its own."""
+    interface: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{0,15}$")] = ""
+    """Network adapter of this computer that leads to the vehicle, such as wlan1; its video at the same address is
+    taken from there too. For vehicles that all have the same address, each behind an adapter of its own. Empty: as this
+    computer's routes say."""
     serial_number: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{0,40}$")] = ""
     """Serial number of the vehicle (of a MAVLink one: its uid2, else uid): another one at its address does not take
     off. groundstation ardrone probe and mavlink probe show it."""
@@ -145,6 +150,13 @@ class DroneOfAnyKind(SettingsSection):
     def pad_yaw_rad(self) -> float:
         """Return the heading on the pad [rad; world]."""
         return math.radians(self.pad_yaw_deg)
+
+    @property
+    def video_source(self) -> str:
+        """Return the source of its camera, through the vehicle's adapter where it is at the vehicle's own address."""
+        source = parse_source(self.camera.source)
+        same = source.host == self.address and not source.interface
+        return behind_adapter(self.camera.source, self.interface) if self.interface and same else self.camera.source
 
     @property
     def sections(self) -> dict[str, KindSection]:

@@ -30,6 +30,8 @@ def _misplaced(name: str, drone: Drone) -> Iterator[tuple[KeyPath, str]]:
     others = {key for kind in all_kinds().values() if kind.name != drone.kind for key in kind.sections}
     if not kind_named(drone.kind).has_serial_number:
         others.add("serial_number")
+    if drone.interface and not kind_named(drone.kind).has_interface:
+        yield ("drones", name, "interface"), f"cannot be used: the driver of {drone.kind} does not choose its adapter"
     for key in sorted(others):
         if getattr(drone, key, None):
             yield ("drones", name, key), f"has no meaning for {drone.kind}"

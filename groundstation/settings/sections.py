@@ -78,7 +78,7 @@ def _moved(drone: Drone, address: str | None) -> Drone:
     if address is None:
         return drone
     sections = kind_named(drone.kind).moved(address.rpartition(".")[0] + ".1", drone.sections)
-    update: dict[str, object] = {"address": address, "serial_number": ""}  # an emulator has its own
+    update: dict[str, object] = {"address": address, "interface": "", "serial_number": ""}  # an emulator has its own
     for key, section in drone.sections.items():
         update[key] = section.model_copy(update=sections.get(key, {}))
     return drone.model_copy(update=update)

@@ -33,7 +33,7 @@ class FailsafeDatagrams:
 
     hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead. voice:
     "module:function" that makes what carries them from way and a speaker's number, "" for UDP. called: vehicles call
-    the driver, so that they are where they were heard last.
+    the driver, so that they are where they were heard last. interface: network adapter of plain UDP, "" for any.
     """
 
     address: str
@@ -44,6 +44,7 @@ class FailsafeDatagrams:
     voice: str = ""
     way: str = ""
     called: bool = False
+    interface: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ import socket
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from groundstation.adapters import bind_to_adapter
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 
 Address = tuple[str, int]
@@ -21,10 +22,11 @@ class Voice(Protocol):
 
 
 class UdpVoice:
-    """Datagrams as they are, from a port of its own."""
+    """Datagrams as they are, from a port of its own, through one network adapter ("": any); raises DriverError."""
 
-    def __init__(self) -> None:
+    def __init__(self, interface: str = "") -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        bind_to_adapter(self._socket, interface)
         self._socket.setblocking(False)
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
@@ -40,7 +42,7 @@ class UdpVoice:
 def open_voice(words: FailsafeDatagrams, speaker: int) -> Voice:
     """Return the transport of one link; raises the driver package's error for an unusable link."""
     if not words.voice:
-        return UdpVoice()
+        return UdpVoice(words.interface)
     # By name, as drivers are started: the supervisor knows no protocol.
     module, _, name = words.voice.partition(":")
     make: Callable[[str, int], Voice] = getattr(importlib.import_module(module), name)

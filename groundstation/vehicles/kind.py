@@ -105,7 +105,8 @@ class VehicleKind:
     processes: who shares a driver process, with its settings; stop: what vehicles of one process are sent when it is
     dead. check: (drone, finding) for what is wrong between the sections of this kind. standing_m: height of the base
     above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme of the
-    vehicle's own video, "" if it has none. has_serial_number: the driver knows the vehicle's own. moved: changes of
+    vehicle's own video, "" if it has none. has_serial_number: the driver knows the vehicle's own. has_interface:
+    driver and fail-safe datagrams use the drone's network adapter and no other. moved: changes of
     sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
     sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
     sections; the conformance kit flies that one.
@@ -123,6 +124,7 @@ class VehicleKind:
     standing_m: tuple[float, float] = (0.08, 0.04)
     camera: str = ""
     has_serial_number: bool = False
+    has_interface: bool = False
     moved: Callable[[str, Mapping[str, KindSection]], dict[str, dict[str, object]]] = _nothing_moves
     emulator: str = ""
     example: Mapping[str, Mapping[str, object]] = field(default_factory=dict)

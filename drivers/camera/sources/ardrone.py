@@ -73,8 +73,8 @@ def _is_next(last: PaveFrame, frame: PaveFrame) -> bool:
 class ArDroneReader:
     """Listens to the video of one drone."""
 
-    def __init__(self, host: str, port: int) -> None:
-        self._line = Line(host, port)
+    def __init__(self, host: str, port: int, interface: str = "") -> None:
+        self._line = Line(host, port, interface)
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
         self.decoder: PictureDecoder | None = H264Decoder(self.rejected)

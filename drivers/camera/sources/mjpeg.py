@@ -20,11 +20,11 @@ class MjpegReader:
 
     decoder: PictureDecoder | None = None
 
-    def __init__(self, host: str, port: int, path: str, login: str = "") -> None:
-        self._line = Line(host, port)
+    def __init__(self, host: str, port: int, path: str, login: str = "", interface: str = "") -> None:
+        self._line = Line(host, port, interface)
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
-        request = f"GET {path} HTTP/1.0\r\nHost: {self.name}\r\nAccept: multipart/x-mixed-replace\r\n"
+        request = f"GET {path} HTTP/1.0\r\nHost: {host}:{port}\r\nAccept: multipart/x-mixed-replace\r\n"
         # WIRE (RFC 7617): sent with the first request; a camera that wants Digest answers 401 all the same.
         secret = f"Authorization: Basic {b64encode(login.encode()).decode()}\r\n" if login else ""
         self._request = f"{request}{secret}\r\n".encode("ascii", "replace")

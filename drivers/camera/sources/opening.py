@@ -25,9 +25,9 @@ def open_source(source: str, size: tuple[int, int] | None = None) -> FrameSource
 def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -> Reader:
     match address.kind:
         case SourceKind.HTTP:
-            return MjpegReader(address.host, address.port, address.path, address.login)
+            return MjpegReader(address.host, address.port, address.path, address.login, address.interface)
         case SourceKind.ARDRONE:
-            return ArDroneReader(address.host, address.port)
+            return ArDroneReader(address.host, address.port, address.interface)
         case SourceKind.RTSP:
             return rtsp(source, f"{address.host}:{address.port}")
         case SourceKind.DEVICE:

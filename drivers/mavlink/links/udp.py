@@ -13,6 +13,7 @@ from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.telemetry import Heartbeat
 from drivers.mavlink.wire.verification import Signing
+from groundstation.adapters import bind_to_adapter, split_zone
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 from groundstation.process.ports import why_refused
@@ -39,7 +40,8 @@ class UdpLink:
     """
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
-        way, address, port = settings.target.split(":")
+        way, place, port = settings.target.split(":")
+        address, interface = split_zone(place)
         self.rejected: Counter[str] = Counter()
         self._peer = (address, int(port)) if way == "udpout" else None
         self._addresses: dict[int, tuple[tuple[str, int], int]] = {}
@@ -50,6 +52,7 @@ class UdpLink:
         self._greeted: dict[tuple[str, int], int] = {}
         self._own = (settings.system_id, settings.component_id)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        bind_to_adapter(self._socket, interface)
         try:
             if self._peer is None:
                 self._socket.bind((address, int(port)))

@@ -1,0 +1,88 @@
+"""Sockets that use one network adapter only: vehicles that all have the same address are told apart by their adapters.
+
+Without that the routes of this computer decide, and of two equal ones only the first is ever used.
+"""
+
+import errno
+import os
+import socket
+from pathlib import Path
+
+from groundstation.errors import DriverError
+
+_CONF = Path("/proc/sys/net/ipv4/conf")
+_STRICT = 1
+Address = tuple[str, int]
+
+
+def bind_to_adapter(one: socket.socket, interface: str) -> None:
+    """Let a new socket send and receive through one network adapter only ("": through any).
+
+    Raises DriverError, which names the adapters there are, or the right that is missing; the socket is closed then.
+    """
+    if not interface:
+        return
+    try:
+        # From Linux 5.7 on everybody may, once for each socket (socket(7), SO_BINDTODEVICE).
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, interface.encode())
+    except OSError as error:
+        one.close()
+        raise DriverError(f"interface {interface}: {_why(error)}") from error
+
+
+def _why(error: OSError) -> str:
+    if error.errno == errno.ENODEV:
+        return f"there is no such network adapter here, only {', '.join(adapters())}; plugged in? see: ip link"
+    if error.errno == errno.EPERM:
+        return (
+            "this user may not choose the network adapter: Linux before 5.7 allows it with CAP_NET_RAW only; "
+            "use a newer one, or run as a user who has it"
+        )
+    return os.strerror(error.errno or 0)
+
+
+def connected(address: Address, timeout_s: float, interface: str = "") -> socket.socket:
+    """Return a TCP connection through one adapter ("": any) whose waits end after timeout_s.
+
+    Raises OSError when nobody answers, DriverError for an adapter that cannot be used.
+    """
+    if not interface:
+        return socket.create_connection(address, timeout=timeout_s)
+    stream = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    bind_to_adapter(stream, interface)
+    try:
+        stream.settimeout(timeout_s)
+        stream.connect(address)
+    except OSError:
+        stream.close()
+        raise
+    return stream
+
+
+def split_zone(text: str) -> tuple[str, str]:
+    """Return address and adapter of "192.168.1.1%wlan1", as IPv6 writes it; the adapter is "" where none is given."""
+    address, _, interface = text.partition("%")
+    return address, interface
+
+
+def with_zone(address: str, interface: str) -> str:
+    """Return an address with the adapter that it is behind, as `split_zone` reads it."""
+    return f"{address}%{interface}" if interface else address
+
+
+def adapters() -> list[str]:
+    """Return the names of this computer's network adapters."""
+    return sorted(name for _, name in socket.if_nameindex())
+
+
+def drops_strangers(interface: str, conf: Path = _CONF) -> bool:
+    """Return whether the kernel drops what comes through an adapter from an address that it reaches through another."""
+    values = [int(_text(conf / name / "rp_filter") or 0) for name in ("all", interface)]
+    return max(values) == _STRICT
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""

@@ -1,6 +1,7 @@
 """Plug-ins of other packages by entry point: found by name, loaded when asked for; one that fails is named.
 
-Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera sources), `skein.planners`.
+Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera sources), `skein.planners`,
+`skein.world_sensors` (schemes of motion capture sources).
 """
 
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from typing import Any
 from groundstation.errors import SettingsError
 
 VEHICLES, CAMERAS, PLANNERS = "skein.vehicles", "skein.cameras", "skein.planners"
+WORLD_SENSORS = "skein.world_sensors"
 
 
 class PlugInError(ValueError):

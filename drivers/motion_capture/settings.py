@@ -1,8 +1,8 @@
 """Settings of one motion capture driver, as the composition hands them over (JSON of `MotionCaptureSection`)."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
+from groundstation import plug_ins
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import rotation_x, rotation_z
 
@@ -17,67 +18,82 @@ Vector3 = tuple[float, float, float]
 Span = tuple[float, float]
 
 
-class SystemKind(StrEnum):
-    """Which protocol poses come by: NatNet, topics of ROS 2, or others through the library `motioncapture`."""
+@dataclass(frozen=True, slots=True)
+class PoseProtocol:
+    """What poses come by: its usual port (0: none), what reads it, and whether its address may have a path and a query.
 
-    NATNET = "natnet"
-    VICON = "vicon"
-    QUALISYS = "qualisys"
-    VRPN = "vrpn"
-    ROS2 = "ros2"
+    reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`.
+    """
+
+    port: int
+    reader: str
+    paths: bool = False
 
 
+_NATNET = "natnet"
+_SOURCES = "drivers.motion_capture.sources"
+# Those of other packages are entry points `skein.world_sensors`: the name is the scheme, the object the reader itself.
+OURS: Mapping[str, PoseProtocol] = {
+    _NATNET: PoseProtocol(1510, f"{_SOURCES}:NatnetSource"),
+    "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource"),
+    "qualisys": PoseProtocol(22222, f"{_SOURCES}:LibrarySource"),
+    "vrpn": PoseProtocol(3883, f"{_SOURCES}:LibrarySource"),
+    "ros2": PoseProtocol(7447, "drivers.motion_capture.ros2_source:Ros2Source", paths=True),
+}
 # WIRE: DDS leaves ports for so many domains.
 _LAST_DOMAIN = 232
-_PORTS = {
-    SystemKind.NATNET: 1510,
-    SystemKind.VICON: 801,
-    SystemKind.QUALISYS: 22222,
-    SystemKind.VRPN: 3883,
-    SystemKind.ROS2: 7447,
-}
 
 
 @dataclass(frozen=True, slots=True)
 class SystemAddress:
-    """Where a motion capture system listens, and what it speaks.
+    """Where a system listens, and what it speaks: an address scheme://host:port/path?query, taken apart.
 
-    path, domain: of ROS 2, the part of the topics before the body, and the domain.
+    port: 0 where neither the address nor the protocol has one.
     """
 
-    kind: SystemKind
+    scheme: str
     host: str
     port: int
     path: str = ""
-    domain: int = 0
+    query: str = ""
+
+    @property
+    def domain(self) -> int:
+        """Return the domain of ROS 2; raises ValueError for any other query."""
+        name, _, value = (self.query or "domain=0").partition("=")
+        if name != "domain" or not value.isdecimal() or int(value) > _LAST_DOMAIN:
+            raise ValueError(f"behind ? there may be domain=0 to {_LAST_DOMAIN}, and nothing else")
+        return int(value)
 
 
 def parse_source(text: str) -> SystemAddress:
     """Return what a system's address says; raises ValueError that names the forms there are."""
-    kinds = {kind.value: kind for kind in SystemKind}
     scheme, mark, rest = text.partition("://")
-    if not mark or scheme not in kinds or not rest or any(character.isspace() for character in text):
+    others = [name for name in plug_ins.names(plug_ins.WORLD_SENSORS) if name not in OURS]
+    if not mark or scheme not in (*OURS, *others) or not rest or any(character.isspace() for character in text):
+        installed = "".join(f", {name}://" for name in others)
         raise ValueError(
             "must be an address such as natnet://192.168.1.5 (OptiTrack), vicon://, qualisys:// or vrpn://192.168.1.5, "
             "or ros2://192.168.1.5/vrpn_mocap?domain=0 for topics /vrpn_mocap/<body>/pose behind a ROS 2 Zenoh router"
+            f"{installed}"
         )
-    parts = urlsplit(text)
+    protocol, parts = OURS.get(scheme, PoseProtocol(0, "", paths=True)), urlsplit(text)
     try:
-        port = parts.port or _PORTS[kinds[scheme]]
+        port = parts.port or protocol.port
     except ValueError:
         raise ValueError("the port is no number from 1 to 65535") from None
-    if kinds[scheme] is SystemKind.ROS2 and parts.hostname:
-        return SystemAddress(SystemKind.ROS2, parts.hostname, port, parts.path.strip("/"), _domain(parts.query))
-    if not parts.hostname or parts.path.strip("/") or parts.query:
+    path = parts.path.strip("/")
+    if (scheme in OURS and not parts.hostname) or ((path or parts.query) and not protocol.paths):
         raise ValueError(f"must name a host and nothing else, as in {scheme}://192.168.1.5")
-    return SystemAddress(kinds[scheme], parts.hostname, port)
+    address = SystemAddress(scheme, parts.hostname or "", port, path, parts.query)
+    if scheme in OURS and protocol.paths:
+        _ = address.domain
+    return address
 
 
-def _domain(query: str) -> int:
-    name, _, value = (query or "domain=0").partition("=")
-    if name != "domain" or not value.isdecimal() or int(value) > _LAST_DOMAIN:
-        raise ValueError(f"behind ? there may be domain=0 to {_LAST_DOMAIN}, and nothing else")
-    return int(value)
+def emulated_source(host: str, port: int) -> str:
+    """Return the address of an emulated system, which speaks NatNet."""
+    return f"{_NATNET}://{host}:{port}"
 
 
 class BodySection(DriverSection):

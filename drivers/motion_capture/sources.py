@@ -9,10 +9,11 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from drivers.motion_capture.captured_frame import CapturedFrame
-from drivers.motion_capture.settings import SystemAddress, SystemKind
+from drivers.motion_capture.settings import OURS, SystemAddress
 from drivers.motion_capture.wire import natnet
+from groundstation import plug_ins
 from groundstation.bus import clock
-from groundstation.errors import SettingsError
+from groundstation.errors import DriverError, SettingsError
 from groundstation.time_units import NS_PER_S
 
 _ASK_AGAIN_NS = NS_PER_S
@@ -36,12 +37,20 @@ class Source(Protocol):
 
 
 def open_source(address: SystemAddress) -> Source:
-    """Return the source of a system; raises SettingsError where its library is missing."""
-    if address.kind is SystemKind.ROS2:
-        from drivers.motion_capture.ros2_source import Ros2Source
+    """Return the source of a system.
 
-        return Ros2Source(address)
-    return NatnetSource(address) if address.kind is SystemKind.NATNET else LibrarySource(address)
+    Raises SettingsError where its library is missing, DriverError for a plug-in that cannot be loaded.
+    """
+    if address.scheme in OURS:
+        module, _, name = OURS[address.scheme].reader.partition(":")
+        reader = getattr(importlib.import_module(module), name)
+    else:
+        try:
+            reader = plug_ins.load(plug_ins.WORLD_SENSORS, address.scheme)
+        except plug_ins.PlugInError as error:
+            raise DriverError(f"motion capture source {address.scheme}://: {error}") from None
+    source: Source = reader(address)
+    return source
 
 
 class NatnetSource:
@@ -153,7 +162,7 @@ class LibrarySource:
             library: Any = importlib.import_module("motioncapture")
         except ImportError:
             remedy = "install it: pip install 'skein-groundstation[mocap]'"
-            raise SettingsError([f"{address.kind}://: the library motioncapture is missing; {remedy}"]) from None
+            raise SettingsError([f"{address.scheme}://: the library motioncapture is missing; {remedy}"]) from None
         self._library, self._address = library, address
         self._frames: deque[CapturedFrame] = deque(maxlen=_WAITING_FRAMES)
         self._came = threading.Event()
@@ -175,7 +184,7 @@ class LibrarySource:
 
     def _follow(self) -> None:
         try:
-            system = self._library.connect(self._address.kind.value, {"hostname": self._address.host})
+            system = self._library.connect(self._address.scheme, {"hostname": self._address.host})
             self.detail = ""
             while not self._closing:
                 system.waitForNextFrame()

@@ -46,7 +46,8 @@ class MotionCaptureSettings(SettingsSection):
 
     source: Annotated[str, AfterValidator(_is_system)]
     """Where it listens: natnet:// (OptiTrack's Motive), vicon://, qualisys:// or vrpn:// with its host; or ros2:// with
-    the host of a ROS 2 Zenoh router and a path, for topics /PATH/BODY/pose."""
+    the host of a ROS 2 Zenoh router and a path, for topics /PATH/BODY/pose; or the scheme of an installed plug-in
+    (entry point `skein.world_sensors`)."""
     volume_m: VolumeSettings
     """The box in which it sees bodies [m; world]. The planner counts on it; poses outside of it are not used."""
     bodies: dict[Name, RigidBodySettings] = Field(default_factory=dict)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from drivers.camera.settings import SourceKind, parse_source
+from drivers.motion_capture.settings import emulated_source
 from groundstation.field.drones import camera_name
 from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
 from groundstation.settings.capture_sections import capture_section
@@ -66,7 +67,7 @@ def rerouted(
 
 
 def _emulated(system: MotionCaptureSettings, place: tuple[str, int] | None) -> MotionCaptureSettings:
-    return system if place is None else system.model_copy(update={"source": f"natnet://{place[0]}:{place[1]}"})
+    return system if place is None else system.model_copy(update={"source": emulated_source(*place)})
 
 
 def _with_source(drone: Drone, stream: tuple[str, int] | None, plain: bool) -> Drone:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from drivers.motion_capture.convert import Placement, body_pose
-from drivers.motion_capture.settings import BodySection, MotionCaptureSection, SystemKind, parse_source
+from drivers.motion_capture.settings import BodySection, MotionCaptureSection, parse_source
 from groundstation.bus.messages import Header
 
 WIDE = ((-9.0, 9.0),) * 3
@@ -55,7 +55,7 @@ def test_numbers_that_are_no_rotation_give_no_pose(quaternion: tuple[float, floa
 
 def test_addresses_of_systems() -> None:
     address = parse_source("vrpn://192.168.1.5")
-    assert (address.kind, address.host, address.port) == (SystemKind.VRPN, "192.168.1.5", 3883)
+    assert (address.scheme, address.host, address.port) == ("vrpn", "192.168.1.5", 3883)
     assert parse_source("natnet://motive:1600").port == 1600
     for wrong in ("natnet://", "http://1.2.3.4", "natnet://host/path", "natnet://host:99999", "192.168.1.5"):
         with pytest.raises(ValueError, match=r"must|port"):

@@ -1,17 +1,18 @@
 """Plug-ins of other packages by entry point: found by name, loaded when asked for; one that fails is named.
 
 Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera sources), `skein.planners`,
-`skein.world_sensors` (schemes of motion capture sources).
+`skein.world_sensors` (schemes of motion capture sources), `skein.markers` (dictionaries of square tags).
 """
 
 from collections.abc import Iterator
+from functools import cache
 from importlib import metadata
 from typing import Any
 
 from groundstation.errors import SettingsError
 
 VEHICLES, CAMERAS, PLANNERS = "skein.vehicles", "skein.cameras", "skein.planners"
-WORLD_SENSORS = "skein.world_sensors"
+WORLD_SENSORS, MARKERS = "skein.world_sensors", "skein.markers"
 
 
 class PlugInError(ValueError):
@@ -39,6 +40,20 @@ def planner(name: str, parameters: object, sensors: object) -> Any:
         return load(PLANNERS, name)(parameters, sensors)
     except PlugInError as error:
         raise SettingsError([f"planner.plug_in: {error}"]) from error
+
+
+@cache
+def tag_family(name: str) -> Any:
+    """Return the `groundstation.geometry.tag.TagFamily` of a dictionary, made once; raises PlugInError."""
+    make = load(MARKERS, name)
+    try:
+        family = make()
+        if min(int(family.count), int(family.bits), float(family.corner_std_px)) <= 0:
+            raise ValueError("count, bits and corner_std_px must be positive")
+        _ = family.finder, family.black_cells
+    except Exception as error:
+        raise PlugInError(f"{name} cannot be used: {type(error).__name__}: {error}") from error
+    return family
 
 
 def load(group: str, name: str) -> Any:

@@ -1,14 +1,13 @@
-"""The second kind of marker: ArUco and AprilTag tags, found by OpenCV where they are expected, else seldom anywhere."""
+"""The second kind of marker: square tags, found by their family where they are expected, else seldom anywhere."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from drivers.camera import pose
 from drivers.camera.detect import Window, resized, window_around
-from drivers.camera.dictionaries import dictionary_of
+from drivers.camera.dictionaries import family_of
 from drivers.camera.prediction import Prediction
 from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Sighting
@@ -20,9 +19,6 @@ GravityOf = Callable[[str], pose.Gravity]
 _LIFETIME_NS = 450_000_000
 # A tag's side in a window: smaller ones are enlarged to this, for their bits need three pixels each.
 _WANTED_PX, _MOST_ENLARGEMENT = 48.0, 4.0
-# Measured: the corners of tags scatter ten times as much as those of checkerboards, and four of them leave only two
-# degrees of freedom to notice it.
-_CORNER_STD_PX = 0.6
 # A tag is read as a whole, with the parity of its dictionary: there are no half-sure readings.
 _MARGIN = 2.0
 
@@ -43,7 +39,8 @@ class TagFinder:
         self._markers = [(marker, marker.tag) for marker in markers if marker.tag is not None]
         self._points = {marker.entity: marker.printed.corners() for marker, _ in self._markers}
         names = {tag.dictionary for _, tag in self._markers}
-        self._detectors = {name: _detector(name) for name in sorted(names)}
+        self._families = {name: family_of(name) for name in sorted(names)}
+        self._finders = {name: family.finder() for name, family in self._families.items()}
         self._seen: dict[str, _Seen] = {}
 
     @property
@@ -90,7 +87,7 @@ class TagFinder:
         window = Window(0, 0, picture.shape[1], picture.shape[0])
         return [
             (wanted[name, number], corners)
-            for name in self._detectors
+            for name in self._finders
             for number, corners in self._detect(picture, name, window, _WANTED_PX)
             if (name, number) in wanted
         ]
@@ -99,33 +96,26 @@ class TagFinder:
         """Return ids and corners (4, 2) [px] of the tags in a window."""
         part = picture[window.top : window.bottom, window.left : window.right]
         enlarged, ratio = resized(part, float(np.clip(_WANTED_PX / max(side, 1.0), 1.0, _MOST_ENLARGEMENT)))
-        corners, ids, _ = self._detectors[name].detectMarkers(np.ascontiguousarray(enlarged))
-        if not len(corners):
-            return []
         place = np.array([window.left, window.top])
-        return [
-            (int(number), (np.asarray(four, np.float64).reshape(4, 2) + 0.5) * ratio - 0.5 + place)
-            for four, number in zip(corners, np.ravel(ids), strict=True)
-        ]
+        try:
+            finds = [(int(number), np.asarray(four, np.float64)) for number, four in self._finders[name](enlarged)]
+        except Exception as error:  # a detector is anybody's program: the picture is counted as one that failed
+            raise ValueError(f"tags {name}: {type(error).__name__}: {error}") from error
+        return [(number, (four + 0.5) * ratio - 0.5 + place) for number, four in finds if four.shape == (4, 2)]
 
     def _measured(self, marker: MarkerSettings, corners: Array, gravity_of: GravityOf) -> Sighting | None:
         points = self._points[marker.entity]
         poses = pose.planar_poses(corners, points, self._intrinsics)
         if not poses:
             return None
-        floor_px = max(_CORNER_STD_PX, self._settings.corner_floor_px)
+        assert marker.tag is not None
+        floor_px = max(self._families[marker.tag.dictionary].corner_std_px, self._settings.corner_floor_px)
         choice = pose.choose(
             poses, points, self._intrinsics, gravity_of(marker.entity), floor_px, self._settings.ambiguity_cost
         )
         if choice.residual_px > self._settings.max_residual_px:
             return None
         return Sighting(marker.entity, _MARGIN, choice, corners)
-
-
-def _detector(name: str) -> cv2.aruco.ArucoDetector:
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    return cv2.aruco.ArucoDetector(dictionary_of(name), parameters)
 
 
 def _side_px(corners: Array) -> float:

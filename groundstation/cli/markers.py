@@ -29,7 +29,9 @@ def markers() -> None:
     "--size", "paper", default="A4", show_default=True, help="Paper: A5..A0, Letter, Tabloid, or 300x400 (mm)."
 )
 @click.option("--square-mm", type=float, help=f"Side of one square of the checkerboard.  [default: {_SQUARE_MM:g}]")
-@click.option("--dictionary", metavar="NAME", help="Print tags of this ArUco or AprilTag dictionary instead.")
+@click.option(
+    "--dictionary", metavar="NAME", help="Print tags of this ArUco, AprilTag or plug-in's dictionary instead."
+)
 @click.option("--size-mm", type=float, help=f"Side of a tag's black square.  [default: {_TAG_MM:g}]")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The PDF to write."

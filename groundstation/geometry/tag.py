@@ -1,13 +1,18 @@
-"""Square tags (ArUco, AprilTag) as second kind of marker: sizes and corners; their bits belong to OpenCV.
+"""Square tags (ArUco, AprilTag, plug-ins) as second kind of marker: sizes and corners; bits belong to their family.
 
 Marker frame: origin at the centre, z out of the face, x to the right and y up as printed; forward is x.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from groundstation.arrays import Array
+from groundstation import plug_ins
+from groundstation.arrays import Array, Image
+
+Finder = Callable[[Image], Iterable[tuple[int, Array]]]
 
 # Name of the dictionary -> how many tags it holds, and bits along the side of one without its black border.
 DICTIONARIES: dict[str, tuple[int, int]] = {
@@ -19,6 +24,29 @@ DICTIONARIES: dict[str, tuple[int, int]] = {
     "DICT_APRILTAG_36H10": (2320, 6),
     "DICT_APRILTAG_36H11": (587, 6),
 }
+
+
+class TagFamily(Protocol):
+    """A dictionary of square tags: OpenCV's, or that of another package (entry point `skein.markers`).
+
+    count: ids are below that; bits: along the side of a tag without its black border of one module; corner_std_px:
+    standard deviation of a corner that its finder finds [px].
+    """
+
+    count: int
+    bits: int
+    corner_std_px: float
+
+    def finder(self) -> Finder:
+        """Return what finds tags in a grey picture (h, w): ids and corners (4, 2) [px].
+
+        In the order of `SquareTag.corners`; the centre of the first pixel is (0, 0).
+        """
+
+    def black_cells(self, number: int) -> list[list[bool]]:
+        """Return which modules of a tag are black, by rows from the top, the border of one module included."""
+
+
 # White paper around the black border, in modules (the side of a bit).
 QUIET_MODULES = 1.0
 
@@ -41,7 +69,16 @@ class SquareTag:
     @property
     def modules(self) -> int:
         """Return the side of the black square in modules: the bits and a border of one on each side."""
-        return DICTIONARIES[self.dictionary][1] + 2
+        bits = DICTIONARIES[self.dictionary][1] if self.family is None else self.family.bits
+        return bits + 2
+
+    @property
+    def family(self) -> TagFamily | None:
+        """Return the plug-in that its dictionary belongs to, None for those of OpenCV."""
+        if self.dictionary in DICTIONARIES:
+            return None
+        family: TagFamily = plug_ins.tag_family(self.dictionary)
+        return family
 
     @property
     def module_m(self) -> float:
@@ -64,7 +101,13 @@ class SquareTag:
 
 def tag_fault(dictionary: str, number: int) -> str:
     """Return what is wrong with a dictionary or an id in it; "" when nothing is."""
-    if dictionary not in DICTIONARIES:
-        return f"dictionary must be one of {', '.join(sorted(DICTIONARIES))} (got {dictionary})"
-    count = DICTIONARIES[dictionary][0]
+    if dictionary in DICTIONARIES:
+        count = DICTIONARIES[dictionary][0]
+    elif dictionary in (installed := plug_ins.names(plug_ins.MARKERS)):
+        try:
+            count = plug_ins.tag_family(dictionary).count
+        except plug_ins.PlugInError as error:
+            return f"dictionary {error}"
+    else:
+        return f"dictionary must be one of {', '.join((*sorted(DICTIONARIES), *installed))} (got {dictionary})"
     return "" if 0 <= number < count else f"id must be in 0..{count - 1} of {dictionary} (got {number})"

@@ -6,7 +6,7 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from groundstation.geometry.board import Checkerboard
-from groundstation.geometry.tag import DICTIONARIES, SquareTag, tag_fault
+from groundstation.geometry.tag import SquareTag, tag_fault
 from groundstation.settings.values import MarkerCode, SettingsSection, SquareSize
 
 TagId = Annotated[int, Field(ge=0)]
@@ -17,14 +17,15 @@ class MarkerSettings(SettingsSection):
     """A flat marker: `code` and `square_mm` of a checkerboard, or `dictionary`, `id` and `size_mm` of a tag."""
 
     kind: Literal["checkerboard", "aruco"] = "checkerboard"
-    """checkerboard: Skein's own marker, whose pose is ten times more accurate; aruco: a tag of an ArUco or AprilTag
-    dictionary."""
+    """checkerboard: Skein's own marker, whose pose is ten times more accurate; aruco: a square tag of an ArUco or
+    AprilTag dictionary, or of a plug-in's."""
     code: MarkerCode | None = None
     """Checkerboard: its number; each marker of a field its own."""
     square_mm: SquareSize = 44.0
     """Checkerboard: side [mm] of one square."""
     dictionary: str | None = None
-    """Tag: OpenCV's name of its dictionary, such as DICT_APRILTAG_36H11."""
+    """Tag: OpenCV's name of its dictionary, such as DICT_APRILTAG_36H11, or that of a plug-in (entry point
+    `skein.markers`)."""
     id: TagId | None = None
     """Tag: its number in the dictionary."""
     size_mm: TagSize | None = None
@@ -50,7 +51,7 @@ class MarkerSettings(SettingsSection):
         if missing or self.dictionary is None or self.id is None:
             return [(key, "missing") for key in missing]
         fault = tag_fault(self.dictionary, self.id)
-        place = "dictionary" if self.dictionary not in DICTIONARIES else "id"
+        place = fault.partition(" ")[0]
         return [(place, _fault(fault.removeprefix(f"{place} ").split(" (got")[0]))] if fault else []
 
     @property

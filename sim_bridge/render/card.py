@@ -35,11 +35,14 @@ class BoardCard:
 
 
 class TagCard:
-    """An ArUco or AprilTag tag with its quiet zone."""
+    """A square tag with its quiet zone; its bits are OpenCV's or a plug-in's."""
 
     def __init__(self, tag: SquareTag) -> None:
-        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, tag.dictionary))
-        black = dictionary.generateImageMarker(tag.id, tag.modules, borderBits=1) == 0
+        if tag.family is not None:
+            black = np.array(tag.family.black_cells(tag.id))
+        else:
+            dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, tag.dictionary))
+            black = dictionary.generateImageMarker(tag.id, tag.modules, borderBits=1) == 0
         self._cells = np.pad(np.where(black, board.BLACK, board.WHITE), 1, constant_values=board.WHITE).astype(np.uint8)
         self.unit_m = tag.module_m
         half = tag.modules / 2 + QUIET_MODULES

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from groundstation.errors import SettingsError
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.process import numba_cache
 from sim_bridge.scenario import Scenario, parse_scenario
@@ -32,6 +33,15 @@ def resolved_field(name: str, overrides: list[str]) -> ResolvedField:
         sys.stderr.write(result.stderr or result.stdout)
         raise SystemExit(result.returncode)
     return field_from_json(result.stdout.encode())
+
+
+def _scenario(path: str) -> Scenario:
+    """Return the scenario of a JSON file; it ends the program when there is none."""
+    try:
+        return parse_scenario(Path(path).read_bytes())
+    except (OSError, SettingsError) as error:
+        hint = f"`groundstation experiment scenarios {path}` flies shipped ones and YAML files"
+        raise SystemExit(f"--scenario {path}: {error}\n  {hint}") from error
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -68,7 +78,7 @@ def main() -> int:
         return scenarios()
     arguments = _parser().parse_args()
     field = resolved_field(arguments.field, arguments.set)
-    scenario = parse_scenario(Path(arguments.scenario).read_bytes()) if arguments.scenario else Scenario()
+    scenario = _scenario(arguments.scenario) if arguments.scenario else Scenario()
     if arguments.start_phase is not None:
         path = scenario.target.path.model_copy(update={"start_phase": arguments.start_phase})
         scenario = scenario.model_copy(update={"target": scenario.target.model_copy(update={"path": path})})

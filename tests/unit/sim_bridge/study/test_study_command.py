@@ -1,0 +1,18 @@
+"""The study's command line: an operator's mistake is answered in a line, without a traceback."""
+
+import sys
+
+import pytest
+
+from sim_bridge.study.__main__ import main
+
+
+@pytest.mark.parametrize(("text", "said"), [(None, "No such file"), ('{"windy": 1}', "windy")])
+def test_a_wrong_scenario_is_named(tmp_path, monkeypatch, text, said):
+    path = tmp_path / "scenario.json"
+    if text is not None:
+        path.write_text(text)
+    monkeypatch.setattr("sim_bridge.study.__main__.resolved_field", lambda *_: None)
+    monkeypatch.setattr(sys, "argv", ["study", "demo", "--scenario", str(path)])
+    with pytest.raises(SystemExit, match=said):
+        main()

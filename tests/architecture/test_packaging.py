@@ -195,9 +195,9 @@ def test_the_continuous_integration_run_is_sound(tmp_path: Path) -> None:
 
 
 def test_the_continuous_integration_run_is_bounded() -> None:
-    """All limits together stay below 80 minutes."""
+    """All limits together stay below 85 minutes."""
     script = ROOT / ".ci" / "run"
     assert script.stat().st_mode & 0o111
     limits = [int(limit) for limit in re.findall(r"^step \S+ (\d+) ", script.read_text(encoding="utf-8"), re.M)]
     assert len(limits) == 7
-    assert sum(limits) + 30 * len(limits) <= 4800
+    assert sum(limits) + 30 * len(limits) <= 5100

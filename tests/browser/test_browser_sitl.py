@@ -32,7 +32,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.ma
 _FLY, _LAND = 290718208, 290717696
 _REF = re.compile(rb"AT\*REF=\d+,(\d+)")
 _DRONES = {"drone_1", "drone_2"}
-_WINDOWS, _WINDOW_S = 4, 5.0
+_WINDOWS, _WINDOW_S = 3, 5.0
 
 
 class Witness:

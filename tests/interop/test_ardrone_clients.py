@@ -47,7 +47,11 @@ def test_three_drones_fly_at_once_by_two_programs(hangar: Any, programs: Any) ->
 
 
 @pytest.mark.parametrize(
-    ("options", "gps"), [(("--omit-option", "27"), False), (("--firmware", "ar2-2.4.8"), True)], ids=["2.3", "2.4.8"]
+    ("options", "gps"),
+    [
+        pytest.param(("--omit-option", "27"), False, id="2.3", marks=pytest.mark.exhaustive),
+        pytest.param(("--firmware", "ar2-2.4.8"), True, id="2.4.8"),
+    ],
 )
 def test_node_reads_full_navdata(hangar: Any, programs: Any, options: tuple[str, ...], gps: bool) -> None:
     drones = hangar(1, *options)

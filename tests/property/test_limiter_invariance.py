@@ -26,7 +26,7 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)))
 LAYOUT = StateLayout().with_entity("a", EntityKind.ROBOT, ROBOT_CORE).with_entity("b", EntityKind.ROBOT, ROBOT_CORE)
 TIME_S = 2.0 * SAFETY.reaction_s
-STATES = int(os.environ.get("GROUNDSTATION_LIMITER_STATES", "100000"))
+STATES = int(os.environ.get("GROUNDSTATION_LIMITER_STATES", "40000"))
 
 
 # -- the nearest velocity ---------------------------------------------------------------------------------------------

@@ -39,8 +39,16 @@ def speed(copter):
     return math.hypot(*copter.airframe.velocity_stabilized())
 
 
-@pytest.mark.parametrize("link", ["pymavlink", "mavsdk"])
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=lambda number: number.name)
+@pytest.mark.parametrize(
+    ("number", "link"),
+    [
+        (signal.SIGKILL, "mavsdk"),
+        (signal.SIGSTOP, "pymavlink"),
+        pytest.param(signal.SIGKILL, "pymavlink", marks=pytest.mark.exhaustive),
+        pytest.param(signal.SIGSTOP, "mavsdk", marks=pytest.mark.exhaustive),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
 def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_path):
     place = ("127.0.0.1", port)
     flown = {}

@@ -37,11 +37,21 @@ def checked(env, only, *settings):
 @pytest.mark.sitl
 @pytest.mark.timeout(420)
 def test_the_kind_of_the_page_keeps_the_contract(puffin):
-    result = checked(puffin, "kind,stand,square,limits,silence,killed")
+    result = checked(puffin, "kind,stand,silence,killed")
     assert result.returncode == 0, result.stdout + result.stderr
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
+@pytest.mark.sitl
+@pytest.mark.timeout(600)
+def test_the_kind_of_the_page_flies_the_whole_kit(puffin):
+    result = checked(puffin, "")
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.sitl
 @pytest.mark.timeout(200)
 def test_its_fail_safe_goes_to_the_port_of_the_field_file(puffin):

@@ -9,6 +9,7 @@ The target is believed as gentle as the scenario's is (it never leaves its eight
 turns on the spot, and its covariance is then too large for an eight, by design.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,11 @@ from sim_bridge.study.summary import summary
 
 pytestmark = pytest.mark.statistics
 GENTLE_M_S2 = 0.3
-FLIGHTS, DURATION_S, OUTLIERS = 50, 25.0, 0.02
-LOW, HIGH, WIDEST = 0.8, 1.3, 0.3
+DURATION_S, OUTLIERS = 25.0, 0.02
+# So many flights; the interval of few is wide.
+MANY = 50
+FLIGHTS = [pytest.param(16, id="16"), pytest.param(MANY, id="50", marks=pytest.mark.exhaustive)]
+LOW, HIGH = 0.8, 1.3
 Reports = list[dict[str, Any]]
 
 
@@ -38,10 +42,14 @@ def fly(field: ResolvedField, seeds: range, duration_s: float, outliers: float) 
 
 
 def judge(reports: Reports, field: ResolvedField, names: tuple[str, ...]) -> None:
+    """Few flights are outside when the whole interval of their mean is; many when their mean is."""
     found = summary(reports, field)
     stated = {name: f"{found[name]} (95 %, {found[name].flights} flights)" for name in names}
     print(stated)
-    assert all(LOW <= found[name].mean <= HIGH and found[name].half <= WIDEST for name in names), stated
+    widest = 0.3 * math.sqrt(MANY / len(reports))
+    for name in names:
+        slack = 0.0 if len(reports) >= MANY else found[name].half
+        assert LOW - slack <= found[name].mean <= HIGH + slack and found[name].half <= widest, stated
 
 
 def test_a_few_short_flights_are_near_consistent(gentle_field: ResolvedField) -> None:
@@ -52,27 +60,27 @@ def test_a_few_short_flights_are_near_consistent(gentle_field: ResolvedField) ->
     assert 0.6 <= found["nis fixed cameras"].mean <= 1.5
 
 
-@pytest.fixture(scope="module")
-def fifty(gentle_field: ResolvedField) -> Reports:
-    """Some 2.3 s of CPU each. 25 s hold a whole approach, several changes of topology and 900 sightings per flight."""
-    return fly(gentle_field, range(100, 100 + FLIGHTS), DURATION_S, OUTLIERS)
+@pytest.fixture(scope="module", params=FLIGHTS)
+def flights(request: pytest.FixtureRequest, gentle_field: ResolvedField) -> Reports:
+    """Some 2.8 s of CPU each. 25 s hold a whole approach, several changes of topology and 900 sightings per flight."""
+    return fly(gentle_field, range(100, 100 + request.param), DURATION_S, OUTLIERS)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_fifty_flights_are_consistent_in_state(fifty: Reports, gentle_field: ResolvedField) -> None:
-    judge(fifty, gentle_field, ("anees robots", "anees robots xy", "anees target", "anees target xy"))
+def test_flights_are_consistent_in_state(flights: Reports, gentle_field: ResolvedField) -> None:
+    judge(flights, gentle_field, ("anees robots", "anees robots xy", "anees target", "anees target xy"))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_fifty_flights_are_consistent_in_innovation(fifty: Reports, gentle_field: ResolvedField) -> None:
-    judge(fifty, gentle_field, ("nis fixed cameras", "nis onboard cameras"))
+def test_flights_are_consistent_in_innovation(flights: Reports, gentle_field: ResolvedField) -> None:
+    judge(flights, gentle_field, ("nis fixed cameras", "nis onboard cameras"))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_fifty_flights_with_outliers_hold_the_target(fifty: Reports) -> None:
-    errors = np.array([report["target_rmse_m"] for report in fifty])
+def test_flights_with_outliers_hold_the_target(flights: Reports) -> None:
+    errors = np.array([report["target_rmse_m"] for report in flights])
     assert np.sqrt(np.mean(errors**2)) <= 0.12
-    assert np.mean([report["target_lost_s"] for report in fifty]) <= 0.1, "on average, from the beginning of tracking"
+    assert np.mean([report["target_lost_s"] for report in flights]) <= 0.1, "on average, from the beginning of tracking"

@@ -33,6 +33,7 @@ def test_all_landmarks(dataset: Dataset) -> None:
     assert not together.lost
 
 
+@pytest.mark.exhaustive
 def test_only_robot_1_sees_landmarks(dataset: Dataset) -> None:
     alone, together = both(dataset, "robot 1 only")
     assert together.rmse_m <= 0.20
@@ -41,6 +42,7 @@ def test_only_robot_1_sees_landmarks(dataset: Dataset) -> None:
     assert not together.lost
 
 
+@pytest.mark.exhaustive
 def test_a_camera_over_half_the_room(dataset: Dataset) -> None:
     together = run_scenario(dataset, BY_NAME["half-room camera"], True)
     assert together.rmse_m <= 0.10
@@ -48,7 +50,13 @@ def test_a_camera_over_half_the_room(dataset: Dataset) -> None:
     assert not together.lost
 
 
-@pytest.mark.parametrize("name", ["camera with dark spells", "half-room camera with dark spells"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("camera with dark spells", marks=pytest.mark.exhaustive),
+        "half-room camera with dark spells",
+    ],
+)
 def test_dark_spells_lose_nobody(dataset: Dataset, name: str) -> None:
     together = run_scenario(dataset, BY_NAME[name], True)
     assert together.anees <= 4.0

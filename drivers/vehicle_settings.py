@@ -2,14 +2,17 @@
 
 import ipaddress
 import math
-from typing import Annotated
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from drivers.watchdog_types import WatchdogLimits
+from groundstation.errors import SettingsError
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import DroneLimits
+from groundstation.vehicles import DriverProcess, VehicleOrder
 
 _SAFETY = SafetyValues()
 
@@ -96,3 +99,60 @@ def vehicle_limits(limits: DroneLimits) -> VehicleLimits:
         battery_min=limits.battery_min,
         battery_hold_s=limits.battery_hold_s,
     )
+
+
+class VehicleDriverSettings(DriverSection):
+    """What the driver of one vehicle of any kind is told; a kind adds its own.
+
+    interface: network adapter that the vehicle is behind ("": any); pad_m: where it takes off [x, y; world];
+    raw_datagrams: whether they are recorded.
+    """
+
+    name: Name
+    address: str
+    interface: str = ""
+    pad_m: tuple[float, float]
+    limits: VehicleLimits = VehicleLimits()
+    safety: SilenceLimits = SilenceLimits()
+    velocity_scale: Positive = 1.0
+    velocity_std_m_s: Positive = 0.05
+    raw_datagrams: bool = True
+
+    @property
+    def authority(self) -> WatchdogLimits:
+        """Return the limits of the shared watchdog."""
+        return self.safety.authority(self.limits, self.pad_m)
+
+
+def values_of(order: VehicleOrder) -> dict[str, Any]:
+    """Return the values of VehicleDriverSettings for one drone of a field."""
+    drone = order.drone
+    return {
+        "name": order.name,
+        "address": drone.address,
+        "interface": drone.interface,
+        "pad_m": drone.pad_m,
+        "limits": vehicle_limits(drone.limits),
+        "safety": silence_limits(order.safety),
+        "velocity_scale": drone.odometry.velocity_scale,
+        "velocity_std_m_s": drone.odometry.velocity_std_m_s,
+        "raw_datagrams": order.raw_datagrams,
+    }
+
+
+def a_process_each(
+    settings_of: Callable[[VehicleOrder], BaseModel],
+) -> Callable[[Sequence[VehicleOrder]], list[DriverProcess]]:
+    """Return what gives each vehicle a driver process of its own; settings_of: what that is told."""
+    return lambda orders: [DriverProcess((order.name,), settings_of(order).model_dump_json()) for order in orders]
+
+
+_Section = TypeVar("_Section", bound=DriverSection)
+
+
+def read_section(model: type[_Section], text: str) -> _Section:
+    """Return a driver's settings from JSON; raises SettingsError."""
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        raise SettingsError([str(error)]) from error

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from pydantic import ValidationError
-
 from drivers.ardrone import convert, velocity_loop
 from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.commands import orders_from_decision
@@ -32,12 +30,12 @@ from drivers.host import VehicleHost, run_hosts
 from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import ARDRONE
 from drivers.plausibility.motion import MotionMonitor
+from drivers.vehicle_settings import read_section
 from drivers.watchdog_types import UP, Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
-from groundstation.errors import SettingsError
 from groundstation.process.priority import go_first
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
@@ -255,10 +253,7 @@ class ArDrone:
 
 def run(child: HostProcess) -> int:
     """Fly one AR.Drone until a stop is requested; the process entry."""
-    try:
-        settings = ArDroneDriverSettings.model_validate_json(child.section)
-    except ValidationError as error:
-        raise SettingsError([str(error)]) from error
+    settings = read_section(ArDroneDriverSettings, child.section)
     drone = ArDrone(settings, child.bus)
 
     def tell(_now_ns: int) -> None:

@@ -12,10 +12,9 @@ from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.datagrams import DatagramLog
-from groundstation.adapters import bind_to_adapter
+from drivers.vehicle_socket import open_udp
 from groundstation.bus import clock
 from groundstation.errors import DriverError
-from groundstation.process.ports import why_refused
 
 # After this silence a lower sequence number is a new session of the drone, before it a replay.
 _RESTART_NS = 300_000_000
@@ -140,13 +139,6 @@ class ArDroneLink:
 
 
 def _open(settings: ArDroneDriverSettings, port: int) -> socket.socket:
-    channel, local_address = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), settings.local_address
-    bind_to_adapter(channel, settings.interface)
-    try:
-        channel.bind((local_address, port))
-    except OSError as error:
-        channel.close()
-        why = why_refused(error, local_address, port, socket.SOCK_DGRAM)
-        raise DriverError(f"cannot bind {local_address or '*'}:{port or 'any'} (UDP): {why}") from error
+    channel = open_udp((settings.local_address, port), settings.interface)
     channel.settimeout(_POLL_S)
     return channel

@@ -6,8 +6,6 @@ import threading
 from collections import Counter, deque
 from collections.abc import Sequence
 
-from pydantic import ValidationError
-
 from drivers.base import HostProcess
 from drivers.host import VehicleHost, run_hosts
 from drivers.mavlink.links.forwarding import with_riders
@@ -17,9 +15,10 @@ from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
 from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.vehicle_settings import read_section
 from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
-from groundstation.errors import DriverError, SettingsError
+from groundstation.errors import DriverError
 from groundstation.process.priority import go_first
 
 # Of what is due by the clock: poses, questions, status. Orders do not wait for a turn.
@@ -128,10 +127,7 @@ def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) 
 
 def run(child: HostProcess) -> int:
     """Fly the vehicles of one link until asked to stop; the process entry."""
-    try:
-        settings = MavlinkDriverSettings.model_validate_json(child.section)
-    except ValidationError as error:
-        raise SettingsError([str(error)]) from error
+    settings = read_section(MavlinkDriverSettings, child.section)
     share_interpreter(settings)
     fleet = Fleet(child, settings)
     try:

@@ -8,8 +8,6 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 
-from pydantic import ValidationError
-
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
@@ -17,26 +15,15 @@ from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
 from drivers.tello.settings import TelloDriverSettings
-from drivers.tello.wire.text import (
-    COMMAND_PORT,
-    EMERGENCY,
-    LAND,
-    OK,
-    SDK,
-    STATE_PORT,
-    TAKE_OFF,
-    State,
-    WireError,
-    parse_state,
-    rc,
-)  # fmt: skip
+from drivers.tello.wire import text
+from drivers.vehicle_settings import read_section
+from drivers.vehicle_socket import open_udp
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
-from groundstation.adapters import bind_to_adapter, with_zone
+from groundstation.adapters import with_zone
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Odometry, Vector3
 from groundstation.bus.topics import ODOMETRY
-from groundstation.errors import DriverError, SettingsError
 from groundstation.process.priority import go_first
 
 RATE_HZ = 20.0
@@ -47,7 +34,7 @@ _AIRBORNE_CM = 20
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
 _STILL_M_S = 0.25
 # Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
-_PAUSE_NS = {SDK: 1_000_000_000, TAKE_OFF: 4_000_000_000, LAND: 500_000_000, EMERGENCY: 100_000_000}
+_PAUSE_NS = {text.SDK: 1_000_000_000, text.TAKE_OFF: 4_000_000_000, text.LAND: 500_000_000, text.EMERGENCY: 100_000_000}
 # Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
 LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
 
@@ -58,7 +45,7 @@ class Heard:
 
     heard_ns: int = 0
     motors_ns: int = 0
-    state: State | None = None
+    state: text.State | None = None
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
 
     def airborne(self, now_ns: int) -> bool:
@@ -67,7 +54,7 @@ class Heard:
         return high or (self.motors_ns > 0 and now_ns - self.motors_ns < _MOTORS_NS)
 
 
-def velocity_from_state(state: State) -> Vector3:
+def velocity_from_state(state: text.State) -> Vector3:
     """Return the velocity [m/s; base_stabilized, FLU]."""
     north, east, down = (0.1 * speed for speed in state.velocity)
     c, s = math.cos(math.radians(state.yaw)), math.sin(math.radians(state.yaw))
@@ -83,7 +70,7 @@ class Tello:
         self._settings, self._bus = settings, bus
         self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
         self._commands = self._open(0)
-        self._states = self._open(STATE_PORT)
+        self._states = self._open(text.STATE_PORT)
         self._ready = False
         self._asked = Action.WAIT
         self._sent_ns: dict[bytes, int] = {}
@@ -96,16 +83,8 @@ class Tello:
 
     def _open(self, port: int) -> socket.socket:
         # Connected, so that only this vehicle is heard: several share the state's port, and each socket gets its own.
-        udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        bind_to_adapter(udp, self._settings.interface)
-        try:
-            if port:
-                udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            udp.bind((self._settings.local_address, port))
-            udp.connect((self._settings.address, COMMAND_PORT))
-        except OSError as error:
-            udp.close()
-            raise DriverError(f"{self.name}: UDP {self._settings.local_address}:{port}: {error.strerror}") from error
+        own = self._settings
+        udp = open_udp((own.tello.local_address, port), own.interface, (own.address, text.COMMAND_PORT))
         udp.setblocking(False)
         return udp
 
@@ -122,11 +101,11 @@ class Tello:
 
     def _take(self, now_ns: int, data: bytes, is_state: bool) -> None:
         if not is_state:
-            self._ready = self._ready or data.strip().lower() == OK
+            self._ready = self._ready or data.strip().lower() == text.OK
             return
         try:
-            state = parse_state(data)
-        except WireError as error:
+            state = text.parse_state(data)
+        except text.WireError as error:
             self._rejected[error.reason] += 1
             return
         before, velocity = self.heard, velocity_from_state(state)
@@ -136,7 +115,7 @@ class Tello:
         self.heard = Heard(now_ns, now_ns if ran else before.motors_ns, state, velocity)
         self._publish(now_ns, state, velocity)
 
-    def _publish(self, now_ns: int, state: State, velocity: Vector3) -> None:
+    def _publish(self, now_ns: int, state: text.State, velocity: Vector3) -> None:
         roll, pitch, yaw = math.radians(state.roll), -math.radians(state.pitch), -math.radians(state.yaw)
         sample = MotionSample(now_ns, velocity[:2], roll, pitch, state.acceleration)
         report = self._plausibility.update(sample, self._flight_state(now_ns))
@@ -184,28 +163,28 @@ class Tello:
         flies = self.heard.airborne(now_ns)
         match decision.action:
             case Action.CUT:
-                self._repeat(now_ns, EMERGENCY)
+                self._repeat(now_ns, text.EMERGENCY)
             case Action.LAND if flies:
-                self._repeat(now_ns, LAND)
+                self._repeat(now_ns, text.LAND)
             case Action.TAKE_OFF if not flies:
-                self._repeat(now_ns, TAKE_OFF if self._ready else SDK)
+                self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)
             case Action.FLY if flies:
                 self._send(now_ns, self._sticks(decision))
             case Action.HOVER | Action.TAKE_OFF if flies:
-                self._send(now_ns, rc(0, 0, 0, 0))
+                self._send(now_ns, text.rc(0, 0, 0, 0))
             case _:
-                self._repeat(now_ns, SDK)
+                self._repeat(now_ns, text.SDK)
         if not self._ready:
-            self._repeat(now_ns, SDK)
+            self._repeat(now_ns, text.SDK)
 
     def _sticks(self, decision: WatchdogDecision) -> bytes:
-        own, limits, (forward, left, up) = self._settings, self._settings.limits, decision.velocity_m_s
+        own, limits, (forward, left, up) = self._settings.tello, self._settings.limits, decision.velocity_m_s
         # A velocity beyond its limit keeps its direction.
         shorter = min(1.0, limits.max_speed_m_s / max(math.hypot(forward, left), 1e-9)) / own.full_speed_m_s
         rise = max(-limits.max_climb_m_s, min(limits.max_climb_m_s, up)) / own.full_climb_m_s
         fastest = limits.max_yaw_rate_deg_s
         turn = max(-fastest, min(fastest, math.degrees(decision.yaw_rate_rad_s))) / own.full_yaw_rate_deg_s
-        return rc(*(round(100 * share) for share in (-left * shorter, forward * shorter, rise, -turn)))
+        return text.rc(*(round(100 * share) for share in (-left * shorter, forward * shorter, rise, -turn)))
 
     def _repeat(self, now_ns: int, word: bytes) -> None:
         if now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]:
@@ -237,14 +216,10 @@ class Tello:
 
 def run(child: HostProcess) -> int:
     """Fly one Tello until a stop is requested; the process entry."""
-    try:
-        settings = TelloDriverSettings.model_validate_json(child.section)
-    except ValidationError as error:
-        raise SettingsError([str(error)]) from error
+    settings = read_section(TelloDriverSettings, child.section)
     tello = Tello(settings, child.bus)
     try:
         go_first()
-        authority = settings.safety.authority(settings.limits, settings.pad_m)
-        return run_hosts(child, [VehicleHost(child, tello, authority)], RATE_HZ)
+        return run_hosts(child, [VehicleHost(child, tello, settings.authority)], RATE_HZ)
     finally:
         tello.close()

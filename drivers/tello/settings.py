@@ -1,21 +1,27 @@
-"""Settings of the Tello driver."""
+"""Settings of a Tello: its section of the field file, and what its driver is told."""
 
-from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits
+from typing import Annotated
+
+from pydantic import Field
+
+from drivers.vehicle_settings import Address, VehicleDriverSettings
+from groundstation.vehicles import KindSection
 
 
-class TelloDriverSettings(DriverSection):
-    """One Tello: address, limits, and what full sticks mean [m/s, deg/s]. pad_m: where it takes off [x, y; world]."""
+class TelloSection(KindSection):
+    """A Tello or RoboMaster TT in SDK mode."""
 
-    name: Name
-    address: str
-    interface: str = ""
-    local_address: str = "0.0.0.0"
-    pad_m: tuple[float, float]
-    limits: VehicleLimits = VehicleLimits()
-    safety: SilenceLimits = SilenceLimits()
-    velocity_scale: Positive = 1.0
-    velocity_std_m_s: Positive = 0.05
-    full_speed_m_s: Positive = 1.0
-    full_climb_m_s: Positive = 1.0
-    full_yaw_rate_deg_s: Positive = 100.0
-    raw_datagrams: bool = True
+    local_address: Address = "0.0.0.0"
+    """IPv4 address of this computer that the state is received at (UDP 8890)."""
+    full_speed_m_s: Annotated[float, Field(gt=0, le=8)] = 1.0
+    """Horizontal speed [m/s] at full stick."""
+    full_climb_m_s: Annotated[float, Field(gt=0, le=4)] = 1.0
+    """Climb rate [m/s] at full stick."""
+    full_yaw_rate_deg_s: Annotated[float, Field(gt=0, le=360)] = 100.0
+    """Turn rate [deg/s] at full stick."""
+
+
+class TelloDriverSettings(VehicleDriverSettings):
+    """One Tello."""
+
+    tello: TelloSection = TelloSection()

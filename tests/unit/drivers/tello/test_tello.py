@@ -35,7 +35,8 @@ class Flight:
     def __init__(self) -> None:
         order = subject_of("tello").order()
         settings = TelloDriverSettings.model_validate_json(kind_named("tello").processes([order])[0].section)
-        settings = settings.model_copy(update={"address": "127.64.78.11", "local_address": "127.64.78.1"})
+        own = settings.tello.model_copy(update={"local_address": "127.64.78.1"})
+        settings = settings.model_copy(update={"address": "127.64.78.11", "tello": own})
         self.heard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.heard.bind((settings.address, COMMAND_PORT))
         self.heard.settimeout(1.0)

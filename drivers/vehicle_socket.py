@@ -1,0 +1,36 @@
+"""The datagram socket of a vehicle's link."""
+
+import os
+import socket
+
+from groundstation.adapters import bind_to_adapter
+from groundstation.errors import DriverError
+from groundstation.process.ports import why_refused
+
+Address = tuple[str, int]
+
+
+def open_udp(local: Address, interface: str = "", peer: Address | None = None) -> socket.socket:
+    """Return a datagram socket on an own address ("": any) and port (0: any free), through one adapter ("": any).
+
+    With a peer it hears that one only, and several sockets may share the port, each with a peer of its own. Raises
+    DriverError: who holds the port, that there is no way to the peer, or no such adapter.
+    """
+    one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    bind_to_adapter(one, interface)
+    address, port = local
+    place = f"{address or '*'}:{port or 'any'} (UDP)"
+    try:
+        if peer is not None:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        one.bind(local)
+    except OSError as error:
+        one.close()
+        raise DriverError(f"cannot bind {place}: {why_refused(error, address, port, socket.SOCK_DGRAM)}") from error
+    try:
+        if peer is not None:
+            one.connect(peer)
+    except OSError as error:
+        one.close()
+        raise DriverError(f"no way from {place} to {peer}: {os.strerror(error.errno or 0)}") from error
+    return one

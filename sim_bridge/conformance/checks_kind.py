@@ -151,6 +151,19 @@ def address_reaches_the_driver(case: Case) -> None:
 
 
 @check()
+def interface_reaches_driver_and_guardian(case: Case) -> None:
+    """A kind that says so hands the network adapter to its driver, and to a voice of its own."""
+    kind = case.subject.kind
+    if not kind.has_interface:
+        raise NotApplicable("it does not choose its adapter (has_interface)")
+    order = case.subject.order()
+    behind = replace(order, drone=change(order.drone, interface="wlan97"))
+    assert "wlan97" in kind.processes([behind])[0].section, "the adapter is not in the driver's section"
+    stop = kind.stop([behind])
+    assert not stop.voice or "wlan97" in stop.way, f"{stop.voice} is not told the adapter"
+
+
+@check()
 def stop_datagrams_fit(case: Case) -> None:
     """Hover and land are different datagrams for a real port, each small enough for one packet."""
     stop = case.subject.kind.stop([case.subject.order()])

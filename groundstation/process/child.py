@@ -13,6 +13,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.roles import Identity
 from groundstation.bus.topics import EVENT, PROCESS_STATUS
+from groundstation.errors import GroundStationError, without_passwords
 from groundstation.process import log
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.parent import ParentWatch
@@ -86,7 +87,10 @@ class Child:
     ) -> None:
         if error is None and self._block is not None:
             self._block.end(self.spec.heartbeat_index)
-        self._set_state(Lifecycle.STOPPING, str(error) if error else "")
+        known = error is None or isinstance(error, GroundStationError)
+        self._set_state(
+            Lifecycle.STOPPING, str(error or "") if known else without_passwords(f"{type(error).__name__}: {error}")
+        )
         if error is not None:
             _log.error("ends by %s: %s", kind.__name__ if kind else "?", error)
         if self._has_bus:

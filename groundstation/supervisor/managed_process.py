@@ -5,6 +5,7 @@ import signal
 import subprocess
 from contextlib import suppress
 
+from groundstation.bus.messages import Lifecycle, ProcessStatus
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.runtime_file import start_time
@@ -32,7 +33,7 @@ class ManagedProcess:
         self.ready_ns = 0
         self.restart_due_ns: int | None = None
         self.kill_reason = ""
-        self.detail = ""
+        self.detail = self.farewell = ""
         self._failures = 0
 
     @property
@@ -64,7 +65,12 @@ class ManagedProcess:
         self.life += 1
         self.started_ns, self.ready_ns = now_ns, 0
         self.restart_due_ns = None
-        self.kill_reason = ""
+        self.kill_reason = self.farewell = ""
+
+    def heard(self, status: ProcessStatus) -> None:
+        """Keep what the process says of itself, and why it ends."""
+        self.detail = status.detail
+        self.farewell = status.detail if status.state is Lifecycle.STOPPING else ""
 
     def heartbeat_age_ns(self, now_ns: int) -> int:
         """Return the time since its last beat [ns]."""
@@ -136,9 +142,10 @@ def _has_ended(pid: int) -> bool:
     return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
-def exit_text(code: int) -> str:
-    """Return an exit code in words."""
+def exit_text(code: int, farewell: str = "") -> str:
+    """Return an exit code in words, with what the process said last of a failure."""
     if code < 0:
         with suppress(ValueError):
             return f"killed by {signal.Signals(-code).name}"
-    return f"ended with code {code}"
+    why = farewell.partition("\n")[0]
+    return f"ended with code {code}: {why}" if code and why else f"ended with code {code}"

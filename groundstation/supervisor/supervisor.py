@@ -197,7 +197,7 @@ class Supervisor:
         for process in self.processes:
             status = details.get(process.spec.name)
             if isinstance(status, ProcessStatus):
-                process.detail = status.detail
+                process.heard(status)
                 if status.state is Lifecycle.READY:
                     self.events.recovery(process)
 
@@ -250,7 +250,7 @@ class Supervisor:
     def _ended(self, process: ManagedProcess, code: int, now_ns: int) -> None:
         if self._stopping:
             return
-        why = process.kill_reason or exit_text(code)
+        why = process.kill_reason or exit_text(code, process.farewell)
         self._speak_for(process, why, now_ns)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):

@@ -45,7 +45,7 @@ def test_crash_of_a_required_process_at_start_names_its_log(make: Callable[..., 
 
 
 def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
-    make: Callable[..., Supervisor], monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("groundstation.supervisor.start._OPTIONAL_GRACE_S", 1.0)
     supervisor = make(spec("ceiling", "crashing", required=False), spec("drone_1", "never_ready", required=False))
@@ -54,6 +54,8 @@ def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     assert 2 <= camera.life <= 4
     assert not supervisor.failure
     assert supervisor.unwell == ["ceiling", "drone_1"]
+    told = (tmp_path / "terminal").read_text()
+    assert "ceiling: ended with code 1: RuntimeError: no luck; restarting" in told
 
 
 def test_late_start_is_waited_for_and_a_recovery_told(make: Callable[..., Supervisor], tmp_path: Path) -> None:

@@ -3,18 +3,23 @@
 FOLDER holds the certificates; "-" for a plain bus. Each says "ready" and ends with its standard input.
 """
 
+import os
+import select
 import sys
 import threading
+import time
 
 from groundstation.bus.access import AccessList
 from groundstation.bus.messages import Odometry, VelocitySetpoint
 from groundstation.bus.roles import Identity, Member, Role
 from groundstation.bus.topics import ODOMETRY, SETPOINT
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus, open_router
+from groundstation.runtime.router_refusals import RouterRefusals
 
 SITE, DRONE = "bench", "drone_1"
 TRACKER, DRIVER = Member("tracker", Role.TRACKER, ("tracker",)), Member(DRONE, Role.DRIVER, (DRONE,), (DRONE,))
 ROUTER = "router"
+_TURN_S = 0.05
 
 
 def identity(folder: str, name: str) -> Identity | None:
@@ -23,12 +28,16 @@ def identity(folder: str, name: str) -> Identity | None:
 
 
 def route(endpoint: str, folder: str) -> None:
-    """Be a router until standard input ends."""
+    """Be a router until standard input ends, as in a run: a guarded one traces, and reads what it traced."""
     access = None if folder == "-" else AccessList(SITE, (TRACKER, DRIVER))
-    router = open_router(endpoint, identity(folder, ROUTER), access)
-    print("ready", flush=True)
-    sys.stdin.read()
+    ready = os.fdopen(os.dup(1), "w")
+    refusals = RouterRefusals()
+    router = open_router(endpoint, identity(folder, ROUTER), access, trace=True)
+    print("ready", file=ready, flush=True)
+    while not select.select([sys.stdin], [], [], _TURN_S)[0]:
+        refusals.take(time.monotonic_ns())
     router.close()
+    refusals.close()
 
 
 def echo(ways: list[tuple[str, str]]) -> None:

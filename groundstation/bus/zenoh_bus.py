@@ -39,8 +39,9 @@ _QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", ".pem", ".key"
 REFUSED_BY = "zenoh_link_tls"
-# The crate that reports who was refused at the door; what the access list denies is only told at a cost per message.
+# The crate that reports who was refused at the door; what the access list denies is told only with all that it allows.
 _LOGGED = f"error,{REFUSED_BY}=warn"
+_DENIED_BY = "zenoh::net::routing::interceptor::access_control"
 
 
 def _configuration(mode: str, endpoint: str, also: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -92,16 +93,22 @@ def _opened(configuration: dict[str, Any]) -> Any:
 
 
 def open_router(
-    endpoint: str, identity: Identity | None = None, access: AccessList | None = None, also: tuple[str, ...] = ()
+    endpoint: str,
+    identity: Identity | None = None,
+    access: AccessList | None = None,
+    also: tuple[str, ...] = (),
+    *,
+    trace: bool = False,
 ) -> Any:
     """Return a listening router session, guarded if there are an identity and an access list.
 
     also: further endpoints that it listens on. A guarded one writes a line with REFUSED_BY to standard output for each
-    stranger. Raises GroundStationError when the port is taken.
+    stranger, and with `trace` one for each message that the access list lets pass or denies. Raises GroundStationError
+    when the port is taken.
     """
     configuration = _configuration("router", endpoint, also)
     if identity is not None and access is not None:
-        zenoh.init_log_from_env_or(_LOGGED)
+        zenoh.init_log_from_env_or(f"{_LOGGED},{_DENIED_BY}=trace" if trace else _LOGGED)
         configuration = _secured(configuration, identity, "listen") | {"access_control": access_control(access)}
     try:
         return _opened(configuration)

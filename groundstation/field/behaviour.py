@@ -70,3 +70,4 @@ class BusValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     port: int = 4717
     listen: str = ""
+    name_refusals: bool = True

@@ -16,6 +16,7 @@ from groundstation.flight.failsafe_datagrams import failsafe_datagrams
 from groundstation.flight.real_parts import ALL_EMULATED, RealParts
 from groundstation.process.ports import port_of
 from groundstation.runtime.router import RouterSection
+from groundstation.settings.behaviour import Bus
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import (
     CAMERA,
@@ -96,22 +97,20 @@ def process_table(
         table.append(replace(rows.CONSOLE, section=page))
     if monitor:
         table.append(replace(rows.MONITOR, section=core))
-    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table, field.bus.listen))
+    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table, field.bus))
     return guarded(tuple(table))
 
 
-def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec], listen: str = "") -> str:
-    """Return what a router is handed: where it listens, and whom it lets speak as whom.
-
-    listen: address at which other hosts of the site find it too, "" for none.
-    """
+def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec], bus: Bus) -> str:
+    """Return what a router is handed: where it listens, and whom it lets speak as whom."""
     members = [
         Member(spec.name, Role(spec.role), (spec.name,), spec.entities or (spec.name,)) for spec in table if spec.on_bus
     ]
     members += [Member(SOURCE, Role.SUPERVISOR, (SOURCE,)), *SHELLS]
-    also = (f"tls/{listen}:{port_of(endpoint)}",) if listen else ()
-    members += hosts(site) if listen else ()
-    return msgspec.json.encode(RouterSection(endpoint, AccessList(site, tuple(members)), also)).decode()
+    also = (f"tls/{bus.listen}:{port_of(endpoint)}",) if bus.listen else ()
+    members += hosts(site) if bus.listen else ()
+    access = AccessList(site, tuple(members))
+    return msgspec.json.encode(RouterSection(endpoint, access, also, bus.name_refusals)).decode()
 
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:

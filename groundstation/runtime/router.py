@@ -10,7 +10,7 @@ from groundstation.bus.messages import Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.bus.zenoh_bus import ZenohBus, open_router
 from groundstation.process.child import Child
-from groundstation.runtime.refused_strangers import RefusedStrangers
+from groundstation.runtime.router_refusals import RouterRefusals
 
 _TURN_NS = 50_000_000
 # Longer than sim_bridge and drivers take to land without a supervisor; they still want to be heard meanwhile.
@@ -20,19 +20,22 @@ _LINGER_NS = 25_000_000_000
 class RouterSection(msgspec.Struct, frozen=True):
     """What the supervisor hands to the router: where to listen, and whom to let in (None: everybody).
 
-    also: further endpoints, for other hosts.
+    also: further endpoints, for other hosts. name_refusals: whether events name members that publish what they may not.
     """
 
     endpoint: str
     access: AccessList | None = None
     also: tuple[str, ...] = ()
+    name_refusals: bool = True
 
 
 def run(child: Child) -> int:
     """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
     section = msgspec.json.decode(child.section, type=RouterSection)
-    strangers = RefusedStrangers()
-    session = open_router(section.endpoint, child.spec.identity, section.access, section.also)
+    refusals = RouterRefusals()
+    session = open_router(
+        section.endpoint, child.spec.identity, section.access, section.also, trace=section.name_refusals
+    )
     bus = ZenohBus(session, child.spec.site, child.name)
     child.ready()
     orphaned_ns = 0
@@ -42,13 +45,12 @@ def run(child: Child) -> int:
             orphaned_ns = orphaned_ns or now_ns
             if now_ns - orphaned_ns > _LINGER_NS or not _has_clients(session):
                 break
-        if refused := strangers.take(now_ns):
-            text = f"the bus refused {refused} connections of programs that are not of this run"
+        for text in refusals.take(now_ns):
             bus.publish(EVENT, Event(header=bus.header(child.name), severity=Severity.WARNING, text=text))
         child.beat()
         child.sleep_until(now_ns + _TURN_NS)
     bus.close()
-    strangers.close()
+    refusals.close()
     return 0
 
 

@@ -155,3 +155,6 @@ class Bus(SettingsSection):
     listen: AddressOrNone = ""
     """Address of this host at which hosts that the site has admitted (`groundstation site`) may stop and order; empty:
     loopback only."""
+    name_refusals: bool = True
+    """Whether an event names each member of the run that publishes what it may not. The router traces every message for
+    that; without it, it drops such messages silently."""

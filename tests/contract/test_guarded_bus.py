@@ -1,6 +1,6 @@
 """The bus of a run over real TLS: strangers hear and move nothing, and nobody speaks as another."""
 
-import os
+import json
 import socket
 import stat
 import subprocess
@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from groundstation.bus import topics, zenoh_bus
@@ -176,19 +177,97 @@ def test_half_open_connections_keep_no_member_out(join: Join, endpoint: str) -> 
             one.close()
 
 
-def test_refused_strangers_are_counted() -> None:
-    code = (
-        "import os, time\n"
-        "from groundstation.runtime.refused_strangers import RefusedStrangers\n"
-        "strangers = RefusedStrangers()\n"
-        "for _ in range(3): os.write(1, b'WARN acc-0 zenoh_link_tls::unicast: eof\\n')\n"
-        "os.write(1, b'another line\\n')\n"
-        "deadline = time.monotonic() + 5\n"
-        "total = 0\n"
-        "while total < 3 and time.monotonic() < deadline: total += strangers.take(total * 20_000_000_000)\n"
-        "assert strangers.take(0) == 0\n"
-        "strangers.close()\n"
-        "print(total)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30, env=os.environ)
-    assert done.stdout == "3\n", done.stderr
+READER = """
+import json, os, sys
+import msgspec
+from groundstation.bus.access import AccessList
+from groundstation.bus.roles import Identity
+from groundstation.bus.zenoh_bus import open_router
+from groundstation.runtime.router_refusals import RouterRefusals
+out = os.fdopen(os.dup(1), "w", 1)
+refusals = RouterRefusals()
+access = msgspec.json.decode(sys.argv[3], type=AccessList)
+router = open_router(sys.argv[1], Identity(sys.argv[2], "router", "r"), access, trace=True)
+print("ready", file=out)
+for turn, _ in enumerate(sys.stdin):
+    print(json.dumps(refusals.take(turn * 20_000_000_000)), file=out)
+router.close()
+refusals.close()
+"""
+
+
+@pytest.fixture
+def told(tmp_path: Path) -> Iterator[tuple[Join, Callable[[], list[str]]]]:
+    """A guarded router in a process of its own: how to join it, and what it has refused since it was last asked."""
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tls/127.0.0.1:{probe.getsockname()[1]}"
+    make_identities(tmp_path / "keys", ["127.0.0.1"], NAMES)
+    access = msgspec.json.encode(AccessList("lab", MEMBERS)).decode()
+    command = [sys.executable, "-c", READER, endpoint, str(tmp_path / "keys"), access]
+    router = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert router.stdin and router.stdout and router.stdout.readline() == "ready\n"
+    buses: list[ZenohBus] = []
+
+    def joined(name: str, source: str = "", patience_s: float = 2.0) -> ZenohBus:
+        identity = Identity(str(tmp_path / "keys"), name, "r")
+        buses.append(zenoh_bus.open_bus(endpoint, "lab", source or name, patience_s, identity))
+        return buses[-1]
+
+    def refused() -> list[str]:
+        assert router.stdin and router.stdout
+        print("?", file=router.stdin, flush=True)
+        texts: list[str] = json.loads(router.stdout.readline())
+        return texts
+
+    yield joined, refused
+    for bus in buses:
+        bus.close()
+    router.communicate(timeout=10)
+
+
+def until_told(refused: Callable[[], list[str]]) -> list[str]:
+    for _ in range(100):
+        if texts := refused():
+            return texts
+        time.sleep(0.02)
+    return []
+
+
+def test_who_publishes_what_it_may_not_is_named(told: tuple[Join, Callable[[], list[str]]]) -> None:
+    join, refused = told
+    tracker, driver, liar = join("tracker"), join("drone_1"), join("drone_2", "tracker")
+    heard_by = driver.subscribe([topics.SETPOINT], entity="drone_1")
+    assert heard(lambda: setpoint(tracker), heard_by)
+    assert refused() == [], "who subscribes, and who says what it may, is not refused"
+    setpoint(liar)
+    (text,) = until_told(refused)
+    assert text == "the bus refused messages of drone_2: it may not publish setpoint of drone_1 as tracker"
+    join(shell(Role.CLI), "cli_17")._session.put("gs/@v1/lab/**", b"x")  # without a declaration, as an attacker would
+    (text,) = until_told(refused)
+    assert "messages of cli-shell: it may not publish under a key that is not in the table" in text
+    assert refused() == []
+
+
+def test_a_flood_of_refusals_neither_stalls_the_bus_nor_fills_the_terminal(
+    told: tuple[Join, Callable[[], list[str]]],
+) -> None:
+    join, refused = told
+    tracker, driver, liar = join("tracker"), join("drone_1"), join("drone_2", "tracker")
+    heard_by = driver.subscribe([topics.SETPOINT], entity="drone_1")
+    for _ in range(8000):  # more than the pipe holds
+        setpoint(liar)
+    assert heard(lambda: setpoint(tracker), heard_by)
+    assert len(until_told(refused)) == 1
+
+
+def test_a_stranger_is_told_once_in_ten_seconds(told: tuple[Join, Callable[[], list[str]]], tmp_path: Path) -> None:
+    join, refused = told
+    make_identities(tmp_path / "other", ["127.0.0.1"], ["tracker"])
+    own = tmp_path / "keys"
+    for name in ("tracker.pem", "tracker.key"):
+        (own / name).write_bytes((tmp_path / "other" / name).read_bytes())
+    with pytest.raises(GroundStationError, match="no router answers"):
+        join("tracker", patience_s=0.0)
+    (text,) = until_told(refused)
+    assert "connections of programs that are not of this run" in text

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.flight.composition import router_section
+from groundstation.settings.behaviour import Bus
 from groundstation.supervisor.process_spec import ProcessSpec, StopOrder
 from groundstation.supervisor.supervisor import Run, Supervisor
 from groundstation.supervisor.terminal import Terminal
@@ -36,7 +37,7 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[.
             "router",
             "router",
             entry="groundstation.runtime.router:run",
-            section=router_section(endpoint, "lab", specs) if guarded else json.dumps({"endpoint": endpoint}),
+            section=router_section(endpoint, "lab", specs, Bus()) if guarded else json.dumps({"endpoint": endpoint}),
             stop_order=StopOrder.CONNECTS,
             on_bus=False,
         )

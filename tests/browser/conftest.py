@@ -102,8 +102,8 @@ def free_port() -> int:
 
 
 @pytest.fixture
-def open_page(browser: Any) -> Iterator[Callable[[str], Seen]]:
+def open_page(browser: Any) -> Iterator[Callable[..., Seen]]:
     contexts: list[Any] = []
-    yield lambda url: open_seen(browser, contexts, url)
+    yield lambda url, **options: open_seen(browser, contexts, url, **options)
     for context in contexts:
         context.close()

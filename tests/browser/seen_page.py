@@ -76,7 +76,7 @@ def open_seen(browser: Any, contexts: list[Any], url: str, role: str = "", **opt
     """Return a page of its own profile at the address, once it has the first frames."""
     from playwright.sync_api import Error
 
-    context = browser.new_context(viewport={"width": 1440, "height": 900}, **options)
+    context = browser.new_context(**{"viewport": {"width": 1440, "height": 900}} | options)
     contexts.append(context)
     if role:
         give_role(context, role)

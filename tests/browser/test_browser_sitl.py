@@ -1,4 +1,4 @@
-"""LAND ALL in the page, and what reaches the emulated drones on the wire."""
+"""Stops by the page and by an invited tablet, and what reaches the emulated drones on the wire."""
 
 import json
 import math
@@ -33,6 +33,14 @@ _FLY, _LAND = 290718208, 290717696
 _REF = re.compile(rb"AT\*REF=\d+,(\d+)")
 _DRONES = {"drone_1", "drone_2"}
 _WINDOWS, _WINDOW_S = 3, 5.0
+_NETWORK = "127.0.0.2"
+_TABLET = {
+    "viewport": {"width": 820, "height": 1180},
+    "device_scale_factor": 2,
+    "is_mobile": True,
+    "has_touch": True,
+    "ignore_https_errors": True,  # nobody signed the console's certificate: a person compares its fingerprint
+}
 
 
 class Witness:
@@ -71,6 +79,7 @@ def kernels() -> None:
 def flight(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
+    arguments += ["--set", f"console.listen={_NETWORK}"]
     process = subprocess.Popen([sys.executable, "-m", "groundstation.cli.main", *arguments], stdout=subprocess.DEVNULL)
     try:
         yield eventually(lambda: next(iter(runtime_file.live_records()), None), 60.0, "a run")
@@ -112,6 +121,7 @@ def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord
             page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden", timeout=30_000)
         page.page.wait_for_timeout(1500)
         page.shot("sitl_flying")
+        _hold_by_tablet(open_page)
         page.there("land-all").click()
         eventually(lambda: _ordered_down(witness.look()), 5.0, "LAND on the wire")
         page.wait(lambda s: any(o["verb"] == "LAND" and o["state"] == "confirmed" for o in s["orders"]), 30.0)
@@ -121,6 +131,24 @@ def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord
     finally:
         bus.close()
         time.sleep(0.1)
+
+
+def _hold_by_tablet(open_page: Any) -> None:
+    """A tablet that was invited to stop comes in over TLS, touches HOLD, and may do nothing more."""
+    command = [sys.executable, "-m", "groundstation.cli.main", "console", "--invite", "stop"]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout
+    invitation = next(line for line in said.splitlines() if line.startswith("https://"))
+    assert invitation.startswith(f"https://{_NETWORK}:")
+    tablet: Seen = open_page(invitation, **_TABLET)
+    assert "code=" not in tablet.page.url, "nobody reads it from the tablet's screen later"
+    assert all(tablet.there(name).is_disabled() for name in ("take-off", "track", "resume"))
+    tablet.there("hold").tap()
+    tablet.wait(lambda s: any(o["verb"] == "HOLD" and o["state"] == "confirmed" for o in s["orders"]), 10.0)
+    tablet.shot("sitl_tablet")
+    assert not tablet.troubles, tablet.troubles
+    stranger = tablet.page.context.browser.new_context(**_TABLET)
+    assert stranger.new_page().goto(invitation).status == 403, "the code works once"
+    stranger.close()
 
 
 def test_ten_slow_viewers_leave_the_tracker_its_deadlines(

@@ -142,14 +142,14 @@ class Flight:
 
     def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
         """Say what a run waits for whose drones landed though nobody ordered it (their watchdogs did)."""
-        flew = operator.phase in (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD)
-        grounded = flew and operator.landed(now_ns)
-        if grounded and not self._grounded:
+        if operator.phase not in (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD):
+            self._grounded = False
+        elif operator.landed(now_ns) and not self._grounded:
+            self._grounded = True  # until the next take-off: a drone that is not heard for a while counts as in the air
             self._say(
                 "all drones have landed by themselves (why: see the events). Ctrl-C ends the run; to fly again: "
                 "groundstation takeoff, then groundstation track"
             )
-        self._grounded = grounded
 
     def _is_over(self, operator: Operator, now_ns: int, began_ns: int) -> tuple[bool, str]:
         if self._plan.asks and (self._plan.duration_s is None or operator.phase is TeamPhase.GROUND):

@@ -22,7 +22,7 @@ _WANTED = frozenset(
     (topic.plane, topic.name)
     for topic in (
         *(t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
-        *(t.PROCESS_STATUS, t.SIM_STATUS, t.TRUTH, t.VEHICLE_STATUS),
+        *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.TRUTH, t.VEHICLE_STATUS),
     )
 )
 
@@ -107,6 +107,8 @@ class _Rows:
                 data.innovations.append(TimedMessage(time_s, message))
             case m.VehicleStatus():
                 data.vehicles.setdefault(message.header.entity, []).append(TimedMessage(time_s, message))
+            case m.SearchMap():
+                data.search_maps.setdefault(message.header.entity, []).append(TimedMessage(time_s, message))
             case m.Event():
                 data.events.append(TimedMessage(time_s, message))
 
@@ -127,6 +129,8 @@ class _Rows:
             data.sim_counters = np.array(sorted(self._sim))[:, 1:]
         for timed in (data.commands, data.acks, data.plans, data.innovations, data.events):
             timed.sort(key=lambda item: item.time_s)
+        for maps in data.search_maps.values():
+            maps.sort(key=lambda item: item.time_s)
 
 
 def _estimate_track(entries: list[tuple[float, m.EntityEstimate]]) -> EstimateTrack:

@@ -17,10 +17,14 @@ from groundstation.report.page.chart import Chart
 from groundstation.report.page.flight_charts import flight_charts
 from groundstation.report.page.health_charts import health_charts
 from groundstation.report.plot_map import draw_map
+from groundstation.report.plot_searches import draw_searches
 from groundstation.report.plot_style import STYLE
+from groundstation.report.searches import searches
 from groundstation.report.story import story
 from groundstation.report.tracks import RunData
 from groundstation.report.wording import missed
+
+_SVG = {**STYLE, "svg.fonttype": "path", "path.simplify_threshold": 0.5, "svg.hashsalt": "skein"}
 
 
 def write_page(data: RunData, report: RunReport, path: Path) -> None:
@@ -32,6 +36,7 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
         ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report)),
         ("What happened", tables.story_table(moments) + _pictures(moment_pictures(report.run_dir, data, moments))),
         ("Room", f'<div class="map">{_room(data)}</div>'),
+        *([("Searches", _searches(data))] if data.search_maps else []),
         ("Flight", holders(flight, 0)),
         ("Topology", tables.switches_table(findings)),
         ("Consistency", holders(health, len(flight)) + tables.edges_table(findings)),
@@ -118,10 +123,26 @@ def rerun_note(report: RunReport) -> str:
 
 
 def _room(data: RunData) -> str:
-    with mpl.rc_context({**STYLE, "svg.fonttype": "path", "path.simplify_threshold": 0.5, "svg.hashsalt": "skein"}):
+    with mpl.rc_context(_SVG):
         figure = Figure(figsize=(11.4, 6.2), layout="constrained")
         draw_map(figure.add_subplot(), data)
-        text = StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+        return _svg(figure)
+
+
+def _searches(data: RunData) -> str:
+    """Return the maps of the longest searches, each with what it shows."""
+    found = searches(data.search_maps)
+    with mpl.rc_context({**_SVG, "axes.grid": False}):
+        maps = _svg(draw_searches(data, found))
+    lines = "".join(
+        f"<li>{escape(one.target)} was searched for from {one.begin_s:.1f} s to {one.end_s:.1f} s</li>" for one in found
+    )
+    note = "The darker a cell, the likelier the target is there. Dots: drones, and where they look; cross: the truth."
+    return f'<ul>{lines}</ul><p class="dim">{note}</p><div class="map">{maps}</div>'
+
+
+def _svg(figure: Figure) -> str:
+    text = StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     return svg[svg.index("<svg") :]

@@ -1,4 +1,4 @@
-"""Round trips over a plain bus and over one with certificates and an access list, in turn in the same run."""
+"""Round trips over a plain bus and over one with certificates and a traced access list, in turn in the same run."""
 
 import subprocess
 import sys

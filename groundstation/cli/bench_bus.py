@@ -16,7 +16,7 @@ _LIMITS = {"ratio_p50": 1.3}
 @click.option("--rate", type=FiniteRange(1, 1000), default=300.0, show_default=True, help="Rate of each [Hz].")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def bus(trips: int, rate: float, as_json: bool) -> int:
-    """Time round trips tracker - router - driver and back: plain, and with TLS and the access list, by turns.
+    """Time round trips tracker - router - driver and back: plain, and by turns with TLS and a traced access list.
 
     Exit code 0 when the limit is kept, 1 when it is not.
     """

@@ -19,7 +19,7 @@ _STRANGERS = ""
 # WIRE: lines of Zenoh's access list, docs/reference/zenoh.md 10.3. Found literally: there may be a megabyte a second.
 _DENIED = b" is unauthorized to Put (ingress) on "
 _WHO = re.compile(rb"([0-9a-f]{1,32})( on \S+)?$")
-_NAME = re.compile(rb"CertCommonName\(([a-z0-9_-]+)\)")
+_NAME = re.compile(rb"CertCommonName\(([\w.-]+)\)")
 _log = logging.getLogger(__name__)
 
 

@@ -37,7 +37,7 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
     """List the vehicles that answer on LINK, without changing anything on them.
 
     LINK: udpin:ADDRESS:PORT waits for vehicles that call this computer, udpout:ADDRESS:PORT calls one,
-    serial:DEVICE:BAUD is a radio.
+    serial:DEVICE:BAUD is a radio. ADDRESS%ADAPTER uses that network adapter only.
     """
     from drivers.mavlink.links.opening import open_link
     from drivers.mavlink.probe import probe as look

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.settings import parse_source
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
@@ -75,7 +75,7 @@ def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple
     for index, (name, drone) in enumerate(field.drones.items()):
         source = parse_source(drone.camera.source)
         # A drone sends its own video from its own address; a real one is none of ours, so its emulated camera is apart.
-        if source.kind is SourceKind.ARDRONE and name not in real.drones:
+        if source.kind == kind_named(drone.kind).camera and name not in real.drones:
             streams[name] = (network.drone_address(index), source.port)
     return {name: stream for name, stream in streams.items() if name not in real.cameras}
 

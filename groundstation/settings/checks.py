@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.settings import parse_source
 from groundstation.errors import without_password
 from groundstation.settings.adapter_checks import findings_of_adapters
 from groundstation.settings.behaviour import EstimatorSettings, PlannerSettings, SafetySettings
@@ -16,7 +16,7 @@ from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.room import CalibrationSettings, RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
-from groundstation.vehicles import kind_named
+from groundstation.vehicles import all_kinds, kind_named
 
 Finding = tuple[KeyPath, str]
 
@@ -166,18 +166,19 @@ def _kinds(parts: Parts) -> Iterator[Finding]:
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
     """A vehicle's video is taken from that very vehicle."""
+    own = {kind.camera for kind in all_kinds().values()}
     for name, camera in parts.cameras.items():
-        if parse_source(camera.source).kind is SourceKind.ARDRONE:
-            yield ("cameras", name, "source"), "must not be an AR.Drone's video: drones carry their cameras"
+        if parse_source(camera.source).kind in own:
+            yield ("cameras", name, "source"), "must not be a vehicle's own video: drones carry their cameras"
     for name, drone in parts.drones.items():
         source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
-        if source.kind is not SourceKind.ARDRONE:
+        if source.kind not in own:
             continue
-        if kind_named(drone.kind).camera != source.kind.value:
-            yield path, f"must not be an AR.Drone's video for kind: {drone.kind}"
+        if kind_named(drone.kind).camera != source.kind:
+            yield path, f"must not be another kind's own video ({source.kind}://) for kind: {drone.kind}"
         elif source.host != drone.address:
             got = without_password(drone.camera.source)
-            yield path, f"must be this drone's own address, ardrone://{drone.address} (got {got})"
+            yield path, f"must be this drone's own address, {source.kind}://{drone.address} (got {got})"
 
 
 def _names(parts: Parts) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.settings import parse_source
 from drivers.motion_capture.settings import emulated_source
 from groundstation.field.drones import camera_name
 from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
@@ -46,7 +46,7 @@ def rerouted(
     """Return the same field with other addresses of drones and other sources of sensors, by name.
 
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
-    port), spoken to as the field's own source is where that is an AR.Drone's video, else by HTTP. captures: motion
+    port), spoken to as the field's own source is where that is the vehicle's own video, else by HTTP. captures: motion
     capture system -> (address, port), spoken to by NatNet. This, and that a drone may have any serial number, is all
     that simulation changes. streams_only: drones whose cameras are never their own video. Raises KeyError for a name
     that is not in the field.
@@ -71,7 +71,9 @@ def _emulated(system: MotionCaptureSettings, place: tuple[str, int] | None) -> M
 
 
 def _with_source(drone: Drone, stream: tuple[str, int] | None, plain: bool) -> Drone:
-    camera = drone.camera.model_copy(update={"source": _source(drone.camera.source, stream, plain)})
+    camera = drone.camera.model_copy(
+        update={"source": _source(drone.camera.source, stream, "" if plain else kind_named(drone.kind).camera)}
+    )
     return drone.model_copy(update={"camera": camera})
 
 
@@ -85,11 +87,11 @@ def _moved(drone: Drone, address: str | None) -> Drone:
     return drone.model_copy(update=update)
 
 
-def _source(source: str, stream: tuple[str, int] | None, plain: bool = False) -> str:
+def _source(source: str, stream: tuple[str, int] | None, own: str = "") -> str:
     if stream is None:
         return source
-    if parse_source(source).kind is SourceKind.ARDRONE and not plain:
-        return f"ardrone://{stream[0]}:{stream[1]}"
+    if own and parse_source(source).kind == own:
+        return f"{own}://{stream[0]}:{stream[1]}"
     return f"http://{stream[0]}:{stream[1]}/video.mjpg"
 
 

@@ -133,9 +133,6 @@ def test_a_plug_in_that_cannot_be_loaded_is_named_and_the_rest_works() -> None:
 # Shared code that still names a kind, and why. The list may only shrink.
 NAMED = {
     "groundstation/settings/new_field.py",  # examples of a new field file
-    "groundstation/settings/checks.py",  # the camera source ardrone://
-    "groundstation/flight/composition.py",  # the same
-    "groundstation/settings/sections.py",  # the same
     "groundstation/flight/real_parts.py",  # the simulators behind autopilots tell true poses
     "sim_bridge/cameras.py",  # the camera source ardrone://
     "sim_bridge/harness.py",  # its propellers can be blocked by a fault

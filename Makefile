@@ -13,7 +13,6 @@ REPEAT ?=
 PYTEST = $(BIN)/python -m pytest $(REPEAT)
 
 INTEROP := .interop
-SINGLES := .pytest_cache/singles
 STUDIES := .pytest_cache/studies
 COMPUTING := .pytest_cache/computing
 COVERAGE := .pytest_cache/coverage-waiting.json .pytest_cache/coverage-computing.json
@@ -21,12 +20,8 @@ COVERAGE := .pytest_cache/coverage-waiting.json .pytest_cache/coverage-computing
 WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/contract/mavlink_links \
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
-# Slow tests that fly single vehicles, and no ground station.
-SINGLE := tests/contract tests/interop tests/scenario/test_ardrone_wire_discipline.py $(addprefix tests/sitl/test_, \
-	ardrone_uplink.py bench_mavlink.py mavlink_interop.py mavlink_own_time_out.py mavlink_real_firmware.py \
-	vehicle_conformance.py written_kind.py)
 
-.PHONY: install demo test test-waiting test-computing raise-floors test-slow slow-teams slow-beside test-exhaustive fuzz test-firmware mutants wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: install demo test test-waiting test-computing raise-floors test-slow slow-flights slow-studies test-exhaustive fuzz test-firmware mutants wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)
 
@@ -51,21 +46,18 @@ test-computing: $(STAMP)-test
 raise-floors: $(STAMP)-test
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise
 
-# Flights of teams are judged by the clock. Beside them fly single vehicles, which need little, and then whatever only
-# computes, where they leave time; both are printed at the end.
-SLOW := slow and not study and not firmware and not exhaustive
+# Flights are judged by the clock; what only computes runs beside them, where they leave time, and is printed at the end.
 test-slow: $(STAMP)-test-slow
-	$(MAKE) --jobs 2 --keep-going --output-sync=none slow-teams slow-beside
+	$(MAKE) --jobs 2 --keep-going --output-sync=none slow-flights slow-studies
 
-slow-teams: $(STAMP)-test-slow
-	$(PYTEST) -m "$(SLOW)" --timeout 900 $(addprefix --ignore=,$(SINGLE)) tests
+slow-flights: $(STAMP)-test-slow
+	$(PYTEST) -m "slow and not study and not firmware and not exhaustive" --timeout 900 tests
 
-slow-beside: $(STAMP)-test-slow
-	@mkdir -p $(SINGLES) $(STUDIES) && code=0; \
-	$(PYTEST) -m "$(SLOW)" --timeout 900 -o cache_dir=$(SINGLES) $(SINGLE) >$(SINGLES)/log 2>&1 || code=$$?; \
+slow-studies: $(STAMP)-test-slow
+	@mkdir -p $(STUDIES) && code=0; \
 	nice -n 15 $(PYTEST) -m "study and not exhaustive" --timeout 1800 -o cache_dir=$(STUDIES) tests \
 		>$(STUDIES)/log 2>&1 || code=$$?; \
-	cat $(SINGLES)/log $(STUDIES)/log; exit $$code
+	cat $(STUDIES)/log; exit $$code
 
 # More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: an hour.
 test-exhaustive: $(STAMP)-test-slow

@@ -87,7 +87,7 @@ async def fly_with_mavsdk(port, ardupilot):
     return facts
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.exhaustive)])
 def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
     facts = asyncio.run(fly_with_mavsdk(port, flavour == "ardupilot"))

@@ -14,11 +14,11 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(300)]
 @pytest.mark.parametrize(
     ("kind", "options", "flights"),
     [
-        ("tello", [], "stand,square,kind"),
+        ("tello", [], "stand,kind"),
         ("ardrone", [], "silence,killed"),
         ("mavlink", [], "epochs,unheard"),
         ("mavlink", ["--with", "mavlink.flavour=ardupilot"], "orphaned,limits"),
-        pytest.param("tello", [], "cut,stranger", marks=pytest.mark.exhaustive),
+        pytest.param("tello", [], "square,cut,stranger", marks=pytest.mark.exhaustive),
         pytest.param("ardrone", [], "damaged", marks=pytest.mark.exhaustive),
         pytest.param("mavlink", [], "lossy", marks=pytest.mark.exhaustive),
         pytest.param("mavlink", ["--with", "mavlink.flavour=ardupilot"], "damaged_aloft", marks=pytest.mark.exhaustive),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(600)]
 
 ROOT = Path(__file__).parents[2]
 

@@ -60,6 +60,7 @@ def test_its_fail_safe_goes_to_the_port_of_the_field_file(puffin):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.sitl
 @pytest.mark.timeout(200)
 def test_a_wrong_sign_is_found(puffin, tmp_path):

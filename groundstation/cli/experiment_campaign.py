@@ -63,13 +63,18 @@ def flown_field(path: Path, options: Sequence[str]) -> dict[str, Any]:
     return {"field": msgspec.to_builtins(resolved_field(field)), "sections": sections}
 
 
-def fly_all(batches: "Sequence[FlightBatch]", scheduler: str, workers: int, single: bool) -> list[dict[str, Any]]:
-    """Return the row of each batch; single: too little work for a local cluster. Raises GroundStationError."""
+def fly_all(
+    batches: "Sequence[FlightBatch]", scheduler: str, workers: int, single: bool, out: Path
+) -> list[dict[str, Any]]:
+    """Return the row of each batch; single: too little work for a local cluster. Raises GroundStationError.
+
+    Each row is kept in a folder of `out`: a campaign that was ended goes on where it was.
+    """
     from groundstation.experiments.faults import fly
     from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks
 
     serial = scheduler == "none" or (scheduler == "local" and (single or not dask_is_there()))
     try:
-        return run_tasks(batches, None, "" if serial else scheduler, workers, progress, fly)
+        return run_tasks(batches, out / "flights", "" if serial else scheduler, workers, progress, fly)
     except (SweepError, RuntimeError) as error:
         raise GroundStationError(str(error)) from error

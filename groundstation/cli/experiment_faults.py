@@ -46,7 +46,7 @@ def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_
 
     began = time.monotonic()
     planned = batches(_order(**flown), seed, flights, size=max(1, min(20, flights // max(1, 2 * workers or 4))))
-    found, timing = flights_of(fly_all(planned, scheduler, workers, single=flights == 1))
+    found, timing = flights_of(fly_all(planned, scheduler, workers, flights == 1, out))
     summary = totals(found, timing) | {"elapsed_s": round(time.monotonic() - began, 1)}
     by_kinds = by_kind(found)
     document = {"experiment": "faults", **summary, "kinds": by_kinds, "flights_flown": found}

@@ -58,7 +58,7 @@ def scenarios(
     from groundstation.experiments.scenarios import against_best_fixed, comparison, rows_of, table
 
     planned, began = _planned(names, _known(strategies), **flown), time.monotonic()
-    found = fly_all([batch for _, batch in planned], scheduler, workers, single=len(planned) == 1)
+    found = fly_all([batch for _, batch in planned], scheduler, workers, len(planned) == 1, out)
     flights = [
         {"scenario": name, **one} for (name, _), row in zip(planned, found, strict=True) for one in flights_of([row])[0]
     ]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.errors import OperatorMistake
+from groundstation.experiments.program_digest import program_digest
 
 BATCH = 20
 # Exit code of the simulator's study for an order that it does not understand.
@@ -31,8 +32,8 @@ class FlightBatch:
 
     @property
     def key(self) -> str:
-        """Return a name that is the same for equal batches only."""
-        digest = hashlib.sha256(self.order.encode()).hexdigest()[:12]
+        """Return a name that is the same for equal batches of the same program only."""
+        digest = hashlib.sha256((self.order + program_digest()).encode()).hexdigest()[:12]
         return f"{self.study}-{digest}-{self.seeds[0]:06d}-{len(self.seeds)}"
 
 

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from groundstation.cli.exits import ExitCode
@@ -84,6 +85,32 @@ def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
     assert order["field"]["safety"]["min_separation_m"] == 0.7
     assert [kind for kind, _ in order["sections"]] == ["ardrone", "ardrone"]
     assert all(json.loads(section)["raw_datagrams"] is False for _, section in order["sections"])
+
+
+def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flown: list[tuple[int, ...]] = []
+
+    def fly_two(batch: FlightBatch) -> dict[str, Any]:
+        if len(flown) == 2:
+            raise KeyboardInterrupt
+        flown.append(batch.seeds)
+        flights = [flight(seed, [], {}) for seed in batch.seeds]
+        return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": [{"cpu": 1.0} for _ in flights]}}
+
+    monkeypatch.setattr("groundstation.experiments.faults.fly", fly_two)
+    arguments = ["faults", "--flights", "3", "--scheduler", "none", "-o", str(tmp_path)]
+    with pytest.raises(click.Abort):
+        experiment.main(arguments, standalone_mode=False)
+    first, flown[:] = list(flown), []
+    assert experiment.main(arguments, standalone_mode=False) == ExitCode.OK
+    assert (first, flown) == ([(1,), (2,)], [(3,)])
+
+
+def test_another_program_flies_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    (batch,) = batches("{}", 1, 1)
+    key = batch.key
+    monkeypatch.setattr("groundstation.experiments.faults.program_digest", lambda: "of another program")
+    assert batch.key != key
 
 
 def test_an_unknown_kind_is_the_operators_mistake() -> None:

@@ -43,7 +43,7 @@ def speed(copter):
     ("number", "link"),
     [
         (signal.SIGKILL, "mavsdk"),
-        (signal.SIGSTOP, "pymavlink"),
+        pytest.param(signal.SIGSTOP, "pymavlink", marks=pytest.mark.exhaustive),
         pytest.param(signal.SIGKILL, "pymavlink", marks=pytest.mark.exhaustive),
         pytest.param(signal.SIGSTOP, "mavsdk", marks=pytest.mark.exhaustive),
     ],

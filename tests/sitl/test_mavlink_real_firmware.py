@@ -160,7 +160,8 @@ def test_real_firmware_is_set_up_and_flown(flavour, kind, tmp_path):
         firmware.end()
 
 
-@pytest.mark.parametrize("flavour", [pytest.param("ardupilot", marks=pytest.mark.exhaustive), "px4"])
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+@pytest.mark.exhaustive
 def test_emulated_vehicle_is_set_up_and_flown_by_the_same_steps(hangar, port, flavour):
     _, copter, _ = hangar.add(flavour, SYSTEM, calls=("127.0.0.1", port), configured=False)
     set_up(flavour, port)

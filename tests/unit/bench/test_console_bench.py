@@ -21,6 +21,7 @@ def test_a_figure_beyond_its_limit_is_named(capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 def test_it_sees_what_the_team_says() -> None:
     result = CliRunner().invoke(console, ["--seconds", "4", "--no-browser", "--json"], standalone_mode=False)
     assert result.exception is None, result.exception

@@ -240,7 +240,7 @@ def test_the_plug_in_makes_a_test_of_each_check(tmp_path):
     env = os.environ | {"PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     result = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=100, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
-    assert "18 passed" in result.stdout
+    assert f"{len(chosen('kind'))} passed" in result.stdout
 
 
 def test_no_check_passes_where_nothing_was_flown():

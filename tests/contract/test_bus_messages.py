@@ -66,6 +66,17 @@ def test_a_covariance_of_the_wrong_size_cannot_be_built() -> None:
         odometry(velocity_covariance=(1.0, 1.0, 1.0))
 
 
+@pytest.mark.parametrize(
+    "wrong", [{"columns": 4}, {"columns": 0}, {"chances": ()}, {"cell_m": 0.0}, {"chances": (0, 256, 1)}]
+)
+def test_a_search_map_without_whole_rows_is_refused(wrong: dict[str, Any]) -> None:
+    values: dict[str, Any] = {"header": HEADER, "first_m": (0.0, 0.0), "cell_m": 0.5, "columns": 3}
+    right = codec.encode(messages.SearchMap(**values, chances=(0, 255, 40, 0, 10, 0)))
+    with pytest.raises(MessageError, match="chances") as caught:
+        codec.decode(key_of(topics.SEARCH_MAP), msgspec.json.encode(msgspec.json.decode(right) | wrong))
+    assert caught.value.reason == "malformed"
+
+
 @pytest.mark.parametrize("number", [b"1e999", b"null", b"NaN", b'"1"', b"[1]"])
 def test_a_bad_number_on_the_wire_is_refused_by_name(number: bytes) -> None:
     payload = codec.encode(odometry()).replace(b"0.3", number)

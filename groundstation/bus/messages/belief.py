@@ -59,6 +59,13 @@ class SearchMap(Message, frozen=True, kw_only=True):
     chances: tuple[int, ...]
     """Probability of each cell in 255ths of the likeliest one's, row by row, y rising."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.cell_m <= 0.0 or self.columns < 1 or not self.chances or len(self.chances) % self.columns:
+            raise ValueError(f"{len(self.chances)} chances are no rows of {self.columns} cells of {self.cell_m:g} m")
+        if not 0 <= min(self.chances) <= max(self.chances) <= 255:
+            raise ValueError("chances must be 0 to 255")
+
 
 class Estimate(Message, frozen=True, kw_only=True):
     """All entities of the belief, predicted to the header's stamp (50 Hz)."""

@@ -19,9 +19,9 @@ class Gains:
     """Figures of loop and vehicle.
 
     proportional [1/s]. reference_rad_s, reference_damping: of the wanted response, second order. observer_rad_s, and
-    blind_observer_rad_s without accelerometers: bandwidth of the observer, its damping. tilt_rad_s, tilt_damping,
-    dead_ticks: how tilt answers, after so many calls. odometry_delay_s: age of the measured speed. drag [1/s],
-    drag_per_m [1/m]: of the air. accelerometer_gain: measured / true. bias_m_s2: bound of what the observer adds.
+    blind_observer_rad_s without accelerometers and in wind: bandwidth of the observer, its damping. tilt_rad_s,
+    tilt_damping, dead_ticks: how tilt answers, after so many calls. odometry_delay_s: age of the measured speed. drag
+    [1/s], drag_per_m [1/m]: of air. accelerometer_gain: measured / true. bias_m_s2: bound of what the observer adds.
     still: speeds below this are zero [m/s, rad/s]. settle_s: after so long at zero the drone holds its place by itself.
     standing_s: time constant with which a standing drone learns what its accelerometers show at rest. overshoot_m_s,
     disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone, and how much of a

@@ -8,6 +8,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import msgspec
 import pytest
 
+from groundstation.bus.messages.belief import SearchMap
 from groundstation.bus.topics import IMAGE, TOPICS, VIDEO, Topic
 from groundstation.recording.file_topics import DATAGRAM_TOPICS, IMAGE_TOPICS, STATE_TOPICS
 from groundstation.recording.schemas import description_of, recorded_type, viewer_schema
@@ -35,6 +36,8 @@ def _example(kind: Any, *, full: bool) -> Any:
             if name in values and kind.__name__ in ("Odometry", "RelativeObservation", "PoseHypothesis"):
                 size = 9 if name == "velocity_covariance" or values.get("yaw_rad") is None else 16
                 values[name] = (0.0,) * size
+        if kind is SearchMap:
+            values["chances"] = (3,) * values["columns"]
         return kind(**values)
     return {float: 1.5, int: 3, str: "abc", bool: True, bytes: b"\xff\xd8"}[kind]
 

@@ -97,6 +97,7 @@ class VehicleHost:
             if isinstance(received.message, VelocitySetpoint):
                 self._count("setpoint", self.watchdog.accept_setpoint(now_ns, received.message))
         decision = self.watchdog.step(now_ns, view, self._upstream())
+        decision = replace(decision, seen_m_s=self._seen.velocity(now_ns))
         self._told = decision
         self.vehicle.apply(now_ns, decision)
         self._report(now_ns, view, decision)

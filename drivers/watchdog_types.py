@@ -147,7 +147,9 @@ class Ack:
 class WatchdogDecision:
     """What to do now; velocity and yaw rate count for FLY only. `reason` says why the mode is what it is.
 
-    setpoint_ns: stamp of the setpoint obeyed, for vehicles that are told each setpoint once; 0 when none is.
+    setpoint_ns: stamp of the setpoint obeyed, for vehicles that are told each setpoint once; 0 when none is. seen_m_s:
+    velocity forward and left as cameras see it, for a vehicle that brakes without a velocity of its own; None if they
+    do not.
     """
 
     mode: DriverMode
@@ -157,3 +159,4 @@ class WatchdogDecision:
     reason: str = ""
     acks: tuple[Ack, ...] = ()
     setpoint_ns: int = 0
+    seen_m_s: tuple[float, float] | None = None

@@ -213,12 +213,14 @@ class ArDrone:
         if decision.action is Action.IDLE and fresh and force is not None:
             self._loop.stand(force, dt_s)
         if fresh and decision.action is Action.HOVER and self._is_blind():
-            return self._loop.brake(dt_s, force)
+            return self._loop.brake(dt_s, force, decision.seen_m_s)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER
         measured = None if self._motion.repeats else self._true(velocity)
-        asked = self._loop.step(decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force)
+        asked = self._loop.step(
+            decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force, decision.seen_m_s
+        )
         if self._loop.contradicted:
             self._doubted_ns = now_ns
             return velocity_loop.HOVER

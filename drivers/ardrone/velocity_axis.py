@@ -27,7 +27,10 @@ class Gains:
     disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone, and how much of a
     steady push that only its speed shows (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m:
     difference between the measured speed and that one which a wrong scale and gusts explain, and the integral of what
-    exceeds it that nothing does; answer_s: by how much the measured one is later.
+    exceeds it that nothing does; answer_s: by how much the measured one is later. lasting_s: what
+    the measured speed teaches in less time may be its drift. seen_ticks, seen_rad_s, first_seen: what cameras see is
+    the mean of so many calls, and draws the observer with this bandwidth where nothing else is measured, at first by
+    this share.
     """
 
     proportional: float = 1.6
@@ -52,6 +55,10 @@ class Gains:
     doubt_m_s: float = 0.3
     doubt_m: float = 0.1
     answer_s: float = 0.3
+    lasting_s: float = 10.0
+    seen_ticks: int = 24
+    seen_rad_s: float = 2.0
+    first_seen: float = 0.9
 
 
 class Axis:
@@ -59,7 +66,7 @@ class Axis:
 
     def __init__(self, gains: Gains) -> None:
         self._gains = gains
-        self.bias_m_s2 = self._rest_m_s2 = self._wind_m_s2 = 0.0
+        self.bias_m_s2 = self._rest_m_s2 = self._lasting_m_s2 = self._wind_m_s2 = 0.0
         self.start(0.0)
 
     def start(self, speed_m_s: float) -> None:
@@ -68,6 +75,8 @@ class Axis:
         self.speed_m_s = self.reference_m_s = 0.5 * speed_m_s
         self._reference_rate = self._tilt = self._tilt_rate = 0.0
         self._under_way = deque([0.0] * self._gains.dead_ticks)
+        self._lately = deque([self.speed_m_s], self._gains.seen_ticks)
+        self._unseen = 0.0
         self.flown_m_s = self.speed_m_s
         self._expected_m_s = self.flown_m_s
         self._unexplained_m = 0.0
@@ -82,17 +91,40 @@ class Axis:
         share = min(1.0, dt_s / self._gains.standing_s)
         rest = -_clamp(force_m_s2 / self._gains.accelerometer_gain, self._gains.bias_m_s2)
         self.bias_m_s2 += (rest - self.bias_m_s2) * share
-        self._rest_m_s2 = self.bias_m_s2
+        self._rest_m_s2 = self._lasting_m_s2 = self.bias_m_s2
 
     def distrust(self) -> None:
         """Forget conclusions from measured speeds that contradict the commanded ones."""
-        self.speed_m_s, self.bias_m_s2, self._unexplained_m = self.flown_m_s, self._rest_m_s2, 0.0
+        self._shift(self.flown_m_s - self.speed_m_s)
+        self._lasting_m_s2, self._unexplained_m = self._rest_m_s2, 0.0
 
-    def observe(self, measured_m_s: float | None, force_m_s2: float | None, turn_m_s2: float, dt_s: float) -> float:
+    def brake(self) -> None:
+        """Go on without the measured speed: what it taught in the last seconds may have been its drift."""
+        self.bias_m_s2 = self._lasting_m_s2
+
+    def see(self, seen_m_s: float, dt_s: float) -> None:
+        """Draw the speed to the mean one that cameras saw over the last calls, at first by most of the difference."""
+        error = seen_m_s - sum(self._lately) / len(self._lately)
+        self._shift(min(1.0, max(self._unseen, self._gains.seen_rad_s * dt_s)) * error)
+        self._unseen = 0.0
+
+    def _shift(self, correction_m_s: float) -> None:
+        self.speed_m_s += correction_m_s
+        self._lately = deque((speed + correction_m_s for speed in self._lately), self._lately.maxlen)
+
+    def observe(
+        self,
+        measured_m_s: float | None,
+        force_m_s2: float | None,
+        turn_m_s2: float,
+        dt_s: float,
+        drift_m_s: float = 0.0,
+    ) -> float:
         """Take a measurement; returns how air and bias accelerate the vehicle [m/s^2].
 
         measured_m_s: None where there is none, so that the speed is integrated. force_m_s2: specific force, None unless
-        measured. turn_m_s2: change of the speed by turning of its frame.
+        measured. turn_m_s2: change of the speed by turning of its frame. drift_m_s: known part of the measured speed
+        that is not true.
         """
         gains = self._gains
         blind = force_m_s2 is None
@@ -101,9 +133,10 @@ class Axis:
         self._wind_m_s2 = 0.0 if blind or self.contradicted else self._wind(air)
         acceleration = self._answer(dt_s) + outside + turn_m_s2
         self.speed_m_s += acceleration * dt_s
+        self._lately.append(self.speed_m_s)
         if measured_m_s is None:
             return outside
-        error = measured_m_s - (self.speed_m_s - gains.odometry_delay_s * acceleration)
+        error = measured_m_s - drift_m_s - (self.speed_m_s - gains.odometry_delay_s * acceleration)
         self._expected_m_s += (self.flown_m_s - self._expected_m_s) * min(1.0, dt_s / gains.answer_s)
         doubt = math.fabs(measured_m_s - self._expected_m_s) - gains.doubt_m_s
         self._unexplained_m = max(0.0, self._unexplained_m + doubt * dt_s)
@@ -111,6 +144,8 @@ class Axis:
         bandwidth = gains.blind_observer_rad_s if blind or self._wind_m_s2 else gains.observer_rad_s
         self.speed_m_s += min(1.0, 2 * gains.observer_damping * bandwidth * dt_s) * error
         self.bias_m_s2 = _clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
+        self._lasting_m_s2 += (self.bias_m_s2 - self._lasting_m_s2) * min(1.0, dt_s / gains.lasting_s)
+        self._unseen = gains.first_seen
         return outside
 
     def _wind(self, air_m_s2: float) -> float:

@@ -7,6 +7,7 @@ The drone takes tilt angles, not velocities: it accelerates by g tan(tilt) and i
 import math
 from dataclasses import dataclass
 
+from drivers.ardrone.odometry_drift import DriftLimits, OdometryDrift
 from drivers.ardrone.settings import ArDroneLimits
 from drivers.ardrone.velocity_axis import Axis, Gains
 from groundstation.bus.messages import Vector3
@@ -42,6 +43,7 @@ class VelocityLoop:
         self._max_acceleration = STANDARD_GRAVITY_M_S2 * math.tan(limits.max_tilt_rad)
         self._gains = gains or Gains()
         self._axes = (Axis(self._gains), Axis(self._gains))
+        self._drifts = (OdometryDrift(DriftLimits()), OdometryDrift(DriftLimits()))
         self.reset()
 
     @property
@@ -53,6 +55,8 @@ class VelocityLoop:
         """Forget the motion, not the learned figures of the vehicle; for times without this loop."""
         self._flying = False
         self._still_s = 0.0
+        for drift in self._drifts:
+            drift.reset()
 
     def stand(self, force_m_s2: tuple[float, float], dt_s: float) -> None:
         """Learn the accelerometer readings (forward, left) of a standing drone."""
@@ -66,14 +70,19 @@ class VelocityLoop:
         measured_m_s: Vector3 | None,
         dt_s: float,
         force_m_s2: tuple[float, float] | None = None,
+        seen_m_s: tuple[float, float] | None = None,
     ) -> AttitudeRequest:
         """Return the attitude for a wanted velocity, given the true (scaled) one [base_stabilized, FLU].
 
         measured_m_s: None while the drone does not see its motion: it is then integrated from what was asked and the
-        forces. force_m_s2: specific force forward and left [base], None when the drone does not tell.
+        forces. force_m_s2: specific force forward and left [base], None when the drone does not tell. seen_m_s:
+        velocity forward and left that cameras see, None if they do not.
         """
         gains = self._gains
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
+        if measured_m_s is not None:
+            for drift, told, seen in zip(self._drifts, measured_m_s, seen_m_s or (None, None), strict=False):
+                drift.compare(told, seen, dt_s)
         turn_rad_s = _clamp(yaw_rate_rad_s, self._limits.max_yaw_rate_rad_s)
         moving = max(abs(yaw_rate_rad_s), *(abs(v) for v in wanted_m_s)) > gains.still
         self._still_s = 0.0 if moving else self._still_s + dt_s
@@ -82,15 +91,25 @@ class VelocityLoop:
             return HOVER
         return self._request(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
 
-    def brake(self, dt_s: float, force_m_s2: tuple[float, float] | None = None) -> AttitudeRequest:
+    def brake(
+        self,
+        dt_s: float,
+        force_m_s2: tuple[float, float] | None = None,
+        seen_m_s: tuple[float, float] | None = None,
+    ) -> AttitudeRequest:
         """Return the attitude that stops a drone whose velocity is wrong, from its last correct speed.
 
-        Its own hover is no brake then: the firmware stops by the same optical flow.
+        Its own hover is no brake then: the firmware stops by the same optical flow. seen_m_s: velocity forward and left
+        that cameras see; without it the error of that last speed stays.
         """
+        dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
         if self.contradicted:
             for axis in self._axes:
                 axis.distrust()
-        dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
+        for axis in self._axes:
+            axis.brake()
+        for axis, seen in zip(self._axes, seen_m_s or (), strict=False):
+            axis.see(seen, dt_s)
         return self._request((0.0, 0.0, 0.0), 0.0, None, dt_s, force_m_s2)
 
     def _request(
@@ -129,8 +148,8 @@ class VelocityLoop:
         forces = (None, None) if force_m_s2 is None else force_m_s2
         asked = [0.0, 0.0]
         for i, axis in enumerate(axes):
-            seen_m_s = None if measured_m_s is None else measured_m_s[i]
-            outside = axis.observe(seen_m_s, forces[i], turning[i], dt_s)
+            told_m_s = None if measured_m_s is None else measured_m_s[i]
+            outside = axis.observe(told_m_s, forces[i], turning[i], dt_s, self._drifts[i].correction_m_s)
             wish = axis.wish(wanted[i], outside, dt_s)
             asked[i] = axis.bounded(wish, wanted[i], outside, dt_s) + centripetal[i]
         x, y = _shortened(asked[0], asked[1], self._max_acceleration)

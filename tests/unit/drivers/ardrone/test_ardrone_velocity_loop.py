@@ -228,13 +228,14 @@ def test_a_healthy_flight_is_never_contradicted(sensed, contradictions):
     assert len(contradictions) > 2000 and not any(contradictions)
 
 
-def stop_blindly(push, seen_s, wrong=0.0):
+def stop_blindly(push, seen_s, wrong=0.0, drift=0.0, cameras=False):
     """Fly 0.5 m/s, seen until seen_s, then with a speed that is off by `wrong` for 0.7 s, then brake for 4 s.
 
-    Return the true speeds of the last second; push: of the air from the brake on [m/s^2].
+    Return the true speeds of the last second; push: of the air from the brake on [m/s^2]; drift: error of the speed
+    that is seen in flight [m/s]; cameras: whether they see the drone.
     """
     rng, loop, tilt = random.Random(1), VelocityLoop(ArDroneLimits()), Tilt()
-    speed, pitch, speeds, air = 0.0, 0.0, [], []
+    speed, pitch, speeds, air = 0.0, 0.0, list[float](), []
     for i in range(round((seen_s + 4.7) / TICK_S)):
         now_s = i * TICK_S
         outside = -speed * (0.2 + 0.1 * abs(speed)) + (push if now_s > seen_s else 0.0)
@@ -243,12 +244,14 @@ def stop_blindly(push, seen_s, wrong=0.0):
         if i % 5 == 0:
             force = (sum(air) / len(air), 0.0)
             air.clear()
-            measured = (speed + rng.gauss(0, 0.04), 0.0, 0.0) if now_s < seen_s else None
+            measured = (speed + drift + rng.gauss(0, 0.04), 0.0, 0.0) if now_s < seen_s else None
             measured = (speed + wrong, 0.0, 0.0) if wrong and now_s >= seen_s else measured
+            half_second = speeds[-round(0.55 / TICK_S) :] or [0.0]
+            seen = (sum(half_second) / len(half_second) + rng.gauss(0, 0.05), 0.0) if cameras else None
             asked = (
                 loop.step((0.5, 0.0, 0.0), 0.0, measured, 1 / 40, force)
                 if now_s < seen_s + 0.7
-                else loop.brake(1 / 40, force)
+                else loop.brake(1 / 40, force, seen)
             )
             assert not asked.hover
             pitch = asked.pitch_rad
@@ -265,6 +268,13 @@ def test_a_drone_that_sees_no_floor_is_braked_by_what_it_knows(seen_s, push):
 
 def test_a_speed_that_contradicts_the_requests_is_no_guide_to_braking():
     assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong=-0.9)) <= 0.25
+
+
+@pytest.mark.parametrize("wrong", [0.0, -0.9])
+def test_cameras_tell_a_drone_that_sees_no_floor_its_speed(wrong):
+    """Its speed had drifted by 0.3 m/s before: it would still do that."""
+    assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong, drift=0.3)) >= 0.15
+    assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong, drift=0.3, cameras=True)) <= 0.08
 
 
 @pytest.mark.parametrize(("values", "repeats"), [((0.1, 0.2, 0.3, 0.4), False), ((0.1, 0.0, 0.0, 0.0, 0.0), True)])

@@ -42,6 +42,7 @@ class FakeFlight(threading.Thread):
         self.rate_hz: dict[str, float] = {}
         self.deaf: set[str] = set()
         self.frozen = False
+        self.distance_m = 1.3  # of the drones from the target
         self.lease = True
         self.commands: list[m.Command] = []
         self.steered: list[m.SimCommand] = []
@@ -91,7 +92,7 @@ class FakeFlight(threading.Thread):
     def drone_at(self, name: str, s: float) -> tuple[float, float, float, float]:
         tx, ty, *_ = self.target_at(s)
         angle = 0.12 * s + {"drone_1": 2.2, "drone_3": 4.3}.get(name, 0.0)
-        px, py = 0.75 * tx + 1.3 * math.cos(angle), 0.75 * ty + 1.3 * math.sin(angle)
+        px, py = 0.75 * tx + self.distance_m * math.cos(angle), 0.75 * ty + self.distance_m * math.sin(angle)
         return px, py, {"drone_1": 2.1, "drone_3": 1.6}.get(name, 1.2), math.atan2(ty - py, tx - px)
 
     # --- what is said ---

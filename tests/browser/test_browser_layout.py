@@ -59,6 +59,9 @@ def test_nothing_is_cut_off(stage: Any, size: tuple[int, int]) -> None:
     assert page.page.evaluate(CUT_OFF) == []
     assert page.page.evaluate(OUTSIDE) == []
     assert page.page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
+    stage.flight.battery["drone_2"] = None
+    page.wait(lambda s: page.there("worst-battery").inner_text() == "unknown drone_2")
+    assert page.page.evaluate(CUT_OFF) == []
     page.shot(f"layout_{size[0]}")
 
 

@@ -1,5 +1,6 @@
 """What the page shows, and that it shows when it is not true any more."""
 
+import itertools
 import math
 import os
 import signal
@@ -46,6 +47,19 @@ def test_first_frame_comes_soon_and_nothing_leaves_loopback(stage: Any) -> None:
     page.shot("light")
     assert {urlsplit(url).hostname for url in page.requests if not url.startswith("blob:")} == {"127.0.0.1"}
     assert not page.troubles, page.troubles
+
+
+def test_words_of_a_crowded_map_give_way_to_each_other(mixed_stage: Any) -> None:
+    mixed_stage.flight.distance_m = 0.3
+    page = mixed_stage.open()
+    for _ in range(5):
+        labels = page.wait(lambda s: len(s["labels"]) > 3)["labels"]
+        assert {label["words"].split()[0] for label in labels} >= {*mixed_stage.flight.drones, "turtlebot"}
+        for one, other in itertools.combinations(labels, 2):
+            beside = one["right"] <= other["left"] or other["right"] <= one["left"]
+            assert beside or one["bottom"] <= other["top"] or other["bottom"] <= one["top"], (one, other)
+        page.page.wait_for_timeout(400)
+    page.shot("crowded")
 
 
 def test_ellipses_are_to_scale(stage: Any) -> None:

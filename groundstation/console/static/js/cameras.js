@@ -5,6 +5,7 @@ import { on, watch } from "./link.js";
 import { colourOf } from "./palette.js";
 import { ageS, isTarget, store } from "./store.js";
 
+const LINE_PX = 22; // of words in a picture
 const STALE_S = 1.5;
 const feeds = new Map(), visible = new Set();
 let observer = null;
@@ -63,7 +64,7 @@ function draw(name, { canvas, bitmap, stamp }) {
   const found = store.s.detections?.[name];
   if (!found || Math.abs(found.stamp_ms - stamp) > 0.01) return;
   // Marks are in pixels of the calibration, which need not be those of the picture.
-  const zoom = width / found.width;
+  const zoom = width / found.width, written = [];
   for (const mark of found.marks) {
     const [u, v, r] = [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)], colour = colourOf(mark.subject);
     const tint = isTarget(mark.subject) ? "#ffe14d" : colour;
@@ -77,13 +78,24 @@ function draw(name, { canvas, bitmap, stamp }) {
     g.font = `700 ${13 * Math.min(2, devicePixelRatio || 1)}px system-ui, "DejaVu Sans", sans-serif`;
     g.lineWidth = 4;
     g.strokeStyle = "#000";
-    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`, long = g.measureText(words).width, beside = u + r + 5;
-    const left = beside + long <= width - 4 ? beside : Math.max(4, u - r - 5 - long); // at the right edge it would lie on the ring
-    g.strokeText(words, left, v + 5);
+    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`;
+    const long = g.measureText(words).width, place = besideRing(u, v, r + 5, long, width, height);
+    while (written.some(([x, y, other]) => place[0] < x + other && x < place[0] + long && Math.abs(place[1] - y) < LINE_PX)) place[1] += LINE_PX;
+    written.push([...place, long]);
+    g.strokeText(words, ...place);
     g.fillStyle = tint;
-    g.fillText(words, left, v + 5);
+    g.fillText(words, ...place);
     pictures.marks += 1;
   }
+}
+
+// Where words stand wholly within the picture and off the ring: right of it, left, else below or above.
+function besideRing(u, v, r, long, width, height) {
+  const baseline = Math.min(Math.max(v + 5, LINE_PX), height - 6);
+  if (u + r + long <= width - 4) return [u + r, baseline];
+  if (u - r - long >= 4) return [u - r - long, baseline];
+  const left = Math.min(Math.max(u - long / 2, 4), width - long - 4);
+  return [left, v + r + LINE_PX <= height - 6 ? v + r + LINE_PX : v - r];
 }
 
 export function showCameras() {

@@ -144,7 +144,7 @@ window.__console = {
   get state() {
     return {
       frames: store.frames, seeds: store.seeds, seq: store.seq, run: store.run, connected: store.connected, client: me.client, trusted: me.trusted,
-      draws: drawn.draws, drawMs: drawn.ms, ellipses: structuredClone(drawn.ellipses), latencies: [...drawn.latencies], marks: structuredClone(drawn.marks), pictures: { ...pictures },
+      draws: drawn.draws, drawMs: drawn.ms, ellipses: structuredClone(drawn.ellipses), labels: structuredClone(drawn.labels), latencies: [...drawn.latencies], marks: structuredClone(drawn.marks), pictures: { ...pictures },
       playback: structuredClone(store.s.playback ?? null), nowMs: now(), sections: structuredClone(store.s), scene: structuredClone(store.scene), samples: store.samples.length,
       orders: structuredClone(store.s.orders ?? []), estimateAge: estimateAge(), trail: Object.fromEntries(Object.entries(store.trails).map(([name, trail]) => [name, trail.length])),
       scale: view.scale, points: Object.fromEntries(entities().map(({ name, mean }) => [name, view.point(mean[0], mean[1])])), at: Object.fromEntries(entities().map(({ name, mean }) => [name, mean])),

@@ -3,6 +3,7 @@
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
+import { FIGURE, NAME, around, keepClear, note } from "./labels.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
 const ARROW_S = 1.5, OLD_S = 2;
@@ -78,7 +79,8 @@ export function drawBodies(g, view, stale) {
     else drawTarget(g, x, y, body.velocity, Math.max(9, 0.18 * view.scale), ink().target);
     const age = estimateAge() + body.age_s;
     const suffix = stale || age > 1 ? ` ${age.toFixed(1)} s old` : "";
-    label(g, `${body.name}${suffix}`, x, y - Math.max(20, 0.36 * view.scale), body.kind === "robot" ? colourOf(body.name) : ink().text, 13, 700);
+    keepClear(x, y, bodyRadius(view) / 2);
+    note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 13), body.kind === "robot" ? colourOf(body.name) : ink().text, 13, 700);
   }
   g.globalAlpha = alpha;
 }
@@ -91,9 +93,13 @@ export function drawStanding(g, view) {
     g.globalAlpha = alpha * 0.6;
     drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), colourOf(name));
     g.globalAlpha = alpha;
-    label(g, `${name} stands`, x, y - Math.max(20, 0.36 * view.scale), colourOf(name), 13, 500);
+    keepClear(x, y, bodyRadius(view) / 2);
+    note(g, NAME, name, `${name} stands`, around(x, y, bodyRadius(view), 13), colourOf(name), 13, 500);
   }
 }
+
+// Within this distance of a body's middle no words stand [pixels].
+const bodyRadius = (view) => Math.max(20, 0.36 * view.scale);
 
 function drawDrone(g, x, y, yaw, r, colour) {
   g.save();
@@ -148,7 +154,9 @@ export function drawVelocities(g, view, stale) {
     const tip = (v) => { const [dx, dy] = bodyToWorld(v, body.mean[3]); return view.point(body.mean[0] + dx * ARROW_S, body.mean[1] + dy * ARROW_S); };
     if (control?.wanted && control.limited_by.length) drawArrow(g, from, tip(control.wanted), 1.2, colourOf(name), 0, true);
     drawArrow(g, from, tip(setpoint.velocity), 3, ink().text);
-    if (control?.limited_by.length) label(g, `cut by ${control.limited_by.join(", ")}`, from[0], from[1] + Math.max(26, 0.45 * view.scale), ink().fence, 11, 700);
+    if (!control?.limited_by.length) continue;
+    const places = around(from[0], from[1], bodyRadius(view) + 6, 11).slice(1);
+    note(g, FIGURE, name, `cut by ${control.limited_by.join(", ")}`, places, ink().fence, 11, 700);
   }
 }
 
@@ -162,7 +170,7 @@ export function drawTruth(g, view) {
     g.moveTo(x - r, y + r); g.lineTo(x + r, y - r);
     g.moveTo(x, y); g.lineTo(...view.point(position[0] + 0.32 * Math.cos(yaw), position[1] + 0.32 * Math.sin(yaw)));
     g.stroke();
-    if (!entity(name)) label(g, `${name} (truth)`, x, y - 10, ink().truth, 11, 500);
+    if (!entity(name)) note(g, NAME, name, `${name} (truth)`, around(x, y, 10, 11), ink().truth, 11, 500);
   }
 }
 

@@ -3,6 +3,7 @@
 import { bodyToWorld, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
+import { FIGURE, SENSOR, around, keepClear, note } from "./labels.js";
 import { ageS, droneNames, entities, entity, isSeen, store, targetHeight } from "./store.js";
 
 const FIGURE_PX = 75;
@@ -86,9 +87,15 @@ export function drawGraph(g, view) {
     g.globalAlpha = alpha;
     // Where the link is shorter than its figure the thickness must do.
     if (Math.hypot(a[0] - b[0], a[1] - b[1]) * view.scale < FIGURE_PX) continue;
-    const [x, y] = view.point((a[0] + b[0]) / 2, (a[1] + b[1]) / 2);
-    label(g, `${information >= 10 ? Math.round(information) : information.toFixed(1)} m⁻²${seen ? "" : " unseen"}`, x, y - 5, colour, 11, 500);
+    const figure = `${information >= 10 ? Math.round(information) : information.toFixed(1)} m⁻²`;
+    const places = [0.5, 0.4, 0.6, 0.3, 0.7].map((share) => onLink(view, a, b, share));
+    note(g, FIGURE, `${observer} ${subject}`, `${figure}${seen ? "" : " unseen"}`, places, colour, 11, 500);
   }
+}
+
+function onLink(view, [ax, ay], [bx, by], share) {
+  const [x, y] = view.point(ax + share * (bx - ax), ay + share * (by - ay));
+  return [x, y - 5, "center"];
 }
 
 function drawSensor(g, view, sensor) {
@@ -99,5 +106,6 @@ function drawSensor(g, view, sensor) {
   g.arc(x, y, 3, 0, 7);
   g.fillStyle = ink().floor;
   g.fill();
-  label(g, sensor.name, x, y + 18, ink().dim, 11, 500);
+  keepClear(x, y, 7);
+  note(g, SENSOR, sensor.name, sensor.name, around(x, y, 8, 11).slice(1), ink().dim, 11, 500);
 }

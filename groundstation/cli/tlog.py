@@ -8,8 +8,8 @@ from pathlib import Path
 from drivers.datagrams import unpack
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import split
-from drivers.mavlink.wire.signature import MAGIC
-from drivers.mavlink.wire.verification import Verifier
+from drivers.mavlink.wire.signature import MAGIC, MAGIC_1
+from drivers.mavlink.wire.verification import Verifier, old_sender
 from groundstation.bus.topics import RAW_RX, RAW_TX
 from groundstation.errors import MessageError
 from groundstation.recording.compatibility import RecordingError
@@ -17,6 +17,7 @@ from groundstation.recording.outputs import new_file, require_absent
 from groundstation.recording.reader import payload
 from groundstation.recording.run import RecordedRun
 
+_MAGICS = (bytes([MAGIC]), bytes([MAGIC_1]))
 _STAMP = struct.Struct(">Q")
 
 
@@ -30,9 +31,12 @@ class Log:
     def add(self, stamp_ns: int, datagram: bytes, verifier: Verifier) -> None:
         """Take the frames of a datagram; what cannot be verified is counted."""
         try:
-            for frame in split(datagram):
+            for frame in split(datagram, old=True):
                 try:
-                    verifier.verify(frame)
+                    if frame[0] == MAGIC_1:
+                        old_sender(frame)
+                    else:
+                        verifier.verify(frame)
                     self.frames.append((stamp_ns, frame))
                 except WireError as error:
                     self.refused[error.reason] += 1
@@ -43,8 +47,8 @@ class Log:
 def write_tlogs(run: RecordedRun, folder: Path) -> dict[Path, Log]:
     """Write one new .tlog for each MAVLink vehicle of a run; returns the files, and what each holds, or would hold.
 
-    Only frames with the right checksum are written; signatures are not checked, because keys are not recorded.
-    Raises RecordingError when there is nothing to write, or a file exists.
+    Only frames with the right checksum are written, those of MAVLink 1 as well; signatures are not checked, because
+    keys are not recorded. Raises RecordingError when there is nothing to write, or a file exists.
     WIRE (.tlog, as pymavlink reads it): UNIX time [us], 8 bytes, big-endian, before each frame.
     """
     logs = _logs(run)
@@ -73,7 +77,7 @@ def _logs(run: RecordedRun) -> dict[str, Log]:
             batch = unpack(payload(record)[1])
         except (MessageError, ValueError):
             continue  # damaged inside: nothing of it can be told from noise
-        if not any(datagram[:1] == bytes([MAGIC]) for _, datagram in batch):
+        if not any(datagram[:1] in _MAGICS for _, datagram in batch):
             continue  # another kind of vehicle
         # The message is stamped as its first datagram; the others follow on the same boot clock.
         offset_ns = record.log_time_ns - batch[0][0]

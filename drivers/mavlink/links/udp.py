@@ -12,7 +12,7 @@ from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.telemetry import Heartbeat
-from drivers.mavlink.wire.verification import Signing
+from drivers.mavlink.wire.verification import Signing, old_sender
 from groundstation.adapters import bind_to_adapter, split_zone
 from groundstation.bus import clock
 from groundstation.errors import DriverError
@@ -48,7 +48,7 @@ class UdpLink:
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._lock = threading.Lock()
-        self._sniffer = sniffer
+        self._sniffer, self._signed = sniffer, signing is not None
         self._greeted: dict[tuple[str, int], int] = {}
         self._own = (settings.system_id, settings.component_id)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -101,8 +101,20 @@ class UdpLink:
         except WireError as error:
             self._reject(error.reason, str(error))
             if error.reason == "mavlink_1":
+                self._note_old(now_ns, data, source)
                 self._greet(now_ns, source)
         return heard
+
+    def _note_old(self, now_ns: int, data: bytes, source: tuple[str, int]) -> None:
+        """Record a datagram's frames of MAVLink 1, unless the link is signed or their system is at another address."""
+        if self._signed:
+            return
+        with suppress(WireError):
+            for raw in split(data, old=True):
+                with suppress(WireError):
+                    system = old_sender(raw)
+                    if self._addresses.get(system, (source,))[0] == source:
+                        self._sniffer(system, now_ns, raw, True)
 
     def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
         """Send a vehicle that uses MAVLink 1 a frame of version 2, after which it uses version 2.

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.wire import flight, positioning, service, simulator, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.signature import frame_size
+from drivers.mavlink.wire.signature import MAGIC_1, frame_size, old_frame_size
 from drivers.mavlink.wire.verification import Signing, Verifier, number_of
 
 Message = tuple[Any, ...]
@@ -76,11 +76,14 @@ def dialect_faults() -> list[str]:
     return faults
 
 
-def split(data: bytes) -> Iterator[bytes]:
-    """Yield the frames of a datagram; raises WireError at the first byte that begins none (the rest is dropped)."""
+def split(data: bytes, *, old: bool = False) -> Iterator[bytes]:
+    """Yield the frames of a datagram; raises WireError at the first byte that begins none (the rest is dropped).
+
+    old: those of MAVLink 1 as well, which are recorded and never obeyed.
+    """
     offset = 0
     while offset < len(data):
-        size = frame_size(data, offset)
+        size = old_frame_size(data, offset) if old and data[offset] == MAGIC_1 else frame_size(data, offset)
         if size > len(data) - offset:
             raise WireError("truncated", f"{len(data) - offset} of {size} bytes")
         yield data[offset : offset + size]

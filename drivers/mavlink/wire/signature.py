@@ -6,6 +6,7 @@ from drivers.mavlink.wire.errors import WireError
 
 MAGIC, MAGIC_1 = 0xFD, 0xFE
 HEADER, CHECKSUM, SIGNATURE = 10, 2, 13
+HEADER_1 = 6
 SIGNED = 1
 _DIGEST = 6
 _EPOCH_S = 1_420_070_400  # 2015-01-01 UTC
@@ -22,6 +23,13 @@ def frame_size(data: bytes | bytearray, offset: int = 0) -> int:
     if flags & ~SIGNED:
         raise WireError("incompatible", f"flags {flags:#x}")
     return HEADER + int(data[offset + 1]) + CHECKSUM + (SIGNATURE if flags & SIGNED else 0)
+
+
+def old_frame_size(data: bytes | bytearray, offset: int = 0) -> int:
+    """Return the length of the frame of MAVLink 1 that begins at an offset; raises WireError (truncated)."""
+    if len(data) - offset < 2:
+        raise WireError("truncated", "header")
+    return HEADER_1 + int(data[offset + 1]) + CHECKSUM
 
 
 def stamp_at(unix_s: float) -> int:

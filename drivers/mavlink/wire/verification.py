@@ -10,7 +10,17 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import all as widest
 
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.signature import CHECKSUM, HEADER, SIGNATURE, SIGNED, digest, frame_size
+from drivers.mavlink.wire.signature import (
+    CHECKSUM,
+    HEADER,
+    HEADER_1,
+    MAGIC_1,
+    SIGNATURE,
+    SIGNED,
+    digest,
+    frame_size,
+    old_frame_size,
+)
 
 # WIRE (pymavlink): a sender that was not heard before may sign with a time up to a minute old [10 us].
 _NEW_SENDER_LAG = 6_000_000
@@ -71,9 +81,25 @@ def _check_signature(frame: bytes, key: bytes) -> None:
 
 
 def _check_sum(frame: bytes) -> None:
-    extra = _CRC_EXTRA.get(number_of(frame))
+    _compare_sum(frame, HEADER + frame[1], number_of(frame), frame[5])
+
+
+def _compare_sum(frame: bytes, end: int, number: int, system: int) -> None:
+    extra = _CRC_EXTRA.get(number)
     if extra is None:
-        raise WireError("unknown_kind", f"message {number_of(frame)} from system {frame[5]}")
-    end = HEADER + frame[1]
+        raise WireError("unknown_kind", f"message {number} from system {system}")
     if widest.x25crc(frame[1:end] + extra).crc != int.from_bytes(frame[end : end + CHECKSUM], "little"):
-        raise WireError("checksum", f"message {number_of(frame)} from system {frame[5]}")
+        raise WireError("checksum", f"message {number} from system {system}")
+
+
+def old_sender(frame: bytes) -> int:
+    """Return the system that sent a whole frame of MAVLink 1; raises WireError (mavlink_2, size, or as for others).
+
+    WIRE (docs/reference/mavlink.md 5.10): bytes 3 and 5 are system and number; it has the checksum of MAVLink 2.
+    """
+    if frame[:1] != bytes([MAGIC_1]):
+        raise WireError("mavlink_2", f"{len(frame)} bytes")
+    if len(frame) < HEADER_1 + CHECKSUM or old_frame_size(frame) != len(frame):
+        raise WireError("size", f"{len(frame)} bytes")
+    _compare_sum(frame, HEADER_1 + frame[1], frame[5], frame[3])
+    return frame[3]

@@ -60,3 +60,23 @@ def test_who_speaks_mavlink_1_is_greeted_once_a_second_and_not_believed(vehicle)
     with pytest.raises(TimeoutError):
         vehicle.recvfrom(300)
     link.close()
+
+
+def test_frames_of_mavlink_1_are_recorded_and_those_of_strangers_are_not(vehicle):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    noted = []
+    sniffer = lambda system, stamp_ns, raw, received: noted.append((system, raw)) if received else None  # noqa: E731
+    link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"), sniffer=sniffer)
+    heartbeat = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
+    old = heartbeat.pack(dialect.MAVLink(None, 7, 1), force_mavlink1=True)
+    new = heartbeat.pack(dialect.MAVLink(None, 7, 1))
+    damaged = bytes(old[:-1]) + bytes([old[-1] ^ 1])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for sender, data in ((vehicle, old), (vehicle, damaged), (vehicle, new), (stranger, old), (vehicle, old)):
+            sender.sendto(data, ("127.0.0.1", port))
+            link.receive()
+    assert noted == [(7, bytes(old)), (7, bytes(new)), (7, bytes(old))]
+    assert link.rejected["mavlink_1"] == 4
+    link.close()

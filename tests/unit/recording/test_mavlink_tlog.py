@@ -72,6 +72,28 @@ def test_tlog_is_read_by_pymavlink(run_dir):
     assert [stamp - 1_700_000_000 for _, stamp in found] == pytest.approx([n / 2 for n in range(10)], abs=1e-3)
 
 
+def test_a_vehicle_of_mavlink_1_is_read_too(tmp_path):
+    encoder = FrameEncoder(11, 1)
+    old = encoder.encode(telemetry.Heartbeat(2, 12, 1, 0, 3), old=True)
+    new = encoder.encode(telemetry.ExtendedSysState(0, 1))
+    damaged = old[:-1] + bytes([old[-1] ^ 1])
+
+    def vehicle(log):
+        for second, datagram in enumerate((old, damaged, old + old[:5], old + new)):
+            log.received(second * S, datagram)
+
+    written = write_tlogs(open_run(record(tmp_path, ("drone_2", vehicle))), tmp_path)
+    ((path, log),) = written.items()
+    assert [frame for _, frame in log.frames] == [old, old, old, new]
+    assert log.refused == {"checksum": 1, "truncated": 1}
+    from pymavlink import mavutil
+
+    reader = mavutil.mavlink_connection(str(path))
+    names = [message.get_type() for message in iter(reader.recv_match, None)]
+    reader.close()
+    assert names == ["HEARTBEAT"] * 3 + ["EXTENDED_SYS_STATE"]
+
+
 def test_a_run_without_mavlink_and_a_log_that_exists_are_errors(run_dir, tmp_path):
     assert CliRunner().invoke(export, ["--tlog", str(run_dir)], standalone_mode=False).exit_code == 0
     again = CliRunner().invoke(export, ["--tlog", str(run_dir)], standalone_mode=False)

@@ -63,9 +63,7 @@ _PX4 = (
     Needed("SYS_HAS_GPS", 0, "arm without GPS"),
     Needed("COM_OF_LOSS_T", 0.5, "time without set-points before the failsafe", REAL32, accepted=(0.3, 1.0)),
     Needed("COM_OBL_RC_ACT", 4, "that failsafe: land"),
-    Needed(
-        "COM_RC_IN_MODE", 0, "a transmitter's kill and mode switches stay alive: 1 and 4 ignore them", others=(2, 3)
-    ),
+    Needed("COM_RC_IN_MODE", 0, "a transmitter's kill and mode switches stay alive, whatever a joystick does"),
     Needed("COM_RCL_EXCEPT", 4, "offboard flight needs no stick", others=(5, 6, 7)),
     Needed("MPC_LAND_CRWL", 0.6, "the last metre of a landing, on which it may have no position", REAL32, (0.3, 1.0)),
     Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),

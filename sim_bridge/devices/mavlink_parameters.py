@@ -41,7 +41,7 @@ _PX4_INDOOR: dict[str, float] = {
     "SYS_HAS_GPS": 0,
     "COM_OBL_RC_ACT": 4,
     "EKF2_EVP_NOISE": 0.05,
-    "COM_RC_IN_MODE": 3,
+    "COM_RC_IN_MODE": 0,
     "COM_RCL_EXCEPT": 4,
 }
 _COPTER_FACTORY: dict[str, float] = {

@@ -10,7 +10,7 @@ def of(name, flavour=Flavour.PX4, **overrides):
     return next(n for n in needed(flavour, 255, overrides) if name in n.names)
 
 
-@pytest.mark.parametrize(("value", "alive"), [(0, True), (1, False), (2, True), (3, True), (4, False)])
+@pytest.mark.parametrize(("value", "alive"), [(0, True), (1, False), (2, False), (3, False), (4, False)])
 def test_a_transmitters_kill_switch_stays_alive(value, alive):
     text = difference(of("COM_RC_IN_MODE"), {"COM_RC_IN_MODE": value})
     assert (text == "") is alive

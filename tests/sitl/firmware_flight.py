@@ -14,11 +14,14 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
-from firmware_room import NAME, Room
+from groundstation.process import numba_cache
 
-from drivers.mavlink.failsafe import HOVERS_S, hover_and_land
-from groundstation.bus.messages import Verb
+sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+numba_cache.activate()  # before the kernels are imported: afterwards they would be compiled anew, for a minute
+from firmware_room import NAME, Room  # noqa: E402
+
+from drivers.mavlink.failsafe import HOVERS_S, hover_and_land  # noqa: E402
+from groundstation.bus.messages import Verb  # noqa: E402
 
 RISEN_M, SETTLED_S, START_S = 0.5, 3.0, 30.0  # hovering before the team tracks
 GUARDIAN_SPEAKS_S = 0.3
@@ -129,9 +132,6 @@ def fly(flavour: str, seed: int, seconds: float, folder: Path, fault: str = "", 
 
 
 if __name__ == "__main__":
-    from groundstation.process import numba_cache
-
-    numba_cache.activate()
     _flavour, _seed, _seconds, *_fault = sys.argv[1:]
     _folder = Path(tempfile.mkdtemp(prefix=f"room-{_flavour}-{_seed}-"))
     print(json.dumps(fly(_flavour, int(_seed), float(_seconds), _folder, *_fault) | {"trace": str(_folder)}, indent=1))

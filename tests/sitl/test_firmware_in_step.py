@@ -13,8 +13,6 @@ sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test 
 from firmware import VARIABLES, binary_of
 from firmware_flight import fly
 
-from groundstation.process import numba_cache
-
 pytestmark = [pytest.mark.slow, pytest.mark.firmware, pytest.mark.timeout(800)]
 TAKE_OFF_M = 0.8
 
@@ -26,7 +24,6 @@ def test_a_firmware_tracks_with_the_team_and_stops_near_without_cameras_or_drive
 ) -> None:
     if not binary_of(flavour):
         pytest.skip(f"{VARIABLES[flavour]} names no SITL binary: none is in a package registry")
-    numba_cache.activate()
     figures = fly(flavour, seed, 30.0, tmp_path, fault)
     assert figures["height_m"] == pytest.approx(TAKE_OFF_M, rel=0.1), figures
     assert figures["drift_m"] <= 0.25, figures

@@ -57,7 +57,8 @@ class Run:
             command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=self.folder
         )
         self.said = ""
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self) -> None:
         for line in self.process.stdout or ():
@@ -88,6 +89,11 @@ class Run:
                 with suppress(subprocess.TimeoutExpired):
                     self.process.wait(patience)
         self.process.kill()
+        self.process.wait()
+        self._reader.join(10.0)
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                pipe.close()
 
 
 @pytest.fixture
@@ -127,7 +133,7 @@ def test_a_foreign_firmware_flies_in_the_team_and_ctrl_c_lands_it_with_the_other
 ) -> None:
     path = field(tmp_path, "flavour: ardupilot, system_id: 1", STAND_IN)
     run = started(path, "--real", "drone_2=autopilot:25648")
-    run.until("Press Enter to take off", 120)
+    run.until("To take off and track press Enter", 120)
     time.sleep(3.0)
     assert max(heights(tmp_path)) < 0.1, "nobody takes off unasked"
     run.press_enter()
@@ -154,7 +160,7 @@ def test_real_firmware_flies_in_the_team(flavour: str, tmp_path: Path, started: 
         listens = f"listen: true, local_address: 127.0.0.1, port: {firmware.port}"
         path = field(tmp_path, f"flavour: {flavour}, system_id: {SYSTEM}, {listens}")
         run = started(path, "--real", f"drone_2=autopilot:{firmware.truth_port}", "--duration", "40")
-        run.until("Press Enter to take off", 120)
+        run.until("To take off and track press Enter", 120)
         run.press_enter()
         run.process.wait(200)
         report = run.report()

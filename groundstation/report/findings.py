@@ -1,4 +1,4 @@
-"""Everything a report finds beyond the figures: consistency per edge, decisions, interventions, links, failsafes."""
+"""Everything a report finds beyond the figures: consistency, decisions, interventions, links, failsafes, doubts."""
 
 import msgspec
 
@@ -7,6 +7,7 @@ from groundstation.report.decisions import Intervention, Switch, interventions, 
 from groundstation.report.happenings import Happening, happenings
 from groundstation.report.links import VehicleLink, links
 from groundstation.report.tracks import RunData
+from groundstation.report.trust import Trust, trust_of
 
 
 class Findings(msgspec.Struct, frozen=True):
@@ -16,9 +17,10 @@ class Findings(msgspec.Struct, frozen=True):
     switches: list[Switch]
     interventions: list[Intervention]
     links: list[VehicleLink]
-    happenings: list[Happening] = []
+    happenings: list[Happening]
+    trust: Trust
 
 
 def findings_of(data: RunData) -> Findings:
     """Return the findings of a run."""
-    return Findings(edges(data), switches(data), interventions(data), links(data), happenings(data))
+    return Findings(edges(data), switches(data), interventions(data), links(data), happenings(data), trust_of(data))

@@ -21,7 +21,7 @@ from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTra
 _WANTED = frozenset(
     (topic.plane, topic.name)
     for topic in (
-        *(t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
+        *(t.BELIEF, t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
         *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.TRUTH, t.VEHICLE_STATUS),
     )
 )
@@ -101,6 +101,8 @@ class _Rows:
                 data.commands.append(TimedMessage(time_s, message))
             case m.CommandAck():
                 data.acks.append(TimedMessage(time_s, message))
+            case m.Belief():
+                data.beliefs[:] = [TimedMessage(time_s, message)]
             case m.Plan():
                 data.plans.append(TimedMessage(time_s, message))
             case m.Innovation():

@@ -12,6 +12,7 @@ from groundstation.report.judge import JSON_NAME, RunReport
 from groundstation.report.wording import bound, missed, quantity, title
 
 _HAPPENINGS_SHOWN = 12
+_DOUBTS_SHOWN = 3
 
 
 def summary(report: RunReport) -> RenderableType:
@@ -21,6 +22,7 @@ def summary(report: RunReport) -> RenderableType:
         parts.append(_criteria(report.criteria))
     parts.append(_details(report))
     parts += _happenings(report.findings.happenings)
+    parts += [Text(f"  doubt: {doubt}", style="yellow") for doubt in report.findings.trust.doubts[:_DOUBTS_SHOWN]]
     for line in report.figures.loud_events[-5:]:
         parts.append(Text(f"  {line}", style="yellow"))
     for line in report.damage[:3]:

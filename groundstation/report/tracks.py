@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.arrays import Array, BoolArray
-from groundstation.bus.messages import Command, CommandAck, Event, Innovation, Plan, SearchMap, VehicleStatus
+from groundstation.bus.messages import Belief, Command, CommandAck, Event, Innovation, Plan, SearchMap, VehicleStatus
 from groundstation.field.behaviour import PlannerValues, SafetyValues
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Fence, Room
@@ -108,6 +108,7 @@ class RunData:
     acks: list[TimedMessage[CommandAck]] = field(default_factory=list)
     plans: list[TimedMessage[Plan]] = field(default_factory=list)
     innovations: list[TimedMessage[Innovation]] = field(default_factory=list)
+    beliefs: list[TimedMessage[Belief]] = field(default_factory=list)
     events: list[TimedMessage[Event]] = field(default_factory=list)
     vehicles: dict[str, list[TimedMessage[VehicleStatus]]] = field(default_factory=dict)
     search_maps: dict[str, list[TimedMessage[SearchMap]]] = field(default_factory=dict)

@@ -16,6 +16,7 @@ from groundstation.report.page import tables
 from groundstation.report.page.chart import Chart
 from groundstation.report.page.flight_charts import flight_charts
 from groundstation.report.page.health_charts import health_charts
+from groundstation.report.page.trust_section import trust_section
 from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_searches import draw_searches
 from groundstation.report.plot_style import STYLE
@@ -34,6 +35,7 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
     flight, health = flight_charts(data, start_s, end_s), health_charts(data, start_s, end_s)
     sections = [
         ("Verdict", tables.criteria_table(report) + tables.accuracy_table(report)),
+        ("Is it to be trusted?", trust_section(findings.trust)),
         ("What happened", tables.story_table(moments) + _pictures(moment_pictures(report.run_dir, data, moments))),
         ("Room", f'<div class="map">{_room(data)}</div>'),
         *([("Searches", _searches(data))] if data.search_maps else []),

@@ -1,0 +1,118 @@
+"""A report says why its run may not be trusted: sensors, surveys, delays, links, and warnings of the flight."""
+
+import random
+
+import msgspec
+import pytest
+
+from groundstation.bus import messages as m
+from groundstation.field.room import LensCalibration, WorldCamera
+from groundstation.report.page.trust_section import trust_section
+from groundstation.report.run_facts import RunFacts
+from groundstation.report.tracks import UNKNOWN_FIELD, RunData, TimedMessage
+from groundstation.report.trust import trust_of
+
+LENS = LensCalibration(
+    model="plumb_bob", width_px=1280, height_px=720, fx_px=900.0, fy_px=900.0, cx_px=640.0, cy_px=360.0,
+    distortion=(0.0, 0.0, 0.0, 0.0, 0.0),
+)  # fmt: skip
+CEILING = WorldCamera(source="x", calibration=LENS, position_m=(0.0, 0.0, 4.2))
+
+
+def header(source: str = "tracker", entity: str = "team") -> m.Header:
+    return m.Header(0, "here", entity, source, 0)
+
+
+def innovations(
+    scale: float = 1.0, refused: float = 0.0, until_s: float = 20.0, subject: str = "drone_1"
+) -> list[TimedMessage[m.Innovation]]:
+    """Return 15 a second of the ceiling camera, whose squared errors are `scale` times those that it claims."""
+    rng = random.Random(1)
+    found = []
+    for i in range(round(15 * until_s)):
+        verdict = m.Verdict.IMPLAUSIBLE if rng.random() < refused else m.Verdict.ACCEPTED
+        nis = scale * sum(rng.gauss(0, 1) ** 2 for _ in range(3))
+        message = m.Innovation(
+            header=header(), observer="ceiling", subject=subject, verdict=verdict, residual=(0.0,) * 3, nis=nis
+        )
+        found.append(TimedMessage(i / 15, message))
+    return found
+
+
+def run_with(**series: object) -> RunData:
+    data = RunData(msgspec.structs.replace(UNKNOWN_FIELD, cameras={"ceiling": CEILING}), RunFacts(), end_s=20.0)
+    for name, value in series.items():
+        setattr(data, name, value)
+    return data
+
+
+def belief(moved_m: float = 0.0, turned_rad: float = 0.0, late_ms: float = 0.0) -> list[TimedMessage[m.Belief]]:
+    layout = tuple(f"ceiling.{what}" for what in ("x", "y", "z", "yaw", "roll_error", "pitch_error"))
+    mean = (moved_m, 0.0, 4.2, 0.0, turned_rad, 0.0)
+    lateness = (m.SensorLateness("ceiling", late_ms, 5.0),)
+    return [
+        TimedMessage(20.0, m.Belief(header=header(), mean=mean, covariance_upper=(), layout=layout, lateness=lateness))
+    ]
+
+
+def planned(observer: str, subject: str) -> list[TimedMessage[m.Plan]]:
+    solver = m.SolverReport("ok", 1, 0.001, 1, 1)
+    edges = (m.Edge(observer, subject, 100.0),)
+    return [
+        TimedMessage(
+            0.5 * i,
+            m.Plan(header=header(), topology="x", cost=1.0, controls=(), edges=edges, alternatives=(), solver=solver,
+                   mode="TRACK"),
+        )
+        for i in range(40)
+    ]  # fmt: skip
+
+
+def test_nothing_speaks_against_a_healthy_run() -> None:
+    trust = trust_of(
+        run_with(innovations=innovations(), beliefs=belief(0.01, 0.002, 5.0), plans=planned("ceiling", "drone_1"))
+    )
+    assert trust.doubts == []
+    (ceiling,) = trust.sensors
+    assert ceiling.verdict == "consistent"
+    assert ceiling.nis_per_dof == pytest.approx(1.0, abs=0.15)
+    assert ceiling.low is not None and ceiling.high is not None and 0.02 < ceiling.high - ceiling.low < 0.5
+    assert trust.links[0].seen_percent == pytest.approx(100.0, abs=0.1)
+    assert "Nothing speaks against it." in trust_section(trust)
+
+
+def test_an_empty_run_has_no_doubts() -> None:
+    assert trust_of(run_with()).doubts == []
+
+
+@pytest.mark.parametrize(
+    ("series", "words"),
+    [
+        (
+            {"innovations": innovations(scale=4.0)},
+            ("ceiling is wrong by more than it claims", "groundstation calibrate"),
+        ),
+        ({"innovations": innovations(refused=0.3)}, ("of what ceiling saw was refused as implausible",)),
+        ({"beliefs": belief(moved_m=0.05)}, ("ceiling hangs 0.050 m", "5 standard deviations", "extrinsics")),
+        ({"beliefs": belief(turned_rad=0.02)}, ("ceiling hangs 1.1 deg", "6 standard deviations")),
+        ({"beliefs": belief(late_ms=-40.0)}, ("pictures of ceiling come 40 +- 5 ms earlier", "calibrate delay")),
+        ({"plans": planned("ceiling", "drone_2")}, ("plans counted on ceiling seeing drone_2 for 20 s", "0 %")),
+    ],
+)
+def test_a_doubt_names_its_cause_and_remedy(series: dict[str, object], words: tuple[str, ...]) -> None:
+    trust = trust_of(run_with(**series))
+    (doubt,) = trust.doubts
+    for word in words:
+        assert word in doubt
+    assert "<li>" in trust_section(trust)
+
+
+def test_what_the_tracker_suspected_in_flight_is_told_once() -> None:
+    warning = m.Event(
+        header=header(entity="ceiling"), severity=m.Severity.WARNING, text="ceiling was bumped", remedy="fix it"
+    )
+    others = m.Event(header=header("drone_1"), severity=m.Severity.WARNING, text="drone_1 HOVER", remedy="RESUME")
+    trust = trust_of(
+        run_with(events=[TimedMessage(7.0, warning), TimedMessage(9.0, warning), TimedMessage(9.5, others)])
+    )
+    assert trust.doubts == ["told in flight, at 7 s: ceiling was bumped; fix it"]

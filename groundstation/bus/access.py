@@ -42,7 +42,7 @@ def audible(site: str, role: Role) -> list[str]:
 
 def access_control(access: AccessList) -> dict[str, Any]:
     """Return the section `access_control` of the router's configuration; anything not listed is denied."""
-    rules, policies, subjects = [], [], []
+    rules, policies = [], dict[str, list[str]]()
     for member in access.members:
         granted = {
             "hear": (["ingress"], ["declare_subscriber"], audible(access.site, member.role)),
@@ -50,16 +50,16 @@ def access_control(access: AccessList) -> dict[str, Any]:
             "learn": (["egress"], ["declare_subscriber"], audible(access.site, Role.VIEW)),
             "say": (["ingress"], ["put"], publishable(access.site, member)),
         }
-        own = [_rule(f"{member.name} {what}", *grant) for what, grant in granted.items() if grant[2]]
+        identity = f"{member.name} {member.role} {member.sources[0]}"
+        own = [_rule(f"{identity} {what}", *grant) for what, grant in granted.items() if grant[2]]
         rules += own
-        subjects.append({"id": member.name, "cert_common_names": [member.name]})
-        policies.append({"rules": [rule["id"] for rule in own], "subjects": [member.name]})
+        policies.setdefault(member.name, []).extend(rule["id"] for rule in own)
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in policies],
+        "policies": [{"rules": named, "subjects": [name]} for name, named in policies.items()],
     }
 
 

@@ -15,11 +15,15 @@ from groundstation.errors import MessageError
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Bytes under a key as they came, decoded later by the process's own loop."""
+    """Bytes under a key as they came, decoded later by the process's own loop.
+
+    arrived_ns: when the network had them, on this host's boot clock; 0 where nobody looked.
+    """
 
     key: str
     payload: bytes
     attachment: bytes = b""
+    arrived_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,15 +34,16 @@ class Received:
     header: Header
     message: Message | None
     payload: bytes
+    arrived_ns: int = 0
 
 
 def decode_sample(sample: Sample) -> Received:
     """Return the message of a sample; raises MessageError with the reason of a refusal."""
     key = keys.parse(sample.key)
     if key.topic.type is None:
-        return Received(key, codec.decode_header(key, sample.attachment), None, sample.payload)
+        return Received(key, codec.decode_header(key, sample.attachment), None, sample.payload, sample.arrived_ns)
     message = codec.decode(key, sample.payload)
-    return Received(key, message.header, message, sample.payload)
+    return Received(key, message.header, message, sample.payload, sample.arrived_ns)
 
 
 class Subscription:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
 
-from groundstation.bus import keys
+from groundstation.bus import clock, keys
 from groundstation.bus.api import Sample, Subscription
 from groundstation.bus.sender import Sender
 from groundstation.bus.topics import Topic
@@ -44,7 +44,7 @@ class MemoryBus(Sender):
 
     def put(self, topic: Topic, entity: str, payload: bytes, attachment: bytes) -> None:
         """Deliver to all matching subscriptions now."""
-        self._exchange.deliver(Sample(self.key(topic, entity), payload, attachment))
+        self._exchange.deliver(Sample(self.key(topic, entity), payload, attachment, clock.own_ns()))
 
     def close(self) -> None:
         """Nothing to release."""

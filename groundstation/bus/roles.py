@@ -23,6 +23,10 @@ class Role(StrEnum):
     """Draws on the operator's terminal."""
     SIM_BRIDGE = "sim_bridge"
     """Emulates devices and publishes the truth."""
+    LIAISON = "liaison"
+    """Speaks with one other host, for the supervisor."""
+    HOST = "host"
+    """Runs devices of the field on another host."""
     CLI = "cli"
     """A command in another shell."""
     VIEW = "view"
@@ -41,8 +45,8 @@ PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 class Member:
     """One certificate of a run, with its role and member.
 
-    name: the certificate's common name. sources: the sources that it may speak as, key chunks in which `$*` stands for
-    any ending. entities: what a device speaks of.
+    name: the certificate's common name; who has several roles by one certificate is several members. sources: the
+    sources that it may speak as, key chunks in which `$*` stands for any ending. entities: what a device speaks of.
     """
 
     name: str

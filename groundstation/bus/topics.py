@@ -55,7 +55,8 @@ _CONSOLE = frozenset({Role.CONSOLE})
 _SIMULATOR = frozenset({Role.SIM_BRIDGE})
 _ORDERING = frozenset({Role.SUPERVISOR, Role.TRACKER, Role.CONSOLE, Role.CLI})
 _ANSWERING = frozenset({Role.DRIVER, Role.SUPERVISOR})
-_NOBODY: frozenset[Role] = frozenset()
+_HOST = frozenset({Role.HOST})
+_LIAISON = frozenset({Role.LIAISON})
 
 IMU = Topic("imu", m.ImuSample, 200, Quality.SENSOR, _DRIVER)
 """Driver: body rates and specific force of a vehicle."""
@@ -94,8 +95,14 @@ EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)
 """Every process and the supervisor: lifecycle, CPU, deadlines."""
-CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE, _NOBODY)
-"""Offset between the clocks of two hosts. Nothing publishes it yet: all processes run on one host."""
+CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE, _HOST)
+"""Another host: offset of its clock to that of the run."""
+HOST_ORDER = Topic("host_order", m.HostOrder, 0, Quality.STATE, _LIAISON)
+"""Liaison to another host: the run, and the field with that host's devices."""
+HOST_REPORT = Topic("host_report", m.HostReport, 20, Quality.SENSOR, _HOST)
+"""Another host to its liaison: what it does, and what its clock reads."""
+HOST_ANSWER = Topic("host_answer", m.HostAnswer, 20, Quality.SENSOR, _LIAISON)
+"""Liaison to another host: what the run's supervisor does, and what the run's clock reads."""
 JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK, _TRACKER)
 """Tracker: inputs and adopted plan of each tick."""
 IMAGE = Topic("image", None, 5, Quality.BULK, _CAMERA, encoding="image/jpeg")
@@ -135,6 +142,9 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         EVENT,
         PROCESS_STATUS,
         CLOCK,
+        HOST_ORDER,
+        HOST_REPORT,
+        HOST_ANSWER,
         JOURNAL,
         IMAGE,
         VIDEO,

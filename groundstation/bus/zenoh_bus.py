@@ -167,10 +167,9 @@ class ZenohBus(Sender):
 
 def _enqueue_into(subscription: Subscription) -> Callable[[Any], None]:
     def enqueue(sample: Any) -> None:
-        attachment = sample.attachment
-        subscription.offer(
-            Sample(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
-        )
+        arrived_ns, attachment = time.monotonic_ns(), sample.attachment
+        annex = attachment.to_bytes() if attachment else b""
+        subscription.offer(Sample(str(sample.key_expr), sample.payload.to_bytes(), annex, arrived_ns))
 
     return enqueue
 

@@ -44,6 +44,12 @@ _SIMULATED: tuple[Option, ...] = (
     ),
     _HEADLESS,
     _ANYWAY,
+    click.option(
+        "--network",
+        metavar="A.B.C.0/24",
+        default="",
+        help="Network in which other hosts reach their emulated devices: drones at .11 and up, cameras at .50 and up.",
+    ),
     SETTINGS,
 )
 
@@ -115,7 +121,10 @@ def run_real(
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """What the options of `sitl` and `demo` ask for; real: what is not emulated; look_only: nobody takes off."""
+    """What the options of `sitl` and `demo` ask for; real: what is not emulated; look_only: nobody takes off.
+
+    network: where other hosts reach emulated devices.
+    """
 
     scenario: str
     duration: float | None
@@ -126,6 +135,7 @@ class Rehearsal:
     options: tuple[str, ...]
     real: tuple[str, ...] = ()
     look_only: bool = False
+    network: str = ""
 
 
 def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
@@ -152,7 +162,7 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
         seed = int(chosen.get("seed", 1))
     for sentence in drawing.beyond_walls(loaded, drawing.paths_of(chosen, loaded.tracked)):
         click.echo(f"scenario {scenario}: {sentence}", err=True)
-    net = network.claim(runtime_file.folder(), loaded.bus.port)
+    net = network.claim(runtime_file.folder(), loaded.bus.port, asked.network)
     try:
         simulation = Simulation(net, chosen, seed, parts)
         facts = RunFacts(
@@ -180,7 +190,8 @@ def _run(
     from groundstation.flight.retention import make_room
     from groundstation.flight.run_folder import log_to, make_run_dir, write_facts
     from groundstation.settings.resolved import yaml_of
-    from groundstation.supervisor.supervisor import Run, Supervisor
+    from groundstation.supervisor.run import Run
+    from groundstation.supervisor.supervisor import Supervisor
     from groundstation.supervisor.terminal import Terminal
 
     removed = [] if report else make_room(Path(field.recording.directory), field.recording.keep_gb)

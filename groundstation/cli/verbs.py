@@ -20,6 +20,7 @@ VERBS: dict[str, CommandRow] = {
         "Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras.", first=True
     ),
     "fly": CommandRow("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones.", first=True),
+    "host": CommandRow("Fly", "groundstation.cli.host:host", "Run the devices that a field gives to this host."),
     "takeoff": CommandRow("Fly", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
     "track": CommandRow("Fly", "groundstation.cli.stop:track", "Let the tracker move the drones."),
     "resume": CommandRow("Fly", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),

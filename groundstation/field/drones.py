@@ -64,6 +64,7 @@ class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
     enabled: bool = True
     address: str
     interface: str = ""
+    host: str = ""
     serial_number: str = ""
     limits: DroneLimits = DroneLimits()
     marker: DroneMarker

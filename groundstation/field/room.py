@@ -63,6 +63,7 @@ class WorldCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     source: str
     calibration: LensCalibration
     position_m: Vector3
+    host: str = ""
     looking: Literal["down"] = "down"
     rotation_deg: Vector3 = (0.0, 0.0, 0.0)
     video_delay_ms: float = 120.0
@@ -92,6 +93,7 @@ class MotionCapture(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     source: str
     volume_m: Volume
+    host: str = ""
     bodies: dict[str, RigidBody] = {}
     observes: tuple[Literal["robots", "targets"], ...] = ("robots",)
     up: Literal["y", "z"] = "z"

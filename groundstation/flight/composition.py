@@ -12,9 +12,11 @@ import msgspec
 from drivers.camera.settings import parse_source
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role
+from groundstation.errors import OperatorMistake
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
 from groundstation.flight.real_parts import ALL_EMULATED, RealParts
 from groundstation.process.ports import port_of
+from groundstation.runtime.liaison import VERSION, LiaisonSection
 from groundstation.runtime.router import RouterSection
 from groundstation.settings.behaviour import Bus
 from groundstation.settings.schema import Field
@@ -30,8 +32,8 @@ from groundstation.supervisor import process_table as rows
 from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
 from groundstation.supervisor.process_spec import ProcessSpec
-from groundstation.supervisor.site import hosts
-from groundstation.supervisor.supervisor import SOURCE
+from groundstation.supervisor.run import SOURCE
+from groundstation.supervisor.site import certificate_name, hosts
 from groundstation.vehicles import kind_named
 
 _SENSOR_DRIVERS = {CAMERA: "drivers.camera.driver:run", MOTION_CAPTURE: "drivers.motion_capture.driver:run"}
@@ -58,7 +60,9 @@ def fly_endpoint(field: Field) -> str:
 def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) -> Field:
     """Return the field with the addresses of its emulated devices; what is real keeps those of the file."""
     addresses = {
-        name: network.drone_address(index) for index, name in enumerate(field.drones) if name not in real.drones
+        name: network.of(drone.host).drone_address(index)
+        for index, (name, drone) in enumerate(field.drones.items())
+        if name not in real.drones
     }
     streams = _streams(field, network, real)
     return rerouted(field, addresses, streams, frozenset(real.drones), _captures(field, network))
@@ -67,16 +71,19 @@ def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) ->
 def _captures(field: Field, network: Network) -> dict[str, tuple[str, int]]:
     """Return where the emulated motion capture systems listen: behind the cameras."""
     first = len(field.cameras) + len(field.drones)
-    return {name: network.stream(first + index) for index, name in enumerate(field.motion_capture)}
+    systems = enumerate(field.motion_capture.items(), start=first)
+    return {name: network.of(system.host).stream(index) for index, (name, system) in systems}
 
 
 def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
-    streams = {name: network.stream(index) for index, name in enumerate((*field.cameras, *field.drones))}
+    hosts = {name: camera.host for name, camera in field.cameras.items()}
+    hosts |= {name: drone.host for name, drone in field.drones.items()}
+    streams = {name: network.of(host).stream(index) for index, (name, host) in enumerate(hosts.items())}
     for index, (name, drone) in enumerate(field.drones.items()):
         source = parse_source(drone.camera.source)
         # A drone sends its own video from its own address; a real one is none of ours, so its emulated camera is apart.
         if source.kind == kind_named(drone.kind).camera and name not in real.drones:
-            streams[name] = (network.drone_address(index), source.port)
+            streams[name] = (network.of(drone.host).drone_address(index), source.port)
     return {name: stream for name, stream in streams.items() if name not in real.cameras}
 
 
@@ -91,24 +98,55 @@ def process_table(
     table.append(replace(rows.TRACKER, section=core))
     if field.recording.enabled:
         table.append(replace(rows.RECORDER, section=core))
-    table += [_driver(section, field) for section in driver_sections(field)]
+    table += device_rows(field)
+    table += [_liaison(host, field) for host in hosts_of(field)]
     if field.console.enabled:
         page = json.dumps(json.loads(core) | {"truth": simulation is not None})
         table.append(replace(rows.CONSOLE, section=page))
     if monitor:
         table.append(replace(rows.MONITOR, section=core))
-    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table, field.bus))
+    elsewhere = [member for host in hosts_of(field) for member in members_on(host, field)]
+    table[0] = replace(rows.ROUTER, section=router_section(endpoint, field.site, table, field.bus, elsewhere))
     return guarded(tuple(table))
 
 
-def router_section(endpoint: str, site: str, table: Iterable[ProcessSpec], bus: Bus) -> str:
-    """Return what a router is handed: where it listens, and whom it lets speak as whom."""
+def hosts_of(field: Field) -> tuple[str, ...]:
+    """Return the other hosts that run devices of a field."""
+    return tuple(dict.fromkeys(section.host for section in driver_sections(field) if section.host))
+
+
+def device_rows(field: Field, host: str = "") -> list[ProcessSpec]:
+    """Return the drivers of one host: of the run's own, or of another one."""
+    return [_driver(section, field) for section in driver_sections(field) if section.host == host]
+
+
+def members_on(host: str, field: Field) -> list[Member]:
+    """Return who another host may speak as: itself, and the devices that it runs; raises OperatorMistake."""
+    certificate = certificate_name(host)
+    if certificate not in {member.name for member in hosts(field.site)}:
+        raise OperatorMistake(
+            f"{host} is to run devices and was not admitted: groundstation site admit {field.site} {host} "
+            f"{field.bus.listen}"
+        )
+    devices = [Member(certificate, Role(row.role), (row.name,), row.entities) for row in device_rows(field, host)]
+    return [Member(certificate, Role.HOST, (host,), (host,)), *devices]
+
+
+def _liaison(host: str, field: Field) -> ProcessSpec:
+    section = LiaisonSection(host, VERSION, field.model_dump_json())
+    return replace(rows.LIAISON, name=f"liaison_{host}", section=msgspec.json.encode(section).decode())
+
+
+def router_section(
+    endpoint: str, site: str, table: Iterable[ProcessSpec], bus: Bus, elsewhere: Iterable[Member] = ()
+) -> str:
+    """Return what a router is handed: where it listens, and whom it lets speak as whom, here and on other hosts."""
     members = [
         Member(spec.name, Role(spec.role), (spec.name,), spec.entities or (spec.name,)) for spec in table if spec.on_bus
     ]
     members += [Member(SOURCE, Role.SUPERVISOR, (SOURCE,)), *SHELLS]
     also = (f"tls/{bus.listen}:{port_of(endpoint)}",) if bus.listen else ()
-    members += hosts(site) if bus.listen else ()
+    members += (*hosts(site), *elsewhere) if bus.listen else ()
     access = AccessList(site, tuple(members))
     return msgspec.json.encode(RouterSection(endpoint, access, also, bus.name_refusals)).decode()
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
+from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.roles import Identity
@@ -30,7 +31,8 @@ class ChildSpec:
 
     name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none),
     with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did); identity:
-    what it shows the router, or the router shows others (None: nobody asks).
+    what it shows the router, or the router shows others (None: nobody asks); clock: id of the run's clock where that is
+    another host's ("": this host's own).
     """
 
     name: str
@@ -42,6 +44,7 @@ class ChildSpec:
     section: str = "{}"
     parent_pid: int = 0
     identity: Identity | None = None
+    clock: str = ""
 
 
 class Child:
@@ -74,6 +77,8 @@ class Child:
         self._stop.install()
         if self.spec.heartbeat:
             self._block = HeartbeatBlock.attach(self.spec.heartbeat)
+            if self.spec.clock:
+                clock.follow(self.spec.clock, self._block.clock_offset_ns)
         self._set_state(Lifecycle.STARTING, "")
         if self.spec.endpoint:
             from groundstation.bus.zenoh_bus import open_bus
@@ -99,6 +104,9 @@ class Child:
         self._stop.close()
         self._parent.close()
         if self._block is not None:
+            if self.spec.clock:
+                last_ns = self._block.clock_offset_ns()
+                clock.follow(self.spec.clock, lambda: last_ns)  # threads of a driver may still read it
             self._block.close()
             self._block = None
 

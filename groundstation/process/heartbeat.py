@@ -17,7 +17,7 @@ from groundstation.errors import GroundStationError
 
 SUPERVISOR_SLOT = 0
 _WORDS_PER_SLOT = 16  # whole cache lines, so that two beating processes never share one
-_STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE = 0, 1, 2, 3, 4, 5
+_STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE, _CLOCK_OFFSET = 0, 1, 2, 3, 4, 5, 6
 _ADDRESSES, MOST_ADDRESSES = 8, 8
 _LEFT_BEHIND_NS = 10_000_000_000
 
@@ -129,6 +129,14 @@ class HeartbeatBlock:
     def silent_since_ns(self, slot: int) -> int:
         """Return since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
         return self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE]
+
+    def set_clock_offset(self, offset_ns: int) -> None:
+        """Record what is to be added to this host's boot clock to read that of the run [ns]."""
+        self._words[SUPERVISOR_SLOT * _WORDS_PER_SLOT + _CLOCK_OFFSET] = offset_ns
+
+    def clock_offset_ns(self) -> int:
+        """Return the same; 0 on the run's own host."""
+        return self._words[SUPERVISOR_SLOT * _WORDS_PER_SLOT + _CLOCK_OFFSET]
 
     def beat_ns(self, slot: int) -> int:
         """Return the time of the last beat [ns], 0 for a slot that never beat."""

@@ -3,9 +3,9 @@
 import os
 import select
 import signal
-import time
 from contextlib import suppress
 
+from groundstation.bus import clock
 from groundstation.process.parent import ParentWatch
 
 
@@ -40,16 +40,16 @@ class StopSignal:
             os.write(self._write, b"\0")
 
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until a monotonic time or `wake`; returns False when a stop or the parent's death ended the sleep."""
+        """Sleep until a time of the bus clock or `wake`; False when a stop or the parent's death ended the sleep."""
         watched = [self._read]
         if self._parent.descriptor >= 0 and not self._parent_reported:
             watched.append(self._parent.descriptor)
         # select, unlike poll, takes less than a millisecond: one wait and one wake-up for each sleep.
         while True:
-            left_ns = 0 if self._nudged else max(0, deadline_ns - time.monotonic_ns())
+            left_ns = 0 if self._nudged else max(0, deadline_ns - clock.now_ns())
             if self._woken(select.select(watched, (), (), left_ns / 1e9)[0]):
                 return False
-            if self._nudged or time.monotonic_ns() >= deadline_ns:
+            if self._nudged or clock.now_ns() >= deadline_ns:
                 self._nudged = False
                 return True
 

@@ -13,7 +13,7 @@ def findings_of_adapters(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath,
     """Return vehicles that cannot be told apart, and videos that would not be taken through their vehicle's adapter."""
     for (first, one), (second, other) in combinations(drones.items(), 2):
         apart = one.interface and other.interface and one.interface != other.interface
-        if one.address == other.address and not apart:
+        if one.address == other.address and one.host == other.host and not apart:
             text = f"address {one.address} is already that of {first}; behind an adapter each, both need an interface"
             yield ("drones", second, "address"), text
     for name, drone in drones.items():

@@ -153,8 +153,8 @@ class Bus(SettingsSection):
     port: Annotated[int, Field(ge=1024, le=65535)] = 4717
     """TCP port of the router. A simulated run takes the next free one if it is taken."""
     listen: AddressOrNone = ""
-    """Address of this host at which hosts that the site has admitted (`groundstation site`) may stop and order; empty:
-    loopback only."""
+    """Address of this host at which hosts that the site has admitted (`groundstation site`) may stop and order, and run
+    the devices that name them (`host`); empty: loopback only."""
     name_refusals: bool = True
     """Whether an event names each member of the run that publishes what it may not. The router traces every message for
     that; without it, it drops such messages silently."""

@@ -102,8 +102,9 @@ def _addresses(field: Field) -> Iterator[Finding]:
 
 
 def _adapters(field: Field) -> Iterator[Finding]:
-    known, shared = adapters(), Counter(drone.address for drone in field.drones.values())
-    for name, drone in field.drones.items():
+    ours = {name: drone for name, drone in field.drones.items() if not drone.host}
+    known, shared = adapters(), Counter(drone.address for drone in ours.values())
+    for name, drone in ours.items():
         path = ("drones", name, "interface")
         if drone.interface and drone.interface not in known:
             yield path, f"is no network adapter of this machine (got {drone.interface}); it has {', '.join(known)}"

@@ -8,9 +8,10 @@ from itertools import combinations
 from drivers.camera.settings import parse_source
 from groundstation.errors import without_password
 from groundstation.settings.adapter_checks import findings_of_adapters
-from groundstation.settings.behaviour import EstimatorSettings, PlannerSettings, SafetySettings
+from groundstation.settings.behaviour import Bus, EstimatorSettings, PlannerSettings, SafetySettings
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
+from groundstation.settings.host_checks import findings_of_hosts
 from groundstation.settings.kind_checks import findings_of_kinds
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.motion_capture import MotionCaptureSettings
@@ -44,6 +45,7 @@ class Parts:
     estimator: EstimatorSettings | None = None
     planner: PlannerSettings | None = None
     safety: SafetySettings | None = None
+    bus: Bus | None = None
 
     @property
     def tracked(self) -> dict[KeyPath, tuple[str, TrackedBody]]:
@@ -147,21 +149,31 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
         for name, drone in parts.drones.items()
     ]
     sources: list[tuple[KeyPath, object, str]] = [
-        (("cameras", name, "source"), without_password(camera.source), name) for name, camera in parts.cameras.items()
+        (("cameras", name, "source"), _placed(camera.source, camera.host), name)
+        for name, camera in parts.cameras.items()
     ]
     for path, (name, target) in parts.tracked.items():
         codes.append(((*path, "marker", _key_of(target.marker)), target.marker.identity, name))
     sources += [
-        (("drones", name, "camera", "source"), without_password(drone.video_source), name)
+        (("drones", name, "camera", "source"), _placed(drone.video_source, drone.host), name)
         for name, drone in parts.drones.items()
     ]
     yield from _unique(codes, "marker code")
     yield from _unique(sources, "camera source")
 
 
+def _placed(source: str, host: str) -> str:
+    """Return a source as the operator may read it; each host has its own devices and networks."""
+    return without_password(source) + (f" on {host}" if host else "")
+
+
 def _kinds(parts: Parts) -> Iterator[Finding]:
     yield from findings_of_adapters(parts.drones)
     yield from findings_of_kinds(parts.drones)
+
+
+def _hosts(parts: Parts) -> Iterator[Finding]:
+    yield from findings_of_hosts(parts.drones, parts.cameras, parts.motion_capture, parts.bus)
 
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
@@ -255,6 +267,7 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _pads,
     _distinct,
     _kinds,
+    _hosts,
     _own_video,
     _names,
     _heights,

@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError, PydanticKnownError
 from drivers.camera.settings import behind_adapter, parse_source
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
-from groundstation.settings.values import Address, OnVehicle, SettingsSection, Source, Vector2, VideoDelay
+from groundstation.settings.values import Address, HostName, OnVehicle, SettingsSection, Source, Vector2, VideoDelay
 from groundstation.vehicles import KindSection, all_kinds, kind_named, refused_kinds
 
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
@@ -129,6 +129,9 @@ class DroneOfAnyKind(SettingsSection):
     """Network adapter of this computer that leads to the vehicle, such as wlan1; its video at the same address is
     taken from there too. For vehicles that all have the same address, each behind an adapter of its own. Empty: as this
     computer's routes say."""
+    host: HostName = ""
+    """Name of the host that the vehicle's driver and its camera's run on, as the site admitted it (`groundstation site
+    admit`); there: `groundstation host`. Empty: the host of the run."""
     serial_number: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{0,40}$")] = ""
     """Serial number of the vehicle (of a MAVLink one: its uid2, else uid): another one at its address does not take
     off. groundstation ardrone probe and mavlink probe show it."""

@@ -136,7 +136,7 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
         return {name: value for name, entry in _without(entries, below).items() if (value := _valid(model, entry))}
 
     # The defaults of Field stand in for sections that are left out; one that is required is a fault of its own.
-    single = ("room", "target", "estimator", "planner", "safety")
+    single = ("room", "target", "estimator", "planner", "safety", "bus")
     return Parts(
         cameras=named("cameras"),
         motion_capture=named("motion_capture"),

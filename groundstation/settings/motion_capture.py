@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from drivers.motion_capture.settings import parse_source
-from groundstation.settings.values import Interval, Name, OnVehicle, SettingsSection, Vector3
+from groundstation.settings.values import HostName, Interval, Name, OnVehicle, SettingsSection, Vector3
 
 Heading = Annotated[float, Field(ge=-180, le=180)]
 
@@ -48,6 +48,8 @@ class MotionCaptureSettings(SettingsSection):
     """Where it listens: natnet:// (OptiTrack's Motive), vicon://, qualisys:// or vrpn:// with its host; or ros2:// with
     the host of a ROS 2 Zenoh router and a path, for topics /PATH/BODY/pose; or the scheme of an installed plug-in
     (entry point `skein.world_sensors`)."""
+    host: HostName = ""
+    """Name of the host that listens to it, as the site admitted it. Empty: the host of the run."""
     volume_m: VolumeSettings
     """The box in which it sees bodies [m; world]. The planner counts on it; poses outside of it are not used."""
     bodies: dict[Name, RigidBodySettings] = Field(default_factory=dict)

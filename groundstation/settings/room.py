@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from groundstation.settings.values import Interval, SettingsSection, Source, Vector3, VideoDelay, of_length
+from groundstation.settings.values import HostName, Interval, SettingsSection, Source, Vector3, VideoDelay, of_length
 
 Length = Annotated[float, Field(gt=0, le=100)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
@@ -109,6 +109,8 @@ class WorldCameraSettings(SettingsSection):
 
     source: Source
     """Where the images come from: http:// or rtsp:// address, /dev/videoN, video file or folder of images."""
+    host: HostName = ""
+    """Name of the host that the camera's driver runs on, as the site admitted it. Empty: the host of the run."""
     calibration: CalibrationSettings
     """Lens calibration: the name of a file beside the field file, or its content."""
     position_m: Vector3

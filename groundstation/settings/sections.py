@@ -26,7 +26,7 @@ MOTION_CAPTURE = "motion_capture"
 class DriverSection:
     """One driver process: its name, its kind, what it drives (a drone or a sensor of the field), and its section.
 
-    entities: all that it speaks of.
+    entities: all that it speaks of. host: the other host that it runs on, "" for the run's own.
     """
 
     name: str
@@ -34,6 +34,7 @@ class DriverSection:
     entity: str
     section: str
     entities: tuple[str, ...]
+    host: str = ""
 
 
 def rerouted(
@@ -108,7 +109,9 @@ def driver_sections(field: Field) -> list[DriverSection]:
     count = len(field.cameras) + len(field.drones)
     phases = [index / (count * SEARCH_RATE_HZ) for index in range(count)]
     fixed = [
-        DriverSection(name, CAMERA, name, world_camera(field, name, camera, phase).model_dump_json(), (name,))
+        DriverSection(
+            name, CAMERA, name, world_camera(field, name, camera, phase).model_dump_json(), (name,), camera.host
+        )
         for (name, camera), phase in zip(field.cameras.items(), phases, strict=False)
     ]
     carried = [
@@ -118,12 +121,13 @@ def driver_sections(field: Field) -> list[DriverSection]:
             name,
             onboard_camera(field, name, drone, phase).model_dump_json(),
             (name, camera_name(name)),
+            drone.host,
         )
         for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
     ]
     captured = [
-        DriverSection(name, MOTION_CAPTURE, name, capture_section(field, name).model_dump_json(), (name,))
-        for name in field.motion_capture
+        DriverSection(name, MOTION_CAPTURE, name, capture_section(field, name).model_dump_json(), (name,), system.host)
+        for name, system in field.motion_capture.items()
     ]
     return _vehicles(field) + fixed + captured + carried
 
@@ -143,11 +147,11 @@ def vehicle_order(field: Field, name: str) -> VehicleOrder:
 
 
 def _vehicles(field: Field) -> list[DriverSection]:
-    orders: dict[str, list[VehicleOrder]] = {}
+    orders: dict[tuple[str, str], list[VehicleOrder]] = {}
     for name, drone in field.drones.items():
-        orders.setdefault(drone.kind, []).append(vehicle_order(field, name))
+        orders.setdefault((drone.kind, drone.host), []).append(vehicle_order(field, name))
     return [
-        DriverSection(process.vehicles[0], kind, process.vehicles[0], process.section, process.vehicles)
-        for kind, group in orders.items()
+        DriverSection(process.vehicles[0], kind, process.vehicles[0], process.section, process.vehicles, host)
+        for (kind, host), group in orders.items()
         for process in kind_named(kind).processes(group)
     ]

@@ -47,6 +47,7 @@ def _is_source(value: str) -> str:
 
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+HostName = Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]{0,15})?$")]
 Vector2 = Annotated[tuple[float, float], of_length(2)]
 Vector3 = Annotated[tuple[float, float, float], of_length(3)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]

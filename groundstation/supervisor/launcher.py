@@ -13,6 +13,7 @@ from groundstation.bus.roles import Identity
 from groundstation.errors import GroundStationError
 from groundstation.process.child import ChildSpec
 from groundstation.supervisor.process_spec import ProcessSpec
+from groundstation.supervisor.run import Run
 
 # 13 processes on 2 cores: a thread pool per process would only fight over them.
 _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -21,10 +22,9 @@ _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 class Launcher:
     """Knows the run folder and the environment that children get; log files stay open across restarts."""
 
-    def __init__(self, run_dir: Path, endpoint: str, site: str, heartbeat: str, identities: Path | None = None) -> None:
-        self._run_dir = run_dir
-        self._endpoint = endpoint
-        self._site = site
+    def __init__(self, run: Run, heartbeat: str, identities: Path | None = None) -> None:
+        self._run = run
+        self._run_dir = run.run_dir
         self._heartbeat = heartbeat
         self._identities = identities
         self._logs: dict[str, BinaryIO] = {}
@@ -52,13 +52,14 @@ class Launcher:
             ChildSpec(
                 name=spec.name,
                 role=spec.role,
-                endpoint=self._endpoint if spec.on_bus else "",
-                site=self._site,
+                endpoint=self._run.endpoint if spec.on_bus else "",
+                site=self._run.site,
                 heartbeat=self._heartbeat,
                 heartbeat_index=slot,
                 section=json.dumps(section),
                 parent_pid=os.getpid(),
                 identity=self._identity(spec),
+                clock=self._run.clock if spec.on_bus else "",
             )
         )
         if spec.command:
@@ -69,9 +70,10 @@ class Launcher:
             return self._popen(spec, command, specification.fileno())
 
     def _identity(self, spec: ProcessSpec) -> Identity | None:
-        if self._identities is None or not (spec.on_bus or spec.is_router):
+        if not (spec.on_bus or spec.is_router):
             return None
-        return Identity(str(self._identities), spec.name, self._run_dir.name)
+        own = Identity(str(self._identities), spec.name, self._run.name) if self._identities else None
+        return own or self._run.identity
 
     def _command(self, spec: ProcessSpec, document: dict[str, object]) -> list[str]:
         path = self._run_dir / f"{spec.name}.json"

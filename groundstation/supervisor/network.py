@@ -2,10 +2,11 @@
 
 import fcntl
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from ipaddress import IPv4Network
 from pathlib import Path
 
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.process.ports import holder_of, host_of, is_free, networks_in_use, port_of
 from groundstation.supervisor import runtime_file
 
@@ -18,13 +19,21 @@ _CANDIDATES = [(a, b) for a in range(64, 128) for b in range(1, 5)]
 class Network:
     """127.a.b.0/24, held as long as the lock's descriptor is open here or in a child that inherited it.
 
-    bus_port: of the router; stream_port: of all emulated network cameras.
+    bus_port: of the router; stream_port: of all emulated network cameras. outside: first three numbers of the network
+    in which other hosts reach emulated devices, "" for none.
     """
 
     prefix: str
     lock: int
     bus_port: int
     stream_port: int
+    outside: str = ""
+
+    def of(self, host: str) -> "Network":
+        """Return where the emulated devices of another host are, or of this one (""); raises OperatorMistake."""
+        if host and not self.outside:
+            raise OperatorMistake(f"{host} cannot reach emulated devices on loopback: give --network 192.168.1.0/24")
+        return replace(self, prefix=self.outside) if host else self
 
     @property
     def endpoint(self) -> str:
@@ -44,23 +53,34 @@ class Network:
         os.close(self.lock)
 
 
-def claim(folder: Path, bus_port: int) -> Network:
+def claim(folder: Path, bus_port: int, outside: str = "") -> Network:
     """Return the first free network, locked by a file in the folder, with ports that nobody holds on all addresses.
 
-    bus_port: first choice for the router, as 8080 is for the cameras; the next ones follow. Raises GroundStationError
-    when there is no network or no port.
+    bus_port: first choice for the router, as 8080 is for the cameras; the next ones follow. outside: the network of
+    emulated devices of other hosts, as A.B.C.0/24. Raises GroundStationError when there is no network or no port.
     """
+    reachable = _prefix(outside) if outside else ""
     in_use = networks_in_use()  # by another user's run, whose locks are elsewhere
     for a, b in _CANDIDATES:
         prefix = f"127.{a}.{b}"
         if prefix in in_use or (lock := _lock(folder / f"{prefix}.lock")) is None:
             continue
         try:
-            return Network(prefix, lock, _free_port(prefix, bus_port), _free_port(prefix, _STREAM_PORT))
+            return Network(prefix, lock, _free_port(prefix, bus_port), _free_port(prefix, _STREAM_PORT), reachable)
         except GroundStationError:
             os.close(lock)
             raise
     raise GroundStationError(f"all {len(_CANDIDATES)} loopback networks are held by other simulated runs: end some")
+
+
+def _prefix(network: str) -> str:
+    try:
+        parsed = IPv4Network(network)
+    except ValueError:
+        parsed = None
+    if parsed is None or parsed.prefixlen != 24:
+        raise OperatorMistake(f"--network {network}: must be a network such as 192.168.1.0/24")
+    return str(parsed.network_address).rpartition(".")[0]
 
 
 def _lock(path: Path) -> int | None:

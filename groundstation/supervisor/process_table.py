@@ -64,6 +64,13 @@ CAMERA = ProcessSpec(  # name and entry are those of the camera
     hang_limit_s=2.0,  # a decoder may stop for longer than a drone may be left alone
     stop_order=StopOrder.DRIVES,
 )
+LIAISON = ProcessSpec(  # name is that of the other host
+    name="",
+    role="liaison",
+    entry="groundstation.runtime.liaison:run",
+    required=False,  # the devices of this host can do without
+    stop_limit_s=30.0,  # the drones there land before it ends
+)
 CONSOLE = ProcessSpec(
     name="console",
     role="console",
@@ -82,4 +89,4 @@ MONITOR = ProcessSpec(
     stop_order=StopOrder.DECIDES,  # the terminal is the operator's again before the shut-down writes on it
     on_terminal=True,
 )
-ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, CONSOLE, MONITOR)
+ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, LIAISON, CONSOLE, MONITOR)

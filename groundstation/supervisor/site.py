@@ -85,8 +85,13 @@ def hosts(site: str) -> tuple[Member, ...]:
     return tuple(_member(host) for host in _names(site))
 
 
+def certificate_name(host: str) -> str:
+    """Return the name in the certificate of an admitted host."""
+    return f"host-{host}"
+
+
 def _member(host: str) -> Member:
-    return Member(f"host-{host}", Role.CLI, (f"cli_{host}_$*", f"deadman_{host}_$*"))
+    return Member(certificate_name(host), Role.CLI, (f"cli_{host}_$*", f"deadman_{host}_$*"))
 
 
 def admit(site: str, host: str, endpoint: str, file: Path) -> None:
@@ -136,6 +141,16 @@ def join(file: Path) -> Admission:
     write_private(place / f"{name}{KEY}", admission.key.encode())
     write_private(place / "admission.json", msgspec.json.encode(msgspec.structs.replace(admission, key="")))
     return admission
+
+
+def membership(site: str | None) -> tuple[Admission, Identity]:
+    """Return what this host was admitted with, and its identity; raises OperatorMistake where that is not one site."""
+    paths = sorted(folder("joined", "").glob(f"{site or '*'}/admission.json"))
+    if len(paths) != 1:
+        known = ", ".join(path.parent.name for path in paths) or "none"
+        raise OperatorMistake(f"this host must have joined the site it serves (groundstation site join): {known}")
+    admission = msgspec.json.decode(paths[0].read_bytes(), type=Admission)
+    return admission, Identity(str(paths[0].parent), certificate_name(admission.host), "")
 
 
 def runs() -> Iterator[RuntimeRecord]:

@@ -13,7 +13,6 @@ from groundstation.supervisor.managed_process import ManagedProcess
 
 _PERIOD_NS = 1_000_000_000
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-_SUPERVISOR = "supervisor"
 
 
 class StatusPublisher:
@@ -29,7 +28,7 @@ class StatusPublisher:
         if now_ns < self._next_ns:
             return
         self._next_ns = now_ns + _PERIOD_NS
-        self._publish(_SUPERVISOR, Lifecycle.READY, os.getpid(), self._own_share(now_ns), "")
+        self._publish(self._bus.source, Lifecycle.READY, os.getpid(), self._own_share(now_ns), "")
         for process in processes:
             name, pid = process.spec.name, process.pid
             if not process.running:

@@ -6,9 +6,8 @@ import select
 import shutil
 import signal
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 from groundstation.bus.api import Subscription
 from groundstation.bus.messages import Lifecycle, ProcessStatus, Severity
@@ -24,11 +23,11 @@ from groundstation.supervisor.interrupts import Interrupts
 from groundstation.supervisor.launcher import Launcher
 from groundstation.supervisor.managed_process import ManagedProcess, exit_text
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder, slot_of
+from groundstation.supervisor.run import SOURCE, Run
 from groundstation.supervisor.status import StatusPublisher
 from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
-SOURCE = "supervisor"
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200_000_000
 _HURRY_S = 1.0
@@ -37,41 +36,28 @@ _KERNEL_S = 3.0
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """What a run is called and where it happens; real: the drones that exist.
-
-    listen: address at which the router is there for other hosts of the site, "" for none.
-    """
-
-    site: str
-    field: str
-    endpoint: str
-    run_dir: Path
-    drones: tuple[str, ...]
-    real: tuple[str, ...] = ()
-    listen: str = ""
-
-    @property
-    def guarded(self) -> bool:
-        """Whether its bus belongs to it alone."""
-        return self.endpoint.startswith("tls/")
-
-
 class Supervisor:
     """Owns all processes of a run, which `Start` starts.
 
-    `step` must be called 10 times a second or more; it sleeps by itself.
+    `step` must be called 10 times a second or more; it sleeps by itself. watched: asked in each step whether it is to
+    beat; on another host than the run's it speaks for the run's supervisor, and is silent when that is.
     """
 
-    def __init__(self, run: Run, table: tuple[ProcessSpec, ...], terminal: Terminal) -> None:
+    def __init__(
+        self,
+        run: Run,
+        table: tuple[ProcessSpec, ...],
+        terminal: Terminal,
+        watched: Callable[["HeartbeatBlock"], bool] = lambda block: True,
+    ) -> None:
         self.run = run
+        self._watched = watched
         self.terminal = terminal
         self.events = ProcessEvents(terminal)
         self.interrupts = Interrupts()
         self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
-        self._identities = runtime_file.identities_of(run.site, os.getpid()) if run.guarded else None
-        self._launcher = Launcher(run.run_dir, run.endpoint, run.site, str(self._block.path), self._identities)
+        self._identities = runtime_file.identities_of(run.site, os.getpid()) if run.makes_identities else None
+        self._launcher = Launcher(run, str(self._block.path), self._identities)
         self.processes = [ManagedProcess(spec, slot_of(index), self._block) for index, spec in enumerate(table)]
         self._last_words = FailsafeSender()
         self.bus: ZenohBus | None = None
@@ -111,12 +97,14 @@ class Supervisor:
 
     def connect(self) -> None:
         """Join the bus; its router is up."""
-        self.bus = self.events.bus = open_bus(self.run.endpoint, self.run.site, SOURCE, identity=self._identity())
+        run = self.run
+        self.bus = self.events.bus = open_bus(run.endpoint, run.site, run.source, identity=self._identity())
         self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
         self._publisher = StatusPublisher(self.bus)
 
     def _identity(self) -> Identity | None:
-        return Identity(str(self._identities), SOURCE, self.run.run_dir.name) if self._identities else None
+        own = Identity(str(self._identities), SOURCE, self.run.name) if self._identities else None
+        return own or self.run.identity
 
     def launch(self, process: ManagedProcess) -> None:
         """Start a process; one that cannot be executed is tried again, or is the failure of a run that needs it."""
@@ -159,9 +147,9 @@ class Supervisor:
 
     def step(self, timeout_s: float = _TURN_S) -> None:
         """Sleep until something happens or the time-out, then look after every process once."""
-        self._block.beat(SUPERVISOR_SLOT)
+        self._beat()
         self._sleep(timeout_s)
-        self._block.beat(SUPERVISOR_SLOT)
+        self._beat()
         now_ns = time.monotonic_ns()
         if now_ns - self._turn_ns > _OWN_DELAY_NS + int(timeout_s * NS_PER_S):
             self._awake_since_ns = now_ns  # it was frozen itself: nobody's silence before now counts
@@ -172,6 +160,10 @@ class Supervisor:
         self._last_words.send_due(now_ns)
         if self._publisher is not None:
             self._publisher.publish_due(now_ns, self.processes)
+
+    def _beat(self) -> None:
+        if self._watched(self._block):
+            self._block.beat(SUPERVISOR_SLOT)
 
     @property
     def unwell(self) -> list[str]:
@@ -205,7 +197,8 @@ class Supervisor:
         if not process.running:
             if process.restart_due_ns is not None and now_ns >= process.restart_due_ns and not self._stopping:
                 self.launch(process)
-                self.write_runtime_file()
+                if self._record is not None:
+                    self.write_runtime_file()
             return
         code = process.reap()
         if code is not None:

@@ -26,13 +26,13 @@ from groundstation.bus.messages.flight import (
     VelocitySetpoint,
     Verb,
 )
+from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
 from groundstation.bus.messages.process import RUN, Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.messages.sensing import (
     BodyPose,
     BodyPoses,
     CameraStatus,
-    ClockOffset,
     ImuSample,
     Odometry,
     PoseHypothesis,
@@ -60,6 +60,9 @@ __all__ = [
     "Event",
     "FlightState",
     "Header",
+    "HostAnswer",
+    "HostOrder",
+    "HostReport",
     "ImuSample",
     "Innovation",
     "JournalEntry",
@@ -79,6 +82,7 @@ __all__ = [
     "SimCommand",
     "SimStatus",
     "SolverReport",
+    "Supervision",
     "TargetSearch",
     "TruthState",
     "Vector3",

@@ -138,12 +138,3 @@ class CameraStatus(Message, frozen=True, kw_only=True):
     """Mean grey value of the newest image, 0 to 1; none: there is no image."""
     edge_px: float | None = None
     """Width of its sharpest edges [px]; none: nothing in it has contrast."""
-
-
-class ClockOffset(Message, frozen=True, kw_only=True):
-    """Offset between two clocks."""
-
-    of: str
-    """The other clock."""
-    offset_ns: int
-    """To be added to its stamps to read them on `header.clock` [ns]."""

@@ -99,8 +99,8 @@ def test_a_fault_of_one_drone_does_not_hide_those_between_drones() -> None:
     assert [problem.split(": ", 1)[1] for problem in problems()] == [
         "defaults.limits.battery_min: must be <= 0.9 (got 15)",
         "drones.drone_2.pad_m: is 0.20 m from the pad of drone_1: must be >= 0.6 (safety.min_separation_m)",
-        "drones.drone_2.colour: unknown key; known here: kind, enabled, address, interface, serial_number, limits,"
-        " marker, camera, odometry, pad_m, pad_yaw_deg, video, ardrone, mavlink, tello, type",
+        "drones.drone_2.colour: unknown key; known here: kind, enabled, address, interface, host, serial_number,"
+        " limits, marker, camera, odometry, pad_m, pad_yaw_deg, video, ardrone, mavlink, tello, type",
     ]
 
 

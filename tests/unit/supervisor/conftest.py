@@ -12,7 +12,8 @@ import pytest
 from groundstation.flight.composition import router_section
 from groundstation.settings.behaviour import Bus
 from groundstation.supervisor.process_spec import ProcessSpec, StopOrder
-from groundstation.supervisor.supervisor import Run, Supervisor
+from groundstation.supervisor.run import Run
+from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 HERE = Path(__file__).parent

@@ -22,8 +22,9 @@ from dummy_table import spec, until
 from groundstation.supervisor.guard_order import GuardOrder, guarded
 from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.supervisor.process_spec import FailsafeDatagrams, ProcessSpec
+from groundstation.supervisor.run import Run
 from groundstation.supervisor.runtime_file import start_time
-from groundstation.supervisor.supervisor import Run, Supervisor
+from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 HERE = Path(__file__).parent
@@ -98,7 +99,8 @@ def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
 SCRIPT = """
     import json, pickle, sys
     from pathlib import Path
-    from groundstation.supervisor.supervisor import Run, Supervisor
+    from groundstation.supervisor.run import Run
+    from groundstation.supervisor.supervisor import Supervisor
     from groundstation.supervisor.terminal import Terminal
     folder, rows = Path(sys.argv[1]), pickle.loads(bytes.fromhex(sys.argv[2]))
     supervisor = Supervisor(Run("lab", "lab", "", folder, ()), rows, Terminal())

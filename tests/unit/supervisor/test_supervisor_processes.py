@@ -133,7 +133,8 @@ def test_killed_supervisor_leaves_no_orphan(tmp_path: Path, monkeypatch: pytest.
         import json
         from pathlib import Path
         from groundstation.supervisor.start import Start
-        from groundstation.supervisor.supervisor import Run, Supervisor
+        from groundstation.supervisor.run import Run
+        from groundstation.supervisor.supervisor import Supervisor
         from groundstation.supervisor.process_spec import *
         from groundstation.supervisor.terminal import Terminal
         endpoint = "tcp/127.0.0.1:{free_port()}"

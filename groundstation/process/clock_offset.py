@@ -1,0 +1,94 @@
+"""The offset of another host's clock from round trips, by the quickest of them. Pure; times in ns.
+
+A round trip bounds the offset by half of its delay whatever the network did, and the quickest of each second is nearly
+free of queues. What stays is half of the difference between the two ways: nobody can measure that.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+from groundstation.time_units import NS_PER_S
+
+# Clocks of two computers run apart by 50 us in a second at most; the line through half a minute follows that.
+_SECONDS, _LINE_S = 32, 8
+_TRIPS_TO_START = 10
+_STEADIEST_NS = 200_000.0
+_DRIFT_LIMIT = 200e-6
+# Corrections by which a clock that is followed is led to its offset; more than _STEP_NS is a clock that was set.
+_SLEW_PER_S, _STEP_NS = 500e-6, 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class RoundTrip:
+    """A question and its answer: sent and heard by our clock, received and answered by the other one."""
+
+    sent_ns: int
+    received_ns: int
+    answered_ns: int
+    heard_ns: int
+
+    @property
+    def offset_ns(self) -> int:
+        """What is to be added to our clock to read the other one, if both ways took as long."""
+        return (self.received_ns - self.sent_ns + self.answered_ns - self.heard_ns) // 2
+
+    @property
+    def delay_ns(self) -> int:
+        """Both ways together, without the time at the other end."""
+        return self.heard_ns - self.sent_ns - (self.answered_ns - self.received_ns)
+
+
+class OffsetFilter:
+    """Keeps the quickest round trip of each second, and the line through them."""
+
+    def __init__(self) -> None:
+        self._trips = 0
+        self._quickest: deque[RoundTrip] = deque(maxlen=_SECONDS)
+
+    def take(self, trip: RoundTrip) -> None:
+        """Take one round trip; an impossible one (a clock was set meanwhile, or somebody lies) is left out."""
+        if trip.delay_ns < 0 or trip.answered_ns < trip.received_ns:
+            return
+        self._trips += 1
+        last = self._quickest[-1] if self._quickest else None
+        if last is None or trip.sent_ns // NS_PER_S != last.sent_ns // NS_PER_S:
+            self._quickest.append(trip)
+        elif trip.delay_ns <= last.delay_ns:
+            self._quickest[-1] = trip
+
+    @property
+    def known(self) -> bool:
+        """Whether there were round trips enough."""
+        return self._trips >= _TRIPS_TO_START
+
+    @property
+    def error_ns(self) -> int:
+        """Most by which the offset can be wrong: half of the quickest round trip."""
+        return min(trip.delay_ns for trip in self._quickest) // 2
+
+    def offset_ns(self, now_ns: int) -> int:
+        """Return what is to be added to our clock now; only once `known`."""
+        trips = self._quickest
+        quickest_ns = min(trip.delay_ns for trip in trips)
+        weights = [(_STEADIEST_NS / (_STEADIEST_NS + trip.delay_ns - quickest_ns)) ** 2 for trip in trips]
+        base_ns, whole = trips[0].offset_ns, sum(weights)
+        times_s = [(trip.sent_ns - now_ns) / NS_PER_S for trip in trips]
+        offsets = [float(trip.offset_ns - base_ns) for trip in trips]
+        mean_s = sum(w * t for w, t in zip(weights, times_s, strict=True)) / whole
+        mean = sum(w * o for w, o in zip(weights, offsets, strict=True)) / whole
+        drift = 0.0
+        if times_s[-1] - times_s[0] >= _LINE_S:
+            spread = sum(w * (t - mean_s) ** 2 for w, t in zip(weights, times_s, strict=True))
+            lean = sum(w * (t - mean_s) * (o - mean) for w, t, o in zip(weights, times_s, offsets, strict=True))
+            limit = _DRIFT_LIMIT * NS_PER_S
+            drift = max(-limit, min(limit, lean / spread)) if spread > 0.0 else 0.0
+        return base_ns + round(mean - drift * mean_s)
+
+
+def led(offset_ns: int, wanted_ns: int, elapsed_s: float) -> int:
+    """Return the next offset of a clock that is led to the wanted one slowly, or at once where it was set."""
+    error_ns = wanted_ns - offset_ns
+    if abs(error_ns) > _STEP_NS:
+        return wanted_ns
+    most_ns = round(_SLEW_PER_S * elapsed_s * NS_PER_S)
+    return offset_ns + max(-most_ns, min(most_ns, error_ns))

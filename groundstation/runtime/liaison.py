@@ -1,0 +1,130 @@
+"""The liaison process: speaks for the supervisor with one other host that runs devices of the field.
+
+It says what the host is to run, answers its questions for the time, and passes the supervisor's silence on. To the
+supervisor it stands for all devices there: it is not well while the host is not, and ends when they have.
+"""
+
+from importlib.metadata import version
+
+import msgspec
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus, Received
+from groundstation.bus.messages import (
+    HostAnswer,
+    HostOrder,
+    HostReport,
+    Lifecycle,
+    Severity,
+    Supervision,
+)
+from groundstation.bus.topics import HOST_ANSWER, HOST_ORDER, HOST_REPORT
+from groundstation.process.child import Child
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+VERSION = version("skein-groundstation")
+_TURN_NS = 50 * NS_PER_MS
+_ORDER_PERIOD_NS = NS_PER_S
+_SILENT_NS = 500 * NS_PER_MS
+# As long as drivers may take to land and end, with the guardian that waits for them.
+_LINGER_NS = 25 * NS_PER_S
+# A host whose devices are starting is waited for; one that nobody has started is not.
+_START_NS = 15 * NS_PER_S
+
+
+class LiaisonSection(msgspec.Struct, frozen=True):
+    """What the supervisor hands to a liaison: the other host, the version of the program, the field as JSON."""
+
+    host: str
+    version: str
+    field: str
+
+
+class Liaison:
+    """The talk with one host; times are of the run's clock."""
+
+    def __init__(self, bus: Bus, section: LiaisonSection) -> None:
+        self._bus, self._section = bus, section
+        self.reports = bus.subscribe([HOST_REPORT], entity=section.host, source=section.host, capacity=256)
+        self._newest: HostReport | None = None
+        self._heard_ns = 0
+        self._next_order_ns = 0
+
+    def turn(self, now_ns: int, supervision: Supervision) -> None:
+        """Answer what came; give the order to a host that does not serve this run yet."""
+        for received in self.reports.drain():
+            if isinstance(received.message, HostReport):
+                self._newest, self._heard_ns = received.message, received.arrived_ns
+                self._answer(received, received.message, supervision)
+        if supervision is Supervision.WATCHES and not self.serving and now_ns >= self._next_order_ns:
+            self._next_order_ns = now_ns + _ORDER_PERIOD_NS
+            section = self._section
+            header = self._bus.header(section.host)
+            order = HostOrder(header=header, run=self._bus.run, version=section.version, field=section.field)
+            self._bus.publish(HOST_ORDER, order)
+
+    def _answer(self, received: Received, report: HostReport, supervision: Supervision) -> None:
+        header = self._bus.header(self._section.host)
+        answer = HostAnswer(
+            header=header, supervision=supervision, sent_ns=report.sent_ns, received_ns=received.arrived_ns
+        )
+        self._bus.publish(HOST_ANSWER, answer)
+
+    @property
+    def serving(self) -> bool:
+        """Whether the host said last that it serves this run."""
+        return self._newest is not None and self._newest.run == self._bus.run
+
+    def silent(self, now_ns: int) -> bool:
+        """Return whether nothing was heard of the host for a while."""
+        return now_ns - self._heard_ns > _SILENT_NS
+
+    def state(self, now_ns: int) -> tuple[Lifecycle, str]:
+        """Return how the devices of the host are, in a word and in words."""
+        host, newest = self._section.host, self._newest
+        if newest is None:
+            return Lifecycle.STARTING, f"{host} is not there: on it, groundstation host"
+        if self.silent(now_ns):
+            return Lifecycle.DEGRADED, f"{host} is silent"
+        if not self.serving:
+            return Lifecycle.STARTING, newest.detail or f"{host} is told what to run"
+        return newest.state, newest.detail or f"devices of {host}"
+
+
+def run(child: Child) -> int:
+    """Speak with the host until the run ends and the devices there have; the process entry."""
+    liaison = Liaison(child.bus, msgspec.json.decode(child.section, type=LiaisonSection))
+    liaison.reports.on_arrival = child.wake
+    began_ns, ends_ns, was_silent = clock.now_ns(), 0, False
+    while True:
+        now_ns = clock.now_ns()
+        supervision = _supervision(child)
+        liaison.turn(now_ns, supervision)
+        _tell(child, liaison, now_ns, now_ns - began_ns < _START_NS)
+        silent = liaison.silent(now_ns) and liaison.serving
+        if silent and not was_silent:
+            child.event(Severity.ERROR, "is silent: its devices, or the link to it, are gone", "look at that host")
+        was_silent = silent
+        if supervision is Supervision.ENDS:
+            ends_ns = ends_ns or now_ns
+            if not liaison.serving or silent or now_ns - ends_ns > _LINGER_NS:
+                return 0
+        child.beat()
+        child.tick_status()
+        child.sleep_until(now_ns + _TURN_NS)
+
+
+def _supervision(child: Child) -> Supervision:
+    if child.stop_requested or not child.supervisor_alive:
+        return Supervision.ENDS
+    return Supervision.WATCHES if child.supervisor_fresh else Supervision.SILENT
+
+
+def _tell(child: Child, liaison: Liaison, now_ns: int, early: bool) -> None:
+    state, detail = liaison.state(now_ns)
+    if state is Lifecycle.READY:
+        child.ready(detail)
+    elif state is Lifecycle.STARTING and early:
+        child.starting(detail)
+    else:
+        child.degrade(detail)

@@ -1,0 +1,35 @@
+"""What must hold of devices that another host runs."""
+
+from collections.abc import Iterator, Mapping
+
+from groundstation.errors import without_password
+from groundstation.settings.behaviour import Bus
+from groundstation.settings.document import KeyPath
+from groundstation.settings.drones import Drone
+from groundstation.settings.motion_capture import MotionCaptureSettings
+from groundstation.settings.room import WorldCameraSettings
+
+
+def findings_of_hosts(
+    drones: Mapping[str, Drone],
+    cameras: Mapping[str, WorldCameraSettings],
+    systems: Mapping[str, MotionCaptureSettings],
+    bus: Bus | None,
+) -> Iterator[tuple[KeyPath, str]]:
+    """Return hosts that cannot reach the run, are called as a device, or would need a password that stays here."""
+    hosts: dict[KeyPath, str] = {("drones", name, "host"): drone.host for name, drone in drones.items()}
+    hosts |= {("cameras", name, "host"): camera.host for name, camera in cameras.items()}
+    hosts |= {("motion_capture", name, "host"): system.host for name, system in systems.items()}
+    sources: dict[KeyPath, tuple[str, str]] = {
+        ("drones", name, "camera", "source"): (one.host, one.camera.source) for name, one in drones.items()
+    }
+    sources |= {("cameras", name, "source"): (one.host, one.source) for name, one in cameras.items()}
+    named = {*drones, *cameras, *systems}
+    for path, host in hosts.items():
+        if host in named:
+            yield path, f"must not be called as a device of the field (got {host})"
+        elif host and bus is not None and not bus.listen:
+            yield path, f"needs bus.listen: the address of this computer at which {host} reaches the run"
+    for place, (host, source) in sources.items():
+        if host and without_password(source) != source:
+            yield place, f"cannot be used on {host} with a password: passwords do not leave this computer"

@@ -1,0 +1,110 @@
+"""Another host's end of the talk with the run's host: its order, its supervisor's silence, the offset of its clock."""
+
+from dataclasses import dataclass
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus, Received
+from groundstation.bus.messages import (
+    ClockOffset,
+    HostAnswer,
+    HostOrder,
+    HostReport,
+    Lifecycle,
+    Supervision,
+)
+from groundstation.bus.topics import CLOCK, HOST_ANSWER, HOST_ORDER, HOST_REPORT
+from groundstation.process.clock_offset import OffsetFilter, RoundTrip, led
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+_PERIOD_NS = 40 * NS_PER_MS
+_CLOCK_PERIOD_NS = NS_PER_S
+# A lost packet of the link is sent again within this; the drivers' own patience begins afterwards.
+_HEARD_NS = 200 * NS_PER_MS
+
+
+@dataclass(frozen=True, slots=True)
+class OwnState:
+    """What this host reports; run: the run that it serves, "" for none."""
+
+    run: str = ""
+    state: Lifecycle = Lifecycle.STARTING
+    detail: str = ""
+
+
+class HostLink:
+    """Call `turn` 20 times a second or more. order: the newest one; ends: whether the run is over for its devices."""
+
+    def __init__(self, bus: Bus, host: str) -> None:
+        self._bus, self._host = bus, host
+        self._orders = bus.subscribe([HOST_ORDER], entity=host, newest=True)
+        self._answers = bus.subscribe([HOST_ANSWER], entity=host, capacity=256)
+        self._offsets = OffsetFilter()
+        self._next_ns = self._next_clock_ns = self._led_ns = 0
+        self._supervision = Supervision.SILENT
+        self.order: HostOrder | None = None
+        self.run_clock = ""
+        self.heard_ns = 0
+        self.offset_ns = 0
+
+    @property
+    def synchronised(self) -> bool:
+        """Whether the run's clock can be read here."""
+        return self._offsets.known
+
+    @property
+    def ends(self) -> bool:
+        """Whether the run's supervisor stops the run, or is dead."""
+        return self._supervision is Supervision.ENDS
+
+    def watches(self, now_ns: int) -> bool:
+        """Return whether the run's supervisor was heard just now, and does not stand still itself."""
+        return self._supervision is not Supervision.SILENT and now_ns - self.heard_ns < _HEARD_NS
+
+    def silent_s(self, now_ns: int) -> float:
+        """Return for how long nothing was heard of the run's host."""
+        return (now_ns - self.heard_ns) / NS_PER_S
+
+    def turn(self, now_ns: int, own: OwnState) -> None:
+        """Take in what came, and report; now_ns: this host's own boot clock."""
+        for received in self._orders.drain():
+            if isinstance(received.message, HostOrder):
+                self.order = received.message
+        for received in self._answers.drain():
+            self._hear(received)
+        if self.synchronised:
+            self._lead(now_ns)
+        if now_ns >= self._next_ns:
+            self._next_ns = now_ns + _PERIOD_NS
+            self._report(own)
+        if self.synchronised and own.run and now_ns >= self._next_clock_ns:
+            self._next_clock_ns = now_ns + _CLOCK_PERIOD_NS
+            self._publish_offset()
+
+    def _hear(self, received: Received) -> None:
+        answer = received.message
+        if not isinstance(answer, HostAnswer):
+            return
+        if answer.header.clock != self.run_clock:  # the run's host was started anew
+            self.run_clock, self._offsets = answer.header.clock, OffsetFilter()
+            self._led_ns = self._next_clock_ns = 0
+        self._supervision, self.heard_ns = answer.supervision, received.arrived_ns
+        self._offsets.take(RoundTrip(answer.sent_ns, answer.received_ns, answer.header.stamp_ns, received.arrived_ns))
+
+    def _lead(self, now_ns: int) -> None:
+        wanted_ns, first = self._offsets.offset_ns(now_ns), not self._led_ns
+        elapsed_s = 0.0 if first else (now_ns - self._led_ns) / NS_PER_S
+        self.offset_ns = wanted_ns if first else led(self.offset_ns, wanted_ns, elapsed_s)
+        self._led_ns = now_ns
+
+    def _report(self, own: OwnState) -> None:
+        header = self._bus.header(self._host)
+        report = HostReport(header=header, run=own.run, state=own.state, detail=own.detail, sent_ns=clock.own_ns())
+        self._bus.publish(HOST_REPORT, report)
+
+    def _publish_offset(self) -> None:
+        if clock.own_id() != self.run_clock:
+            header = self._bus.header(self._host)
+            error_ns = self._offsets.error_ns
+            self._bus.publish(
+                CLOCK, ClockOffset(header=header, of=clock.own_id(), offset_ns=self.offset_ns, error_ns=error_ns)
+            )

@@ -1,0 +1,43 @@
+"""What a run is called and where it happens, as its supervisor is told."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.bus.roles import Identity
+
+SOURCE = "supervisor"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run. real: the drones that exist.
+
+    listen: address at which the router is there for other hosts of the site, "" for none. source, identity, clock:
+    what the supervisor of another host's devices is called, shows the router, and takes its time from.
+    """
+
+    site: str
+    field: str
+    endpoint: str
+    run_dir: Path
+    drones: tuple[str, ...]
+    real: tuple[str, ...] = ()
+    listen: str = ""
+    source: str = SOURCE
+    identity: Identity | None = None
+    clock: str = ""
+
+    @property
+    def name(self) -> str:
+        """What orders and leases call it."""
+        return self.run_dir.name
+
+    @property
+    def guarded(self) -> bool:
+        """Whether its bus belongs to it alone."""
+        return self.endpoint.startswith("tls/")
+
+    @property
+    def makes_identities(self) -> bool:
+        """Whether the certificates of its members are made at its start: on its own host."""
+        return self.guarded and self.identity is None

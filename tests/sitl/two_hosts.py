@@ -1,0 +1,180 @@
+"""A run on one host with its drones' drivers and cameras on another: two namespaces, a link with delay and loss.
+
+Run in a network namespace of its own, as root there: `unshare --user --map-root-user --net python two_hosts.py ...`.
+The clock of the other host is 895 s ahead. Prints what became of it as a line of JSON.
+"""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from far_link import FarLink, Namespace, ip
+from sitl_run import COMMAND, SitlRun
+
+from groundstation.bus.messages import ClockOffset
+from groundstation.bus.topics import CLOCK
+from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.supervisor import site
+
+AHEAD_S = 895
+HERE, THERE = "10.77.0.1", "10.77.0.2"
+HOST = "lab_pc_2"
+DEVICES = ("drones.drone_1", "drones.drone_2", "cameras.ceiling")
+
+
+class TwoHosts:
+    """This namespace is the run's host; the other host is in one of its own, with a clock of its own."""
+
+    def __init__(self, folder: Path, delay_s: float, loss: float) -> None:
+        ip("link set lo up")
+        self.beyond = Namespace()
+        self.link = FarLink(self.beyond, (HERE, THERE), delay_s, loss)
+        # Devices are near the host that speaks to them: a link of its own, without delay.
+        ip(f"link add near type veth peer name near netns {self.beyond.path}")
+        for last in (1, 11, 12, 50, 51, 52):
+            ip(f"addr add 10.78.0.{last}/24 dev near")
+        ip("link set near up")
+        with self.beyond.entered():
+            ip("addr add 10.78.0.2/24 dev near")
+            ip("link set near up")
+        self.folder = folder
+        os.environ["XDG_CONFIG_HOME"] = str(folder / "config")
+        os.environ["XDG_RUNTIME_DIR"] = str(folder)
+        site.found("lab")
+        site.admit("lab", HOST, f"tls/{HERE}:4717", folder / "admission")
+        site.join(folder / "admission")
+
+    def start_host(self) -> "subprocess.Popen[bytes]":
+        """Start the one command on the other host."""
+        (self.folder / "there").mkdir(exist_ok=True)
+        clock = ["unshare", "--time", "--monotonic", str(AHEAD_S), "--"]
+        with self.beyond.entered(), (self.folder / "host.txt").open("ab") as sink:
+            return subprocess.Popen(
+                [*clock, *COMMAND, "host", "--one-run"],
+                stdin=subprocess.DEVNULL,
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+                cwd=self.folder / "there",
+                start_new_session=True,
+            )
+
+    def start_run(self, order: dict[str, Any]) -> SitlRun:
+        """Start the demo, with the ordered devices on the other host."""
+        settings = [f"{device}.host={HOST}" for device in order.get("devices", DEVICES)] + [f"bus.listen={HERE}"]
+        options = [part for setting in settings for part in ("--set", setting)]
+        figures = ("--duration", str(order["duration_s"]), "--seed", str(order.get("seed", 1)))
+        return SitlRun(self.folder, "demo", *figures, "--network", "10.78.0.0/24", *options)
+
+
+def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
+    """Fly the demo to its end and return what the report says, and the offset that was measured."""
+    host, run = two.start_host(), two.start_run(order)
+    try:
+        offsets = bus_of(run).subscribe([CLOCK])
+        code = run.wait(order["duration_s"] + 120.0)
+        heard = [one.message for one in offsets.drain() if isinstance(one.message, ClockOffset)]
+        return {
+            "code": code,
+            "host_code": host.wait(30.0),
+            "offset_s": heard[-1].offset_ns / 1e9,
+            "error_s": heard[-1].error_ns / 1e9,
+            "lost": two.link.lost / two.link.carried,
+            "report": json.loads((run.run_dir / "report.json").read_text()),
+        }
+    finally:
+        run.close()
+        end(host.pid)
+
+
+def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
+    """Kill something in flight and return how long the drones stayed in the air, and how far each went [s, m]."""
+    host, run = two.start_host(), two.start_run(order)
+    victims = {"liaison": lambda: [run.pid(f"liaison_{HOST}")], "supervisor": lambda: [run.process.pid]}
+    victims |= {"host": lambda: [host.pid], "driver": lambda: [named(host.pid)["drone_1"]]}
+    # Not what stands for the drones themselves, and for the bus by which they are watched here.
+    spared = ("sim_bridge", "router")
+    victims["run"] = lambda: [run.process.pid] + [p.pid for p in run.record.processes if p.name not in spared]
+    victims["all"] = lambda: [host.pid, *named(host.pid).values()]
+    try:
+        run.until_tracking()
+        rest(run, 3.0)
+        before = {name: run.truth(name)[-1][1].position_m for name in run.record.drones}
+        children = named(host.pid)
+        if order["kill"] == "link":
+            two.link.cut.set()
+        else:
+            for pid in victims[order["kill"]]():
+                os.kill(pid, signal.SIGKILL)
+        killed_s, landed_s = time.monotonic(), dict[str, float]()
+        while time.monotonic() - killed_s < order.get("watch_s", 25.0) and len(landed_s) < len(before):
+            rest(run, 0.05)
+            for name in before:
+                if name not in landed_s and run.on_ground(name):
+                    landed_s[name] = time.monotonic() - killed_s
+        after = {name: run.truth(name)[-1][1].position_m for name in before}
+        rest(run, order.get("settle_s", 3.0))
+        return {
+            "landed_s": landed_s,
+            "went_m": {name: math.dist(before[name][:2], after[name][:2]) for name in before},
+            "speed_m_s": {name: run.speed_between(name, killed_s + 1.5, killed_s + 3.0) for name in before},
+            "modes": {name: run.mode(name) for name in before},
+            "left": [name for name, pid in children.items() if Path(f"/proc/{pid}").exists()],
+            "events": [event for event in run.events() if "INFO" not in event],
+        }
+    finally:
+        with suppress(AssertionError):
+            run.close()
+        end(host.pid)
+
+
+def bus_of(run: SitlRun) -> ZenohBus:
+    """Return the bus that a run is watched on."""
+    assert run._bus is not None
+    return run._bus
+
+
+def rest(run: SitlRun, seconds: float) -> None:
+    """Listen for a while."""
+    deadline_s = time.monotonic() + seconds
+    while time.monotonic() < deadline_s:
+        run.listen()
+        time.sleep(0.02)
+
+
+def named(pid: int) -> dict[str, int]:
+    """Return the children of a process by the names that they were started with."""
+    pids = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return {Path(f"/proc/{one}/cmdline").read_text().split("\0")[3]: int(one) for one in pids}
+
+
+def end(pid: int) -> None:
+    """End the other host's command, and what it started."""
+    with suppress(OSError):
+        children = named(pid).values()
+        os.kill(pid, signal.SIGKILL)
+        for child in children:
+            os.kill(child, signal.SIGKILL)
+
+
+def main() -> None:
+    """Read an order as JSON, fly, print the result as JSON."""
+    order = json.loads(sys.argv[1])
+    folder = Path(order.get("folder") or tempfile.mkdtemp(prefix="two-hosts-"))
+    two = TwoHosts(folder, order.get("delay_s", 0.02), order.get("loss", 0.01))
+    result = kill(two, order) if "kill" in order else fly(two, order)
+    texts = {"text": (folder / "output.txt").read_text(), "host_text": (folder / "host.txt").read_text()}
+    print(json.dumps(result | texts))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""One run served by another host: the order awaited, the end followed, a wrong version refused; without a network."""
+
+import logging
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import HostOrder, Lifecycle, Supervision
+from groundstation.bus.roles import Identity
+from groundstation.flight import hosting
+from groundstation.runtime.liaison import VERSION, Liaison, LiaisonSection
+from groundstation.settings.load import load_field
+from groundstation.supervisor import host_link, supervisor
+from groundstation.supervisor.site import Admission
+from groundstation.supervisor.terminal import Terminal
+
+LAB = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
+HOST = "pc_2"
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class RunElsewhere:
+    """The liaison of a run, on a thread; says the end when the host is ready."""
+
+    def __init__(self, exchange: MemoryExchange, version: str) -> None:
+        section = LiaisonSection(HOST, version, load_field(LAB, ()).model_dump_json())
+        self.liaison = Liaison(MemoryBus(exchange, "lab", f"liaison_{HOST}", "run-7"), section)
+        self.states: list[Lifecycle] = []
+        self.details: list[str] = []
+        self.over = threading.Event()
+        self.thread = threading.Thread(target=self._speak)
+        self.thread.start()
+
+    def _speak(self) -> None:
+        supervision = Supervision.WATCHES
+        while not self.over.wait(0.002):
+            self.liaison.turn(clock.own_ns(), supervision)
+            state, detail = self.liaison.state(clock.own_ns())
+            self.states.append(state)
+            self.details.append(detail)
+            if state is Lifecycle.READY:
+                supervision = Supervision.ENDS
+
+
+@pytest.fixture
+def make(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[[str], tuple[hosting.Hosting, RunElsewhere]]]:
+    exchange, runs = MemoryExchange(), list[RunElsewhere]()
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
+    root = logging.getLogger()
+    kept, level = list(root.handlers), root.level
+    monkeypatch.setattr(logging, "raiseExceptions", logging.raiseExceptions)  # it is turned off in flight
+
+    def open_bus(endpoint: str, site: str, source: str, *_: object, identity: Identity | None = None) -> MemoryBus:
+        return MemoryBus(exchange, site, source, identity.run if identity else "")
+
+    for module in (hosting, supervisor):
+        monkeypatch.setattr(module, "open_bus", open_bus)
+    monkeypatch.setattr(hosting, "device_rows", lambda field, host: [])
+    monkeypatch.setattr(hosting, "_TURN_S", 0.001)
+    monkeypatch.setattr(host_link, "_PERIOD_NS", 1_000_000)
+
+    def build(version: str) -> tuple[hosting.Hosting, RunElsewhere]:
+        admission = Admission("lab", HOST, "tls/10.77.0.1:4717", "", "", "")
+        runs.append(RunElsewhere(exchange, version))
+        return hosting.Hosting(admission, Identity("keys", "host-pc_2", ""), tmp_path, Terminal()), runs[-1]
+
+    yield build
+    for run in runs:
+        run.over.set()
+        run.thread.join()
+    clock.follow_none()
+    signal.set_wakeup_fd(-1)
+    for number, former in handlers.items():
+        signal.signal(number, former)
+    for handler in set(root.handlers) - set(kept):
+        root.removeHandler(handler)
+        handler.close()
+    root.setLevel(level)
+
+
+def test_a_host_serves_the_run_that_it_is_told_of_until_that_ends(
+    make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], tmp_path: Path
+) -> None:
+    served, run = make(VERSION)
+    order = served.wait()
+    assert isinstance(order, HostOrder) and order.run == "run-7"
+    assert served.serve(order) is False, "nobody interrupted it here"
+    assert Lifecycle.READY in run.states and run.states[-1] is not Lifecycle.READY
+    assert not run.liaison.serving, "it said good-bye"
+    assert (tmp_path / "run-7" / "log" / "supervisor.log").exists()
+
+
+def test_another_version_is_not_served_and_the_run_says_why(
+    make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served, run = make("0.0.1")
+
+    def stop_when_told(_: float) -> None:
+        if run.details and "the run 0.0.1" in run.details[-1]:
+            raise KeyboardInterrupt
+        run.over.wait(0.001)
+
+    monkeypatch.setattr(time, "sleep", stop_when_told)
+    with pytest.raises(KeyboardInterrupt):
+        served.wait()
+    assert not run.liaison.serving and Lifecycle.READY not in run.states

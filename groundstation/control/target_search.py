@@ -132,7 +132,7 @@ class Search:
         rooms = [room for name in targets if (room := self.targets[name].room) is not None]
         if not rooms or not robots:
             return Outlook({}, 0.0, np.inf)
-        chances: Array = np.sum([room.chances for room in rooms], axis=0) / len(rooms)
+        chances: Array = np.sum([room.in_view for room in rooms], axis=0) / len(rooms)
         poses = {name: belief.mean_of(name)[:4] for name in robots}
         order = robots_in_order(robots, chances, poses, self.grid)
         footprints = {name: self._footprints[name] for name in order}
@@ -182,7 +182,7 @@ class Search:
         variance = p.target_speed_m_s**2 * p.target_straight_s * _STEP_NS / NS_PER_S
         for name, state in self.targets.items():
             if state.room is not None:
-                self.targets[name] = replace(state, room=state.room.moved(variance))
+                self.targets[name] = replace(state, room=state.room.moved(variance).uncovered(_STEP_NS / NS_PER_S))
 
     def _look(self, picture: SearchedPicture, now_ns: int) -> None:
         """Count a picture for all targets that it does not show."""

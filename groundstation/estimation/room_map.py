@@ -1,7 +1,7 @@
-"""Where in the room a target is that is not seen: probabilities on a grid, that it stands there, that it drives there.
+"""Where in the room a target is that is not seen: probabilities on a grid, that it stands, drives, or is hidden there.
 
-Two hypotheses are kept, since what was searched stays empty of a target that stands, and does not of one that drives.
-Every operation returns a new value.
+Hypotheses are kept apart, since what was searched stays empty of a target that stands, and does not of one that drives;
+and no picture shows one that something hides. Every operation returns a new value.
 """
 
 import math
@@ -16,10 +16,14 @@ MOST_CELLS = 2400
 STANDS_SHARE = 0.6
 """Prior of a target that is not seen: it stands."""
 
+HIDDEN_S = 2.0
+"""How long a person who passes hides a target from all cameras, on average (docs/decisions/0125)."""
+
 # Of a target that was seen just now and is not where it was predicted: it is there all the same, near, anywhere.
 _THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
 _HINTED = 0.5
+_HIDDEN = 0.5  # of one that is where it was predicted: somebody stands in the way
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,20 +48,28 @@ class RoomGrid:
 
 @dataclass(frozen=True, slots=True)
 class RoomMap:
-    """Probabilities by cell (rows along y, columns along x): that it is there and stands, and is there and drives.
+    """Probabilities by cell (rows along y, columns along x): that it stands there, drives there, or is hidden there.
 
-    overlooked: chance that all pictures since the beginning would have missed a target standing there.
+    hidden: by something that the field does not name, from all cameras; overlooked: chance that all pictures since the
+    beginning would have missed a target standing there in plain view.
     """
 
     grid: RoomGrid
     stands: Array
     drives: Array
+    hidden: Array
     overlooked: Array
 
     @property
     def chances(self) -> Array:
         """Return the probability of each cell; their sum is 1."""
-        return self.stands + self.drives
+        return self.stands + self.drives + self.hidden
+
+    @property
+    def in_view(self) -> Array:
+        """Return the probability of each cell for a target that nothing hides: what a search can find there."""
+        shown = self.stands + self.drives
+        return np.asarray(shown / max(float(shown.sum()), 1e-12))
 
     def moved(self, variance_m2: float) -> "RoomMap":
         """Return the map after the target, if it drives, went about: the variance that this adds to each axis.
@@ -70,14 +82,21 @@ class RoomMap:
             drives = _smoothed(drives, axis, share)
         return replace(self, drives=drives)
 
+    def uncovered(self, time_s: float) -> "RoomMap":
+        """Return the map after some time, in which what hides the target may have gone: it stands or drives in view."""
+        left = math.exp(-time_s / HIDDEN_S)
+        shown = (1.0 - left) * self.hidden
+        stands, drives = self.stands + STANDS_SHARE * shown, self.drives + (1.0 - STANDS_SHARE) * shown
+        return replace(self, stands=stands, drives=drives, hidden=left * self.hidden)
+
     def emptied(self, chance: Array) -> "RoomMap":
         """Return the map after a picture without the target; chance: with which it shows a target in each cell."""
         missed = 1.0 - chance
         stands, drives = self.stands * missed, self.drives * missed
-        total = float(stands.sum() + drives.sum())
+        total = float(stands.sum() + drives.sum() + self.hidden.sum())
         if total <= 1e-9:
             return replace(unknown_place(self.grid), overlooked=self.overlooked * missed)
-        return RoomMap(self.grid, stands / total, drives / total, self.overlooked * missed)
+        return RoomMap(self.grid, stands / total, drives / total, self.hidden / total, self.overlooked * missed)
 
     def mass_near(self, mean: Sequence[float] | Array, covariance: Array, sigmas: float, least_m: float) -> float:
         """Return the probability that the target is within some standard deviations of a place, or a least distance."""
@@ -91,8 +110,8 @@ class RoomMap:
         return 1.0 - float(np.mean(self.overlooked))
 
     def likeliest(self) -> tuple[float, float]:
-        """Return the centre of the likeliest cell [m; world]."""
-        row, column = np.unravel_index(int(np.argmax(self.chances)), self.grid.shape)
+        """Return the centre of the likeliest cell of a target that nothing hides [m; world]."""
+        row, column = np.unravel_index(int(np.argmax(self.in_view)), self.grid.shape)
         return float(self.grid.xs[column]), float(self.grid.ys[row])
 
 
@@ -100,24 +119,25 @@ def unknown_place(grid: RoomGrid, hints: Sequence[tuple[float, float]] = ()) -> 
     """Return the map of a target that was never seen: anywhere, and rather near the middle of some places."""
     even = np.full(grid.shape, 1.0 / (grid.shape[0] * grid.shape[1]))
     if not hints:
-        return _shared(grid, even)
+        return _shared(grid, even, np.zeros(grid.shape))
     x, y = np.mean(hints, axis=0)
     near = np.exp(-np.hypot(grid.xs[None, :] - x, grid.ys[:, None] - y) / _NEAR_M)
-    return _shared(grid, _HINTED * near / near.sum() + (1.0 - _HINTED) * even)
+    return _shared(grid, _HINTED * near / near.sum() + (1.0 - _HINTED) * even, np.zeros(grid.shape))
 
 
 def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) -> RoomMap:
     """Return the map of a target that was predicted at a Gaussian place (2), (2, 2) and is not seen any more.
 
-    It may also have been carried away, so places near to it and the whole room have their share.
+    It may be hidden there; or it was carried away, so places near to it and the whole room have their share.
     """
     dx, dy = grid.xs[None, :] - mean[0], grid.ys[:, None] - mean[1]
     wide = np.asarray(covariance) + (0.5 * grid.cell_m) ** 2 * np.eye(2)
     square = _squared_distance(dx, dy, wide)
     there = np.exp(-0.5 * (square - square.min()))
     near = np.exp(-np.hypot(dx, dy) / _NEAR_M)
-    chances = _THERE * there / there.sum() + _NEAR * near / near.sum() + _ANYWHERE / there.size
-    return _shared(grid, chances)
+    there *= _THERE / there.sum()
+    chances = (1.0 - _HIDDEN) * there + _NEAR * near / near.sum() + _ANYWHERE / there.size
+    return _shared(grid, chances, _HIDDEN * there)
 
 
 def _squared_distance(dx: Array, dy: Array, covariance: Array) -> Array:
@@ -126,8 +146,8 @@ def _squared_distance(dx: Array, dy: Array, covariance: Array) -> Array:
     return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
 
 
-def _shared(grid: RoomGrid, chances: Array) -> RoomMap:
-    return RoomMap(grid, STANDS_SHARE * chances, (1.0 - STANDS_SHARE) * chances, np.ones(grid.shape))
+def _shared(grid: RoomGrid, chances: Array, hidden: Array) -> RoomMap:
+    return RoomMap(grid, STANDS_SHARE * chances, (1.0 - STANDS_SHARE) * chances, hidden, np.ones(grid.shape))
 
 
 def _centres(size_m: float, cell_m: float) -> Array:

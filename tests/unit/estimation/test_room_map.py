@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
+from groundstation.estimation.room_map import HIDDEN_S, RoomGrid, RoomMap, lost_at, unknown_place
 
 GRID = RoomGrid.over(8.0, 6.0)
 
@@ -50,7 +50,8 @@ def test_walls_keep_in_what_drives_and_what_stands_stays() -> None:
 
 def test_the_spread_of_one_that_drives_grows_by_the_variance_given() -> None:
     room = lost_at(GRID, (0.0, 0.0), 1e-4 * np.eye(2))
-    start = RoomMap(GRID, np.zeros(GRID.shape), np.where(room.drives == room.drives.max(), 0.25, 0.0), room.overlooked)
+    nowhere, peak = np.zeros(GRID.shape), np.where(room.drives == room.drives.max(), 0.25, 0.0)
+    start = RoomMap(GRID, nowhere, peak, nowhere, room.overlooked)
     moved = start
     for _ in range(10):
         moved = moved.moved(0.018)
@@ -71,5 +72,29 @@ def test_empty_pictures_move_the_probability_elsewhere_and_count_as_searched() -
 
 
 def test_when_every_place_is_excluded_it_may_be_anywhere_again() -> None:
-    room = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2))
+    room = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2)).uncovered(100.0 * HIDDEN_S)
     assert np.array_equal(room.emptied(np.ones(GRID.shape)).chances, unknown_place(GRID).chances)
+
+
+def left_at_the_prediction(after_s: float) -> float:
+    """Return the probability near where a target was predicted after pictures of all around there, 6 a second."""
+    room, around = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2)), seen_within(0.0, 0.0, 1.0)
+    for _ in range(round(after_s * 6)):
+        room = room.uncovered(1.0 / 6.0).emptied(around)
+    assert room.chances.sum() == pytest.approx(1.0)
+    return room.mass_near((0.0, 0.0), 0.01 * np.eye(2), 2.0, 0.5)
+
+
+def test_what_nobody_sees_for_a_moment_may_be_hidden_and_is_not_for_long() -> None:
+    given_up_below = 0.3  # control/search_parameters.py
+    assert left_at_the_prediction(1.0) > given_up_below
+    assert left_at_the_prediction(2.0) < given_up_below
+    assert left_at_the_prediction(4.0) < 0.15
+
+
+def test_who_comes_out_from_behind_something_stands_or_drives() -> None:
+    room = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2))
+    later = room.uncovered(HIDDEN_S)
+    assert later.hidden.sum() == pytest.approx(room.hidden.sum() / np.e)
+    assert later.chances == pytest.approx(room.chances)
+    assert later.stands.sum() / later.drives.sum() == pytest.approx(room.stands.sum() / room.drives.sum())

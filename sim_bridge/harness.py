@@ -58,8 +58,8 @@ class Harness:
             self._child.starting(f"{len(order.streams)} cameras")
             specs = render_specs(order.site, order.scenario, order.streams, name, order.seed, order.unseen)
             self._stage.open_cameras(specs, lambda: self._child.stop_requested)
-            if order.scenario.obstacles:
-                self._child.event(Severity.WARNING, "rendered pictures do not show the scenario's obstacles")
+            if self.world.obstacles:
+                self._child.event(Severity.WARNING, "rendered pictures do not show obstacles")
 
     def run(self) -> None:
         """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""

@@ -20,10 +20,18 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
 
+class SimulatedObstacle(_Part):
+    """An upright box that stands on the floor along the room's axes."""
+
+    centre_m: tuple[float, float]
+    size_m: tuple[float, float, float]
+
+
 class SimulatedRoom(_Part):
-    """Size along x, y, z; the origin is on the floor in the middle."""
+    """Size along x, y, z, the origin on the floor in the middle, and what stands there, by name."""
 
     size_m: tuple[float, float, float]
+    obstacles: dict[str, SimulatedObstacle] = {}
 
 
 class Lens(_Part):

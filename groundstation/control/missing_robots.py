@@ -11,6 +11,7 @@ from groundstation.bus.messages import SearchedPicture
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.detection import detection
 from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.occlusion import SOFT_M, box_rows, sight
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
@@ -27,6 +28,7 @@ class MissingRobots:
     def __init__(self, sensors: SensorSuite, robots: Sequence[str]) -> None:
         self._sensors, self._robots = sensors, tuple(robots)
         self._cameras = {name: camera_rows([camera], sensors.softness) for name, camera in sensors.world.items()}
+        self._boxes = box_rows(sensors.obstacles)
         self._pictures: list[SearchedPicture] = []
         self._history: deque[JointBelief] = deque(maxlen=_HISTORY)
         self._evidence: dict[str, float] = {}
@@ -67,6 +69,8 @@ class MissingRobots:
                 continue
             slack_m = 2.0 * float(np.diag(belief.covariance_of(name))[:2].max()) ** 0.5
             chance = detection(self._cameras[picture.observer][0], _FIXED, slack_m, *marker.tolist())
+            eye = self._sensors.world[picture.observer].position_m
+            chance *= sight(self._boxes, SOFT_M, *eye, *marker.tolist()).a
             self._evidence[name] = self._evidence.get(name, 0.0) + math.log(1.0 - chance)
 
     def _is_hidden(self, name: str, marker: Array, camera: str, belief: JointBelief) -> bool:

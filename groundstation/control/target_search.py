@@ -18,6 +18,7 @@ from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknow
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.footprint import footprint_of
 from groundstation.sensing.models import OnboardCameraModel, SensorSuite
+from groundstation.sensing.occlusion import box_rows, sight_map
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
@@ -78,6 +79,7 @@ class Search:
             for name, camera in onboard.items()
             if name in parameters.observers
         }
+        self._boxes = box_rows(sensors.obstacles)
         self._lattice = lattice_of(self.grid, parameters)
         self._pictures: list[SearchedPicture] = []
         self._history: deque[JointBelief] = deque(maxlen=_HISTORY)
@@ -195,6 +197,9 @@ class Search:
             assert state.room is not None
             camera, height_m = self._cameras[picture.observer][0], self._sensors.marker_height_m[name]
             chance = detection_map(camera, pose, slack_m, self.grid.xs, self.grid.ys, height_m)
+            if len(self._boxes):
+                eye = self._sensors.eye(picture.observer, pose)
+                chance = chance * sight_map(self._boxes, eye, self.grid.xs, self.grid.ys, height_m)
             self.targets[name] = replace(state, room=state.room.emptied(chance))
 
     def _pose_at(self, observer: str, stamp_ns: int) -> tuple[Array | None, float]:

@@ -18,11 +18,19 @@ class Fence(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     z_m: Interval
 
 
+class RoomObstacle(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An upright box that stands on the floor along the room's axes: its centre and size [m; world]."""
+
+    centre_m: Vector2
+    size_m: Vector3
+
+
 class Room(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Size along x, y, z, the origin on the floor in the middle, and the fence."""
+    """Size along x, y, z, the origin on the floor in the middle, the fence, and what hides markers, by name."""
 
     size_m: Vector3
     fence: Fence
+    obstacles: dict[str, RoomObstacle] = {}
 
 
 class LensStd(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

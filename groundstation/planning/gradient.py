@@ -81,6 +81,10 @@ def undo_weights(
             state[a, X] -= gx
             state[a, Y] -= gy
             state[a, HEIGHT] -= gz
+            if problem.boxes.shape[0] > 0:
+                state[a, X] += seen.v * seen.along_x
+                state[a, Y] += seen.v * seen.along_y
+                state[a, HEIGHT] += seen.v * seen.along_z
             state[a, YAW] += seen.v * seen.a_yaw + 2.0 * seen.w * (spread_x * seen.y - spread_y * seen.x)
         if b < n:
             state[b, X] += gx

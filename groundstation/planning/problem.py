@@ -15,6 +15,7 @@ from groundstation.planning.lbfgs import search_state, solve
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, TARGET_STATES, CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.occlusion import box_rows
 from groundstation.sensing.topology import Topology
 from groundstation.sensing.visibility import camera_rows
 
@@ -156,6 +157,7 @@ class ProblemBuilder:
         self._onboard = {name: row for row, name in enumerate(sensors.onboard, start=len(self._world))}
         self.eyes = (*sensors.world, *sensors.onboard)
         self._cameras = camera_rows([*sensors.world.values(), *sensors.onboard.values()], sensors.softness)
+        self._boxes = box_rows(sensors.obstacles)
         p, low, high = parameters, parameters.fence_margin_m, -parameters.fence_margin_m
         bottom, top = parameters.heights_m
         self.height_m, self._half_m = 0.5 * (bottom + top), max(0.5 * (top - bottom), _LEAST_BAND_M)
@@ -176,7 +178,7 @@ class ProblemBuilder:
         cost = CostProblem(
             scale=self._scale, poses=scene.poses, targets=scene.moving, climbs=self._climbs, prior=scene.prior,
             yaw_variances=scene.yaw_variances, edges=edges, cameras=self._cameras, markers=self._markers,
-            target_weights=self._target_weights, options=self._options,
+            target_weights=self._target_weights, boxes=self._boxes, options=self._options,
         )  # fmt: skip
         return PlanningProblem(topology, cost, wanted)
 

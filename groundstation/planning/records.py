@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.kernel import Record, Rows
+from groundstation.sensing.occlusion import BoxRow
 from groundstation.sensing.visibility import CameraRow
 
 # Columns of a robot's path, of its controls (and of derivatives by its path), of a target's mean, of a robot's pose.
@@ -63,7 +64,7 @@ class CostProblem(NamedTuple):
 
     scale (4 n): bounds of the controls, for the effort; poses (n, 4): x, y, z, yaw; targets (k, 4): x, y, vx, vy;
     climbs (n): how fast each may climb [m/s]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k):
-    heights above the robot's centre or the floor [m]; target_weights (k), in state order.
+    heights above the robot's centre or the floor [m]; target_weights (k), in state order; boxes: what hides markers.
     """
 
     scale: Vector
@@ -76,6 +77,7 @@ class CostProblem(NamedTuple):
     cameras: Rows[CameraRow]
     markers: Vector
     target_weights: Vector
+    boxes: Rows[BoxRow]
     options: CostOptions
 
 
@@ -83,7 +85,8 @@ class EdgeTape(Record):
     """What one edge saw in one step: availability, its derivatives by relative position [world] and observer's yaw.
 
     x, y: relative position [m]; square, z: squared distance from the camera, and its vertical part [m]; variance of a
-    position per axis and w, the information; v: information of the heading.
+    position per axis and w, the information; v: information of the heading; along_x, along_y, along_z: derivatives of
+    the availability if observer and subject move alike, past a box [1/m; world], only where there are boxes.
     """
 
     a: float
@@ -98,6 +101,9 @@ class EdgeTape(Record):
     variance: float
     w: float
     v: float
+    along_x: float
+    along_y: float
+    along_z: float
 
 
 class Tape(NamedTuple):

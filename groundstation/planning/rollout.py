@@ -28,6 +28,7 @@ from groundstation.planning.records import (
     Y,
     Z,
 )
+from groundstation.sensing.occlusion import SOFT_M, sight
 from groundstation.sensing.visibility import SPREAD, CameraRow, available
 
 _EDGE_TAPE = EdgeTape.dtype
@@ -103,6 +104,30 @@ def look(camera: CameraRow, edge: EdgeRow, x: float, y: float, z: float, c: floa
 
 
 @kernel()
+def hide(problem: CostProblem, tape: Tape, i: int, e: int) -> None:
+    """Count what boxes hide of one edge in one step: less is available, and it depends on where both are."""
+    edge, seen = problem.edges[e], tape.sightings[i * problem.edges.shape[0] + e]
+    seen.along_x = seen.along_y = seen.along_z = 0.0
+    if seen.a <= 0.0:
+        return
+    camera, a, c, s, x, y, z = problem.cameras[edge.camera], edge.observer, 1.0, 0.0, 0.0, 0.0, 0.0
+    if a >= 0:
+        place = tape.path[i + 1, a]
+        c, s, x, y, z = place[COS], place[SIN], place[X], place[Y], place[Z]
+    off_x, off_y = c * camera.position[0] - s * camera.position[1], s * camera.position[0] + c * camera.position[1]
+    z += camera.position[2]
+    width = math.sqrt(SOFT_M * SOFT_M + SPREAD * edge.blur_m2)
+    free = sight(problem.boxes, width, x + off_x, y + off_y, z, x + seen.x, y + seen.y, z + seen.z)
+    seen.along_x, seen.along_y = seen.a * (free.eye_x + free.x), seen.a * (free.eye_y + free.y)
+    seen.along_z = seen.a * (free.eye_z + free.z)
+    seen.a_x, seen.a_y = free.a * seen.a_x + seen.a * free.x, free.a * seen.a_y + seen.a * free.y
+    seen.a_z = free.a * seen.a_z + seen.a * free.z
+    if a >= 0:
+        seen.a_yaw = free.a * seen.a_yaw + seen.a * (off_x * free.eye_y - off_y * free.eye_x)
+    seen.a *= free.a
+
+
+@kernel()
 def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
     """Return repulsion between robots and soft fence at one step; adds d/d(x, y) to gradient (n, 3)."""
     n, cost = path.shape[0], 0.0
@@ -148,6 +173,8 @@ def look_around(problem: CostProblem, tape: Tape, i: int) -> None:
             x, y, z = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - path[i + 1, a, Z]
             c, s = path[i + 1, a, COS], path[i + 1, a, SIN]
         look(cameras[edge.camera], edge, x, y, z, c, s, seen)
+        if problem.boxes.shape[0] > 0:
+            hide(problem, tape, i, e)
 
 
 @kernel(inlined=True)

@@ -7,7 +7,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import LensCalibration, MotionCapture, WorldCamera
 from groundstation.field.targets import Marker
 from groundstation.geometry.rotations import world_from_downward_optical
-from groundstation.sensing.models import Frustum, Noise, OnboardCameraModel, SensorSuite, WorldCameraModel
+from groundstation.sensing.models import Box, Frustum, Noise, OnboardCameraModel, SensorSuite, WorldCameraModel
 
 BORDER_SQUARES = 3.5
 """Half the diagonal of a board, in squares of it: the whole board must be in the picture."""
@@ -40,6 +40,7 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
         | {name: _captured(system) for name, system in field.sensing_capture.items()},
         onboard={name: _onboard(drone, smallest, reach) for name, drone in drones.items()},
         marker_height_m=heights | {name: target.marker.height_m for name, target in targets.items()},
+        obstacles=tuple(Box(one.centre_m, one.size_m) for one in field.room.obstacles.values()),
     )
 
 

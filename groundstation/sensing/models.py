@@ -136,8 +136,21 @@ class Rectangle:
 
 
 @dataclass(frozen=True, slots=True)
+class Box:
+    """An upright box that stands on the floor along the room's axes, and hides what is behind it [m; world]."""
+
+    centre_m: tuple[float, float]
+    size_m: tuple[float, float, float]
+
+    @property
+    def middle_m(self) -> tuple[float, float, float]:
+        """Return its middle."""
+        return (*self.centre_m, self.size_m[2] / 2.0)
+
+
+@dataclass(frozen=True, slots=True)
 class SensorSuite:
-    """All cameras and marker heights of the team.
+    """All cameras and marker heights of the team, and what is known to hide markers.
 
     marker_height_m: of robots above their centre, of targets above the floor. sightings_per_s: of what is in view.
     """
@@ -147,11 +160,18 @@ class SensorSuite:
     marker_height_m: Mapping[str, float]
     softness: Softness = Softness()
     sightings_per_s: float = 12.0
+    obstacles: tuple[Box, ...] = ()
 
     def marker(self, name: str, mean: Array, is_robot: bool) -> Array:
         """Return the centre of an entity's marker [m; world] from its part of the belief's mean."""
         height = self.marker_height_m[name] + (float(mean[2]) if is_robot else 0.0)
         return np.array([mean[0], mean[1], height])
+
+    def eye(self, camera: str, mean: Array) -> Array:
+        """Return where a camera is [m; world]; mean: x, y, z, yaw of its carrier, of no account for a fixed one."""
+        if camera in self.world:
+            return np.array(self.world[camera].position_m)
+        return np.asarray(mean[:3] + rotation_z(float(mean[3])) @ np.array(self.onboard[camera].position_m))
 
     def world_in_view(self, camera: str, point: Array) -> bool:
         """Return whether a world-fixed camera has a marker at a world point in view (hard limits)."""

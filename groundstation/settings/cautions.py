@@ -21,6 +21,7 @@ from groundstation.settings.schema import Field
 _STANDING_MARKER_M = 0.14
 _FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
 _LEAST_STD_M = 0.1
+_ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
 # Cosine of the angle between the optical axis and straight down from which on a camera looks at walls.
 _AT_WALLS = math.cos(math.radians(75.0))
@@ -81,6 +82,20 @@ def _fence(field: Field) -> Iterator[Finding]:
         if min(inside) < _FENCE_MARGIN_M:
             text = f"is {max(0.0, min(inside)):.2f} m from the fence: a take-off drifts farther than that"
             yield ("drones", name, "pad_m"), text
+
+
+def _obstacles(field: Field) -> Iterator[Finding]:
+    fence, lowest = field.room.fence, min(height for row in field.planner.level_heights_m for height in row)
+    for name, one in field.room.obstacles.items():
+        (x, y), (width, depth, height) = one.centre_m, one.size_m
+        inside = (fence.x_m[0] - width / 2 < x < fence.x_m[1] + width / 2) and (
+            fence.y_m[0] - depth / 2 < y < fence.y_m[1] + depth / 2
+        )
+        if inside and height > lowest - _ABOVE_OBSTACLE_M:
+            text = (
+                f"is {height:g} m high, and drones fly at {lowest:g} m and do not go round it: keep it out of the fence"
+            )
+            yield ("room", "obstacles", name), text
 
 
 def _uncertainty(field: Field) -> Iterator[Finding]:
@@ -152,6 +167,7 @@ _CHECKS: tuple[Callable[[Field], Iterator[Finding]], ...] = (
     _views,
     _carried_cameras,
     _fence,
+    _obstacles,
     _uncertainty,
     _addresses,
     _adapters,

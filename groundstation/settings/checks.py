@@ -76,6 +76,20 @@ def _fence_in_room(parts: Parts) -> Iterator[Finding]:
             yield ("room", "fence", name), f"must lie inside the room, {low:g} to {high:g} (got {least:g} to {most:g})"
 
 
+def _obstacles(parts: Parts) -> Iterator[Finding]:
+    if parts.room is None:
+        return
+    size = parts.room.size_m
+    for name, one in parts.room.obstacles.items():
+        path = ("room", "obstacles", name)
+        (x, y), half = one.centre_m, (one.size_m[0] / 2, one.size_m[1] / 2)
+        if abs(x) + half[0] > size[0] / 2 or abs(y) + half[1] > size[1] / 2 or one.size_m[2] > size[2]:
+            yield path, "must stand inside the room"
+        for drone, own in parts.flying.items():
+            if abs(own.pad_m[0] - x) < half[0] and abs(own.pad_m[1] - y) < half[1]:
+                yield ("drones", drone, "pad_m"), f"lies in room.obstacles.{name}"
+
+
 def _cameras_above_fence(parts: Parts) -> Iterator[Finding]:
     if parts.room is None:
         return
@@ -260,6 +274,7 @@ def _calibrations(parts: Parts) -> Iterator[Finding]:
 
 _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _fence_in_room,
+    _obstacles,
     _cameras_above_fence,
     _root,
     _captured,

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from groundstation.settings.room import WorldCameraSettings
+from groundstation.settings.room import ObstacleSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ Paths = dict[str, list[tuple[float, float]]]
 
 _SLOT_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown")
 _TARGET_COLOUR = "tab:red"
+_OBSTACLE_COLOUR = "dimgrey"
 
 
 def draw(field: Field, output: Path, paths: Paths | None = None) -> None:
@@ -87,6 +88,9 @@ def marker_height(field: Field, slot_m: float) -> float:
 def _draw_top(axes: "Axes", field: Field, paths: Paths) -> None:
     fence = field.room.fence
     _box(axes, fence.x_m, fence.y_m, linestyle="--", edgecolor="grey", label="fence")
+    for name, one in field.room.obstacles.items():
+        xs, ys = _sides(one)
+        _box(axes, xs, ys, edgecolor=_OBSTACLE_COLOUR, label=f"{name}, {one.size_m[2]:g} m high", filled=True)
     for name, camera in field.cameras.items():
         x, y, _ = camera.position_m
         axes.plot(x, y, "k^", label=f"camera {name}")
@@ -110,6 +114,8 @@ def _draw_top(axes: "Axes", field: Field, paths: Paths) -> None:
 def _draw_side(axes: "Axes", field: Field, paths: Paths) -> None:
     fence = field.room.fence
     _box(axes, fence.x_m, fence.z_m, linestyle="--", edgecolor="grey")
+    for one in field.room.obstacles.values():
+        _box(axes, _sides(one)[0], (0.0, one.size_m[2]), edgecolor=_OBSTACLE_COLOUR, filled=True)
     for camera in field.cameras.values():
         x, _, z = camera.position_m
         length, _ = footprint(camera, 0.0)
@@ -144,6 +150,11 @@ def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
     axes.plot(0.0, board_m, color=_TARGET_COLOUR, marker="s")
 
 
+def _sides(box: ObstacleSettings) -> tuple[tuple[float, float], tuple[float, float]]:
+    (x, y), (width, depth, _) = box.centre_m, box.size_m
+    return (x - width / 2, x + width / 2), (y - depth / 2, y + depth / 2)
+
+
 def _box(
     axes: "Axes",
     x: tuple[float, float],
@@ -151,9 +162,12 @@ def _box(
     edgecolor: str,
     linestyle: str = "-",
     label: str | None = None,
+    filled: bool = False,
 ) -> None:
     from matplotlib.patches import Rectangle
 
     size = x[1] - x[0], y[1] - y[0]
-    box = Rectangle((x[0], y[0]), *size, fill=False, label=label, edgecolor=edgecolor, linestyle=linestyle)
+    box = Rectangle((x[0], y[0]), *size, fill=filled, label=label, edgecolor=edgecolor, linestyle=linestyle)
+    if filled:
+        box.set(facecolor=edgecolor, alpha=0.35)
     axes.add_patch(box)

@@ -6,7 +6,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from groundstation.settings.values import HostName, Interval, SettingsSection, Source, Vector3, VideoDelay, of_length
+from groundstation.settings.values import (
+    HostName,
+    Interval,
+    Name,
+    SettingsSection,
+    Source,
+    Vector2,
+    Vector3,
+    VideoDelay,
+    of_length,
+)
 
 Length = Annotated[float, Field(gt=0, le=100)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
@@ -27,13 +37,24 @@ class FenceSettings(SettingsSection):
         return self.x_m[0] <= x_m <= self.x_m[1] and self.y_m[0] <= y_m <= self.y_m[1]
 
 
+class ObstacleSettings(SettingsSection):
+    """An upright box along the room's axes that hides what is behind it: a cupboard, a pillar, a table."""
+
+    centre_m: Vector2
+    """Where its middle stands on the floor [x, y in m; world]."""
+    size_m: Annotated[tuple[Length, Length, Length], of_length(3)]
+    """Its size along world x, y and z [m]; it stands on the floor."""
+
+
 class RoomSettings(SettingsSection):
-    """The room: its size, and the fence in it."""
+    """The room: its size, the fence in it, and what stands there."""
 
     size_m: Annotated[tuple[Length, Length, Length], of_length(3)]
     """Size of the room along x, y and z [m]. The origin is on the floor, in the middle."""
     fence: FenceSettings
     """Box inside the room that drones are not allowed to leave."""
+    obstacles: dict[Name, ObstacleSettings] = Field(default_factory=dict)
+    """What stands in the room and hides markers, by name. Plans look past it; drones do not fly round it."""
 
 
 Rotation = Annotated[tuple[Angle, Angle, Angle], of_length(3)]

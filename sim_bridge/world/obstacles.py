@@ -7,7 +7,9 @@ import numpy as np
 
 from groundstation.arrays import Array
 from sim_bridge.scenario import TargetScenario
+from sim_bridge.site import SimulatedObstacle
 from sim_bridge.surroundings import Obstacle
+from sim_bridge.target_paths import Standstill
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.unicycle import BASES, Unicycle
 
@@ -48,10 +50,16 @@ class Box:
         return enters < leaves
 
 
+def all_obstacles(scenario: Iterable[Obstacle], room: Iterable[SimulatedObstacle]) -> tuple[Obstacle, ...]:
+    """Return the obstacles of a scenario, then those that the field says stand in the room."""
+    standing = (Obstacle(size_m=one.size_m, path=Standstill(position_m=one.centre_m)) for one in room)
+    return (*scenario, *standing)
+
+
 def boxes_of(
     obstacles: Iterable[Obstacle], tick_s: float, seed: int, half_room: tuple[float, float]
 ) -> tuple[Box, ...]:
-    """Return the obstacles of a scenario, each with chance of its own."""
+    """Return boxes, each with chance of its own."""
     return tuple(
         Box(one, tick_s, generator_of(seed, f"obstacle {index}"), half_room) for index, one in enumerate(obstacles)
     )

@@ -15,7 +15,7 @@ from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.emulation import Body, emulation_of, senses_of
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.noise import generator_of
-from sim_bridge.world.obstacles import boxes_of, floor_below
+from sim_bridge.world.obstacles import all_obstacles, boxes_of, floor_below
 from sim_bridge.world.puppet import Puppet
 from sim_bridge.world.unicycle import Unicycle
 
@@ -58,7 +58,8 @@ class World:
         self.targets = {
             name: Unicycle(path, TICK_S, generator_of(seed, name), half_floor) for name, path in paths.items()
         }
-        self.obstacles = boxes_of(scenario.obstacles, TICK_S, seed, half_floor)
+        about = all_obstacles(scenario.obstacles, site.room.obstacles.values())
+        self.obstacles = boxes_of(about, TICK_S, seed, half_floor)
         self._zones = scenario.floor_zones
         self._echoes = scenario.drones.echoes_of_bodies
         self._target_tops = {name: one.marker.height_m for name, one in site.tracked.items()}

@@ -249,6 +249,9 @@ def test_config_draw(lab: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["config", "draw", "lab.yaml", "--scenario", "realistic", "--output", "room.svg"]) == 0
     text = (lab / "room.svg").read_text(encoding="utf-8")
     assert text.count("<path") > 20
+    table = ("--set", "room.obstacles={table: {centre_m: [2, 1], size_m: [1, 1, 0.7]}}")
+    assert cli.run(["config", "draw", "lab.yaml", "--scenario", "realistic", *table, "--output", "table.svg"]) == 0
+    assert (lab / "table.svg").read_text(encoding="utf-8").count("<path") > text.count("<path") + 2
     assert cli.run(["config", "draw", "lab.yaml", "--output", "room.txt"]) == 2
     assert "must end in .png, .svg or .pdf" in capsys.readouterr().err
 

@@ -1,5 +1,6 @@
 """A robot that a fixed camera should see and does not is missed; one that may be hidden is not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from groundstation.control.missing_robots import MissingRobots
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.models import Box
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
@@ -25,11 +27,15 @@ def belief(first: tuple[float, ...], second: tuple[float, ...], stamp_ns: int, s
 
 
 def missed(
-    first: tuple[float, ...], second: tuple[float, ...], age_s: float = 2.0, std_m: float = 0.05
+    first: tuple[float, ...],
+    second: tuple[float, ...],
+    age_s: float = 2.0,
+    std_m: float = 0.05,
+    obstacles: tuple[Box, ...] = (),
 ) -> tuple[list[str], MissingRobots]:
     """Return whom ten pictures without drone_1 let miss."""
     said: list[str] = []
-    watch = MissingRobots(SENSORS, NAMES)
+    watch = MissingRobots(replace(SENSORS, obstacles=obstacles), NAMES)
     for tick in range(1, 11):
         stamp_ns = tick * 100_000_000
         header = Header(stamp_ns, "c", "ceiling", "ceiling", tick)
@@ -61,3 +67,8 @@ def test_one_that_may_well_not_be_seen_is_not_missed(
     said, watch = missed(first, second, age_s, std_m)
     assert said == []
     assert watch.missed_s == {}
+
+
+def test_one_behind_a_pillar_is_not_missed() -> None:
+    said, _ = missed((0.9, 0.4, 1.3, 0.0), (-0.8, 0.0, 1.6, 0.0), obstacles=(Box((0.75, 0.3), (0.3, 0.3, 3.0)),))
+    assert said == []

@@ -19,6 +19,7 @@ from groundstation.estimation.room_map import RoomGrid
 from groundstation.sensing.detection import detection
 from groundstation.sensing.footprint import footprint_of
 from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.models import Box, SensorSuite
 from groundstation.sensing.visibility import camera_rows
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
@@ -48,8 +49,8 @@ def picture(observer: str, stamp_s: float, *found: str) -> SearchedPicture:
     return SearchedPicture(header=header, observer=observer, camera=f"{observer}_camera", found=found)
 
 
-def new_search(parameters: SearchParameters = SEARCH) -> Search:
-    return Search(parameters, CONTROL.lost_after_s, SENSORS, ("turtlebot",), Excursions(CONTROL, SENSORS))
+def new_search(parameters: SearchParameters = SEARCH, sensors: SensorSuite = SENSORS) -> Search:
+    return Search(parameters, CONTROL.lost_after_s, sensors, ("turtlebot",), Excursions(CONTROL, sensors))
 
 
 def fly(
@@ -105,6 +106,22 @@ def test_pictures_are_searched_as_far_as_a_full_search_finds_markers() -> None:
     row = int(np.argmin(np.abs(search.grid.ys)))
     assert after.chances[row, ahead] < 0.6 * before.chances[row, ahead]
     assert after.chances[row, behind] > before.chances[row, behind]
+
+
+def test_what_a_cupboard_hides_is_not_searched_by_a_picture_of_it() -> None:
+    poses, maps = {"drone_1": np.array([0.0, 0.0, 1.6, 0.0])}, []
+    for boxes in ((), (Box((1.3, 0.0), (0.2, 1.6, 1.3)),)):
+        search = new_search(sensors=replace(SENSORS, obstacles=boxes))
+        search.advance(belief(poses, 0.02), {"turtlebot": math.inf})
+        search.take(picture("drone_1", 0.02))
+        search.advance(belief(poses, 0.04), {"turtlebot": math.inf})
+        room = search.targets["turtlebot"].room
+        assert room is not None
+        maps.append(room.overlooked)
+    ahead, row = int(np.argmin(np.abs(search.grid.xs - 1.7))), int(np.argmin(np.abs(search.grid.ys)))
+    assert maps[0][row, ahead] < 0.5
+    assert maps[1][row, ahead] > 0.95
+    assert maps[1].min() < 0.5  # before it
 
 
 def test_each_searches_on_its_own_side_whoever_is_nearer_to_the_middle() -> None:

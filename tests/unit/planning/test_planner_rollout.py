@@ -8,11 +8,13 @@ import pytest
 from scipy.optimize import minimize
 
 from groundstation.arrays import Array
+from groundstation.kernel import Rows
 from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
 from groundstation.planning.lbfgs import search_state, solve
 from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
-from groundstation.sensing.models import Frustum, OnboardCameraModel, Softness, WorldCameraModel
+from groundstation.sensing.models import Box, Frustum, OnboardCameraModel, Softness, WorldCameraModel
+from groundstation.sensing.occlusion import BoxRow, box_rows
 from groundstation.sensing.visibility import available, camera_rows
 
 CEILING = WorldCameraModel((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0))
@@ -21,6 +23,7 @@ CAMERAS = camera_rows([CEILING, ONBOARD], Softness())
 FENCE, STEPS, HEIGHT_M = np.array([[-0.8, 0.9], [-0.6, 0.7]]), 8, 1.5
 OPTIONS = CostOptions(STEPS, 0.3, 0.9, 2e-3, 3e-4, 0.05, 0.1, 1.0, 1.0, FENCE, 1e-3, 0.5, 3.6, HEIGHT_M)
 WEIGHTS = np.array([1.0, 2.5])  # of two targets
+BOXES = box_rows([Box((0.2, 0.1), (0.3, 0.4, 1.1)), Box((-0.4, -0.3), (0.2, 0.2, 1.6))])
 
 
 @dataclass
@@ -75,6 +78,7 @@ def case(n: int, layout: str, seed: int, targets: int = 1) -> Case:
             CAMERAS,
             markers,
             WEIGHTS[:targets].copy(),
+            box_rows([]),
             OPTIONS,
         ),
     )
@@ -163,10 +167,12 @@ def test_the_uncertainty_is_that_of_a_dense_textbook_filter(n: int, layout: str,
         assert report[0] == pytest.approx(textbook(one, u), rel=1e-6)
 
 
+@pytest.mark.parametrize("boxes", [box_rows([]), BOXES])
 @pytest.mark.parametrize(("n", "layout", "targets"), CASES)
-def test_the_gradient_is_exact(n: int, layout: str, targets: int) -> None:
+def test_the_gradient_is_exact(n: int, layout: str, targets: int, boxes: Rows[BoxRow]) -> None:
     for seed in range(8):
         one = case(n, layout, seed, targets)
+        one.cost = one.cost._replace(boxes=boxes)
         u = np.random.default_rng(200 + seed).uniform(-1, 1, 4 * n) * one.scale
         _, g = one.gradient(u)
         differences = np.empty(u.size)
@@ -177,6 +183,17 @@ def test_the_gradient_is_exact(n: int, layout: str, targets: int) -> None:
             near, far = one.value(u + e) - one.value(u - e), one.value(u + 2 * e) - one.value(u - 2 * e)
             differences[j] = (8 * near - far) / 36e-6
         assert np.abs(g - differences).max() <= 1e-6 * np.abs(g).max()
+
+
+def test_what_stands_in_the_way_costs_and_never_helps() -> None:
+    hidden = 0
+    for seed in range(10):
+        one = case(2, "string", seed)
+        free = one.value(np.zeros(8))
+        one.cost = one.cost._replace(boxes=BOXES)
+        assert one.value(np.zeros(8)) >= free * (1.0 - 1e-12)
+        hidden += one.value(np.zeros(8)) > 1.01 * free
+    assert hidden > 2
 
 
 def search(one: Case, start: Array, budget: int, tolerance: float) -> tuple[Array, float, int]:

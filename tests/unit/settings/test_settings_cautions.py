@@ -23,12 +23,19 @@ FOOLISH = [
     ("drones.drone_1.camera.tilt_down_deg=-45", "drones.drone_1.camera.tilt_down_deg", "seen from above only"),
     ("room.fence.x_m=[-0.95,3.7]", "drones.drone_1.pad_m", "0.05 m from the fence"),
     ("room.fence.x_m=[-1.6,-0.7]", "room.fence.x_m", "leaves 0.90 m"),
+    ("room.obstacles={pillar: {centre_m: [2, 1], size_m: [1, 1, 2]}}", "room.obstacles.pillar", "do not go round it"),
     ("safety.max_position_std_m=0.01", "safety.max_position_std_m", "would hover all the time"),
     ("drones.drone_1.address=192.168.1.255", "drones.drone_1.address", "no address of one vehicle"),
     ("drones.drone_1.address=224.0.0.1", "drones.drone_1.address", "no address of one vehicle"),
     ("recording.directory=/dev/null/runs", "recording.directory", "cannot be written"),
     ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
 ]
+
+
+@pytest.mark.parametrize(("centre", "height"), [("[2, 1]", 0.8), ("[3.85, 0]", 2.0)])
+def test_what_drones_fly_over_or_never_reach_is_no_cause_for_caution(centre: str, height: float) -> None:
+    option = f"room.obstacles={{table: {{centre_m: {centre}, size_m: [0.2, 1, {height}]}}}}"
+    assert cautions_of(LAB, [option]) == cautions_of(LAB)
 
 
 @pytest.mark.parametrize(("option", "path", "words"), FOOLISH)

@@ -56,6 +56,20 @@ def test_one_mistake_gives_one_line(old: str, new: str, expected: str) -> None:
 
 
 @pytest.mark.usefixtures("lab")
+@pytest.mark.parametrize(
+    ("box", "words"),
+    [
+        ("{centre_m: [3.8, 0], size_m: [1, 1, 1]}", "room.obstacles.box: must stand inside the room"),
+        ("{centre_m: [0, 0], size_m: [1, 1, 5]}", "room.obstacles.box: must stand inside the room"),
+        ("{centre_m: [-0.9, 0.45], size_m: [0.6, 0.6, 1]}", "drones.drone_1.pad_m: lies in room.obstacles.box"),
+        ("{centre_m: [0, 0], size_m: [1, 0, 1]}", "room.obstacles.box.size_m[1]: must be > 0 (got 0)"),
+    ],
+)
+def test_an_obstacle_stands_in_the_room_and_on_no_pad(box: str, words: str) -> None:
+    assert any(words in line for line in problems(f"room.obstacles={{box: {box}}}"))
+
+
+@pytest.mark.usefixtures("lab")
 def test_all_mistakes_are_named_at_once_in_the_order_of_lines() -> None:
     changes = {
         "site: lab": "site: Lab",

@@ -65,6 +65,20 @@ def test_an_obstacle_under_the_ceiling_camera_hides_the_drone(
     assert drone.kind == "ardrone"
 
 
+def test_the_room_of_the_simulation_has_the_obstacles_of_the_field(lab_field: ResolvedField) -> None:
+    values = msgspec.to_builtins(lab_field)
+    values["room"]["obstacles"] = {"cupboard": {"centre_m": [1.0, -0.5], "size_m": [0.6, 0.4, 1.2]}}
+    told = scenario(obstacles=[{"path": {"shape": "none", "position_m": [-2.0, 0.0]}}])
+    world = World(parse_site(values), told, 1)
+    for _ in range(50):
+        world.step()
+    person, cupboard = world.obstacles
+    assert (person.body.x, cupboard.body.x, cupboard.body.y) == (-2.0, 1.0, -0.5)
+    assert cupboard.size_m == (0.6, 0.4, 1.2)
+    eye = np.array([1.0, -2.0, 1.5])
+    assert cupboard.hides(eye, np.array([1.0, 0.5, 0.4])) and not cupboard.hides(eye, np.array([2.0, 0.5, 0.4]))
+
+
 def test_a_floor_zone_misleads_the_flow_of_those_above_it(site: Site) -> None:
     zones = [{"x_m": [-10, 10], "y_m": [-10, 10], "flow_bias_m_s": [0.5, 0.0]}]
     readings = []

@@ -12,7 +12,16 @@ import pytest
 
 from groundstation.bus import topics, zenoh_bus
 from groundstation.bus.access import AccessList
-from groundstation.bus.messages import Command, FlightState, Lease, VehicleStatus, VelocitySetpoint, Verb
+from groundstation.bus.messages import (
+    CameraStatus,
+    Command,
+    FlightState,
+    HostReport,
+    Lease,
+    VehicleStatus,
+    VelocitySetpoint,
+    Verb,
+)
 from groundstation.bus.roles import Identity, Member, Role
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.errors import GroundStationError, OperatorMistake
@@ -23,6 +32,10 @@ from groundstation.supervisor.joining import join
 MEMBERS = (
     Member("supervisor", Role.SUPERVISOR, ("supervisor",)),
     Member("drone_1", Role.DRIVER, ("drone_1",), ("drone_1",)),
+)
+HOSTED = (
+    Member("host-laptop", Role.HOST, ("laptop",), ("laptop",)),
+    Member("host-laptop", Role.CAMERA, ("ceiling",), ("ceiling",)),
 )
 HERE, ELSEWHERE = "127.0.0.1", "127.0.0.9"
 
@@ -51,9 +64,9 @@ class Run:
 
     def __init__(self, folder: Path, port: int) -> None:
         make_identities(folder, [HERE, ELSEWHERE], ["router", *(m.name for m in MEMBERS)], site.authority_of("lab"))
-        access = AccessList("lab", (*MEMBERS, *site.hosts("lab")))
-        here, elsewhere = f"tls/{HERE}:{port}", f"tls/{ELSEWHERE}:{port}"
-        self.router = zenoh_bus.open_router(here, Identity(str(folder), "router", "r"), access, (elsewhere,))
+        access = AccessList("lab", (*MEMBERS, *site.hosts("lab"), *HOSTED))
+        here, self.elsewhere = f"tls/{HERE}:{port}", f"tls/{ELSEWHERE}:{port}"
+        self.router = zenoh_bus.open_router(here, Identity(str(folder), "router", "r"), access, (self.elsewhere,))
         self.operator, self.driver = (self._join(folder, here, member.name) for member in MEMBERS)
         self.commands = self.driver.subscribe([topics.COMMAND])
         self.setpoints = self.driver.subscribe([topics.SETPOINT])
@@ -113,6 +126,32 @@ def test_an_admitted_host_finds_the_run_and_stops_it_under_its_own_name(run: Run
     assert run.setpoints.drain_samples() == []
     assert {r.key.source for r in run.commands.drain()} <= {bus.source}
     bus.close()
+
+
+def say_everything(bus: ZenohBus, entity: str) -> None:
+    header = bus.header(entity)
+    bus.publish(topics.HOST_REPORT, HostReport(header=header, sent_ns=1))
+    seen = CameraStatus(header=header, connected=True, fps=1.0, age_ms=1.0, frames=1, skipped=0, detections=0)
+    bus.publish(topics.CAMERA_STATUS, seen)
+    bus.publish(topics.VEHICLE_STATUS, VehicleStatus(header=header, flight_state=FlightState.LANDED, mode="FALSE"))
+    moves = VelocitySetpoint(header=header, velocity_m_s=(1, 0, 0), yaw_rate_rad_s=0, lifetime_ms=300, epoch=1)
+    bus.publish(topics.SETPOINT, moves)
+
+
+def test_a_host_speaks_as_itself_and_as_the_devices_that_the_field_gives_it(run: Run) -> None:
+    place = Identity(str(site.folder("joined", "lab")), "host-laptop", "run-7")
+    heard = run.operator.subscribe([topics.HOST_REPORT, topics.CAMERA_STATUS, topics.VEHICLE_STATUS, topics.SETPOINT])
+    for source, entity in (("laptop", "laptop"), ("ceiling", "ceiling"), ("ceiling", "west"), ("drone_1", "drone_1")):
+        bus = zenoh_bus.open_bus(run.elsewhere, "lab", source, 2.0, place)
+        for _ in range(2):  # the first may come before the router has told who listens
+            say_everything(bus, entity)
+            time.sleep(0.04)
+        bus.close()
+    got = [one for one in heard.drain() if getattr(one.message, "mode", "") != "LANDED"]
+    assert {(one.key.topic.name, one.key.entity, one.key.source) for one in got} == {
+        ("host_report", "laptop", "laptop"),
+        ("camera_status", "ceiling", "ceiling"),
+    }
 
 
 def test_who_was_not_admitted_before_the_run_or_was_expelled_says_nothing(home: Path, run: Run, port: int) -> None:

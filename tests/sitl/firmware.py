@@ -10,7 +10,10 @@ from pathlib import Path
 VARIABLES = {"px4": "SKEIN_PX4", "ardupilot": "SKEIN_ARDUCOPTER"}
 # PX4 sends to 14540 + n, and its simulator the truth to 19410 + n; its system id is n + 1.
 PX4_API, PX4_TRUTH = 14540, 19410
-_COPTER = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 0.0}  # without a frame it never arms
+# Without a frame it never arms; our driver lets nobody take off whose battery is unknown.
+_COPTER = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 0.0, "BATT_MONITOR": 4.0}
+# Nor without calibrated accelerometers, which have another offset than zero; there are two of them.
+_COPTER |= {f"INS_ACC{number}OFFS_{axis}": 0.001 for number in ("", "2") for axis in "XYZ"}
 _SAVED_S = 2.0
 
 

@@ -124,6 +124,7 @@ def fly(flavour: str, seed: int, seconds: float, folder: Path, fault: str = "", 
             if fault and not figures["left"]:
                 figures |= room.end_badly(fault)
             figures["speed"] = round(room.study.world.time_s / (time.monotonic() - began), 2)
+            figures["alone_s"] = round(room.alone_s, 3)
             figures["texts"] = room.process.texts[-12:]
             return figures
     finally:

@@ -15,7 +15,7 @@ from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import ARMED, FORCE, Flavour, Landed, MavCmd, guided_mode, land_mode, mode_name
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
-from groundstation.bus.messages import Vector3
+from groundstation.bus.messages import EntityEstimate, Vector3
 
 _STREAM_FIRST_NS = 1_200_000_000
 _CLIMB_LIMIT_NS = 8_000_000_000
@@ -60,6 +60,19 @@ class Orders:
             return ""
         return f" ({self.said[-1][1]})"
 
+    def see(self, now_ns: int, good: EntityEstimate, reported_m_s: Vector3 | None) -> bool:
+        """Take a good estimate and the velocity [base_stabilized] reported at that time; return whether both count.
+
+        While its motors turn on the floor they do: leaning against a velocity that it does not have it would slide off.
+        """
+        lifted = self.lift.lifted
+        if not lifted:
+            self.lift.see((good.mean[0], good.mean[1], good.mean[2]))
+        if reported_m_s is None or not (lifted or self.starting):
+            return False
+        self.drift.hear(now_ns, good, reported_m_s)
+        return True
+
     def step(
         self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float,
         climb_m_s: float = 0.0,
@@ -97,7 +110,10 @@ class Orders:
         """Return the height above the floor [m]: from the tracker, else the vehicle's own since lift-off."""
         risen_m = self.lift.hear(now_ns, self.starting, landed, reported_m, climb_m_s)
         if not self.lift.lifted:
-            self.drift.reset()
+            if self.starting:
+                self.drift.stand()
+            else:
+                self.drift.reset()
         believed = self.drift.place(now_ns)
         return risen_m if believed is None else believed[2] - self._floor_m
 

@@ -77,6 +77,10 @@ class DriftFeedback:
         self._yaw_rad = 0.0
         self._held: Vector3 | None = None
 
+    def stand(self) -> None:
+        """Forget the error of its climb rate, which sways on the floor."""
+        self._climb_drift_m_s = 0.0
+
     def tell(self, now_ns: int, velocity_m_s: Vector3) -> None:
         """Note the velocity [base_stabilized] that goes out, correction included."""
         self._obedience.tell(now_ns, velocity_m_s[:2])

@@ -179,10 +179,8 @@ class MavlinkVehicle:
     def see(self, now_ns: int, estimate: Estimate) -> None:
         """Take the tracker's estimate."""
         good, known = self.vision.hear(now_ns, estimate), self.telemetry
-        if good is not None and not self.orders.lift.lifted:
-            self.orders.lift.see((good.mean[0], good.mean[1], good.mean[2]))
-        elif good is not None and now_ns - known.moved_ns < _FRESH_NS:
-            self.orders.drift.hear(now_ns, good, known.velocity_m_s)
+        reported = known.velocity_m_s if now_ns - known.moved_ns < _FRESH_NS else None
+        if good is not None and self.orders.see(now_ns, good, reported):
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
 
     def view(self, now_ns: int) -> VehicleView:

@@ -2,7 +2,7 @@
 
 Cameras, target and the other drones are those of the study; driver, tracker and firmware are the real ones. The
 firmware's process is stopped while the room computes, and goes on for 10 ms of its own time at a time: a loaded machine
-makes the flight slower, never different.
+makes the flight slower.
 """
 
 import json

@@ -27,7 +27,7 @@ class Climb:
         if self.seen:
             place = EntityEstimate(name="v", kind="robot", mean=(0.0, 0.0, self.height_m, 0.0), covariance=SURE,
                                    velocity_m_s=(0.0, 0.0, self.climb_m_s), converged=True, age_s=0.0)  # fmt: skip
-            self.orders.drift.hear(self.now_ns, place, (0.0, 0.0, self.climb_m_s))
+            self.orders.see(self.now_ns, place, (0.0, 0.0, self.climb_m_s))
         landed = Landed.IN_AIR if self.height_m > 0.02 else Landed.ON_GROUND
         told = self.orders.step(
             self.now_ns, WatchdogDecision(mode, action), ARMED, guided_mode(self.flavour), landed, self.height_m,
@@ -69,3 +69,36 @@ def test_a_hover_after_the_take_off_goes_on_to_its_height_and_a_later_hold_keeps
     for _ in range(40):
         climb.turn(DriverMode.HOLD, Action.HOVER)
     assert climb.height_m == pytest.approx(reached_m, abs=0.05)
+
+
+def stands(orders, seconds, action, mode, reported=(0.2, 0.0, 0.1), at_m=(0.0, 0.0)):
+    """Have it stand somewhere, motors on, with a velocity of its own; returns what it was told last."""
+    told = None
+    for turn in range(round(seconds * 20)):
+        now_ns = 10**9 + turn * 50_000_000
+        place = EntityEstimate("v", "robot", (*at_m, 0.02, 0.0), SURE, (0.0, 0.0, 0.0), True, 0.1)
+        orders.see(now_ns, place, reported)
+        decision = WatchdogDecision(mode, action)
+        # PX4 says that it flies long before it does.
+        landed = Landed.IN_AIR if action is Action.TAKE_OFF and turn > 20 else Landed.ON_GROUND
+        told = orders.step(now_ns, decision, ARMED, guided_mode(Flavour.PX4), landed, 0.0) or told
+    return told
+
+
+def px4():
+    vehicle = VehicleSettings(name="v", system_id=1, flavour="px4", take_off_m=TAKE_OFF_M)
+    return Orders(vehicle, Flavour.PX4, Requests(1))
+
+
+def test_on_the_floor_an_error_of_its_velocity_is_corrected_before_it_leans_against_it():
+    orders = px4()
+    told = stands(orders, 3.0, Action.TAKE_OFF, DriverMode.TAKING_OFF)
+    assert not orders.lift.lifted
+    assert told.vx == pytest.approx(0.2, abs=0.02) and told.vy == pytest.approx(0.0, abs=0.02)
+    assert told.vz == pytest.approx(-0.4), "what its climb rate sways by there is left alone"
+
+
+def test_what_was_not_asked_to_take_off_is_not_corrected_on_the_floor():
+    orders = px4()
+    stands(orders, 1.0, Action.IDLE, DriverMode.LANDED)
+    assert orders.drift.drift(2 * 10**9) == (0.0, 0.0, 0.0)

@@ -160,6 +160,10 @@ class Tracker:
         self._watch_plan(now_ns)
         return self._belief
 
+    def tilt_of(self, message: RelativeObservation) -> tuple[float, float]:
+        """Return the observer's (roll, pitch) [rad] of a sighting as the filter takes them."""
+        return self._intake.tilt_of(message)
+
     def take_corrections(self) -> list[Correction]:
         """Return and forget what became of the observations since the last call."""
         corrections, self._corrections = self._corrections, []

@@ -139,8 +139,7 @@ class Intake:
         values = (message.position_m, message.yaw_rad)
         if self._sight_watch.is_frozen((message.observer, message.camera, message.subject), values, stamp_ns):
             return Verdict.FROZEN
-        reported = (message.roll_rad, message.pitch_rad)
-        roll_rad, pitch_rad = self._attitudes.tilt(message.observer, stamp_ns, reported)
+        roll_rad, pitch_rad = self._tilt(message, stamp_ns)
         measurement = Measurement(
             stamp_ns,
             message.camera if message.camera in self._cameras else message.observer,
@@ -154,6 +153,14 @@ class Intake:
         )
         tie = f"{key}#{message.subject}#{message.header.seq}"
         return self._filter.add_observation(measurement, tie, now_ns) or Verdict.ACCEPTED
+
+    def _tilt(self, message: RelativeObservation, stamp_ns: int) -> tuple[float, float]:
+        return self._attitudes.tilt(message.observer, stamp_ns, (message.roll_rad, message.pitch_rad))
+
+    def tilt_of(self, message: RelativeObservation) -> tuple[float, float]:
+        """Return the observer's (roll, pitch) [rad] of a sighting as the filter takes them, not as the vehicle says."""
+        stamp_ns = self._local_stamp(message)
+        return (message.roll_rad, message.pitch_rad) if stamp_ns is None else self._tilt(message, stamp_ns)
 
     def _local_stamp(self, message: Message) -> int | None:
         if message.header.clock == self._clock:

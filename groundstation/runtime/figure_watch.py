@@ -2,7 +2,9 @@
 
 import math
 
-from groundstation.bus.messages import Message, RelativeObservation, Severity
+import msgspec
+
+from groundstation.bus.messages import RelativeObservation, Severity
 from groundstation.bus.notice import Notice
 from groundstation.estimation.figure_suspicion import Charge, FigureSuspicion, Suspect
 from groundstation.estimation.sight_loops import SightLoops
@@ -23,10 +25,11 @@ class FigureWatch:
         self._told: tuple[Suspect, ...] = ()
         self.cause = ""
 
-    def take(self, message: Message) -> None:
-        """Take a message that the tracker accepted."""
-        if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
-            self._loops.see(message)
+    def take(self, sighting: RelativeObservation, tilt: tuple[float, float]) -> None:
+        """Take a sighting that the tracker accepted, and its observer's (roll, pitch) [rad] as it has them."""
+        if sighting.header.clock == self._clock:
+            roll_rad, pitch_rad = tilt
+            self._loops.see(msgspec.structs.replace(sighting, roll_rad=roll_rad, pitch_rad=pitch_rad))
 
     def notices(self, now_ns: int) -> list[Notice]:
         """Return a new finding, or the end of one. `cause` is the finding that stands, in a few words, or ""."""

@@ -10,7 +10,7 @@ import msgspec
 from groundstation import plug_ins
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Message, Severity
+from groundstation.bus.messages import Message, RelativeObservation, Severity
 from groundstation.bus.notice import Notice
 from groundstation.bus.topics import SEARCH_MAP
 from groundstation.field.resolved import ResolvedField
@@ -121,7 +121,8 @@ class Tracking:
             verdict = tracker.ingest(key, message, now_ns)
             if verdict is None:
                 self._picture_age.take(message)
-                self._figures.take(message)
+                if isinstance(message, RelativeObservation):
+                    self._figures.take(message, tracker.tilt_of(message))
             else:
                 self._contradictions.refused(message, verdict, now_ns)
         tracker.advance(now_ns)

@@ -73,7 +73,8 @@ class Room:
                     RelativeObservation(
                         **{f: getattr(sighting, f) for f in sighting.__struct_fields__ if f != "header"},
                         header=Header(shifted, "c", sighting.observer, sighting.observer, 1),
-                    )
+                    ),
+                    (sighting.roll_rad, sighting.pitch_rad),
                 )
             if picture % 15 == 14:
                 notices = watch.notices(round((at_s + 0.05) * 1e9))
@@ -113,7 +114,7 @@ def test_figures_that_are_right_again_are_refuted(lab_field: ResolvedField) -> N
         if picture == 15 * 20:
             room.wrong = {}
         for sighting in room.pictures(picture / 15.0):
-            watch.take(sighting)
+            watch.take(sighting, (sighting.roll_rad, sighting.pitch_rad))
         if picture % 15 == 14:
             states += [notice.severity for notice in watch.notices(round((picture / 15.0 + 0.05) * 1e9))]
     assert states[0] is Severity.WARNING and states[-1] is Severity.INFO

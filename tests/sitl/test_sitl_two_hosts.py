@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(300)]
+
 PROGRAM = Path(__file__).with_name("two_hosts.py")
 ALONE = ["unshare", "--user", "--map-root-user", "--net"]
 AHEAD_S = 895
@@ -38,7 +40,6 @@ def flown(folder: Path, **order: Any) -> dict[str, Any]:
     return told
 
 
-@pytest.mark.slow
 def test_all_drivers_and_cameras_on_another_host_behind_a_bad_link(tmp_path: Path) -> None:
     told = flown(tmp_path, duration_s=5, delay_s=0.02, loss=0.01)
     criteria = {one["name"]: one["value"] for one in told["report"]["criteria"]}

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 @dataclass(frozen=True, slots=True)
 class DriftLimits:
     """ticks: calls over which cameras see a mean. smoothing_s, fades_s: of the difference, and without cameras.
-    tolerated_m_s: noise and a wrong scale, never corrected; most_m_s: largest correction; step_m_s: largest difference
-    that counts at once, so that a picture that hangs is found before it moves anything.
+    tolerated_m_s: noise, a wrong scale, a floor that misleads a little: a drift begins beyond it, and is over below
+    half of it; most_m_s: largest correction; step_m_s: largest difference that counts at once, so that a picture that
+    hangs is found before it moves anything.
     """
 
     ticks: int = 24
     smoothing_s: float = 0.5
     fades_s: float = 2.0
-    tolerated_m_s: float = 0.1
+    tolerated_m_s: float = 0.2
     most_m_s: float = 0.6
     step_m_s: float = 0.3
 
@@ -35,6 +36,7 @@ class OdometryDrift:
         """Forget it: the drone stands, or holds its place by itself."""
         self._measured: deque[float] = deque(maxlen=self._limits.ticks)
         self._off_m_s = 0.0
+        self._drifts = False
 
     def compare(self, measured_m_s: float, seen_m_s: float | None, dt_s: float) -> None:
         """Take a measured speed and the mean one that cameras saw, None if they did not."""
@@ -45,12 +47,12 @@ class OdometryDrift:
         elif len(self._measured) == limits.ticks:
             change = sum(self._measured) / limits.ticks - seen_m_s - self._off_m_s
             self._off_m_s += min(1.0, dt_s / limits.smoothing_s) * _clamp(change, limits.step_m_s)
+        self._drifts = math.fabs(self._off_m_s) > limits.tolerated_m_s * (0.5 if self._drifts else 1.0)
 
     @property
     def correction_m_s(self) -> float:
         """Return how much of a measured speed is not true [m/s]."""
-        limits = self._limits
-        return _clamp(self._off_m_s - _clamp(self._off_m_s, limits.tolerated_m_s), limits.most_m_s)
+        return _clamp(self._off_m_s, self._limits.most_m_s) if self._drifts else 0.0
 
 
 def _clamp(value: float, limit: float) -> float:

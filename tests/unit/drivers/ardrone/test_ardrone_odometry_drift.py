@@ -51,14 +51,20 @@ def test_cameras_hold_a_drone_whose_odometry_drifts() -> None:
     seen = fly(drifting, lambda now_s, mean: mean)
     assert max(blind) > 0.75
     assert max(seen) < 0.55  # what is tolerated, and what drifts in the time that cameras need
-    assert abs(sum(seen[-200:]) / 200 - 0.3) < 0.15
+    assert abs(sum(seen[-200:]) / 200 - 0.3) < 0.05
 
 
-@pytest.mark.parametrize("hangs_s", [0.5, 1.0])
-def test_a_picture_that_hangs_moves_nobody(hangs_s: float) -> None:
-    """Cameras say that it stands, for as long as it takes to find that out, and then nothing."""
+@pytest.mark.parametrize(("hangs_s", "most_m_s"), [(0.5, 0.35), (1.0, 0.55)])
+def test_a_picture_that_hangs_carries_nobody_off(hangs_s: float, most_m_s: float) -> None:
+    """Cameras say that it stands, for longer than it takes to find that out, and then nothing."""
     speeds = fly(lambda now_s: 0.0, lambda now_s, mean: mean if now_s < 8 else 0.0 if now_s < 8 + hangs_s else None)
-    assert max(speeds[round(8 / TICK_S) :]) < 0.3 + 0.2
+    assert max(speeds[round(8 / TICK_S) :]) < most_m_s
+
+
+def test_a_floor_that_misleads_by_a_little_changes_nothing() -> None:
+    seen = fly(lambda now_s: 0.1, lambda now_s, mean: mean)
+    alone = fly(lambda now_s: 0.1, lambda now_s, mean: None)
+    assert max(abs(a - b) for a, b in zip(seen, alone, strict=True)) < 0.02
 
 
 def test_a_healthy_velocity_is_not_touched() -> None:
@@ -72,9 +78,9 @@ def test_without_cameras_the_correction_fades() -> None:
     drift = OdometryDrift(DriftLimits())
     for _ in range(400):
         drift.compare(0.8, 0.3, TICK_S)
-    assert drift.correction_m_s == pytest.approx(0.4, abs=0.01)
+    assert drift.correction_m_s == pytest.approx(0.5, abs=0.01)
     for _ in range(80):
         drift.compare(0.8, None, TICK_S)
-    assert drift.correction_m_s < 0.15
+    assert drift.correction_m_s < 0.2
     drift.reset()
     assert drift.correction_m_s == 0.0

@@ -8,6 +8,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from drivers.ardrone.velocity_axis import SEEN_TICKS, clamp
+
 
 @dataclass(frozen=True, slots=True)
 class DriftLimits:
@@ -17,7 +19,7 @@ class DriftLimits:
     hangs is found before it moves anything.
     """
 
-    ticks: int = 24
+    ticks: int = SEEN_TICKS
     smoothing_s: float = 0.5
     fades_s: float = 2.0
     tolerated_m_s: float = 0.2
@@ -46,14 +48,10 @@ class OdometryDrift:
             self._off_m_s *= math.exp(-dt_s / limits.fades_s)
         elif len(self._measured) == limits.ticks:
             change = sum(self._measured) / limits.ticks - seen_m_s - self._off_m_s
-            self._off_m_s += min(1.0, dt_s / limits.smoothing_s) * _clamp(change, limits.step_m_s)
+            self._off_m_s += min(1.0, dt_s / limits.smoothing_s) * clamp(change, limits.step_m_s)
         self._drifts = math.fabs(self._off_m_s) > limits.tolerated_m_s * (0.5 if self._drifts else 1.0)
 
     @property
     def correction_m_s(self) -> float:
         """Return how much of a measured speed is not true [m/s]."""
-        return _clamp(self._off_m_s, self._limits.most_m_s) if self._drifts else 0.0
-
-
-def _clamp(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)
+        return clamp(self._off_m_s, self._limits.most_m_s) if self._drifts else 0.0

@@ -9,6 +9,9 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+SEEN_TICKS = 24
+"""Calls of the loop over which cameras see a mean speed."""
+
 _SUBSTEPS = 4
 # How fast the commanded speed is corrected by the measured one in wind [1/s].
 _LEARN_WIND = 1.0
@@ -27,10 +30,9 @@ class Gains:
     disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone, and how much of a
     steady push that only its speed shows (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m:
     difference between the measured speed and that one which a wrong scale and gusts explain, and the integral of what
-    exceeds it that nothing does; answer_s: by how much the measured one is later. lasting_s: what
-    the measured speed teaches in less time may be its drift. seen_ticks, seen_rad_s, first_seen: what cameras see is
-    the mean of so many calls, and draws the observer with this bandwidth where nothing else is measured, at first by
-    this share.
+    exceeds it that nothing does; answer_s: by how much the measured one is later. lasting_s: what the measured speed
+    teaches in less time may be its drift. seen_ticks, seen_rad_s, first_seen: what cameras see is the mean of so many
+    calls, and draws the observer with this bandwidth where nothing else is measured, at first by this share.
     """
 
     proportional: float = 1.6
@@ -56,7 +58,7 @@ class Gains:
     doubt_m: float = 0.1
     answer_s: float = 0.3
     lasting_s: float = 10.0
-    seen_ticks: int = 24
+    seen_ticks: int = SEEN_TICKS
     seen_rad_s: float = 2.0
     first_seen: float = 0.9
 
@@ -89,7 +91,7 @@ class Axis:
     def stand(self, force_m_s2: float, dt_s: float) -> None:
         """Learn from a standing drone: after the flat trim these are its accelerometer readings when level."""
         share = min(1.0, dt_s / self._gains.standing_s)
-        rest = -_clamp(force_m_s2 / self._gains.accelerometer_gain, self._gains.bias_m_s2)
+        rest = -clamp(force_m_s2 / self._gains.accelerometer_gain, self._gains.bias_m_s2)
         self.bias_m_s2 += (rest - self.bias_m_s2) * share
         self._rest_m_s2 = self._lasting_m_s2 = self.bias_m_s2
 
@@ -143,7 +145,7 @@ class Axis:
         # In wind nobody knows how far the firmware leans against it by itself: the speed tells.
         bandwidth = gains.blind_observer_rad_s if blind or self._wind_m_s2 else gains.observer_rad_s
         self.speed_m_s += min(1.0, 2 * gains.observer_damping * bandwidth * dt_s) * error
-        self.bias_m_s2 = _clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
+        self.bias_m_s2 = clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
         self._lasting_m_s2 += (self.bias_m_s2 - self._lasting_m_s2) * min(1.0, dt_s / gains.lasting_s)
         self._unseen = gains.first_seen
         return outside
@@ -154,8 +156,8 @@ class Axis:
         Whatever the odometry says has no part in it: what brakes a drone is judged by the speed it must have flown.
         """
         push = air_m_s2 + self._rest_m_s2 + self.drag(self.flown_m_s)
-        unexplained = push - _clamp(push, self._gains.disturbance_m_s2)
-        return _clamp(2.0 * unexplained, math.fabs(push))
+        unexplained = push - clamp(push, self._gains.disturbance_m_s2)
+        return clamp(2.0 * unexplained, math.fabs(push))
 
     def _answer(self, dt_s: float) -> float:
         """Advance the model of the tilt by the command of a dead time ago; returns its mean acceleration."""
@@ -217,5 +219,6 @@ class Axis:
         return speed_m_s * (self._gains.drag + self._gains.drag_per_m * math.fabs(speed_m_s))
 
 
-def _clamp(value: float, limit: float) -> float:
+def clamp(value: float, limit: float) -> float:
+    """Return the nearest value between -limit and limit."""
     return min(max(value, -limit), limit)

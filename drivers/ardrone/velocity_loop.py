@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from drivers.ardrone.odometry_drift import DriftLimits, OdometryDrift
 from drivers.ardrone.settings import ArDroneLimits
-from drivers.ardrone.velocity_axis import Axis, Gains
+from drivers.ardrone.velocity_axis import Axis, Gains, clamp
 from groundstation.bus.messages import Vector3
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
@@ -83,7 +83,7 @@ class VelocityLoop:
         if measured_m_s is not None:
             for drift, told, seen in zip(self._drifts, measured_m_s, seen_m_s or (None, None), strict=False):
                 drift.compare(told, seen, dt_s)
-        turn_rad_s = _clamp(yaw_rate_rad_s, self._limits.max_yaw_rate_rad_s)
+        turn_rad_s = clamp(yaw_rate_rad_s, self._limits.max_yaw_rate_rad_s)
         moving = max(abs(yaw_rate_rad_s), *(abs(v) for v in wanted_m_s)) > gains.still
         self._still_s = 0.0 if moving else self._still_s + dt_s
         if self._still_s >= gains.settle_s:
@@ -124,7 +124,7 @@ class VelocityLoop:
         return AttitudeRequest(
             roll_rad=-math.atan(y / STANDARD_GRAVITY_M_S2),
             pitch_rad=math.atan(x / STANDARD_GRAVITY_M_S2),
-            climb_m_s=_clamp(wanted_m_s[2], self._limits.max_climb_m_s),
+            climb_m_s=clamp(wanted_m_s[2], self._limits.max_climb_m_s),
             yaw_rate_rad_s=turn_rad_s,
         )
 
@@ -162,7 +162,3 @@ def _shortened(x: float, y: float, longest: float) -> tuple[float, float]:
     # The same direction, no longer than this.
     size = math.hypot(x, y)
     return (x, y) if size <= longest else (x * longest / size, y * longest / size)
-
-
-def _clamp(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)

@@ -102,7 +102,7 @@ class _Rows:
             case m.CommandAck():
                 data.acks.append(TimedMessage(time_s, message))
             case m.Belief():
-                data.beliefs[:] = [TimedMessage(time_s, message)]
+                data.belief = message
             case m.Plan():
                 data.plans.append(TimedMessage(time_s, message))
             case m.Innovation():

@@ -93,7 +93,7 @@ UNKNOWN_FIELD = ResolvedField(
 class RunData:
     """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
-    rerun: what it repeats, where it is no recorded flight.
+    belief: the last one. rerun: what it repeats, where it is no recorded flight.
     """
 
     resolved: ResolvedField
@@ -108,7 +108,7 @@ class RunData:
     acks: list[TimedMessage[CommandAck]] = field(default_factory=list)
     plans: list[TimedMessage[Plan]] = field(default_factory=list)
     innovations: list[TimedMessage[Innovation]] = field(default_factory=list)
-    beliefs: list[TimedMessage[Belief]] = field(default_factory=list)
+    belief: Belief | None = None
     events: list[TimedMessage[Event]] = field(default_factory=list)
     vehicles: dict[str, list[TimedMessage[VehicleStatus]]] = field(default_factory=dict)
     search_maps: dict[str, list[TimedMessage[SearchMap]]] = field(default_factory=dict)

@@ -82,7 +82,7 @@ class Trust(msgspec.Struct, frozen=True):
 
 def trust_of(data: RunData) -> Trust:
     """Return what speaks for and against a run."""
-    belief = data.beliefs[-1].message if data.beliefs else None
+    belief = data.belief
     sensors, shifts = _sensors(data), [] if belief is None else list(_shifts(data, belief))
     delays = [] if belief is None else [DelayShift(one.sensor, one.offset_ms, one.std_ms) for one in belief.lateness]
     links = _links(data)

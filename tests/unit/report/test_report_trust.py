@@ -46,13 +46,11 @@ def run_with(**series: object) -> RunData:
     return data
 
 
-def belief(moved_m: float = 0.0, turned_rad: float = 0.0, late_ms: float = 0.0) -> list[TimedMessage[m.Belief]]:
+def belief(moved_m: float = 0.0, turned_rad: float = 0.0, late_ms: float = 0.0) -> m.Belief:
     layout = tuple(f"ceiling.{what}" for what in ("x", "y", "z", "yaw", "roll_error", "pitch_error"))
     mean = (moved_m, 0.0, 4.2, 0.0, turned_rad, 0.0)
     lateness = (m.SensorLateness("ceiling", late_ms, 5.0),)
-    return [
-        TimedMessage(20.0, m.Belief(header=header(), mean=mean, covariance_upper=(), layout=layout, lateness=lateness))
-    ]
+    return m.Belief(header=header(), mean=mean, covariance_upper=(), layout=layout, lateness=lateness)
 
 
 def planned(observer: str, subject: str) -> list[TimedMessage[m.Plan]]:
@@ -70,7 +68,7 @@ def planned(observer: str, subject: str) -> list[TimedMessage[m.Plan]]:
 
 def test_nothing_speaks_against_a_healthy_run() -> None:
     trust = trust_of(
-        run_with(innovations=innovations(), beliefs=belief(0.01, 0.002, 5.0), plans=planned("ceiling", "drone_1"))
+        run_with(innovations=innovations(), belief=belief(0.01, 0.002, 5.0), plans=planned("ceiling", "drone_1"))
     )
     assert trust.doubts == []
     (ceiling,) = trust.sensors
@@ -93,9 +91,9 @@ def test_an_empty_run_has_no_doubts() -> None:
             ("ceiling is wrong by more than it claims", "groundstation calibrate"),
         ),
         ({"innovations": innovations(refused=0.3)}, ("of what ceiling saw was refused as implausible",)),
-        ({"beliefs": belief(moved_m=0.05)}, ("ceiling hangs 0.050 m", "5 standard deviations", "extrinsics")),
-        ({"beliefs": belief(turned_rad=0.02)}, ("ceiling hangs 1.1 deg", "6 standard deviations")),
-        ({"beliefs": belief(late_ms=-40.0)}, ("pictures of ceiling come 40 +- 5 ms earlier", "calibrate delay")),
+        ({"belief": belief(moved_m=0.05)}, ("ceiling hangs 0.050 m", "5 standard deviations", "extrinsics")),
+        ({"belief": belief(turned_rad=0.02)}, ("ceiling hangs 1.1 deg", "6 standard deviations")),
+        ({"belief": belief(late_ms=-40.0)}, ("pictures of ceiling come 40 +- 5 ms earlier", "calibrate delay")),
         ({"plans": planned("ceiling", "drone_2")}, ("plans counted on ceiling seeing drone_2 for 20 s", "0 %")),
     ],
 )

@@ -60,5 +60,6 @@ def test_the_image_is_built_and_says_its_version() -> None:
     tag = "skein-test"
     build = [program, "build", "--file", "config/host/Containerfile", "--tag", tag, "."]
     subprocess.run(build, cwd=ROOT, check=True, timeout=1200)
-    said = subprocess.run([program, "run", "--rm", tag, "--version"], capture_output=True, text=True, timeout=60)
+    command = [program, "run", "--rm", "--network", "none", tag, "--version"]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert PROJECT["version"] in said.stdout

@@ -1,13 +1,12 @@
 """`groundstation config`: check, show, draw, describe or start a field file."""
 
 import json
-import shutil
 from pathlib import Path
 
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.errors import OperatorMistake, SettingsError
+from groundstation.errors import SettingsError
 
 _OPTION = click.option(
     "--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; may be given often."
@@ -161,19 +160,13 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
 def init(directory: Path, like: str) -> None:
     """Write a commented field file, its camera calibrations and a scenario into DIRECTORY, to start from."""
     from groundstation.settings.files import SHIPPED
+    from groundstation.settings.shipped_copies import copy, refuse_existing, shipped
 
-    copies = [
-        SHIPPED / f"{like}.yaml",
-        *sorted(SHIPPED.glob("cameras/*.yaml")),
-        *sorted(SHIPPED.glob("scenarios/*.yaml")),
-    ]
-    targets = [directory / source.relative_to(SHIPPED) for source in copies]
-    standing = [str(target) for target in targets if target.exists()]
-    if standing:
-        raise OperatorMistake(f"{standing[0]}: is there already; nothing was written; name another folder")
-    for source, target in zip(copies, targets, strict=True):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
+    sources = [SHIPPED / f"{like}.yaml", *shipped()]
+    targets = [directory / source.relative_to(SHIPPED) for source in sources]
+    refuse_existing(targets)
+    for source, target in zip(sources, targets, strict=True):
+        copy(source, target)
         click.echo(f"wrote {target}")
     click.echo(
         f"next: groundstation sitl {targets[0]}; for your own lab: room, cameras, addresses and pads in it, then"

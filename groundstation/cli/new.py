@@ -1,6 +1,5 @@
-"""`groundstation new`: a field file from a few questions."""
+"""`groundstation new`: a field file from a few questions, in the terminal or on a page."""
 
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,20 +8,31 @@ import click
 from groundstation.errors import OperatorMistake
 
 if TYPE_CHECKING:
-    from groundstation.settings.new_field import NewDrone
+    from groundstation.settings.new_field import NewDrone, NewRoom, NewTarget
 
 
-@click.command(epilog="\b\nExamples:\n  groundstation new my_lab\n  groundstation sitl my_lab/my_lab.yaml")
+@click.command(
+    epilog="\b\nExamples:\n  groundstation new my_lab\n  groundstation new my_lab --page\n"
+    "  groundstation sitl my_lab/my_lab.yaml"
+)
 @click.argument("directory", type=click.Path(path_type=Path, file_okay=False))
-def new(directory: Path) -> None:
-    """Ask for room, camera and drones, draw the room, and write a commented field file into DIRECTORY."""
-    from groundstation.settings.new_field import NewRoom, check_room, field_text
-    from groundstation.settings.room_text import room_text
+@click.option("--page", is_flag=True, help="Ask on a page in the browser, which draws the room to scale.")
+def new(directory: Path, page: bool) -> None:
+    """Ask for room, camera, drones and target, draw the room, and write a commented field file into DIRECTORY."""
+    from groundstation.settings.shipped_copies import refuse_existing
 
-    site = directory.resolve().name
-    path = directory / f"{site}.yaml"
-    if path.exists():
-        raise OperatorMistake(f"{path}: is there already; nothing was written; name another folder")
+    path = directory.resolve()
+    path = path / f"{path.name}.yaml"
+    refuse_existing([path])
+    (_ask_on_page if page else _ask)(path)
+    shown = directory / path.name
+    click.echo(f"wrote {shown}\nnext: groundstation config check {shown}, then groundstation sitl {shown}")
+
+
+def _ask(path: Path) -> None:
+    from groundstation.settings.new_field import NewRoom, check_room, field_text
+    from groundstation.settings.shipped_copies import write_field
+
     click.echo("The floor's middle is the origin, x along the long side. Enter takes what stands in brackets.")
     length = click.prompt("Length of the room [m]", default=8.0, type=click.FloatRange(3, 60))
     width = click.prompt("Width [m]", default=6.0, type=click.FloatRange(3, length))
@@ -30,21 +40,29 @@ def new(directory: Path) -> None:
     source = click.prompt("Pictures of the ceiling camera", default="http://192.168.1.50:8080/video.mjpg")
     room = NewRoom(length, width, height, source)
     check_room(room)
-    drones = _ask_drones()
-    text = field_text(site, room, drones)
-    click.echo(room_text(room, len(drones)))
-    click.echo("Digits are pads, dots what the ceiling camera sees 1 m above the floor.")
+    _draw(room, 0)
+    drones = _ask_drones(room)
+    text = field_text(path.stem, room, drones, _ask_target())
     if not click.confirm(f"Write {path}?", default=True):
         raise OperatorMistake("nothing was written")
-    _write(path, text)
-    click.echo(f"wrote {path}\nnext: groundstation config check {path}, then groundstation sitl {path}")
+    write_field(path, text)
 
 
-def _ask_drones() -> "list[NewDrone]":
+def _draw(room: "NewRoom", drones: int) -> None:
+    from groundstation.settings.room_text import room_text
+
+    click.echo(room_text(room, drones))
+    pads = "Digits are pads, dots" if drones else "Dots are"
+    click.echo(f"{pads} what the ceiling camera sees 1 m above the floor.")
+
+
+def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
     from groundstation.settings.new_field import KINDS, NewDrone
 
+    count = click.prompt("How many drones", default=2, type=click.IntRange(1, 9))
+    _draw(room, count)
     drones: list[NewDrone] = []
-    for number in range(1, 1 + click.prompt("How many drones", default=2, type=click.IntRange(1, 9))):
+    for number in range(1, 1 + count):
         before = drones[-1].kind if drones else KINDS[0]
         kind = click.prompt(f"Kind of drone_{number}", default=before, type=click.Choice(KINDS))
         address = click.prompt("  its address", default=f"192.168.1.{10 + number}")
@@ -53,12 +71,24 @@ def _ask_drones() -> "list[NewDrone]":
     return drones
 
 
-def _write(path: Path, text: str) -> None:
-    from groundstation.settings.files import SHIPPED
+def _ask_target() -> "NewTarget":
+    from groundstation.settings.new_field import BASES, NewTarget
 
-    for source in (*sorted(SHIPPED.glob("cameras/*.yaml")), *sorted(SHIPPED.glob("scenarios/*.yaml"))):
-        target = path.parent / source.relative_to(SHIPPED)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if not target.exists():
-            shutil.copyfile(source, target)
-    path.write_text(text, encoding="utf-8")
+    base = click.prompt("Target", default=next(iter(BASES)), type=click.Choice(tuple(BASES)))
+    board = click.prompt("  height of the marker board on it [m]", default=BASES[base], type=click.FloatRange(0, 3))
+    return NewTarget(base, board)
+
+
+def _ask_on_page(path: Path) -> None:
+    import asyncio
+
+    from groundstation.console.new_field.server import FormServer
+    from groundstation.console.server import claim_port
+    from groundstation.field.behaviour import ConsoleValues
+
+    server = FormServer(path, claim_port(ConsoleValues().port))
+    click.echo(f"open {server.url} in a browser (Ctrl-C ends it; nothing is written before its button is pressed)")
+    try:
+        asyncio.run(server.serve())
+    except KeyboardInterrupt:
+        raise OperatorMistake("nothing was written") from None

@@ -24,11 +24,16 @@ class StaticFile:
 
 def load_pages(token: str, run: str) -> dict[str, StaticFile]:
     """Return all files by their path on the server; the page holds the token for commands and the run's identity."""
-    files = dict(_walk(resources.files("groundstation.console") / "static", ""))
+    files = files_of("groundstation.console")
     index = files.pop("/index.html")
     content = index.content.replace(_TOKEN, token.encode()).replace(_RUN, run.encode())
     files["/"] = StaticFile(content, index.media_type)
     return files
+
+
+def files_of(package: str) -> dict[str, StaticFile]:
+    """Return the files in the folder `static` of a package, by their path on the server."""
+    return dict(_walk(resources.files(package) / "static", ""))
 
 
 def _walk(folder: Traversable, path: str) -> list[tuple[str, StaticFile]]:

@@ -1,15 +1,13 @@
 """The console's loop: bus in, board out, twenty times a second; uvicorn serves in the same event loop."""
 
 import asyncio
-import contextlib
 import secrets
 import socket
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import msgspec
-import uvicorn
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Received
@@ -31,7 +29,7 @@ from groundstation.bus.topics import (
     TRUTH,
     VEHICLE_STATUS,
 )
-from groundstation.console.access import Asgi, Door
+from groundstation.console.access import Door
 from groundstation.console.app import ConsoleApp
 from groundstation.console.code_file import CodeFile
 from groundstation.console.commands import CommandDesk
@@ -44,6 +42,7 @@ from groundstation.console.room import lenses_of
 from groundstation.console.session import Sessions
 from groundstation.console.snapshot import Snapshot
 from groundstation.console.state import NO_CAMERAS, ConsoleState
+from groundstation.console.web_server import serve
 from groundstation.errors import GroundStationError
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.state import Cast
@@ -146,9 +145,10 @@ class ConsoleServer:
 
     async def serve(self, go_on: Callable[[int, int], bool]) -> None:
         """Serve until `go_on(turns, late turns)`, asked in each turn, says no."""
-        servers = [self._served(self.app.asgi, self._listener)]
+        servers = [serve(self.app.asgi, self._listener, protocol(self.half_open))]
         if self._network is not None and self.app.network is not None:
-            servers.append(self._served(self.app.network, self._network.listener, self._network))
+            http = protocol(self.half_open, self.peers)
+            servers.append(serve(self.app.network, self._network.listener, http, self._network))
         try:
             with self._code:
                 await self._turns(go_on, servers[0][1])
@@ -157,30 +157,6 @@ class ConsoleServer:
             for server, _ in servers:
                 server.should_exit = True
             await asyncio.gather(*(serving for _, serving in servers))
-
-    def _served(
-        self, app: Asgi, listener: socket.socket, network: Network | None = None
-    ) -> tuple[uvicorn.Server, "asyncio.Task[None]"]:
-        config = uvicorn.Config(
-            app,
-            log_config=None,
-            access_log=False,
-            log_level="warning",
-            lifespan="off",
-            ws="websockets-sansio",
-            http=protocol(self.half_open, self.peers if network else None),
-            ws_max_size=16 * 1024,
-            ws_per_message_deflate=False,
-            ws_ping_interval=10.0,
-            ws_ping_timeout=20.0,
-            server_header=False,
-            timeout_graceful_shutdown=1,
-            limit_concurrency=400,
-            ssl_certfile=network.certificate if network else None,
-            ssl_keyfile=network.key if network else None,
-        )
-        server = _Server(config)
-        return server, asyncio.create_task(server.serve(sockets=[listener]))
 
     async def _turns(self, go_on: Callable[[int, int], bool], serving: "asyncio.Task[None]") -> None:
         loop = asyncio.get_running_loop()
@@ -294,12 +270,3 @@ class ConsoleServer:
             "s": msgspec.Raw(self.board.since(-1)),
         }
         return msgspec.json.encode(seed).decode()
-
-
-class _Server(uvicorn.Server):
-    """Leaves the signals to the process: the supervisor says when to stop."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """Capture nothing."""
-        yield

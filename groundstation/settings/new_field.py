@@ -14,6 +14,11 @@ _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
 _LOWEST_CEILING_M = 3.0
 _PAD_GAP_M, _PAD_MARGIN_M, _PAD_SEEN_AT_M = 1.0, 0.15, 1.0
 _TARGET_CODE = 5
+# Drones fly in a band below the fence's top, this high at least, and this far above the target's board.
+_TOP_MARGIN_M, _BAND_M, _LEAST_BAND_M, _LOWEST_FLIGHT_M, _ABOVE_BOARD_M = 0.3, 1.4, 0.2, 0.8, 0.4
+
+BASES = {"turtlebot_2": 0.4, "person": 1.4, "rc_car": 0.2}
+"""Kinds of targets (`target.base`), each with a likely height of the board on it [m]."""
 
 
 class NewDrone(NamedTuple):
@@ -22,6 +27,13 @@ class NewDrone(NamedTuple):
     kind: str
     address: str
     camera: str
+
+
+class NewTarget(NamedTuple):
+    """The target: its kind (of BASES), and the height of the board on it above the floor [m]."""
+
+    base: str = "turtlebot_2"
+    board_m: float = BASES["turtlebot_2"]
 
 
 class NewRoom(NamedTuple):
@@ -48,12 +60,26 @@ class NewRoom(NamedTuple):
         return below * _HALF_VIEW[0], below * _HALF_VIEW[1]
 
 
+def check_target(room: NewRoom, target: NewTarget) -> None:
+    """Raise OperatorMistake for a board that no drone can look down on."""
+    most = round(room.fence_top_m - _TOP_MARGIN_M - _LEAST_BAND_M - _ABOVE_BOARD_M, 2)
+    if not 0.0 <= target.board_m <= most:
+        raise OperatorMistake(
+            f"no drone looks down on a board {target.board_m:g} m above the floor in a room {room.height_m:g} m high: "
+            f"{most:g} m at most"
+        )
+
+
 def check_room(room: NewRoom) -> None:
     """Raise OperatorMistake for a room in which no team can fly."""
     if room.height_m < _LOWEST_CEILING_M:
         raise OperatorMistake(f"a room {room.height_m:g} m high is too low: two drones need {_LOWEST_CEILING_M:g} m")
     if min(room.length_m, room.width_m) < 3.0:
         raise OperatorMistake(f"a room of {room.length_m:g} x {room.width_m:g} m is too small: 3 x 3 m at least")
+    if max(room.length_m, room.width_m, 3 * room.height_m) > 60.0:
+        raise OperatorMistake(
+            f"a room of {room.length_m:g} x {room.width_m:g} x {room.height_m:g} m is too large: 60 x 60 x 20 m at most"
+        )
 
 
 def pads(room: NewRoom, count: int) -> list[Place]:
@@ -70,13 +96,14 @@ def pads(room: NewRoom, count: int) -> list[Place]:
     return [(round(x, 2), round(y, 2)) for x in column for y in row][:count]
 
 
-def field_text(site: str, room: NewRoom, drones: list[NewDrone]) -> str:
-    """Return the field file; raises OperatorMistake for a room or a team that does not fit."""
+def field_text(site: str, room: NewRoom, drones: list[NewDrone], target: NewTarget) -> str:
+    """Return the field file; raises OperatorMistake for a room, a team or a target that does not fit."""
     check_room(room)
+    check_target(room, target)
     kinds = list(dict.fromkeys(drone.kind for drone in drones))
     parts = [_room(site, room), _DEFAULTS, "types:\n" + "".join(_TYPES[kind] for kind in kinds)]
     parts.append("drones:\n" + "".join(map(_drone, range(1, 1 + len(drones)), drones, pads(room, len(drones)))))
-    return "\n".join([*parts, _TARGET, _planner(room, len(drones)), _REST])
+    return "\n".join([*parts, _target(target), _planner(room, len(drones), target.board_m), _REST])
 
 
 def _room(site: str, room: NewRoom) -> str:
@@ -119,9 +146,18 @@ def _drone(number: int, drone: NewDrone, pad: Place) -> str:
 """
 
 
-def _planner(room: NewRoom, drones: int) -> str:
-    top = room.fence_top_m - 0.3
-    low = max(0.8, top - 1.4)
+def _target(target: NewTarget) -> str:
+    return f"""\
+target:
+  name: {target.base}
+  base: {target.base}            # what it can do at most; max_speed_m_s and its like for any other
+  marker: {{code: {_TARGET_CODE}, height_m: {target.board_m:g}, square_mm: 44}}
+"""
+
+
+def _planner(room: NewRoom, drones: int, board_m: float) -> str:
+    top = room.fence_top_m - _TOP_MARGIN_M
+    low = max(_LOWEST_FLIGHT_M, top - _BAND_M, board_m + _ABOVE_BOARD_M)
     rows = "".join(f"    - [{_heights(top, low, levels)}]\n" for levels in range(1, max(3, drones) + 1))
     return f"""\
 planner:
@@ -165,12 +201,6 @@ _TYPES = {
     "px4": "  px4:\n    kind: mavlink\n    mavlink: {flavour: px4}\n" + _FED,
     "ardupilot": "  ardupilot:\n    kind: mavlink\n    mavlink: {flavour: ardupilot}\n" + _FED,
 }
-_TARGET = """\
-target:
-  name: turtlebot
-  marker: {code: 5, height_m: 0.4, square_mm: 44}
-  acceleration_std_m_s2: 1.2     # 2.5 x its steady acceleration: TurtleBot 1.2, person 5, RC car 10
-"""
 _REST = """\
 recording: {directory: runs}
 """

@@ -8,16 +8,17 @@ from click.testing import CliRunner
 from groundstation.cli.new import new
 from groundstation.errors import OperatorMistake
 from groundstation.settings.load import load_field
-from groundstation.settings.new_field import NewDrone, NewRoom, check_room, field_text, pads
+from groundstation.settings.new_field import BASES, NewDrone, NewRoom, NewTarget, check_room, field_text, pads
 from groundstation.settings.room_text import room_text
 
 ARDRONE = NewDrone("ardrone", "192.168.1.11", "ardrone://192.168.1.11")
+TURTLEBOT = NewTarget("turtlebot_2", 0.4)
 SOURCE = "http://192.168.1.50:8080/video.mjpg"
 
 
 @pytest.mark.parametrize(("size", "drones"), [((8, 6, 4.5), 3), ((6, 4, 3.2), 1), ((20, 15, 8), 9)])
 def test_what_is_written_is_a_good_field(tmp_path: Path, size: tuple[float, float, float], drones: int) -> None:
-    answers = "\n".join([*map(str, size), "", str(drones), *(["", "", ""] * drones), "y", ""])
+    answers = "\n".join([*map(str, size), "", str(drones), *(["", "", ""] * drones), "", "", "y", ""])
     result = CliRunner().invoke(new, [str(tmp_path / "hall")], input=answers)
     assert result.exit_code == 0, result.output
     field = load_field(tmp_path / "hall" / "hall.yaml")
@@ -26,7 +27,9 @@ def test_what_is_written_is_a_good_field(tmp_path: Path, size: tuple[float, floa
 
 def test_kinds_may_be_mixed(tmp_path: Path) -> None:
     team = ["", "", "", "px4", "", "", "ardupilot", "", ""]
-    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "3", *team, "y", ""]))
+    result = CliRunner().invoke(
+        new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "3", *team, "", "", "y", ""])
+    )
     assert result.exit_code == 0, result.output
     assert [drone.kind for drone in load_field(tmp_path / "hall" / "hall.yaml").drones.values()][1:] == ["mavlink"] * 2
 
@@ -45,7 +48,7 @@ def test_a_low_room_is_refused_with_the_reason() -> None:
     with pytest.raises(OperatorMistake, match="too low"):
         check_room(NewRoom(8, 6, 2.4, SOURCE))
     with pytest.raises(OperatorMistake, match="too low"):
-        field_text("lab", NewRoom(8, 6, 2.4, SOURCE), [ARDRONE])
+        field_text("lab", NewRoom(8, 6, 2.4, SOURCE), [ARDRONE], TURTLEBOT)
 
 
 def test_the_drawing_shows_each_pad_within_the_view() -> None:
@@ -62,6 +65,19 @@ def test_an_existing_field_is_left_alone(tmp_path: Path) -> None:
 
 def test_a_refused_room_writes_nothing(tmp_path: Path) -> None:
     result = CliRunner().invoke(
-        new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "1", "", "", "", "n", ""])
+        new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "1", "", "", "", "", "", "n", ""])
     )
     assert isinstance(result.exception, OperatorMistake) and not (tmp_path / "hall").exists()
+
+
+def test_the_target_says_what_it_is(tmp_path: Path) -> None:
+    answers = ["", "", "", "", "1", "", "", "", "person", "", "y", ""]
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join(answers))
+    assert result.exit_code == 0, result.output
+    target = load_field(tmp_path / "hall" / "hall.yaml").tracked["person"]
+    assert (target.base, target.marker.height_m, target.max_speed_m_s) == ("person", BASES["person"], 1.5)
+
+
+def test_a_board_too_high_to_look_down_on_is_refused() -> None:
+    with pytest.raises(OperatorMistake, match=r"2 m above the floor .* 4\.5 m high: 1\.9"):
+        field_text("lab", NewRoom(8, 6, 4.5, SOURCE), [ARDRONE], NewTarget("person", 2.0))

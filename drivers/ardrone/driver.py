@@ -28,7 +28,7 @@ from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.host import VehicleHost, run_hosts
 from drivers.plausibility.health import Health, Sensor
-from drivers.plausibility.limits import ARDRONE
+from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor
 from drivers.vehicle_settings import read_section
 from drivers.watchdog_types import UP, Action, VehicleView, WatchdogDecision
@@ -50,6 +50,8 @@ _NO_AR1_VIDEO = Notice(
     "this is an AR.Drone 1.0: its video (UVLC and P264 over UDP 5555) is out of scope and is left alone",
     "take the video section out of the field file and give the drone a camera of its own",
 )
+# Firmware limits tilt to 30 degrees and flies 5 m/s at most. WIRE: the TIME option wraps after 2048 s.
+LIMITS = PlausibilityLimits(clock_wrap_s=2048.0)
 _log = logging.getLogger(__name__)
 
 
@@ -94,7 +96,7 @@ class ArDrone:
         self._scale = scale_from_settings(settings)
         self._loop = VelocityLoop(settings.limits)
         self._motion = MotionMean()
-        self._plausibility = MotionMonitor(ARDRONE)
+        self._plausibility = MotionMonitor(LIMITS)
         self._applied_ns = 0
         self._doubted_ns = -_DOUBTED_NS
         self._video_refused = False
@@ -146,7 +148,7 @@ class ArDrone:
         heard = self.telemetry
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         configured = self._session.phase is SessionPhase.READY
-        unsound = self._plausibility.report.reason(Health.BAD, ARDRONE.essential)
+        unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         if not unsound and now_ns - self._doubted_ns < _DOUBTED_NS:
             unsound = "its velocity contradicts what was asked for"
         not_ready = self._not_ready(heard)

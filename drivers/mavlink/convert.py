@@ -19,6 +19,7 @@ from drivers.mavlink.wire.names import (
     land_mode,
 )
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
+from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionSample
 from drivers.vehicle_settings import VehicleLimits
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
@@ -30,6 +31,8 @@ _RAD_S_FROM_MRAD_S = 0.001
 # Beyond these nothing is a measurement of an indoor vehicle.
 _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
 _STILL_M_S = 0.15
+# An estimator may be reset once by the first position that it is fed; time_boot_ms wraps after 49 days.
+LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from drivers.base import LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
-from drivers.mavlink.convert import BaseAttitude
+from drivers.mavlink.convert import LIMITS, BaseAttitude
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.requests import Requests
@@ -20,7 +20,6 @@ from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, SensorBits
 from drivers.plausibility.health import Health
-from drivers.plausibility.limits import MAVLINK
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus import clock
@@ -86,7 +85,7 @@ class MavlinkVehicle:
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
         self._traffic = Traffic()
-        self._plausibility = MotionMonitor(MAVLINK)
+        self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()
         self._said, self._boot_clock = Texts(), BootClock()
         self._jumps: deque[int] = deque(maxlen=8)
@@ -188,7 +187,7 @@ class MavlinkVehicle:
         known = self.telemetry
         fresh = self._is_heard(now_ns, known)
         state = self._state(known)
-        unsound = self._plausibility.report.reason(Health.BAD, MAVLINK.essential)
+        unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         if not known.heartbeat_ns or not known.landed:
             state = FlightState.UNKNOWN
         elif state is FlightState.FLYING and self.orders.starting and not self.orders.lift.lifted:

@@ -1,4 +1,4 @@
-"""What each kind of vehicle can do, as data: beyond it a value is no measurement."""
+"""What a kind of vehicle can do, as data: beyond it a value is no measurement."""
 
 import math
 from dataclasses import dataclass
@@ -38,9 +38,3 @@ class PlausibilityLimits:
     hold_s: float = 1.0
     clock_wrap_s: float | None = None
     essential: frozenset[Sensor] = frozenset({Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY, Sensor.ATTITUDE})
-
-
-# Firmware limits tilt to 30 degrees and flies 5 m/s at most. WIRE: the TIME option wraps after 2048 s.
-ARDRONE = PlausibilityLimits(clock_wrap_s=2048.0)
-# An estimator may be reset once by the first position that it is fed; time_boot_ms wraps after 49 days.
-MAVLINK = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2
+from sim_bridge.world.airframe import GRAVITY_M_S2
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.readings import Readings
 

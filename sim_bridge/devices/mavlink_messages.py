@@ -13,7 +13,7 @@ from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, SensorBits
 from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
-from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
+from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.mavlink_estimator import InertialEstimate
 from sim_bridge.world.readings import Readings
 from sim_bridge.world.world import TICK_NS

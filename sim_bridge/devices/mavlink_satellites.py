@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
+from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 
 _DEGREE_M = 111_318.845

@@ -8,7 +8,7 @@ from drivers.mavlink.wire.frames import FrameEncoder, Message
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
 from sim_bridge.devices.mavlink_satellites import Satellites
-from sim_bridge.world.ardrone_airframe import Airframe
+from sim_bridge.world.airframe import Airframe
 
 Address = tuple[str, int]
 _EVERY_TICKS = {Flavour.ARDUPILOT: 4, Flavour.PX4: 8}  # 50 Hz when asked, 25 Hz

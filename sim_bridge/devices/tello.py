@@ -26,7 +26,7 @@ from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.listening import open_udp
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.downwash import wake_between
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 from sim_bridge.world.readings import Readings

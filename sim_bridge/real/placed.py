@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
+from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.puppet import OutsidePose, Vector3
 
 _WANDERS_M = 0.5

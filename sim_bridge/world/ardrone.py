@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from sim_bridge.scenario import DroneScenario
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.ardrone_autopilot import Autopilot
 from sim_bridge.world.downwash import wake_between
 from sim_bridge.world.noise import GaussMarkov, standard_normals

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.ardrone_animations import FLIP_KICK_M_S2, FLIP_KICK_S, FLIP_TURN_S, FLIPS, Animation, motion_at
 from sim_bridge.world.noise import DelayLine, Draw, GaussMarkov
 

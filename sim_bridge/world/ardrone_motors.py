@@ -6,7 +6,7 @@ Mass, thrust curve and the ramp of a recorded take-off: docs/reference/ardrone.m
 import bisect
 import math
 
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2
+from sim_bridge.world.airframe import GRAVITY_M_S2
 
 _MASS_KG = 0.458  # with the indoor hull
 _THRUST = (1.112e-4, 7.705e-3, 0.0924)  # N per motor of the PWM in percent

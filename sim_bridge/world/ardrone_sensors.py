@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from sim_bridge.scenario import DroneScenario
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
 
 LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below

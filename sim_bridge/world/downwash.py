@@ -2,7 +2,7 @@
 
 import math
 
-from sim_bridge.world.ardrone_airframe import Airframe
+from sim_bridge.world.airframe import Airframe
 
 # A modest wake: momentum theory gives 7.5 m/s under an AR.Drone, and forces of several do not add linearly.
 _RADIUS_M = 0.3

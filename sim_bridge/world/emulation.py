@@ -11,7 +11,7 @@ from groundstation.vehicles.registry import load
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
-from sim_bridge.world.ardrone_airframe import Airframe
+from sim_bridge.world.airframe import Airframe
 
 Vector3 = tuple[float, float, float]
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from sim_bridge.scenario import CopterScenario
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2, Airframe
+from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 
 Vector3 = tuple[float, float, float]

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.airframe import STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.downwash import wake_between
 
 Vector3 = tuple[float, float, float]

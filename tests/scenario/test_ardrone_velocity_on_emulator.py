@@ -11,14 +11,13 @@ from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata, sample_from_motion
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
-from drivers.ardrone.driver import RATE_HZ
+from drivers.ardrone.driver import LIMITS, RATE_HZ
 from drivers.ardrone.session import ArdroneSession
 from drivers.ardrone.settings import ArDroneDriverSettings, VelocityScale
 from drivers.ardrone.velocity_loop import HOVER, VelocityLoop
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.options import DEMO
 from drivers.plausibility.health import Health
-from drivers.plausibility.limits import ARDRONE
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
@@ -68,7 +67,7 @@ class Flight:
         self.packet = navdata.Navdata(0, 0)
         self.motion = MotionMean()
         self.flight_state = FlightState.UNKNOWN
-        self.plausibility = MotionMonitor(ARDRONE)
+        self.plausibility = MotionMonitor(LIMITS)
         self.doubts: set[Any] = set()
         self.lie = lambda motion: motion
 
@@ -206,7 +205,7 @@ def test_a_velocity_that_says_0_runs_away_no_more(lie, within_m):
     flight = Flight(7).take_off()
     flight.lie, speeds, noticed_s, start = lie, [], None, (flight.drone.airframe.x, flight.drone.airframe.y)
     for tick in range(round(6.0 / TICK_S)):
-        bad = flight.plausibility.report.reason(Health.BAD, ARDRONE.essential)
+        bad = flight.plausibility.report.reason(Health.BAD, LIMITS.essential)
         if noticed_s is None and (bad or flight.loop.contradicted):
             noticed_s = tick * TICK_S
         flight.tick(Action.FLY if noticed_s is None else Action.HOVER, (0.5, 0.0, 0.0))

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.ardrone.driver import LIMITS as ARDRONE
+from drivers.mavlink.convert import LIMITS as MAVLINK
 from drivers.plausibility.clock_watch import ClockWatch
 from drivers.plausibility.health import Health, Sensor
-from drivers.plausibility.limits import ARDRONE, MAVLINK
 from drivers.plausibility.motion import MotionMonitor, MotionSample
 from groundstation.bus.messages import FlightState
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sim_bridge.scenario import DroneScenario
-from sim_bridge.world.ardrone_airframe import Airframe
+from sim_bridge.world.airframe import Airframe
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.noise import DelayLine, GaussMarkov, generator_of, standard_normals
 

@@ -7,8 +7,8 @@ import pytest
 
 from sim_bridge.scenario import DroneScenario, Scenario, TargetScenario
 from sim_bridge.site import Site
+from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.ardrone import Quadrotor
-from sim_bridge.world.ardrone_airframe import STANDING_HEIGHT_M
 from sim_bridge.world.ardrone_autopilot import FlightLimits, MotionReferences, Phase
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_S, World

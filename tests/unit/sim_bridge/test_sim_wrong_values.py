@@ -20,8 +20,8 @@ from sim_bridge.devices.mavlink_px4 import Px4
 from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part, exchanged
 from sim_bridge.mounting import turned_about
 from sim_bridge.scenario import CopterScenario, DroneScenario, parse_scenario
+from sim_bridge.world.airframe import GRAVITY_M_S2
 from sim_bridge.world.ardrone import Quadrotor
-from sim_bridge.world.ardrone_airframe import GRAVITY_M_S2
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.mavlink_copter import PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.noise import generator_of

@@ -18,7 +18,9 @@ from groundstation.vehicles import (
     DriverProcess,
     ErrorHabits,
     Finding,
+    KindCommands,
     KindSection,
+    Offer,
     StopDatagrams,
     VehicleKind,
     VehicleOrder,
@@ -141,6 +143,17 @@ def _moved(_local_address: str, _sections: Mapping[str, KindSection]) -> dict[st
     return {"ardrone": {name: ArDroneOwn.model_fields[name].default for name in _PORTS}}
 
 
+_OFFER = """\
+    odometry:                    # calibrated figures of this vehicle's navdata
+      velocity_scale: 1.18       # true speed = scale x reported speed
+      velocity_std_m_s: 0.05
+      velocity_delay_ms: 30
+      height_std_m: 0.04
+      height_delay_ms: 85
+      attitude_std_deg: 1.0
+      yaw_rate_std_deg_s: 1.0
+"""
+
 # An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. Its navdata call a drone level that
 # leans into moving air.
 KIND = VehicleKind(
@@ -158,4 +171,6 @@ KIND = VehicleKind(
     has_serial_number=True,
     has_interface=True,
     emulator="sim_bridge.devices.ardrone_emulation:EMULATION",
+    offers={"ardrone": Offer("AR.Drone 2", _OFFER, pictures="ardrone://{address}")},
+    commands=KindCommands("groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it.", ("probe",)),
 )

@@ -14,7 +14,9 @@ from groundstation.vehicles import (
     DriverProcess,
     ErrorHabits,
     Finding,
+    KindCommands,
     KindSection,
+    Offer,
     StopDatagrams,
     VehicleKind,
     VehicleOrder,
@@ -158,6 +160,12 @@ def _moved(local_address: str, sections: Mapping[str, KindSection]) -> dict[str,
     return {"mavlink": {"local_address": local_address, "serial": ""}}
 
 
+def _offer(flavour: str, title: str) -> Offer:
+    odometry = "velocity_std_m_s: 0.05, velocity_delay_ms: 10, attitude_std_deg: 0.3, yaw_rate_std_deg_s: 0.07"
+    of_type = f"    mavlink: {{flavour: {flavour}}}\n    odometry: {{{odometry}}}\n"
+    return Offer(title, of_type, "    mavlink: {system_id: {id}}\n")
+
+
 # It flies on our position: it has no height of its own to report; its velocity follows our errors as slowly as its
 # filter does.
 KIND = VehicleKind(
@@ -175,4 +183,8 @@ KIND = VehicleKind(
     moved=_moved,
     emulator="sim_bridge.devices.mavlink_emulation:EMULATION",
     example={"mavlink": {"flavour": "px4", "system_id": 1}},
+    offers={"px4": _offer("px4", "PX4"), "ardupilot": _offer("ardupilot", "ArduPilot")},
+    commands=KindCommands(
+        "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them.", ("probe", "setup")
+    ),
 )

@@ -28,7 +28,7 @@ _SHOWN_MISSING = 3
 @click.command(
     epilog="\b\nExamples:\n"
     "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
-    "  groundstation calibrate camera ardrone://192.168.1.11 --board skein --square-mm 44 --name drone_1_front\n"
+    "  groundstation calibrate camera rtsp://192.168.1.60/front --board skein --square-mm 44 --name drone_1_front\n"
     "  groundstation calibrate camera pictures/ --board 9x6 --preview judged/\n\n"
     "Show the board in every part of the picture, near and far, tilted to all sides, and hold still for each view.\n\n"
     "Exit codes: 0 written, 2 wrong usage, 4 no pictures or no lens can be fitted."

@@ -27,7 +27,7 @@ _ROLLED_DEG = 1.0
     "  groundstation calibrate extrinsics http://192.168.1.50:8080/video.mjpg --calibration cameras/ceiling.yaml \\\n"
     "      --marker 1=1.0,1.0 --marker 2=-1.0,1.0 --marker 3=-1.0,-1.0 --marker 4=1.0,-1.0\n"
     "  groundstation calibrate extrinsics /dev/video0 --calibration cameras/ceiling.yaml --markers floor.yaml\n"
-    "  groundstation calibrate extrinsics ardrone://192.168.1.11 --calibration cameras/ardrone_front.yaml \\\n"
+    "  groundstation calibrate extrinsics rtsp://192.168.1.60/front --calibration cameras/front.yaml \\\n"
     "      --onboard --marker 3=0.9,0.0,-0.12,0\n\n"
     "A marker is CODE=X,Y[,Z[,HEADING]]: centre [m], heading of its bar [deg]. Fixed cameras: in the world. --onboard: "
     "relative to the drone, which stands level: x ahead, y left, z up; Z is then mostly below zero.\n\n"

@@ -22,7 +22,7 @@ def camera() -> None:
 
 @camera.command(
     epilog="\b\nExamples:\n  groundstation camera view /dev/video0 --calibration config/cameras/ceiling.yaml --stream\n"
-    "  groundstation camera view ardrone://192.168.1.11 -o seen/ --frames 50\n"
+    "  groundstation camera view rtsp://192.168.1.60/front -o seen/ --frames 50\n"
     "  groundstation camera view pictures/ --calibration config/cameras/ceiling.yaml -o seen/\n\n"
     "Exit codes: 0 done, 2 wrong usage, or pictures of another size than the calibration, 4 no pictures."
 )

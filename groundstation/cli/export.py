@@ -30,7 +30,7 @@ _MAX_LINES = 5
     multiple=True,
     help="A copy with ellipses, links and arrows for Foxglove's 3D panel; extra [foxglove].",
 )
-@click.option("--tlog", "formats", flag_value="tlog", multiple=True, help="MAVLink logs, one for each vehicle.")
+@click.option("--tlog", "formats", flag_value="tlog", multiple=True, help="Logs of autopilots, one for each vehicle.")
 @click.option("--rosbag2", "formats", flag_value="rosbag2", multiple=True, help="A bag for ROS 2 tools; extra [ros2].")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Where to (default: beside the recording).")
 def export(recording: Path, formats: tuple[str, ...], output: Path | None) -> int:

@@ -9,16 +9,34 @@ from pathlib import Path
 import click
 
 from groundstation.cli.exits import ExitCode, exit_code_of
-from groundstation.cli.verbs import ELSEWHERE, RENAMED, VERBS
+from groundstation.cli.verbs import RENAMED, VERBS, CommandRow, all_verbs, meant, of_kinds
 from groundstation.errors import GroundStationError, SettingsError
 
 
 def _meant(word: str) -> str:
     from difflib import get_close_matches
 
-    near = get_close_matches(word, VERBS, 1, 0.5)
-    meant = ELSEWHERE.get(word.lower()) or (f"'{near[0]}'" if near else "")
-    return f" Did you mean {meant}?" if meant else ""
+    near = get_close_matches(word, all_verbs(), 1, 0.5)
+    likely = meant(word.lower()) or (f"'{near[0]}'" if near else "")
+    return f" Did you mean {likely}?" if likely else ""
+
+
+def _row(name: str) -> CommandRow | None:
+    return VERBS.get(name) or of_kinds().get(name)
+
+
+def _command(name: str, verb: CommandRow) -> click.Command:
+    module, _, function = verb.target.partition(":")
+    try:
+        command = getattr(importlib.import_module(module), function)
+        if not isinstance(command, click.Command):
+            raise TypeError(f"{verb.target} is a {type(command).__name__}, no click command")
+    except Exception as error:
+        if name in VERBS:
+            raise
+        why = f"{type(error).__name__}: {error}"
+        raise GroundStationError(f"the commands of {name} cannot be used: {verb.target}: {why}") from error
+    return command
 
 
 class VerbGroup(click.Group):
@@ -26,17 +44,12 @@ class VerbGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of the table."""
-        return list(VERBS)
+        return list(all_verbs())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command of a verb, importing its module now; None for an unknown verb."""
-        verb = VERBS.get(cmd_name)
-        if verb is None:
-            return None
-        module, _, function = verb.target.partition(":")
-        command = getattr(importlib.import_module(module), function)
-        assert isinstance(command, click.Command)
-        return command
+        verb = _row(cmd_name)
+        return None if verb is None else _command(cmd_name, verb)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the arguments; `help VERB` asks for what `VERB --help` prints, `help all` for every command."""
@@ -48,19 +61,20 @@ class VerbGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command for the first argument; an unknown one fails with the verb that was probably meant."""
-        if args and args[0] not in VERBS and not args[0].startswith("-"):
+        if args and not args[0].startswith("-") and _row(args[0]) is None:
             raise click.UsageError(f"There is no command {args[0]!r}.{_meant(args[0])}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the table by families, without importing any command: the first page, or all of it."""
-        shown = {name: verb for name, verb in VERBS.items() if verb.first or ctx.obj == "all"}
+        verbs = all_verbs()
+        shown = {name: verb for name, verb in verbs.items() if verb.first or ctx.obj == "all"}
         for family in dict.fromkeys(verb.family for verb in shown.values()):
             with formatter.section(family):
                 formatter.write_dl([(name, verb.summary) for name, verb in shown.items() if verb.family == family])
-        if len(shown) < len(VERBS):
+        if len(shown) < len(verbs):
             with formatter.section("More"):
-                every = f"All {len(VERBS)} commands: those to prepare, study and develop as well."
+                every = f"All {len(verbs)} commands: those to prepare, study and develop as well."
                 formatter.write_dl([("help all", every), ("help COMMAND", "What one command does, with its options.")])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -57,16 +57,17 @@ def _draw(room: "NewRoom", drones: int) -> None:
 
 
 def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
-    from groundstation.settings.new_field import KINDS, NewDrone
+    from groundstation.settings.new_field import NewDrone, offers
 
     count = click.prompt("How many drones", default=2, type=click.IntRange(1, 9))
     _draw(room, count)
+    known = offers()
     drones: list[NewDrone] = []
     for number in range(1, 1 + count):
-        before = drones[-1].kind if drones else KINDS[0]
-        kind = click.prompt(f"Kind of drone_{number}", default=before, type=click.Choice(KINDS))
+        before = drones[-1].kind if drones else next(iter(known))
+        kind = click.prompt(f"Kind of drone_{number}", default=before, type=click.Choice(tuple(known)))
         address = click.prompt("  its address", default=f"192.168.1.{10 + number}")
-        own = f"ardrone://{address}" if kind == "ardrone" else f"http://{address}:8080/video.mjpg"
+        own = known[kind][1].pictures.replace("{address}", address)
         drones.append(NewDrone(kind, address, click.prompt("  pictures of its camera", default=own)))
     return drones
 

@@ -14,7 +14,12 @@ if TYPE_CHECKING:
     from drivers.camera.calibration.feed import SourcePicture
     from groundstation.geometry.lens import CameraIntrinsics
 
-SOURCES = "http://..., rtsp://..., ardrone://..., /dev/video0, a video file, or a folder of pictures"
+
+def _forms() -> str:
+    from groundstation.vehicles import all_kinds
+
+    schemes = ["http", "rtsp", *(kind.camera for kind in all_kinds().values() if kind.camera)]
+    return ", ".join([*(f"{scheme}://..." for scheme in schemes), "/dev/video0, a video file, or a folder of pictures"])
 
 
 def source_of(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
@@ -24,7 +29,7 @@ def source_of(_context: click.Context, _parameter: click.Parameter, value: str) 
     path = Path(value)
     if "://" not in value and not value.startswith("/dev/"):
         if not path.exists():
-            raise click.BadParameter(f"{without_password(value)!r} is no file or folder here, nor {SOURCES}.")
+            raise click.BadParameter(f"{without_password(value)!r} is no file or folder here, nor {_forms()}.")
         return str(path.resolve())
     try:
         parse_source(value)

@@ -25,7 +25,7 @@ def list_() -> None:
 
 @vehicle.command(
     epilog="\b\nExamples:\n  groundstation vehicle check tello\n"
-    "  groundstation vehicle check mavlink --with mavlink.flavour=ardupilot\n"
+    "  groundstation vehicle check tello --with tello.local_address=127.0.0.9\n"
     "  groundstation vehicle check blimp --only square,silence    (two flights of it)\n\n"
     "Exit codes: 0 all checks that apply pass, 1 some fail, 2 wrong usage."
 )

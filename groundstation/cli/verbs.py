@@ -1,6 +1,9 @@
 """The table of verbs: where each command is, and its line in the help."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from groundstation.vehicles import KindCommands
 
 
 class CommandRow(NamedTuple):
@@ -66,10 +69,6 @@ VERBS: dict[str, CommandRow] = {
         "Prepare", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."
     ),
     "markers": CommandRow("Prepare", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
-    "ardrone": CommandRow("Prepare", "groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it."),
-    "mavlink": CommandRow(
-        "Prepare", "groundstation.cli.mavlink:mavlink", "Probe MAVLink vehicles, check and set them."
-    ),
     "vehicle": CommandRow("Prepare", "groundstation.cli.vehicle:vehicle", "List the kinds of vehicles, and judge one."),
     "site": CommandRow("Prepare", "groundstation.cli.site:site", "Let other hosts stop and order."),
     "experiment": CommandRow(
@@ -81,6 +80,34 @@ VERBS: dict[str, CommandRow] = {
     ),
 }
 
+
+def of_kinds() -> dict[str, CommandRow]:
+    """Return the rows of what kinds of vehicles bring; a name that is ours already stays ours."""
+    rows = {}
+    for name, commands in _commands_of_kinds().items():
+        if name not in VERBS:
+            rows[name] = CommandRow("Prepare", commands.target, commands.summary)
+    return rows
+
+
+def all_verbs() -> dict[str, CommandRow]:
+    """Return every row: the table's, then those of kinds of vehicles, whose objects it imports."""
+    return VERBS | of_kinds()
+
+
+def meant(word: str) -> str:
+    """Return the commands that a word of another ground station, or of one level down, leads to, or ""."""
+    below = [f"'{name} {word}'" for name, commands in _commands_of_kinds().items() if word in commands.words]
+    return ELSEWHERE.get(word) or " or ".join(below)
+
+
+def _commands_of_kinds() -> "dict[str, KindCommands]":
+    # Only where it is asked for: what stops drones must not wait for it.
+    from groundstation.vehicles import all_kinds
+
+    return {name: kind.commands for name, kind in all_kinds().items() if kind.commands is not None}
+
+
 ELSEWHERE = {
     **dict.fromkeys(("stop", "halt", "abort", "emergency", "kill"), "'land', 'hold' or 'cut-motors'"),
     **dict.fromkeys(("start", "run", "launch"), "'sitl' or 'fly'"),
@@ -88,9 +115,7 @@ ELSEWHERE = {
     **{word: f"'recording {word}'" for word in ("info", "recover", "cut")},
     "compare": "'report RUN --compare OTHER'",
     "print": "'markers print'",
-    "probe": "'ardrone probe' or 'mavlink probe'",
     "record": "'recording' (each run is recorded by itself)",
-    "setup": "'mavlink setup'",
 }
 """Words of other ground stations, and those that stand one level down here: the likeness of letters would mislead."""
 

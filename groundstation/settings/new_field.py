@@ -1,13 +1,15 @@
 """A field file from a few answers: room, ceiling camera, drones, target."""
 
+import json
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from groundstation.errors import OperatorMistake
+from groundstation.vehicles import Offer, VehicleKind, all_kinds
 
 Place = tuple[float, float]
 
-KINDS = ("ardrone", "px4", "ardupilot")
 # Lens of config/cameras/ceiling.yaml: half a picture over its focal length.
 _HALF_VIEW = (640.0 / 1179.0, 360.0 / 1179.0)
 _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
@@ -22,7 +24,7 @@ BASES = {"turtlebot_2": 0.4, "person": 1.4, "rc_car": 0.2}
 
 
 class NewDrone(NamedTuple):
-    """One drone: its kind (of KINDS), its address, and where its camera's pictures come from."""
+    """One drone: its kind (of `offers`), its address, and where its camera's pictures come from."""
 
     kind: str
     address: str
@@ -96,12 +98,27 @@ def pads(room: NewRoom, count: int) -> list[Place]:
     return [(round(x, 2), round(y, 2)) for x in column for y in row][:count]
 
 
+def offers() -> dict[str, tuple[str, Offer]]:
+    """Return what a new drone may be, by name: its kind of vehicle, and the texts of its type."""
+    return {name: (kind.name, offer) for kind in all_kinds().values() for name, offer in _offers_of(kind).items()}
+
+
+def _offers_of(kind: VehicleKind) -> Mapping[str, Offer]:
+    own = "".join(f"    {key}: {json.dumps(dict(section))}\n" for key, section in kind.example.items())
+    return kind.offers or {kind.name: Offer(of_type=own)}
+
+
+def _type(name: str, kind: str, offer: Offer) -> str:
+    return f"  {name}:\n    kind: {kind}\n{offer.of_type}"
+
+
 def field_text(site: str, room: NewRoom, drones: list[NewDrone], target: NewTarget) -> str:
     """Return the field file; raises OperatorMistake for a room, a team or a target that does not fit."""
     check_room(room)
     check_target(room, target)
-    kinds = list(dict.fromkeys(drone.kind for drone in drones))
-    parts = [_room(site, room), _DEFAULTS, "types:\n" + "".join(_TYPES[kind] for kind in kinds)]
+    known = offers()
+    types = "".join(_type(name, *known[name]) for name in dict.fromkeys(drone.kind for drone in drones))
+    parts = [_room(site, room), _DEFAULTS, f"types:\n{types}"]
     parts.append("drones:\n" + "".join(map(_drone, range(1, 1 + len(drones)), drones, pads(room, len(drones)))))
     return "\n".join([*parts, _target(target), _planner(room, len(drones), target.board_m), _REST])
 
@@ -133,13 +150,13 @@ cameras:                         # fixed in the world; they observe drones only
 
 
 def _drone(number: int, drone: NewDrone, pad: Place) -> str:
-    ids = f"    mavlink: {{system_id: {10 + number}}}\n" if drone.kind != "ardrone" else ""
+    own = offers()[drone.kind][1].of_drone.replace("{id}", str(10 + number)).replace("{address}", drone.address)
     heading = math.degrees(math.atan2(-pad[1], -pad[0])) if any(pad) else 0.0
     return f"""\
   drone_{number}:
     type: {drone.kind}
     address: {drone.address}
-{ids}    camera: {{source: "{drone.camera}"}}
+{own}    camera: {{source: "{drone.camera}"}}
     marker: {{code: {number if number < _TARGET_CODE else number + 1}}}   # print it: groundstation markers print
     pad_m: [{pad[0]:g}, {pad[1]:g}]          # where it stands before take-off, in the ceiling camera's view
     pad_yaw_deg: {heading:.0f}              # towards the middle of the room
@@ -182,25 +199,6 @@ defaults:                        # every drone, unless its type or its own entry
     tilt_down_deg: 45
     video_delay_ms: 120
 """
-_FED = (
-    "    odometry: {velocity_std_m_s: 0.05, velocity_delay_ms: 10, attitude_std_deg: 0.3, yaw_rate_std_deg_s: 0.07}\n"
-)
-_TYPES = {
-    "ardrone": """\
-  ardrone:
-    kind: ardrone
-    odometry:                    # calibrated figures of this vehicle's navdata
-      velocity_scale: 1.18       # true speed = scale x reported speed
-      velocity_std_m_s: 0.05
-      velocity_delay_ms: 30
-      height_std_m: 0.04
-      height_delay_ms: 85
-      attitude_std_deg: 1.0
-      yaw_rate_std_deg_s: 1.0
-""",
-    "px4": "  px4:\n    kind: mavlink\n    mavlink: {flavour: px4}\n" + _FED,
-    "ardupilot": "  ardupilot:\n    kind: mavlink\n    mavlink: {flavour: ardupilot}\n" + _FED,
-}
 _REST = """\
 recording: {directory: runs}
 """

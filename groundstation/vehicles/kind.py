@@ -88,6 +88,32 @@ class StopDatagrams:
     hovers_s: float = math.inf
 
 
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What `groundstation new` writes of a type of this kind, and of each drone of it, beside what all have.
+
+    title: its name for people, "" where the word is one. of_type, of_drone: YAML, indented by four; pictures: the
+    address of its camera's. {address} is the drone's own, {id} a number that no other drone has.
+    """
+
+    title: str = ""
+    of_type: str = ""
+    of_drone: str = ""
+    pictures: str = "http://{address}:8080/video.mjpg"
+
+
+@dataclass(frozen=True, slots=True)
+class KindCommands:
+    """A kind's own commands, `groundstation NAME ...`: "module:attribute" of a click group, and its line in the help.
+
+    words: those of its commands that people look for one level up.
+    """
+
+    target: str
+    summary: str
+    words: tuple[str, ...] = ()
+
+
 def _no_findings(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
     return iter(())
 
@@ -109,7 +135,8 @@ class VehicleKind:
     driver and fail-safe datagrams use the drone's network adapter and no other. moved: changes of
     sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
     sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
-    sections; the conformance kit flies that one.
+    sections; the conformance kit flies that one. offers: types of it by name for `groundstation new`; none: one with
+    the sections of the example. commands: its own part of the command line.
     """
 
     name: str
@@ -128,3 +155,5 @@ class VehicleKind:
     moved: Callable[[str, Mapping[str, KindSection]], dict[str, dict[str, object]]] = _nothing_moves
     emulator: str = ""
     example: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    offers: Mapping[str, Offer] = field(default_factory=dict)
+    commands: KindCommands | None = None

@@ -13,7 +13,7 @@ from groundstation.bus import topics
 from groundstation.bus.topics import TOPICS
 from groundstation.cli import main as cli
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.verbs import VERBS
+from groundstation.cli.verbs import all_verbs
 from groundstation.settings.json_schema import field_file_schema
 from sim_bridge.scenario import Scenario
 from skein_reference.attribute_texts import attribute_texts
@@ -72,7 +72,7 @@ def test_every_command_and_option_is_in_its_page_and_explained(pages: dict[str, 
         assert context.command.help, context.command_path
         bare = [one.name for one in context.command.params if isinstance(one, click.Option) and not one.help]
         assert not bare, f"{context.command_path}: {bare}"
-    assert all(f"\n## groundstation {verb}\n" in page for verb in VERBS)
+    assert all(f"\n## groundstation {verb}\n" in page for verb in all_verbs())
 
 
 def test_every_exit_code_is_in_its_page(pages: dict[str, str]) -> None:

@@ -9,7 +9,7 @@ import msgspec
 from groundstation.errors import MessageError, OperatorMistake, SettingsError
 from groundstation.settings import drawing
 from groundstation.settings.load import cautions_of, load_field
-from groundstation.settings.new_field import KINDS, NewDrone, NewRoom, NewTarget, field_text
+from groundstation.settings.new_field import NewDrone, NewRoom, NewTarget, field_text, offers
 from groundstation.settings.shipped_copies import write_field
 
 
@@ -34,13 +34,19 @@ class Reply(msgspec.Struct):
     written: str = ""
 
 
+def offers_script() -> bytes:
+    """Return the script that tells the page what a drone may be: titles and where pictures come from, by name."""
+    shown = {name: {"title": one.title or name, "pictures": one.pictures} for name, (_, one) in offers().items()}
+    return b"export const OFFERS = " + msgspec.json.encode(shown) + b";\n"
+
+
 def decode(frame: str | bytes) -> Answers:
     """Return the answers of a page; raises MessageError."""
     try:
         answers = msgspec.json.decode(frame, type=Answers)
     except (msgspec.DecodeError, UnicodeError) as error:
         raise MessageError(f"not the form's answers: {error}") from error
-    if unknown := [drone.kind for drone in answers.drones if drone.kind not in KINDS]:
+    if unknown := [drone.kind for drone in answers.drones if drone.kind not in offers()]:
         raise MessageError(f"not a kind of drone: {unknown[0]}")
     return answers
 

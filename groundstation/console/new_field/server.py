@@ -15,8 +15,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from groundstation.console.access import Door, Gate
 from groundstation.console.code_file import CodeFile
 from groundstation.console.half_open import HalfOpen, protocol
-from groundstation.console.new_field.answers import decode, reply_to
-from groundstation.console.pages import files_of
+from groundstation.console.new_field.answers import decode, offers_script, reply_to
+from groundstation.console.pages import StaticFile, files_of
 from groundstation.console.web_server import serve
 from groundstation.errors import MessageError
 
@@ -32,6 +32,7 @@ class FormServer:
         self._code = CodeFile(listener.getsockname()[1])
         console = files_of("groundstation.console")
         self._files = files_of(_PACKAGE) | {name: console[name] for name in ("/style.css", "/icon.svg")}
+        self._files["/offers.js"] = StaticFile(offers_script(), "text/javascript")
         routes = [WebSocketRoute("/ws", self._socket), Route("/{path:path}", self._file)]
         self.asgi = Gate(Starlette(routes=routes), Door(self._code.code, str(self._code.path)))
         self.url = f"http://127.0.0.1:{listener.getsockname()[1]}/"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from groundstation.console.new_field.answers import decode, reply_to
+from groundstation.console.new_field.answers import decode, offers_script, reply_to
 from groundstation.errors import MessageError
 from groundstation.settings.load import load_field
 
@@ -28,6 +28,12 @@ def test_answers_are_drawn_and_nothing_is_written(tmp_path: Path) -> None:
     assert reply.number == 3 and reply.problem == "" and reply.written == ""
     assert "<svg" in reply.svg and "site: hall" in reply.text
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_offers_every_kind_there_is() -> None:
+    told = json.loads(offers_script().decode().partition("=")[2].rstrip().rstrip(";"))
+    assert told["px4"] == {"title": "PX4", "pictures": "http://{address}:8080/video.mjpg"}
+    assert told["ardrone"]["pictures"] == "ardrone://{address}" and told["tello"]["title"] == "tello"
 
 
 def test_the_button_writes_a_good_field_once(tmp_path: Path) -> None:

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.cli import main as cli
+from groundstation.cli.exits import ExitCode
 from groundstation.errors import SettingsError
 from groundstation.flight.composition import process_table
 from groundstation.settings.load import load_field
+from groundstation.settings.new_field import NewDrone, NewRoom, NewTarget, field_text, offers
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import driver_sections, rerouted
 from groundstation.supervisor.process_spec import FailsafeDatagrams
@@ -20,8 +23,10 @@ CONFIG = ROOT / "config"
 REFUSED = r"kind: zeppelin is not known; known: .*ardrone, mavlink"
 
 FOREIGN = """
-from groundstation.vehicles import DriverProcess, ErrorHabits, StopDatagrams, VehicleKind
+import click
+from groundstation.vehicles import DriverProcess, ErrorHabits, KindCommands, StopDatagrams, VehicleKind
 
+blimp = click.Group("blimp", {"inflate": click.Command("inflate", callback=lambda: print("inflated"))})
 KIND = VehicleKind(
     name="blimp",
     summary="a blimp",
@@ -29,6 +34,8 @@ KIND = VehicleKind(
     habits=ErrorHabits(1.0, 1.0, 1.0, 0.1, 0.0, True, True),
     processes=lambda orders: [DriverProcess((one.name,), '{"name": "' + one.name + '"}') for one in orders],
     stop=lambda orders: StopDatagrams(7000, b"hover", b"land"),
+    example={"blimp": {}},
+    commands=KindCommands("blimp_kind:blimp", "Meet blimps.", ("inflate",)),
 )
 """
 ENTRIES = "[skein.vehicles]\nblimp = blimp_kind:KIND\nbroken = no_such_module:KIND\nodd = blimp_kind:FOREIGN\n"
@@ -122,6 +129,30 @@ def test_a_foreign_kind_flies_by_its_own_driver_and_its_own_last_words(tmp_path:
 
 
 @pytest.mark.usefixtures("plug_ins")
+def test_a_foreign_kind_has_commands_of_its_own(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert cli.run(["blimp", "inflate"]) == 0
+    assert cli.run(["help", "all"]) == 0
+    told = capsys.readouterr().out
+    assert "inflated" in told and "Meet blimps." in told
+    assert cli.run(["inflate"]) == ExitCode.SETTINGS
+    assert "Did you mean 'blimp inflate'?" in capsys.readouterr().err
+    monkeypatch.setattr(sys.modules["blimp_kind"], "blimp", None)
+    assert cli.run(["blimp"]) == ExitCode.FAULT
+    assert "the commands of blimp cannot be used: blimp_kind:blimp: TypeError" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("plug_ins")
+def test_a_new_field_may_have_any_kind() -> None:
+    room = NewRoom(8, 6, 4.5, "http://192.168.1.50:8080/video.mjpg")
+    for type_name, (kind, _) in offers().items():
+        text = field_text("lab", room, [NewDrone(type_name, "192.168.1.11", "http://a/v")], NewTarget())
+        assert f"  {type_name}:\n    kind: {kind}\n" in text
+    assert {"ardrone", "px4", "ardupilot", "tello", "blimp"} <= set(offers())
+
+
+@pytest.mark.usefixtures("plug_ins")
 def test_a_plug_in_that_cannot_be_loaded_is_named_and_the_rest_works() -> None:
     assert {"ardrone", "mavlink", "blimp"} <= set(all_kinds())
     assert "lab-blimp" in refused_kinds()["broken"] and "no_such_module" in refused_kinds()["broken"]
@@ -132,7 +163,8 @@ def test_a_plug_in_that_cannot_be_loaded_is_named_and_the_rest_works() -> None:
 
 # Shared code that still names a kind, and why. The list may only shrink.
 NAMED = {
-    "groundstation/settings/new_field.py",  # examples of a new field file
+    "groundstation/cli/bench.py",  # benches of one codec and one link, by their names
+    "groundstation/cli/tlog.py",  # a log format of one protocol
     "groundstation/flight/real_parts.py",  # the simulators behind autopilots tell true poses
     "sim_bridge/cameras.py",  # the camera source ardrone://
     "sim_bridge/harness.py",  # its propellers can be blocked by a fault
@@ -143,16 +175,11 @@ NAMED = {
     "sim_bridge/scenario.py",  # figures of the emulated AR.Drones and MAVLink vehicles
     "sim_bridge/standalone.py",  # emulators for programs of others
     "sim_bridge/world/world.py",  # ultrasound and optical flow of AR.Drones
-    "sim_bridge/world/downwash.py",  # the airframe that all bodies share
-    "sim_bridge/world/emulation.py",  # the same
-    "sim_bridge/world/puppet.py",  # the same
-    "sim_bridge/real/placed.py",  # the same
     "sim_bridge/real/followers.py",  # the simulators behind autopilots
     "sim_bridge/real/autopilot_truth.py",  # the same
     "sim_bridge/render/outputs.py",  # the video of AR.Drones
     "sim_bridge/render/process.py",  # the same
     "sim_bridge/render/spec.py",  # the same
-    "drivers/plausibility/limits.py",  # limits of both
 }
 KIND_WORD = re.compile(r"ardrone|mavlink", re.IGNORECASE)
 
@@ -164,7 +191,7 @@ def code_of(path: Path) -> str:
 
 
 def test_shared_code_names_no_kind() -> None:
-    apart = ("groundstation/bench/", "groundstation/cli/", "sim_bridge/study/", "sim_bridge/devices/")
+    apart = ("groundstation/bench/", "sim_bridge/study/", "sim_bridge/devices/")
     files = [*(ROOT / "groundstation").rglob("*.py"), *(ROOT / "sim_bridge").rglob("*.py")]
     files += [*(ROOT / "drivers").glob("*.py"), *(ROOT / "drivers/plausibility").glob("*.py")]
     shared = [p for p in files if not str(p.relative_to(ROOT)).startswith(apart) and not KIND_WORD.search(p.name)]

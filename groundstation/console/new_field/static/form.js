@@ -1,5 +1,6 @@
 // The form of a new field: each change is sent, and the newest answer's drawing shown.
-const KINDS = [["ardrone", "AR.Drone 2"], ["px4", "PX4"], ["ardupilot", "ArduPilot"]];
+import { OFFERS } from "/offers.js";
+
 const PAUSE_MS = 200;
 const form = document.getElementById("form");
 const fields = form.elements;
@@ -25,14 +26,14 @@ function input(value) {
 
 function select() {
   const made = document.createElement("select");
-  for (const [value, text] of KINDS) made.append(new Option(text, value));
+  for (const [value, offer] of Object.entries(OFFERS)) made.append(new Option(offer.title, value));
   return made;
 }
 
 // Its pictures come from the place that its kind suggests, until somebody writes another.
 function suggest(kind, address, pictures) {
   if (pictures.dataset.own) return;
-  pictures.value = kind.value === "ardrone" ? `ardrone://${address.value}` : `http://${address.value}:8080/video.mjpg`;
+  pictures.value = OFFERS[kind.value].pictures.replace("{address}", address.value);
 }
 
 function drone(index) {

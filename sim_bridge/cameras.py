@@ -17,10 +17,10 @@ from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import WORLD_FROM_DOWNWARD_OPTICAL, base_from_tilted_optical
 from groundstation.geometry.tag import SquareTag
-from sim_bridge.devices.ardrone_firmware import FIRMWARES
-from sim_bridge.devices.ardrone_video import VideoMode
+from groundstation.vehicles import kind_named
 from sim_bridge.fault_kinds import FaultKind, exchanged
 from sim_bridge.mounting import generator_of_eye, mounted
+from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.spec import (
     BoardSpec,
     BodyShape,
@@ -30,15 +30,14 @@ from sim_bridge.render.spec import (
     OutageKind,
     PictureQuality,
     RenderSpec,
-    StreamKind,
 )
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Lens, Site
+from sim_bridge.world.emulation import video_of
 
 Stream = tuple[str, int]
 _START_LIMIT_S = 45.0
 _STOP_LIMIT_S = 1.5
-_ARDRONE_SOURCE = "ardrone://"
 # Picture right is world +x, picture down is world -y, the optical axis points at the floor.
 
 
@@ -65,8 +64,7 @@ def render_specs(
             bodies=site.bodies,
             address=address,
             port=port,
-            kind=_kind(site, name),
-            video_header_bytes=FIRMWARES[scenario.drones.firmware_of(name)].video_header_bytes,
+            own=_own_video(site, name, scenario),
             scenario=_camera_scenario(scenario, name),
             seed=seed,
             room_size_m=site.room.size_m,
@@ -76,10 +74,13 @@ def render_specs(
     ]
 
 
-def _kind(site: Site, name: str) -> StreamKind:
+def _own_video(site: Site, name: str, scenario: Scenario) -> OwnVideo | None:
     drone = site.drones.get(name)
-    own = drone is not None and drone.camera is not None and drone.camera.source.startswith(_ARDRONE_SOURCE)
-    return StreamKind.ARDRONE if own else StreamKind.MJPEG
+    if drone is None or drone.camera is None:
+        return None
+    scheme = kind_named(drone.kind).camera
+    own = bool(scheme) and drone.camera.source.startswith(f"{scheme}://")
+    return video_of(drone.kind, name, scenario) if own else None
 
 
 def _lens(site: Site, name: str) -> Lens:
@@ -156,15 +157,15 @@ class Cameras:
         context = multiprocessing.get_context("spawn")
         self._specs = tuple(specs)
         self._processes: dict[str, SpawnProcess] = {}
-        self._modes: dict[str, tuple[Connection, VideoMode]] = {}
+        self._modes: dict[str, tuple[Connection, object]] = {}
         self._tallies: list[MutableSequence[int]] = []
         for spec in self._specs:
             told: Connection | None = None
             tally = context.RawArray("q", 2)
             self._tallies.append(tally)
-            if spec.kind is StreamKind.ARDRONE:
+            if spec.own is not None:
                 told, teller = context.Pipe(duplex=False)
-                self._modes[spec.camera] = teller, VideoMode()
+                self._modes[spec.camera] = teller, None
             process = context.Process(
                 target=_render, args=(spec, told, tally), name=f"render-{spec.camera}", daemon=True
             )
@@ -189,7 +190,7 @@ class Cameras:
         """Return the drones whose own video is served."""
         return tuple(self._modes)
 
-    def set_mode(self, drone: str, mode: VideoMode) -> None:
+    def set_mode(self, drone: str, mode: tuple[object, ...]) -> None:
         """Send a drone's video configuration to its camera, if it has changed."""
         teller, known = self._modes[drone]
         if mode != known:

@@ -44,11 +44,11 @@ class FaultKind(StrEnum):
 
 
 class Part(Enum):
-    """What can have a fault: any vehicle, an AR.Drone alone, a camera, the marker of a drone or target, a motion
-    capture system, or its body on a drone or target."""
+    """What can have a fault: any vehicle, one whose emulator has it (`VehicleKind.emulated_faults`), a camera, the
+    marker of a drone or target, a motion capture system, or its body on a drone or target."""
 
     VEHICLE = auto()
-    ARDRONE = auto()
+    ABLE_VEHICLE = auto()
     CAMERA = auto()
     MARKER = auto()
     CAPTURE = auto()
@@ -74,7 +74,7 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.CAMERA_CUT: KindRules(Part.CAMERA),
     FaultKind.CAMERA_STALL: KindRules(Part.CAMERA),
     FaultKind.BATTERY_DROP: KindRules(Part.VEHICLE, (0.0, 1.0)),
-    FaultKind.PROPELLER_BLOCKED: KindRules(Part.ARDRONE),
+    FaultKind.PROPELLER_BLOCKED: KindRules(Part.ABLE_VEHICLE),
     FaultKind.TELEMETRY_FROZEN: KindRules(Part.VEHICLE),
     FaultKind.TELEMETRY_DELAYED: KindRules(Part.VEHICLE, (0.0, 10.0), 0.5),
     FaultKind.VELOCITY_STUCK: KindRules(Part.VEHICLE, (-5.0, 5.0), 0.0),
@@ -84,8 +84,8 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.HEADING_DRIFTING: KindRules(Part.VEHICLE, (-90.0, 90.0), 1.0),
     FaultKind.HEADING_JUMPING: KindRules(Part.VEHICLE, (-180.0, 180.0), 30.0),
     FaultKind.BATTERY_STUCK: KindRules(Part.VEHICLE, (0.0, 1.0), 1.0),
-    FaultKind.UNIFORM_FLOOR: KindRules(Part.ARDRONE),
-    FaultKind.OBSTACLE_BELOW: KindRules(Part.ARDRONE, (0.0, 2.0), 0.4),
+    FaultKind.UNIFORM_FLOOR: KindRules(Part.ABLE_VEHICLE),
+    FaultKind.OBSTACLE_BELOW: KindRules(Part.ABLE_VEHICLE, (0.0, 2.0), 0.4),
     FaultKind.WIND: KindRules(Part.VEHICLE, (0.0, 5.0), 1.0),
     FaultKind.IDS_SWAPPED: KindRules(Part.VEHICLE, other=True),
     FaultKind.CAMERA_BUMPED: KindRules(Part.CAMERA, (-90.0, 90.0), 5.0),

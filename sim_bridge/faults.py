@@ -2,17 +2,10 @@
 
 from collections import deque
 from collections.abc import Iterable, Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from sim_bridge.fault_kinds import RULES, Fault, FaultKind
-from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
 from sim_bridge.world.world import World
-
-
-class Control(Protocol):
-    """What obeys an AR.Drone's commands."""
-
-    blocked: bool
 
 
 class Emulator(Protocol):
@@ -22,16 +15,22 @@ class Emulator(Protocol):
     deaf: bool
 
 
+@runtime_checkable
+class Sufferer(Protocol):
+    """A body or an emulator with faults that only its kind can have."""
+
+    def suffer(self, fault: Fault, begins: bool) -> None:
+        """Break, or heal; a fault that is another part's is left to it."""
+
+
 class FaultSchedule:
     """Applies faults to the world and to links as time passes, and reports each.
 
     Wrong values are applied by the vehicles' edges, those of cameras by the render processes, at the same times.
     """
 
-    def __init__(
-        self, faults: Iterable[Fault], world: World, emulators: Mapping[str, Emulator], controls: Mapping[str, Control]
-    ) -> None:
-        self._world, self._emulators, self._controls = world, emulators, controls
+    def __init__(self, faults: Iterable[Fault], world: World, emulators: Mapping[str, Emulator]) -> None:
+        self._world, self._emulators = world, emulators
         edges = []
         for fault in faults:
             edges.append((fault.start_s, True, fault))
@@ -64,23 +63,15 @@ class FaultSchedule:
                 self._emulators[fault.entity].silent = begins
             case FaultKind.AT_DEAF:
                 self._emulators[fault.entity].deaf = begins
-            case FaultKind.PROPELLER_BLOCKED:
-                self._controls[fault.entity].blocked = begins
             case FaultKind.BATTERY_DROP if begins:
                 self._world.drones[fault.entity].battery = fault.amount
             case FaultKind.WIND:
                 self._world.blow(fault.entity, fault.amount if begins else 0.0, fault.direction_deg)
-            case FaultKind.UNIFORM_FLOOR | FaultKind.OBSTACLE_BELOW:
-                self._look_down(self._world.drones[fault.entity], fault, begins)
-
-    @staticmethod
-    def _look_down(drone: object, fault: Fault, begins: bool) -> None:
-        if not isinstance(drone, Quadrotor):
-            return
-        if fault.kind is FaultKind.UNIFORM_FLOOR:
-            drone.autopilot.blind = begins
-        else:
-            drone.autopilot.floor_m = fault.amount if begins else 0.0
+            case kind if RULES[kind].part is Part.ABLE_VEHICLE:
+                # Where ids are swapped the body is another's than the emulator: each has what it can have.
+                for one in (self._emulators[fault.entity], self._world.drones[fault.entity]):
+                    if isinstance(one, Sufferer):
+                        one.suffer(fault, begins)
 
 
 def described(fault: Fault) -> str:

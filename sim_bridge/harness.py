@@ -11,7 +11,6 @@ from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
-from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
@@ -49,8 +48,7 @@ class Harness:
         self._open_emulators()
         self._followers = Followers(self._order.site, self._order.real, self.world.puppets, self._child.bus)
         emulators = self._stage.emulators
-        controls = {name: one.control for name, one in emulators.items() if isinstance(one, ArDroneEmulator)}
-        self._faults = FaultSchedule(self._order.scenario.faults, self.world, emulators, controls)
+        self._faults = FaultSchedule(self._order.scenario.faults, self.world, emulators)
         name = f"{os.getpid()}-{self._order.site.site}"
         self._stage.share_truth(name)
         order = self._order

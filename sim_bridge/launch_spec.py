@@ -11,9 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import SettingsError
 from groundstation.process.child import ChildSpec
+from groundstation.vehicles import kind_named
 from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
 from sim_bridge.scenario import Scenario, describe_problems, parse_scenario
-from sim_bridge.site import Site, parse_site
+from sim_bridge.site import Site, SiteDrone, parse_site
 
 
 class PoseSource(StrEnum):
@@ -102,13 +103,15 @@ def read_order(path: Path) -> LaunchSpec:
     return LaunchSpec(envelope.child, site, scenario, addresses, streams, seed, real, captures)
 
 
+def _able(vehicles: Mapping[str, SiteDrone], kind: FaultKind) -> list[str]:
+    return sorted(name for name, drone in vehicles.items() if kind in kind_named(drone.kind).emulated_faults)
+
+
 def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], real: Collection[str] = ()) -> None:
     """Raise SettingsError naming every fault of an entity that does not exist, is real, or cannot have it."""
     vehicles = {name: drone for name, drone in site.drones.items() if name not in real}
-    ardrones = sorted(name for name, drone in vehicles.items() if drone.kind == "ardrone")
     known = {
         Part.VEHICLE: sorted(vehicles),
-        Part.ARDRONE: ardrones,
         Part.CAMERA: sorted(cameras),
         Part.MARKER: list(site.bodies),
         Part.CAPTURE: sorted(site.motion_capture),
@@ -116,7 +119,8 @@ def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], r
     }
     problems = []
     for number, fault in enumerate(faults):
-        names = known[RULES[fault.kind].part]
+        part = RULES[fault.kind].part
+        names = _able(vehicles, fault.kind) if part is Part.ABLE_VEHICLE else known[part]
         for key, name in (("entity", fault.entity), ("other", fault.other or fault.entity)):
             if name not in names:
                 problems.append(f"scenario: faults.{number}.{key}: {name!r} is none of {', '.join(names)}")

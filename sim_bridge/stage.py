@@ -4,11 +4,9 @@ import select
 from collections.abc import Callable, Iterable
 
 from sim_bridge.cameras import Cameras
-from sim_bridge.devices.ardrone import ArDroneEmulator
-from sim_bridge.devices.ardrone_video import VideoMode
 from sim_bridge.render.spec import RenderSpec
 from sim_bridge.truth import TruthBoard, remove_stale_boards
-from sim_bridge.world.emulation import Emulator
+from sim_bridge.world.emulation import Emulator, video_settings_of
 from sim_bridge.world.world import World
 
 
@@ -54,9 +52,8 @@ class Stage:
         if self.cameras is None:
             return
         for name in self.cameras.configurable:
-            emulator = self.emulators[name]
-            if isinstance(emulator, ArDroneEmulator):
-                self.cameras.set_mode(name, VideoMode.configured(emulator.control.configuration.integer))
+            if (settings := video_settings_of(self.emulators[name])) is not None:
+                self.cameras.set_mode(name, settings)
 
     def close(self) -> None:
         """Stop the cameras, close the ports, remove the truth; idempotent."""

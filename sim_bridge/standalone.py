@@ -99,10 +99,10 @@ class Hangar:
         self._stage = Stage(self.world)
         self._tellers: list[TruthTeller] = []
         try:
-            for name, drone in self.world.ardrones.items():
+            for name, drone in self.world.of(Quadrotor).items():
                 emulator = ArDroneEmulator(name, name, drone, self.world.onboard[name], firmware=firmware)
                 self._stage.add(name, emulator, emulator.fileno())
-            for name, copter in self.world.copters.items():
+            for name, copter in self.world.of(MavlinkCopter).items():
                 self._open_mavlink(name, copter)
         except GroundStationError:
             self.close()
@@ -124,7 +124,7 @@ class Hangar:
         """Serve the pictures of all drones; returns when every port listens. Raises GroundStationError."""
         name = f"{os.getpid()}-hangar"
         self._stage.share_truth(name)
-        streams = {address: (address, PORT) for address in self.world.ardrones}
+        streams = {address: (address, PORT) for address in self.world.of(Quadrotor)}
         specs = render_specs(self._site, self._scenario, streams, name, self._seed)
         self._stage.open_cameras(specs, should_stop)
 
@@ -239,7 +239,7 @@ def main() -> int:
         mavlink = MavlinkChoice(arguments.indoor, arguments.call, arguments.truth_to)
         hangar = Hangar(arguments.drones, firmware, arguments.seed, mavlink)
         # WIRE: an AR.Drone 1 sends its pictures over UDP in a coding of its own, which is not emulated.
-        if hangar.world.ardrones and not arguments.no_video and firmware.generation == 2:
+        if hangar.world.of(Quadrotor) and not arguments.no_video and firmware.generation == 2:
             hangar.open_video(lambda: bool(stopped))
         print(f"serving {', '.join(arguments.drones)}", file=sys.stderr, flush=True)
         serve(hangar, arguments.seconds, arguments.truth, lambda: bool(stopped))

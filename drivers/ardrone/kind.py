@@ -171,6 +171,7 @@ KIND = VehicleKind(
     has_serial_number=True,
     has_interface=True,
     emulator="sim_bridge.devices.ardrone_emulation:EMULATION",
+    emulated_faults=frozenset({"propeller_blocked", "uniform_floor", "obstacle_below"}),
     offers={"ardrone": Offer("AR.Drone 2", _OFFER, pictures="ardrone://{address}")},
     commands=KindCommands("groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it.", ("probe",)),
 )

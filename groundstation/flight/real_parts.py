@@ -8,6 +8,7 @@ from dataclasses import field as of_class
 from groundstation.errors import OperatorMistake
 from groundstation.field.drones import camera_name
 from groundstation.settings.schema import Field
+from groundstation.vehicles import all_kinds, kind_named
 
 AUTOPILOT, ESTIMATE, NONE = "autopilot", "estimate", "none"
 _LOOPBACK = "127.0.0.1"
@@ -77,8 +78,9 @@ def _body(field: Field, name: str, source: str) -> RealBody:
     if kind == ESTIMATE and not place:
         return RealBody(ESTIMATE)
     if kind == AUTOPILOT:
-        if field.drones[name].kind != "mavlink":
-            raise OperatorMistake(f"--real {name}={source}: only the simulator of a MAVLink firmware tells a true pose")
+        if not kind_named(field.drones[name].kind).true_pose:
+            told = ", ".join(kind.name for kind in all_kinds().values() if kind.true_pose)
+            raise OperatorMistake(f"--real {name}={source}: only simulators of firmware tell a true pose ({told})")
         return RealBody(AUTOPILOT, _address(name, source, place))
     raise OperatorMistake(
         f"--real {name}={source}: the source of its pose is autopilot:PORT (the port on which the simulator behind its "

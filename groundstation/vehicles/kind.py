@@ -136,7 +136,9 @@ class VehicleKind:
     sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
     sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
     sections; the conformance kit flies that one. offers: types of it by name for `groundstation new`; none: one with
-    the sections of the example. commands: its own part of the command line.
+    the sections of the example. commands: its own part of the command line. emulated_faults: faults of a scenario that
+    its emulator can have and others cannot. true_pose: "module:function" of what hears from the simulator behind a real
+    firmware where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells.
     """
 
     name: str
@@ -157,3 +159,5 @@ class VehicleKind:
     example: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     offers: Mapping[str, Offer] = field(default_factory=dict)
     commands: KindCommands | None = None
+    emulated_faults: frozenset[str] = frozenset()
+    true_pose: str = ""

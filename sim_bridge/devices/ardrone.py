@@ -12,6 +12,8 @@ from sim_bridge.devices.ardrone_navdata import NavdataWriter
 from sim_bridge.devices.ardrone_ports import Ports, open_shared_udp
 from sim_bridge.devices.ardrone_state import state_word
 from sim_bridge.devices.ardrone_subscribers import Listener
+from sim_bridge.devices.ardrone_video import VideoMode
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.world import TICK_NS
@@ -63,6 +65,16 @@ class ArDroneEmulator:
         except GroundStationError:
             self.close()
             raise
+
+    def suffer(self, fault: Fault, begins: bool) -> None:
+        """Have something hold a propeller, or let it go."""
+        if fault.kind is FaultKind.PROPELLER_BLOCKED:
+            self.control.blocked = begins
+
+    @property
+    def video_settings(self) -> VideoMode:
+        """Return what its configuration says of its video."""
+        return VideoMode.configured(self.control.configuration.integer)
 
     def fileno(self) -> int:
         """Return a descriptor that can be read from when something waits to be received."""

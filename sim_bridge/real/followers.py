@@ -6,10 +6,9 @@ from typing import Protocol
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate
 from groundstation.bus.topics import ESTIMATE
-from sim_bridge.devices.mavlink_identity import identity_of
+from groundstation.vehicles import kind_named
+from groundstation.vehicles.registry import load
 from sim_bridge.launch_spec import PoseSource, RealBody
-from sim_bridge.real.autopilot_truth import AutopilotTruth
-from sim_bridge.real.placed import Placement
 from sim_bridge.site import Site
 from sim_bridge.world.puppet import OutsidePose, Puppet
 
@@ -93,6 +92,6 @@ class Followers:
 def _feed(name: str, body: RealBody, site: Site, bus: Bus) -> PoseFeed:
     drone = site.drones[name]
     if body.source is PoseSource.AUTOPILOT and body.address is not None:
-        system = identity_of(drone).system_id
-        return AutopilotTruth(name, body.address, system, Placement(drone.pad_m, drone.pad_yaw_rad))
+        feed: PoseFeed = load(kind_named(drone.kind).true_pose)(name, body.address, drone)
+        return feed
     return EstimateFeed(name, bus)

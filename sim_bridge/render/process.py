@@ -16,7 +16,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 from sim_bridge.render.outputs import Output, open_output
-from sim_bridge.render.spec import Outage, OutageKind, RenderSpec, StreamKind
+from sim_bridge.render.spec import Outage, OutageKind, RenderSpec
 from sim_bridge.truth import TruthBoard
 
 _log = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ _REPEATED_AFTER_MS = 200.0
 def run(spec: RenderSpec, modes: Connection | None = None, tally: MutableSequence[int] | None = None) -> int:
     """Render and serve until SIGTERM or until the parent has gone; returns the exit code.
 
-    modes: what an AR.Drone's configuration says of its video, as it changes; tally: see _Exposures.
+    modes: what a vehicle's configuration says of its own video, as it changes; tally: see _Exposures.
     """
     stop: list[int] = []
     _obey_signals(stop)
@@ -58,12 +58,12 @@ def _obey_signals(stop: list[int]) -> None:
 class FrameDelay:
     """What the network does to frames: a delay with jitter that keeps their order, and loss.
 
-    A frame of an AR.Drone's video is never missing: what is lost of it comes late, and so does what waits behind it.
+    A frame that is sent again is never missing: what is lost comes late, and so does what waits behind it.
     """
 
     def __init__(self, spec: RenderSpec) -> None:
         self._scenario = spec.scenario
-        self._repeats = spec.kind is StreamKind.ARDRONE
+        self._repeats = spec.own is not None and spec.own.repeats
         self._random = np.random.default_rng([spec.seed, 7, *spec.camera.encode()])
         self._last_ns = 0
 

@@ -7,6 +7,7 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.fault_kinds import Fault
+from sim_bridge.own_video import OwnVideo
 
 
 class BodyShape(StrEnum):
@@ -51,13 +52,6 @@ class FloorKind(StrEnum):
     TILES = "tiles"
 
 
-class StreamKind(StrEnum):
-    """How a camera's pictures travel: MJPEG over HTTP, or H.264 over the video port of an AR.Drone."""
-
-    MJPEG = "mjpeg"
-    ARDRONE = "ardrone"
-
-
 class OutageKind(StrEnum):
     """How a stream fails: `STALL` keeps the connection but sends nothing, `CUT` closes it and refuses new ones."""
 
@@ -79,7 +73,7 @@ class PictureQuality:
     """How good the camera and its link are.
 
     video_delay_ms +- video_jitter_ms (uniform) from exposure to arrival; frame_loss: share of frames never sent, or,
-    where TCP repeats what is lost and nothing may be missing (AR.Drone), sent late;
+    where TCP repeats what is lost and nothing may be missing (OwnVideo.repeats), sent late;
     corner_noise_px: rms error of each board corner (print, lens model), pixel_noise: grey levels rms; blur_px: sigma
     of the defocus; exposure_ms: motion blur; rolling_shutter_ms: time from the first row to the last (the stamp is the
     middle); light: share of a full exposure, shot_noise: rms of photon noise at white [grey levels]; faults: of this
@@ -108,8 +102,8 @@ class RenderSpec:
     """All that `sim_bridge.render.process.run` needs; picklable.
 
     truth_name: shared memory of the TruthBoard; bodies: its bodies in order; room_size_m: (x, y, z), the floor is
-    centred at the origin; address, port, kind: where and how the stream is served; parent_pid: exit when it is gone
-    (0: never). video_header_bytes: of each frame of an AR.Drone's video, by its firmware.
+    centred at the origin; address, port: where the stream is served, as MJPEG unless the vehicle sends its own;
+    parent_pid: exit when it is gone (0: never).
     """
 
     camera: str
@@ -124,5 +118,4 @@ class RenderSpec:
     seed: int = 1
     room_size_m: tuple[float, float, float] = (8.0, 6.0, 4.5)
     parent_pid: int = 0
-    kind: StreamKind = StreamKind.MJPEG
-    video_header_bytes: int = 68
+    own: OwnVideo | None = None

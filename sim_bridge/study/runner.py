@@ -25,6 +25,8 @@ from sim_bridge.study.mavlink_copter import CopterLink
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
 from sim_bridge.study.wrong_figures import WrongFigures
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
@@ -102,14 +104,16 @@ class Study:
         for onboard in world.onboard.values():
             onboard.trim()  # as the driver does at connect
         lifetime = field.safety.setpoint_lifetime_ms / 1000
-        self._links: dict[str, FlownLink] = {n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.copters.items()}
+        self._links: dict[str, FlownLink] = {
+            n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.of(MavlinkCopter).items()
+        }
         self._telemetry: dict[str, TelemetryPublisher | FlownLink] = {
-            n: TelemetryPublisher(n, d, world.onboard[n], CLOCK) for n, d in world.ardrones.items()
+            n: TelemetryPublisher(n, d, world.onboard[n], CLOCK) for n, d in world.of(Quadrotor).items()
         }
         self._telemetry |= self._links
         self._pilots = {
             name: Pilot(drone, world.onboard[name], field.drones[name].odometry.velocity_scale, lifetime)
-            for name, drone in world.ardrones.items()
+            for name, drone in world.of(Quadrotor).items()
         }
         self._eyes: list[Eye | CaptureEye] = [
             *eyes_of(self.site, scenario.cameras, options.outliers, options.seed),
@@ -134,7 +138,7 @@ class Study:
         cpu, wall = time.process_time(), time.perf_counter()
         for _ in range(round(self.options.stand_s * 1e9) // TICK_NS):
             self.step()
-        for drone in self.world.ardrones.values():
+        for drone in self.world.of(Quadrotor).values():
             drone.autopilot.take_off()
         ticks = round((self.options.take_off_s + self.options.duration_s) * 1e9) // TICK_NS
         for _ in range(ticks):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.ardrone_autopilot import Autopilot
@@ -70,6 +71,13 @@ class Quadrotor:
         strength = math.hypot(x, y)
         share = min(1.0, self._most_air / strength) if strength > 0.0 else 1.0
         return self.wind[0] + share * x, self.wind[1] + share * y
+
+    def suffer(self, fault: Fault, begins: bool) -> None:
+        """Break what looks at the floor, or heal it."""
+        if fault.kind is FaultKind.UNIFORM_FLOOR:
+            self.autopilot.blind = begins
+        elif fault.kind is FaultKind.OBSTACLE_BELOW:
+            self.autopilot.floor_m = fault.amount if begins else 0.0
 
     def wake_on(self, other: Airframe) -> tuple[float, float, float] | None:
         """Return how this drone's downwash accelerates another one below it, None when out of its reach."""

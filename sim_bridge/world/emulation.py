@@ -1,7 +1,7 @@
 """What a kind of vehicle brings to the simulator: how it moves, and how it speaks at the wire."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from groundstation.errors import SettingsError
 from groundstation.vehicles import kind_named
 from groundstation.vehicles.registry import load
 from sim_bridge.launch_spec import LaunchSpec
+from sim_bridge.own_video import OwnVideo
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
 from sim_bridge.world.airframe import Airframe
@@ -27,7 +28,8 @@ class Motors(Protocol):
 class Body(Protocol):
     """A vehicle of the room. battery: share of the full charge; wind: push of the air by a fault [m/s^2; world].
 
-    One that has a method `sense` is told after each step, when walls have had their say, to take its readings.
+    One that has a method `sense` is told after each step, when walls have had their say, to take its readings. Those
+    that have the same `ultrasound_code` disturb each other's ultrasound.
     """
 
     airframe: Airframe
@@ -72,7 +74,12 @@ class Emulator(Protocol):
 
 
 class Emulation(Protocol):
-    """How one kind of vehicle is emulated; `groundstation.vehicles.VehicleKind.emulator` names it."""
+    """How one kind of vehicle is emulated; `groundstation.vehicles.VehicleKind.emulator` names it.
+
+    It may have more: `video(name, scenario)`, the `sim_bridge.own_video.OwnVideo` of a kind that has its own (its
+    emulators then have `video_settings`, a tuple of what its configuration says of it), and the methods of
+    `KeepsSensors`.
+    """
 
     def body(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> Body:
         """Return a vehicle that stands on its pad."""
@@ -91,6 +98,41 @@ def emulation_of(kind: str) -> Emulation:
         raise SettingsError([f"kind: {kind} has no emulator: it cannot be simulated"])
     emulation: Emulation = load(reference)
     return emulation
+
+
+class Around(NamedTuple):
+    """What misleads the sensors of a vehicle in this tick.
+
+    crosstalk: another one's ultrasound of the same rate is in reach; flow_bias: by the floor below [m/s; world], and
+    below_m: height of what stands there, None where the scenario has no such thing.
+    """
+
+    crosstalk: bool = False
+    flow_bias: tuple[float, float] | None = None
+    below_m: float | None = None
+
+
+@runtime_checkable
+class KeepsSensors(Protocol):
+    """An emulation whose sensors the world keeps, beside their bodies, in `onboard`."""
+
+    def sensors(self, name: str, body: Any, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> Any:
+        """Return the sensors of a body that `body` made."""
+
+    def sense(self, body: Any, onboard: Any, around: Around) -> None:
+        """Take their readings, after each step."""
+
+
+def video_of(kind: str, name: str, scenario: Scenario) -> OwnVideo | None:
+    """Return the own video of one vehicle, None where its emulation has none."""
+    video: Callable[[str, Scenario], OwnVideo] | None = getattr(emulation_of(kind), "video", None)
+    return None if video is None else video(name, scenario)
+
+
+def video_settings_of(emulator: Emulator) -> tuple[object, ...] | None:
+    """Return what a vehicle's configuration says of its own video, None where there is nothing to say."""
+    settings: tuple[object, ...] | None = getattr(emulator, "video_settings", None)
+    return settings
 
 
 def senses_of(body: Body) -> Callable[[], None] | None:

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,7 @@ from numpy.typing import NDArray
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site, SiteDrone
 from sim_bridge.truth import WIDTH
-from sim_bridge.world.ardrone import Quadrotor
-from sim_bridge.world.ardrone_sensors import Onboard
-from sim_bridge.world.emulation import Body, emulation_of, senses_of
-from sim_bridge.world.mavlink_copter import MavlinkCopter
+from sim_bridge.world.emulation import Around, Body, KeepsSensors, emulation_of, senses_of
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.obstacles import all_obstacles, boxes_of, floor_below
 from sim_bridge.world.puppet import Puppet
@@ -27,6 +25,8 @@ _STILL_AIR = (0.0, 0.0, 0.0)
 CROSSTALK_M = 2.0
 _CROSSTALK_TICKS = 8
 _NOWHERE = (math.nan,) * WIDTH
+_UNTROUBLED, _TROUBLED = Around(), Around(crosstalk=True)
+_Body = TypeVar("_Body")
 
 
 class World:
@@ -44,7 +44,8 @@ class World:
         self.ticks = 0
         self.drones: dict[str, Body] = {}
         self.puppets: dict[str, Puppet] = {}
-        self.onboard: dict[str, Onboard] = {}
+        self.onboard: dict[str, Any] = {}
+        self._keeps: dict[str, KeepsSensors] = {}
         self._senses: dict[str, Callable[[], None]] = {}
         room = self._half_room = (site.room.size_m[0] / 2, site.room.size_m[1] / 2, site.room.size_m[2])
         for name, drone in site.drones.items():
@@ -71,11 +72,12 @@ class World:
         self._states = np.zeros((len(self.bodies), WIDTH))
 
     def _drone(self, name: str, drone: SiteDrone, scenario: Scenario, seed: int) -> Body:
-        body = emulation_of(drone.kind).body(drone, scenario, TICK_S, generator_of(seed, name))
-        if isinstance(body, Quadrotor):
-            sensors = generator_of(seed, f"{name}/onboard")
-            magnetometer = scenario.drones.firmware_of(name).startswith("ar2")
-            self.onboard[name] = Onboard(scenario.drones, TICK_S, body.airframe, sensors, magnetometer)
+        emulation = emulation_of(drone.kind)
+        body = emulation.body(drone, scenario, TICK_S, generator_of(seed, name))
+        if isinstance(emulation, KeepsSensors):
+            self._keeps[name] = emulation
+            rng = generator_of(seed, f"{name}/onboard")
+            self.onboard[name] = emulation.sensors(name, body, scenario, TICK_S, rng)
         elif (sense := senses_of(body)) is not None:
             self._senses[name] = sense
         return body
@@ -99,16 +101,14 @@ class World:
         together = len(drones) + len(self.puppets) > 1
         wakes = {name: self._wake(name) for name in drones} if self._downwash and together else {}
         if self._crosstalk and self.ticks % _CROSSTALK_TICKS == 0:
-            self._disturbed = _disturbed(self.ardrones)
+            self._disturbed = _disturbed(drones)
         for name, drone in drones.items():
             drone.step(wakes.get(name, _STILL_AIR))
             drone.airframe.confine(*self._half_room)
             if (sense := self._senses.get(name)) is not None:
                 sense()
-            elif isinstance(drone, Quadrotor):
-                if self._zones or self._echoes:
-                    self._disturb(name, drone)
-                self.onboard[name].step(drone, drone.autopilot.motors_on, name in self._disturbed, drone.air)
+            elif (emulation := self._keeps.get(name)) is not None:
+                emulation.sense(drone, self.onboard[name], self._around(name, drone))
         self._let_targets_depart()
         for target in self.targets.values():
             target.step()
@@ -117,18 +117,17 @@ class World:
             box.step()
         self.ticks += 1
 
-    def _disturb(self, name: str, drone: Quadrotor) -> None:
-        """Let floor and bodies below a drone mislead its optical flow and its ultrasound."""
-        onboard, body = self.onboard[name], drone.airframe
-        onboard.flow_bias = next(
-            (z.flow_bias_m_s for z in self._zones if _in(body.x, z.x_m) and _in(body.y, z.y_m)), (0.0, 0.0)
-        )
-        if self._echoes:
-            tops = [(one.x, one.y, _TARGET_RADIUS_M, self._target_tops[n]) for n, one in self.targets.items()]
-            tops += [(one.body.x, one.body.y, min(one.size_m[:2]) / 2, one.size_m[2]) for one in self.obstacles]
-            below_m = floor_below(body.x, body.y, body.z, tops)
-            if below_m != onboard.below_m:  # what a fault puts there stays until then
-                onboard.below_m = drone.autopilot.floor_m = below_m
+    def _around(self, name: str, drone: Body) -> Around:
+        """Return what floor, bodies below and neighbours do to a drone's optical flow and ultrasound."""
+        crosstalk, body = name in self._disturbed, drone.airframe
+        if not self._zones and not self._echoes:
+            return _TROUBLED if crosstalk else _UNTROUBLED
+        bias = next((z.flow_bias_m_s for z in self._zones if _in(body.x, z.x_m) and _in(body.y, z.y_m)), (0.0, 0.0))
+        if not self._echoes:
+            return Around(crosstalk, bias)
+        tops = [(one.x, one.y, _TARGET_RADIUS_M, self._target_tops[n]) for n, one in self.targets.items()]
+        tops += [(one.body.x, one.body.y, min(one.size_m[:2]) / 2, one.size_m[2]) for one in self.obstacles]
+        return Around(crosstalk, bias, floor_below(body.x, body.y, body.z, tops))
 
     def states(self) -> NDArray[np.float64]:
         """Return the true states (n, 13), columns as in `truth.FIELDS`, NaN where they are not known.
@@ -161,15 +160,9 @@ class World:
         wind = (push_m_s2 * math.cos(angle), push_m_s2 * math.sin(angle)) if push_m_s2 else (0.0, 0.0)
         self.drones[name].wind = wind
 
-    @property
-    def copters(self) -> dict[str, MavlinkCopter]:
-        """Return the MAVLink vehicles."""
-        return {name: drone for name, drone in self.drones.items() if isinstance(drone, MavlinkCopter)}
-
-    @property
-    def ardrones(self) -> dict[str, Quadrotor]:
-        """Return the AR.Drones."""
-        return {name: drone for name, drone in self.drones.items() if isinstance(drone, Quadrotor)}
+    def of(self, body: type[_Body]) -> dict[str, _Body]:
+        """Return the drones whose body is of a class."""
+        return {name: drone for name, drone in self.drones.items() if isinstance(drone, body)}
 
     def _wake(self, name: str) -> tuple[float, float, float]:
         below = self.drones[name].airframe
@@ -187,12 +180,13 @@ def _in(value: float, side: tuple[float, float]) -> bool:
     return side[0] <= value <= side[1]
 
 
-def _disturbed(drones: Mapping[str, Quadrotor]) -> frozenset[str]:
+def _disturbed(drones: Mapping[str, Body]) -> frozenset[str]:
     """Return the flying drones that have another one of the same ultrasound rate near them."""
-    flying = [(name, drone) for name, drone in drones.items() if drone.airborne]
+    codes = {name: getattr(drone, "ultrasound_code", None) for name, drone in drones.items()}
+    flying = [(name, drone) for name, drone in drones.items() if codes[name] is not None and drone.airborne]
     near = set()
     for (name, drone), (other_name, other) in itertools.combinations(flying, 2):
         a, b = drone.airframe, other.airframe
-        if drone.ultrasound_code == other.ultrasound_code and math.hypot(a.x - b.x, a.y - b.y) < CROSSTALK_M:
+        if codes[name] == codes[other_name] and math.hypot(a.x - b.x, a.y - b.y) < CROSSTALK_M:
             near |= {name, other_name}
     return frozenset(near)

@@ -14,6 +14,7 @@ import pytest
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.scenario import DroneScenario, Scenario
 from sim_bridge.site import Site
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.world import World
 
 TAKE_OFF, LAND = 290718208, 290717696
@@ -41,7 +42,7 @@ class Bench:
             }
         )
         self.world = World(site, Scenario(drones=scenario or DroneScenario()), 1)
-        drone, onboard = self.world.ardrones["d"], self.world.onboard["d"]
+        drone, onboard = self.world.of(Quadrotor)["d"], self.world.onboard["d"]
         self.body, self.autopilot = drone.airframe, drone.autopilot
         self.emulator = ArDroneEmulator("d", self.address, drone, onboard)
         self.navdata = self.client()

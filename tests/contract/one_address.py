@@ -39,6 +39,7 @@ from sim_bridge.devices.tello import TelloBody, TelloEmulator
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
 from sim_bridge.standalone import Hangar
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.world import TICK_NS
 
 _NEWNET = 0x40000000
@@ -71,7 +72,7 @@ class Beyond:
             self.hangar = Hangar(names[:: 1 if index else -1], FIRMWARES[_ADAPTERS[adapter]])
             body = TelloBody(SiteDrone.model_validate({"kind": "tello", **_PAD}), Scenario(), 0.005, _rng(index))
             self.tello, self.tello_body = TelloEmulator("tello", _TELLO, body), body
-        self.ardrone = self.hangar.world.ardrones[_ARDRONE]
+        self.ardrone = self.hangar.world.of(Quadrotor)[_ARDRONE]
         self.ardrone.battery = self.tello_body.battery = 0.9 - 0.4 * index
 
     @staticmethod

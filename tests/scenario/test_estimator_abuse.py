@@ -14,6 +14,7 @@ from groundstation.field.resolved import ResolvedField
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.camera_model import Eye
 from sim_bridge.study.runner import Study, StudyOptions
+from sim_bridge.world.ardrone import Quadrotor
 
 DRONES = ("drone_1", "drone_2")
 BEGIN_S, END_S = 9.0, 11.0
@@ -35,7 +36,7 @@ class Abused(Study):
         self.errors: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
         self.joined: list[tuple[float, str]] = []
         self.reasons: defaultdict[str, int] = defaultdict(int)
-        for drone in self.world.ardrones.values():
+        for drone in self.world.of(Quadrotor).values():
             drone.autopilot.take_off()
 
     def _send(self, arrival_ns: int, key: str, message: Message) -> None:
@@ -231,7 +232,7 @@ def test_a_kidnapped_target_is_found_again_and_nobody_else_doubted(lab_field: Re
 
 def test_a_kidnapped_robot_is_found_again_and_does_not_take_the_target_along(lab_field: ResolvedField) -> None:
     flight = Abused(lab_field, as_it_is).fly(BEGIN_S)
-    flight.world.ardrones["drone_1"].airframe.x += 0.7
+    flight.world.of(Quadrotor)["drone_1"].airframe.x += 0.7
     flight.fly()
     assert flight.joined_again() == {"drone_1"}
     assert flight.worst("drone_1", BEGIN_S + 2.0) < 0.12
@@ -254,7 +255,7 @@ def test_who_was_carried_off_is_found_again_among_outliers(lab_field: ResolvedFi
     target = flight.world.targets["turtlebot"]
     target.place(target.x - 0.3, target.y)
     flight.fly(BEGIN_S + 2.5)
-    flight.world.ardrones["drone_1"].airframe.x += 0.7
+    flight.world.of(Quadrotor)["drone_1"].airframe.x += 0.7
     flight.fly(BEGIN_S + 5.0)
     assert flight.worst("turtlebot", BEGIN_S + 4.5) < 0.12
     assert max(flight.worst(name, BEGIN_S + 4.5) for name in DRONES) < 0.12

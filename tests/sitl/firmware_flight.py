@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.process import numba_cache
+from sim_bridge.world.ardrone import Quadrotor
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 numba_cache.activate()  # before the kernels are imported: afterwards they would be compiled anew, for a minute
@@ -33,7 +34,7 @@ class Flight(Room):  # type: ignore[misc]
     def take_off(self) -> dict[str, float]:
         """Bring the team into the air; returns height and drift of the real one until it tracks."""
         self.study.start_ns, self.flying = self._now_ns, True
-        for drone in self.study.world.ardrones.values():
+        for drone in self.study.world.of(Quadrotor).values():
             drone.autopilot.take_off()
         body, (pad_x, pad_y) = self.puppet.airframe, self.drone.pad_m
         drifts, heights = [0.0], [0.0]

@@ -36,7 +36,7 @@ from groundstation.bus.topics import COMMAND, ESTIMATE, LEASE, ODOMETRY, SETPOIN
 from groundstation.settings.load import load_field  # noqa: E402
 from groundstation.settings.resolved import resolved_field  # noqa: E402
 from groundstation.settings.sections import driver_sections  # noqa: E402
-from sim_bridge.real.autopilot_truth import AutopilotTruth  # noqa: E402
+from sim_bridge.real.mavlink_truth import AutopilotTruth  # noqa: E402
 from sim_bridge.real.placed import Placement  # noqa: E402
 from sim_bridge.scenario import Scenario  # noqa: E402
 from sim_bridge.study.runner import CLOCK, Study, StudyOptions  # noqa: E402
@@ -133,7 +133,7 @@ class Room:
         )
         self.puppet = self.study.world.puppets[NAME]
         self.study.attach(NAME, self)
-        self.study.world.onboard[NAME] = Lean(self.vehicle)  # type: ignore[assignment]
+        self.study.world.onboard[NAME] = Lean(self.vehicle)
         self._zero_ns = self._now_ns = self._next_estimate_ns = self.orders = self._truth_ns = 0
         self.alone_s = 0.0
         self.flying = False

@@ -14,9 +14,10 @@ from drivers.camera.sources.opening import open_source
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from sim_bridge.devices.ardrone_video import VideoMode
+from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.outputs import scaled
 from sim_bridge.render.process import FrameDelay, run
-from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec, StreamKind
+from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 from sim_bridge.truth import TruthBoard
 
 pytestmark = pytest.mark.sitl
@@ -37,7 +38,7 @@ def make_spec(truth_name, port, **scenario):
         port=port,
         scenario=PictureQuality(**scenario),
         parent_pid=os.getpid(),
-        kind=StreamKind.ARDRONE,
+        own=OwnVideo("sim_bridge.render.ardrone_output:ArDroneOutput"),
     )
 
 

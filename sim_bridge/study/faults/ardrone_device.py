@@ -6,6 +6,7 @@ from sim_bridge.devices.ardrone_edge import ArDroneEdge
 from sim_bridge.devices.ardrone_firmware import FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_navdata import NavdataWriter
 from sim_bridge.devices.ardrone_state import state_word
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.study.faults.memory_network import MemoryNetwork, MemorySocket
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard
@@ -41,6 +42,11 @@ class MemoryArDrone:
         for udp, port in ((self._navdata, NAVDATA_PORT), (self._at, AT_PORT)):
             udp.setblocking(False)
             udp.bind((address, port))
+
+    def suffer(self, fault: Fault, begins: bool) -> None:
+        """Have something hold a propeller, or let it go."""
+        if fault.kind is FaultKind.PROPELLER_BLOCKED:
+            self.control.blocked = begins
 
     def receive(self) -> None:
         """Take what waits at both ports."""

@@ -30,7 +30,6 @@ from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 from sim_bridge.study.camera_model import eyes_of
 from sim_bridge.study.exposures import Exposures
-from sim_bridge.study.faults.ardrone_device import MemoryArDrone
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.judge import Judge
 from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
@@ -142,8 +141,7 @@ class FaultFlight:
         self.tracking = Tracking(self._tracker_bus, section, feed)
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         self._exposures = Exposures([WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)])
-        controls = {name: one.control for name, one in self.devices.items() if isinstance(one, MemoryArDrone)}
-        self._schedule = FaultSchedule(scenario.faults, self.world, self.devices, controls)
+        self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
         self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S)
         self._tracking_since_s: float | None = None

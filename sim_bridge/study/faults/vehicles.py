@@ -21,6 +21,8 @@ from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site
 from sim_bridge.study.faults.ardrone_device import MemoryArDrone
 from sim_bridge.study.faults.memory_network import MemoryNetwork
+from sim_bridge.world.ardrone import Quadrotor
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS, World
 from sim_bridge.wrong_values import WrongValues
 
@@ -73,10 +75,10 @@ def devices_of(
 ) -> dict[str, Device]:  # fmt: skip
     """Return the emulated vehicles; call it where sockets are in memory."""
     devices: dict[str, Device] = {}
-    for name, drone in world.ardrones.items():
+    for name, drone in world.of(Quadrotor).items():
         firmware = scenario.drones.firmware_of(name)
         devices[name] = MemoryArDrone(addresses[name], drone, world.onboard[name], firmware, wrong[name], network)
-    for name, copter in world.copters.items():
+    for name, copter in world.of(MavlinkCopter).items():
         identity = identity_of(site.drones[name])
         flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
         calls = (identity.local_address, identity.port) if identity.listen else None

@@ -71,7 +71,7 @@ def test_a_real_ardrone_has_an_emulated_camera_of_its_own(team: Field) -> None:
         (["drone_2=mocap"], "motion capture cannot be read"),
         (["drone_2=autopilot:lots"], "is no PORT"),
         (["drone_2=autopilot"], "is no PORT"),
-        (["drone_1=autopilot:19410"], "only the simulator of a MAVLink firmware"),
+        (["drone_1=autopilot:19410"], "only simulators of firmware tell a true pose"),
         (["drone_2=autopilot:5000", "drone_3=autopilot:5000"], "the same port"),
         (["drone_2_camera"], "drone_2, which carries it"),
         (["turtlebot"], "nothing can see it"),

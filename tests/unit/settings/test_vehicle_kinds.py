@@ -165,21 +165,8 @@ def test_a_plug_in_that_cannot_be_loaded_is_named_and_the_rest_works() -> None:
 NAMED = {
     "groundstation/cli/bench.py",  # benches of one codec and one link, by their names
     "groundstation/cli/tlog.py",  # a log format of one protocol
-    "groundstation/flight/real_parts.py",  # the simulators behind autopilots tell true poses
-    "sim_bridge/cameras.py",  # the camera source ardrone://
-    "sim_bridge/harness.py",  # its propellers can be blocked by a fault
-    "sim_bridge/stage.py",  # its configuration sets its video
-    "sim_bridge/launch_spec.py",  # faults of AR.Drones only
-    "sim_bridge/fault_kinds.py",  # the same
-    "sim_bridge/faults.py",  # the same
     "sim_bridge/scenario.py",  # figures of the emulated AR.Drones and MAVLink vehicles
     "sim_bridge/standalone.py",  # emulators for programs of others
-    "sim_bridge/world/world.py",  # ultrasound and optical flow of AR.Drones
-    "sim_bridge/real/followers.py",  # the simulators behind autopilots
-    "sim_bridge/real/autopilot_truth.py",  # the same
-    "sim_bridge/render/outputs.py",  # the video of AR.Drones
-    "sim_bridge/render/process.py",  # the same
-    "sim_bridge/render/spec.py",  # the same
 }
 KIND_WORD = re.compile(r"ardrone|mavlink", re.IGNORECASE)
 

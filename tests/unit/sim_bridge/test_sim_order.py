@@ -19,6 +19,7 @@ from sim_bridge.launch_spec import read_order
 from sim_bridge.render.spec import BodyShape, OutageKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.tick_schedule import LATE_NS, Clockwork
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.world import TICK_NS, World
 
 LENS = {
@@ -147,11 +148,12 @@ def test_the_header_of_a_drone_s_video_is_that_of_its_firmware(
     tmp_path: Path, firmware: str | None, header_bytes: int
 ) -> None:
     content = order()
+    content["field"]["drones"]["drone_1"]["camera"]["source"] = "ardrone://192.168.1.11"
     if firmware is not None:
         content["scenario"] = {"drones": {"firmware_by_drone": {"drone_1": firmware}}}
     read = read_order(write(tmp_path, content))
     _, onboard = render_specs(read.site, read.scenario, read.streams, "board", read.seed)
-    assert onboard.video_header_bytes == header_bytes
+    assert onboard.own is not None and onboard.own.options == {"header_bytes": header_bytes}
 
 
 def test_a_stream_of_no_camera_is_named(tmp_path: Path) -> None:
@@ -189,7 +191,7 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
     world = World(read.site, Scenario(), 1)
     emulators = {
         name: ArDroneEmulator(name, "127.90.1.1" if name == "drone_1" else "127.90.1.2", drone, world.onboard[name])
-        for name, drone in world.ardrones.items()
+        for name, drone in world.of(Quadrotor).items()
     }
     schedule = FaultSchedule(
         [
@@ -201,7 +203,6 @@ def test_faults_begin_and_end_on_time(tmp_path: Path) -> None:
         ],
         world,
         emulators,
-        {name: emulator.control for name, emulator in emulators.items()},
     )
     assert schedule.apply(0.5) == [("ceiling", "fault camera_cut of ceiling begins")]
     assert len(schedule.apply(1.6)) == 2

@@ -20,7 +20,7 @@ from groundstation.errors import GroundStationError, SettingsError
 from sim_bridge.cameras import render_specs
 from sim_bridge.harness import Harness
 from sim_bridge.launch_spec import LaunchSpec, read_order
-from sim_bridge.real.autopilot_truth import AutopilotTruth
+from sim_bridge.real.mavlink_truth import AutopilotTruth
 from sim_bridge.real.placed import Placement
 from sim_bridge.render.scene import compose_scene
 from sim_bridge.world.puppet import STALE_S, OutsidePose, Puppet

@@ -13,6 +13,7 @@ from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.standalone import Hangar, MavlinkChoice
+from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS
 
 _net = count(1)
@@ -26,7 +27,7 @@ class Room:
         self.hangar = Hangar([name], FIRMWARES[DEFAULT], mavlink=MavlinkChoice(indoor=indoor))
         vehicle = self.hangar._stage.emulators[name]
         assert isinstance(vehicle, MavlinkEmulator)
-        self.vehicle, self.body = vehicle, self.hangar.world.copters[name].airframe
+        self.vehicle, self.body = vehicle, self.hangar.world.of(MavlinkCopter)[name].airframe
         self._ticks = 0
 
     def turn(self, seconds: float) -> None:

@@ -16,6 +16,7 @@ from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.site import Site, parse_site
 from sim_bridge.study.camera_model import Eye
 from sim_bridge.surroundings import Obstacle
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.obstacles import Box, floor_below
 from sim_bridge.world.world import TICK_S, World
 
@@ -84,7 +85,7 @@ def test_a_floor_zone_misleads_the_flow_of_those_above_it(site: Site) -> None:
     readings = []
     for told in (scenario(), scenario(floor_zones=zones)):
         world = World(site, told, 1)
-        for drone in world.ardrones.values():
+        for drone in world.of(Quadrotor).values():
             drone.autopilot.take_off()
         for _ in range(600):
             world.step()

@@ -5,6 +5,7 @@ import pytest
 
 from sim_bridge.scenario import DroneScenario, Scenario
 from sim_bridge.site import Site
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.world import World
 
 
@@ -21,7 +22,7 @@ def fly(apart_m: float, codes: tuple[int, int], crosstalk: bool = True) -> tuple
         }
     )
     world = World(site, Scenario(drones=DroneScenario(ultrasound_crosstalk=crosstalk)), 3)
-    for drone, code in zip(world.ardrones.values(), codes, strict=True):
+    for drone, code in zip(world.of(Quadrotor).values(), codes, strict=True):
         drone.ultrasound_code = code
         drone.autopilot.take_off()
     fused, echoes, rejected = [], [], 0

@@ -207,7 +207,7 @@ def test_a_drone_under_another_sinks_but_recovers() -> None:
     def lowest(downwash: bool) -> float:
         scenario = Scenario(drones=DroneScenario(air_unrest_m_s2=0.0, downwash=downwash))
         world = World(site((0, 0), (0.05, 0)), scenario, 1)
-        for body in world.ardrones.values():
+        for body in world.of(Quadrotor).values():
             body.autopilot.take_off()
         for _ in range(1600):
             world.step()
@@ -225,7 +225,7 @@ def test_a_drone_under_another_sinks_but_recovers() -> None:
 
 def test_walls_hold() -> None:
     world = World(site((3.5, 0)), Scenario(), 1)
-    body = world.ardrones["drone_1"]
+    body = world.of(Quadrotor)["drone_1"]
     body.autopilot.take_off()
     for tick in range(2000):
         if tick == 1000:
@@ -237,7 +237,7 @@ def test_walls_hold() -> None:
 
 def run(seed: int, pads: tuple[tuple[float, float], ...] = ((0, 0), (1, 0)), ticks: int = 1400) -> np.ndarray:
     world = World(site(*pads), Scenario(), seed)
-    for body in world.ardrones.values():
+    for body in world.of(Quadrotor).values():
         body.autopilot.take_off()
     for _ in range(ticks):
         world.step()
@@ -266,7 +266,7 @@ def test_states_are_in_the_order_of_the_bodies() -> None:
 def test_the_target_waits_until_the_whole_team_has_been_in_the_air_long_enough() -> None:
     scenario = Scenario(target=TargetScenario(departs_after_team_s=1.0))
     world = World(site((-1, 0.5), (-1, -0.5)), scenario, 1)
-    first, second = world.ardrones.values()
+    first, second = world.of(Quadrotor).values()
     first.autopilot.take_off()
     for _ in range(round(8.0 / TICK_S)):
         world.step()

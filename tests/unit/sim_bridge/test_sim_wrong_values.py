@@ -240,7 +240,7 @@ def test_every_kind_has_rules_and_every_vehicle_kind_is_applied_somewhere() -> N
     assert set(RULES) == set(FaultKind)
     world = {"uniform_floor", "obstacle_below", "wind", "propeller_blocked", "battery_drop"}
     links = {"navdata_silent", "at_deaf", "ids_swapped"}
-    of_vehicles = {k for k, rules in RULES.items() if rules.part in (Part.VEHICLE, Part.ARDRONE)}
+    of_vehicles = {k for k, rules in RULES.items() if rules.part in (Part.VEHICLE, Part.ABLE_VEHICLE)}
     assert of_vehicles == WRONG_VALUES | {FaultKind(kind) for kind in world | links}
 
 

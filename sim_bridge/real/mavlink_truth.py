@@ -14,8 +14,10 @@ from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
 from drivers.mavlink.wire.telemetry import Attitude, LocalPositionNed
+from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.listening import open_udp
 from sim_bridge.real.placed import Placement, TrueState
+from sim_bridge.site import SiteDrone
 from sim_bridge.world.puppet import OutsidePose, Vector3
 
 Address = tuple[str, int]
@@ -120,6 +122,11 @@ class AutopilotTruth:
     def close(self) -> None:
         """Close the port."""
         self._socket.close()
+
+
+def of_drone(name: str, address: Address, drone: SiteDrone) -> AutopilotTruth:
+    """Return what hears, at an address, where a drone of the field is."""
+    return AutopilotTruth(name, address, identity_of(drone).system_id, Placement(drone.pad_m, drone.pad_yaw_rad))
 
 
 def _is_finite(state: TrueState) -> bool:

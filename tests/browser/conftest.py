@@ -3,9 +3,7 @@
 import shutil
 import subprocess
 import sys
-import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 from fake_flight import FakeFlight
 from fake_flight import free_port as any_port
+from real_flight import answers, kernels, live, served  # noqa: F401
 from seen_page import Seen, open_seen
 from serve_fake import start_console
 
@@ -62,9 +61,7 @@ class Stage:
 
     def answers(self) -> bool:
         """Whether a console serves at the port."""
-        with suppress(OSError), urllib.request.urlopen(f"{self.url}token", timeout=2):
-            return True
-        return False
+        return answers(self.url)
 
     def open(self, **options: Any) -> Seen:
         seen = open_seen(self.browser, self._contexts, self.url, **options)

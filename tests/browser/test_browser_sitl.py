@@ -1,24 +1,20 @@
 """Stops by the page and by an invited tablet, and what reaches the emulated drones on the wire."""
 
-import json
 import math
 import os
 import re
-import signal
 import socket
 import subprocess
 import sys
 import time
-import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import pytest
+from real_flight import NETWORK
 from seen_page import Seen, eventually
-from serve_fake import field_json
 
 from groundstation.bus import topics as t
 from groundstation.bus.messages import ProcessStatus, TruthState
@@ -33,7 +29,6 @@ _FLY, _LAND = 290718208, 290717696
 _REF = re.compile(rb"AT\*REF=\d+,(\d+)")
 _DRONES = {"drone_1", "drone_2"}
 _WINDOWS, _WINDOW_S = 3, 5.0
-_NETWORK = "127.0.0.2"
 _TABLET = {
     "viewport": {"width": 820, "height": 1180},
     "device_scale_factor": 2,
@@ -63,58 +58,13 @@ class Witness:
         return self
 
 
-@pytest.fixture(scope="module")
-def kernels() -> None:
-    """Compile the tracker's kernels before the run: on a busy machine that takes longer than a run waits for it."""
-    script = (
-        "import sys; from groundstation.process import numba_cache; numba_cache.activate();"
-        "from groundstation.field.resolved import field_from_json; from groundstation.runtime.warm_up import warm_up;"
-        "warm_up(field_from_json(sys.stdin.buffer.read()))"
-    )
-    field = json.dumps(field_json(8765)).encode()
-    subprocess.run([sys.executable, "-c", script], input=field, timeout=280, check=True)
-
-
-@pytest.fixture
-def flight(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
-    arguments += ["--set", f"console.listen={_NETWORK}"]
-    process = subprocess.Popen([sys.executable, "-m", "groundstation.cli.main", *arguments], stdout=subprocess.DEVNULL)
-    try:
-        yield eventually(lambda: next(iter(runtime_file.live_records()), None), 60.0, "a run")
-    finally:
-        process.send_signal(signal.SIGINT)
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(60)
-        process.kill()
-        process.wait(10)
-
-
-@pytest.fixture
-def served(flight: runtime_file.RuntimeRecord, free_port: int) -> Iterator[str]:
-    command = [sys.executable, "-m", "groundstation.cli.main", "console", "--port", str(free_port)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=dict(os.environ))
-    url = f"http://127.0.0.1:{free_port}/"
-    eventually(lambda: _answers(url), 30.0, "the console answers")  # a page that is refused says so on its console
-    yield url
-    process.terminate()
-    process.wait(10)
-
-
-def _answers(url: str) -> bool:
-    with suppress(OSError), urllib.request.urlopen(f"{url}token", timeout=2):
-        return True
-    return False
-
-
-def test_land_all_reaches_the_emulated_drones(flight: runtime_file.RuntimeRecord, served: str, open_page: Any) -> None:
-    bus = join(flight, "view", Role.VIEW)
+def test_land_all_reaches_the_emulated_drones(live: runtime_file.RuntimeRecord, served: str, open_page: Any) -> None:
+    bus = join(live, "view", Role.VIEW)
     try:
         witness = Witness(bus)
         page: Seen = open_page(served)
-        eventually(lambda: not flight.supervisor.alive or _aloft(witness.look()), 150.0, "both drones fly")
-        assert flight.supervisor.alive, "the run has ended before its time"
+        eventually(lambda: not live.supervisor.alive or _aloft(witness.look()), 150.0, "both drones fly")
+        assert live.supervisor.alive, "the run has ended before its time"
         page.wait(lambda s: {"drone_1", "drone_2"} <= set(s["ellipses"]), 60.0)
         # Both carry their own camera, whose H.264 reaches the page as the JPEGs that its driver makes of it.
         for camera in ("ceiling", "drone_1_camera", "drone_2_camera"):
@@ -138,7 +88,7 @@ def _hold_by_tablet(open_page: Any) -> None:
     command = [sys.executable, "-m", "groundstation.cli.main", "console", "--invite", "stop"]
     said = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout
     invitation = next(line for line in said.splitlines() if line.startswith("https://"))
-    assert invitation.startswith(f"https://{_NETWORK}:")
+    assert invitation.startswith(f"https://{NETWORK}:")
     tablet: Seen = open_page(invitation, **_TABLET)
     assert "code=" not in tablet.page.url, "nobody reads it from the tablet's screen later"
     assert all(tablet.there(name).is_disabled() for name in ("take-off", "track", "resume"))
@@ -152,14 +102,13 @@ def _hold_by_tablet(open_page: Any) -> None:
 
 
 def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
-    flight: runtime_file.RuntimeRecord, served: str, record_property: Callable[[str, object], None]
+    live: runtime_file.RuntimeRecord, served: str, record_property: Callable[[str, object], None]
 ) -> None:
     """Ten pages that take nothing, in every other window of the same flight: what else the machine does is in both."""
-    bus = join(flight, "view", Role.VIEW)
+    bus = join(live, "view", Role.VIEW)
     try:
         witness, pace = Witness(bus), Pace(bus)
         eventually(lambda: _aloft(witness.look()), 150.0, "both drones fly")
-        eventually(lambda: _answers(served), 30.0, "the console answers")
         without, with_them = Counter[str](), Counter[str]()
         for _ in range(_WINDOWS):
             without += pace.over(_WINDOW_S)
@@ -167,7 +116,7 @@ def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
                 for _ in range(10):
                     stack.enter_context(idle_viewer(served))
                 with_them += pace.over(_WINDOW_S)
-        assert flight.supervisor.alive, "the run has ended before its time"
+        assert live.supervisor.alive, "the run has ended before its time"
     finally:
         bus.close()
     late, late_with = (counts["late"] / counts["ticks"] for counts in (without, with_them))

@@ -1,0 +1,66 @@
+"""A whole run of emulated drones, and its console: fixtures of the tests that look at one."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from seen_page import eventually
+from serve_fake import field_json
+
+from groundstation.supervisor import runtime_file
+
+NETWORK = "127.0.0.2"
+"""Where the run's console also serves invited devices."""
+
+
+def answers(url: str) -> bool:
+    """Return whether a console serves at this address."""
+    with suppress(OSError), urllib.request.urlopen(f"{url}token", timeout=2):
+        return True
+    return False
+
+
+@pytest.fixture(scope="module")
+def kernels() -> None:
+    """Compile the tracker's kernels before the run: on a busy machine that takes longer than a run waits for it."""
+    script = (
+        "import sys; from groundstation.process import numba_cache; numba_cache.activate();"
+        "from groundstation.field.resolved import field_from_json; from groundstation.runtime.warm_up import warm_up;"
+        "warm_up(field_from_json(sys.stdin.buffer.read()))"
+    )
+    field = json.dumps(field_json(8765)).encode()
+    subprocess.run([sys.executable, "-c", script], input=field, timeout=280, check=True)
+
+
+@pytest.fixture
+def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
+    arguments += ["--set", f"console.listen={NETWORK}"]
+    process = subprocess.Popen([sys.executable, "-m", "groundstation.cli.main", *arguments], stdout=subprocess.DEVNULL)
+    try:
+        yield eventually(lambda: next(iter(runtime_file.live_records()), None), 60.0, "a run")
+    finally:
+        process.send_signal(signal.SIGINT)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(60)
+        process.kill()
+        process.wait(10)
+
+
+@pytest.fixture
+def served(live: runtime_file.RuntimeRecord, free_port: int) -> Iterator[str]:
+    command = [sys.executable, "-m", "groundstation.cli.main", "console", "--port", str(free_port)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=dict(os.environ))
+    url = f"http://127.0.0.1:{free_port}/"
+    eventually(lambda: answers(url), 30.0, "the console answers")  # a page that is refused says so on its console
+    yield url
+    process.terminate()
+    process.wait(10)

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from pydantic import Field
 
+from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of
 from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
 from groundstation import plug_ins
 from groundstation.arrays import Array
@@ -38,10 +39,8 @@ OURS: Mapping[str, PoseProtocol] = {
     "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource"),
     "qualisys": PoseProtocol(22222, f"{_SOURCES}:LibrarySource"),
     "vrpn": PoseProtocol(3883, f"{_SOURCES}:LibrarySource"),
-    "ros2": PoseProtocol(7447, "drivers.motion_capture.ros2_source:Ros2Source", paths=True),
+    "ros2": PoseProtocol(ROUTER_PORT, "drivers.motion_capture.ros2_source:Ros2Source", paths=True),
 }
-# WIRE: DDS leaves ports for so many domains.
-_LAST_DOMAIN = 232
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +59,7 @@ class SystemAddress:
     @property
     def domain(self) -> int:
         """Return the domain of ROS 2; raises ValueError for any other query."""
-        name, _, value = (self.query or "domain=0").partition("=")
-        if name != "domain" or not value.isdecimal() or int(value) > _LAST_DOMAIN:
-            raise ValueError(f"behind ? there may be domain=0 to {_LAST_DOMAIN}, and nothing else")
-        return int(value)
+        return domain_of(self.query)
 
 
 def parse_source(text: str) -> SystemAddress:

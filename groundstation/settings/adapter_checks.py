@@ -7,13 +7,15 @@ from urllib.parse import urlsplit
 from drivers.camera.settings import SourceKind, parse_source
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
+from groundstation.vehicles import kind_named
 
 
 def findings_of_adapters(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, str]]:
     """Return vehicles that cannot be told apart, and videos that would not be taken through their vehicle's adapter."""
     for (first, one), (second, other) in combinations(drones.items(), 2):
         apart = one.interface and other.interface and one.interface != other.interface
-        if one.address == other.address and one.host == other.host and not apart:
+        together = one.kind == other.kind and kind_named(one.kind).shares_address
+        if one.address == other.address and one.host == other.host and not (apart or together):
             text = f"address {one.address} is already that of {first}; behind an adapter each, both need an interface"
             yield ("drones", second, "address"), text
     for name, drone in drones.items():

@@ -132,13 +132,14 @@ class VehicleKind:
     dead. check: (drone, finding) for what is wrong between the sections of this kind. standing_m: height of the base
     above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme of the
     vehicle's own video, "" if it has none. has_serial_number: the driver knows the vehicle's own. has_interface:
-    driver and fail-safe datagrams use the drone's network adapter and no other. moved: changes of
-    sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
-    sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
-    sections; the conformance kit flies that one. offers: types of it by name for `groundstation new`; none: one with
-    the sections of the example. commands: its own part of the command line. emulated_faults: faults of a scenario that
-    its emulator can have and others cannot. true_pose: "module:function" of what hears from the simulator behind a real
-    firmware where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells.
+    driver and fail-safe datagrams use the drone's network adapter and no other. shares_address: its vehicles may have
+    one address, and `check` tells them apart. moved: changes of sections in a simulated network, where this computer
+    has the local address. emulator: "module:attribute" of a sim_bridge.world.emulation.Emulation, "" if there is none.
+    example: what a field file may say of one in its sections; the conformance kit flies that one. offers: types of it
+    by name for `groundstation new`; none: one with the sections of the example. commands: its own part of the command
+    line. emulated_faults: faults of a scenario that its emulator can have and others cannot. true_pose:
+    "module:function" of what hears from the simulator behind a real firmware where the vehicle is (a
+    sim_bridge.real.followers.PoseFeed), "" if none tells.
     """
 
     name: str
@@ -154,6 +155,7 @@ class VehicleKind:
     camera: str = ""
     has_serial_number: bool = False
     has_interface: bool = False
+    shares_address: bool = False
     moved: Callable[[str, Mapping[str, KindSection]], dict[str, dict[str, object]]] = _nothing_moves
     emulator: str = ""
     example: Mapping[str, Mapping[str, object]] = field(default_factory=dict)

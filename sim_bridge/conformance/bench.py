@@ -7,7 +7,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -42,6 +42,7 @@ class Bench:
         self._folder = tempfile.TemporaryDirectory(prefix="conformance-")
         self._log = Path(self._folder.name) / "driver.log"
         self._lives: list[DriverLife] = []
+        self._voice: Any = None
         self.room = Room(subject.launch(faults), self.record)
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
         self._router = open_router(self._endpoint)
@@ -59,6 +60,8 @@ class Bench:
     ) -> None:
         for life in self._lives:
             life.close()
+        if self._voice is not None:
+            self._voice.close()
         self.up.close()
         self.room.__exit__()
         for bus in self._buses:
@@ -71,7 +74,9 @@ class Bench:
     # -- the driver's process -----------------------------------------------------------------------------------------
 
     def start_driver(self) -> DriverLife:
-        """Start the driver, anew if it ran before."""
+        """Start the driver, anew if it ran before; what may have to speak for it is prepared first, as in a run."""
+        if self._voice is None:
+            self._voice = _open(self.subject.kind.stop([self.subject.order()]))
         kind, process = self.subject.kind, self.subject.kind.processes([self.subject.order()])[0]
         self._block.clear(_SLOT)
         spec = ChildSpec(NAME, "driver", self._endpoint, SITE, str(self._block.path), _SLOT)
@@ -93,11 +98,12 @@ class Bench:
         """Speak for a dead driver as supervisor and guardian do: with "hover" or "land"."""
         stop = self.subject.kind.stop([self.subject.order()])
         addresses = self._block.addresses(_SLOT) if stop.called else ((self.subject.address, stop.port),)
-        voice = _open(stop)
-        try:
-            yield lambda word: voice.say(stop.hover if word == "hover" else stop.land, addresses)
-        finally:
-            voice.close()
+
+        def say(word: str) -> None:
+            with suppress(OSError):  # a lost link is no error there either: words are repeated
+                self._voice.say(stop.hover if word == "hover" else stop.land, addresses)
+
+        yield say
 
     def speak(self, word: str, seconds: float) -> None:
         """Say one word for a dead driver, ten times a second for a while."""

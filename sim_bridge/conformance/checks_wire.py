@@ -135,6 +135,8 @@ def damage_aloft_ends_no_driver(case: Case) -> None:
 def damage_aloft_is_counted(case: Case) -> None:
     """Damaged datagrams are counted as refused in its status."""
     case.record.span("landing under damage")
+    if not case.record.facts["sent damaged"]:
+        raise NotApplicable(_UNSEEN)
     told = case.record.heard(VEHICLE_STATUS)
     count = sum(told[-1].message.rejected.values()) if told else 0
     assert count > 0, "none is counted"

@@ -102,7 +102,8 @@ def test_settings_open_no_socket() -> None:
             (
                 "groundstation.bus.zenoh_bus",
                 "groundstation.engineering_views.ros2.live",
-                "drivers.motion_capture.ros2_source",
+                "drivers.rmw_zenoh.session",
+                "sim_bridge.devices.ros2",
             ),
         ),
         ("ruamel", ("groundstation.settings", "groundstation.cli")),

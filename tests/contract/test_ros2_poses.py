@@ -16,9 +16,9 @@ from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.ros2_source import Ros2Source
 from drivers.motion_capture.settings import parse_source
 from drivers.motion_capture.sources import open_source
-from drivers.motion_capture.wire.natnet import WireError
 from drivers.motion_capture.wire.ros2_pose import body_of, decode_pose
-from groundstation.engineering_views.ros2 import graph
+from drivers.rmw_zenoh.wire import graph
+from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.engineering_views.ros2.codec import Ros2Codec
 
 PLACE, TURN = (1.0, -2.0, 1.5), (0.0, 0.0, 0.6, 0.8)
@@ -91,7 +91,10 @@ def test_poses_come_through_a_router_that_starts_later(source: Ros2Source, port:
     codec, frames = Ros2Codec(), list[CapturedFrame]()
     try:
         deadline = time.monotonic() + 10.0
-        while len(frames) < 3 and time.monotonic() < deadline:
+        while (
+            not (source.rejected["type"] and any(len(frame.poses) == 2 for frame in frames))
+            and time.monotonic() < deadline
+        ):
             for body, kind in (("cf1", KINDS[0]), ("cf2", KINDS[2])):
                 key = graph.topic_key(7, f"/vrpn_mocap/{body}/pose", kind, codec.hash_of(kind))
                 node.put(key, written(kind, "world"))
@@ -100,8 +103,9 @@ def test_poses_come_through_a_router_that_starts_later(source: Ros2Source, port:
     finally:
         node.close()
         router.close()
-    assert len(frames) >= 3 and not source.detail and source.rejected["type"] >= 1
-    assert frames[-1].poses == {"cf1": (PLACE, TURN), "cf2": (PLACE, TURN)}
+    assert not source.detail and source.rejected["type"] >= 1
+    # At a busy machine a frame may end between the two.
+    assert {"cf1": (PLACE, TURN), "cf2": (PLACE, TURN)} in [frame.poses for frame in frames]
 
 
 def test_the_address_names_router_topics_and_domain() -> None:

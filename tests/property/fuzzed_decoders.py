@@ -12,15 +12,18 @@ from fuzzed_wire import (
     damaged_frame,
     damaged_navdata,
     damaged_old_frame,
+    damaged_ros2,
     damaged_stream,
     read_commands,
     read_frames,
     read_navdata,
+    read_ros2,
     read_stream,
 )
 
 from drivers.ardrone.wire import errors as ardrone_errors
 from drivers.mavlink.wire import errors as mavlink_errors
+from drivers.rmw_zenoh.wire.cdr import WireError as CdrError
 from groundstation.console import protocol
 from groundstation.errors import MessageError, SettingsError
 
@@ -59,6 +62,7 @@ def _all() -> Iterable[Decoder]:
     yield Decoder("pave", damaged_stream, read_stream, ardrone_errors.WireError)
     yield Decoder("mavlink_1", damaged_old_frame, read_frames, mavlink_errors.WireError)
     yield Decoder("mavlink_2", damaged_frame, read_frames, mavlink_errors.WireError)
+    yield Decoder("ros2", damaged_ros2, read_ros2, CdrError)
     yield Decoder("bus", damaged_sample, read_sample, MessageError)
     yield Decoder("console", damaged_words, protocol.decode, MessageError)
     yield Decoder("field", damaged_field, read_field, SettingsError)

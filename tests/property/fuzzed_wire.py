@@ -16,6 +16,7 @@ from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.signature import SIGNED, digest
 from drivers.mavlink.wire.verification import Signing
+from drivers.rmw_zenoh.wire import vehicle
 
 # AR.Drone
 
@@ -150,3 +151,23 @@ def use(message: object) -> None:
             attitude_from_quaternion(message)
         case telemetry.HighresImu():
             imu_from_highres(message)
+
+
+# ROS 2
+
+_STILL = vehicle.OdometryMessage(9, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0))
+ROS2 = (
+    (vehicle.encode_odometry(_STILL, "odom", "base_link"), vehicle.decode_odometry),
+    (vehicle.encode_battery(9, 0.5), vehicle.decode_charge),
+    (vehicle.encode_answer(False, "no GPS"), vehicle.decode_answer),
+    (vehicle.encode_twist((0.1, 0.2, 0.3), 0.4, 9), lambda payload: vehicle.decode_twist(payload, True)),
+)
+
+
+def damaged_ros2(rng: Random) -> tuple[int, bytes]:
+    which = rng.randrange(len(ROS2))
+    return which, bytes(damaged_bytes(rng, ROS2[which][0]))
+
+
+def read_ros2(damaged: tuple[int, bytes]) -> None:
+    ROS2[damaged[0]][1](damaged[1])

@@ -1,16 +1,12 @@
 """Poses of ROS 2 in CDR, and the keys under which rmw_zenoh publishes them.
 
-WIRE (docs/reference/ros2.md 1): `<domain>/<topic>/<DDS type>/<type hash>`; numbers are aligned to their size, counted
-from behind the 4 bytes of the encapsulation.
+WIRE (docs/reference/ros2.md 1): `<domain>/<topic>/<DDS type>/<type hash>`.
 """
 
-import struct
-
-from drivers.motion_capture.wire.natnet import WireError
+from drivers.rmw_zenoh.wire.cdr import CdrReader, WireError
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-_ENCAPSULATION = 4
 # DDS type -> texts before the pose: the frame, and of an Odometry that of the vehicle.
 _TEXTS = {
     "geometry_msgs::msg::dds_::PoseStamped_": 1,
@@ -36,16 +32,9 @@ def decode_pose(dds_type: str, payload: bytes) -> tuple[Vector3, Quaternion]:
     """Return position [m] and quaternion (x, y, z, w); raises WireError for another type and what is cut short."""
     if dds_type not in _TEXTS:
         raise WireError("type")
-    if len(payload) < _ENCAPSULATION:
-        raise WireError("short")
-    order = "<" if payload[1] & 1 else ">"
-    content, at = payload[_ENCAPSULATION:], 8  # behind seconds and nanoseconds
-    try:
-        for _ in range(_TEXTS[dds_type]):
-            at += -at % 4
-            (length,) = struct.unpack_from(f"{order}I", content, at)
-            at += 4 + length
-        x, y, z, qx, qy, qz, qw = struct.unpack_from(f"{order}7d", content, at + -at % 8)
-    except struct.error:
-        raise WireError("short") from None
+    reader = CdrReader(payload)
+    reader.header()
+    if _TEXTS[dds_type] == 2:
+        reader.text()
+    x, y, z, qx, qy, qz, qw = reader.numbers("d", 7)
     return (x, y, z), (qx, qy, qz, qw)

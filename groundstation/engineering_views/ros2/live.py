@@ -7,12 +7,12 @@ from typing import Any
 
 import zenoh
 
+from drivers.rmw_zenoh.wire import graph
 from groundstation.bus import codec as bus_codec
 from groundstation.bus import keys
 from groundstation.bus.api import Sample
 from groundstation.bus.keys import Key
 from groundstation.bus.topics import IMAGE
-from groundstation.engineering_views.ros2 import graph
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import Ros2Scene
 from groundstation.errors import MessageError, OperatorMistake

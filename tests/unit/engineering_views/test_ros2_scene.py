@@ -11,8 +11,8 @@ pytest.importorskip("rosbags")
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from drivers.rmw_zenoh.wire import graph
 from groundstation.bus import messages as m
-from groundstation.engineering_views.ros2 import graph
 from groundstation.engineering_views.ros2.bag import write_bag
 from groundstation.engineering_views.ros2.codec import Ros2Codec
 from groundstation.engineering_views.ros2.scene import Ros2Scene

@@ -114,7 +114,7 @@ def test_a_fault_of_one_drone_does_not_hide_those_between_drones() -> None:
         "defaults.limits.battery_min: must be <= 0.9 (got 15)",
         "drones.drone_2.pad_m: is 0.20 m from the pad of drone_1: must be >= 0.6 (safety.min_separation_m)",
         "drones.drone_2.colour: unknown key; known here: kind, enabled, address, interface, host, serial_number,"
-        " limits, marker, camera, odometry, pad_m, pad_yaw_deg, video, ardrone, mavlink, tello, type",
+        " limits, marker, camera, odometry, pad_m, pad_yaw_deg, video, ardrone, mavlink, ros2, tello, type",
     ]
 
 

@@ -71,7 +71,7 @@ def verdict(record, name, kind="tello"):
     return kit.judge(CHECKS[name])
 
 
-@pytest.mark.parametrize("kind", ["ardrone", "mavlink", "tello"])
+@pytest.mark.parametrize("kind", ["ardrone", "mavlink", "ros2", "tello"])
 def test_the_objects_of_our_kinds_pass(kind):
     kit = Kit(kind)
     checks = [one for one in chosen("kind") if one.name != "kind_is_light"]  # it starts an interpreter

@@ -23,6 +23,11 @@ def topic_key(domain: int, topic: str, kind: str, type_hash: str) -> str:
     return f"{domain}/{topic.lstrip('/')}/{dds_type(kind)}/{type_hash}"
 
 
+def heard_key(domain: int, topic: str, kind: str = "*") -> str:
+    """Return the key expression of what is published under a topic, whatever the type's hash; kind "*": any type."""
+    return f"{domain}/{topic.strip('/')}/{kind if kind == '*' else dds_type(kind)}/*"
+
+
 def node_token(domain: int, session: str, node: str) -> str:
     """Return the token that says that a node lives."""
     return f"{_ADMIN_SPACE}/{domain}/{session}/0/0/{_NODE}/{_ENCLAVE}/{_NAMESPACE}/{node}"
@@ -33,6 +38,11 @@ def publisher_token(domain: int, session: str, node: str, number: int, topic: st
     name = topic.replace("/", "%")
     entity = f"{_ADMIN_SPACE}/{domain}/{session}/0/{number}/{_PUBLISHER}/{_ENCLAVE}/{_NAMESPACE}/{node}"
     return f"{entity}/{name}/{dds_type(kind)}/{type_hash}/{_QOS}"
+
+
+def publisher_of(attached: bytes) -> bytes:
+    """Return the 16 bytes that name the publisher of a message, or nothing where a message does not say it."""
+    return attached[17:33] if len(attached) == 33 else b""
 
 
 def attachment(sequence: int, stamp_ns: int, publisher: bytes) -> bytes:

@@ -1,0 +1,1 @@
+"""Vehicles behind a ROS 2 node: Odometry in, Twist out."""

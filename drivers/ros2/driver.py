@@ -1,0 +1,192 @@
+"""The driver of a vehicle behind a ROS 2 node: what it says, what a decision means to it, and the process entry."""
+
+import math
+from collections import Counter
+
+from drivers.base import HostProcess, LinkHealth
+from drivers.datagrams import DatagramLog
+from drivers.host import VehicleHost, run_hosts
+from drivers.plausibility.health import Health
+from drivers.plausibility.limits import PlausibilityLimits
+from drivers.plausibility.motion import MotionMonitor, MotionSample
+from drivers.rmw_zenoh.wire import vehicle
+from drivers.rmw_zenoh.wire.cdr import WireError
+from drivers.ros2 import names
+from drivers.ros2.flight import FlightWatch, angles_of, levelled
+from drivers.ros2.link import Ros2Link
+from drivers.ros2.names import Order
+from drivers.ros2.settings import Ros2DriverSettings
+from drivers.vehicle_settings import read_section
+from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import Odometry, Vector3
+from groundstation.bus.topics import ODOMETRY
+from groundstation.process.priority import go_first
+from groundstation.time_units import NS_PER_S
+
+RATE_HZ = 20.0
+_FRESH_NS = 300_000_000
+# A publisher that is silent for so long may be followed by another one: the node was started anew.
+_HEIR_NS = NS_PER_S
+# Charges come seldom; an older one is unknown.
+_CHARGE_NS = 30 * NS_PER_S
+_STANDING_M = 0.08  # the base of a standing vehicle, as its kind says
+# Orders are repeated until they are obeyed; a standing vehicle is told once a second that it shall not move.
+_PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT: NS_PER_S // 2, None: NS_PER_S}
+_ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
+_WORDS = {Order.TAKE_OFF: "take off", Order.LAND: "land", Order.CUT: "stop its motors"}
+LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
+
+
+class Ros2Vehicle:
+    """One vehicle behind its router; `drivers.base.Vehicle`."""
+
+    def __init__(self, settings: Ros2DriverSettings, bus: Bus) -> None:
+        self.name, self.address = settings.name, settings.address
+        self._settings, self._bus = settings, bus
+        self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
+        self._flight = FlightWatch(settings.ros2.take_off_m)
+        self._plausibility = MotionMonitor(LIMITS)
+        self._rejected: Counter[str] = Counter()
+        self._asked = Action.WAIT
+        self._said_ns: dict[Order | None, int] = {}
+        self._heard_ns = self._charge_ns = 0
+        self._publisher, self._charge, self._rate_hz = b"", 0.0, 0.0
+        self._velocity: Vector3 = (0.0, 0.0, 0.0)
+        self._battery_type = names.battery_key(settings.ros2).rpartition("/")[0]
+        self._link = Ros2Link(settings.address, settings.ros2, f"skein_{settings.name}", self._hear)
+
+    # -- the network's thread -----------------------------------------------------------------------------------------
+
+    def _hear(self, key: str, payload: bytes, publisher: bytes) -> None:
+        now_ns = clock.now_ns()
+        self._log.received(now_ns, recorded(key, payload))
+        try:
+            if key.rpartition("/")[0] == self._battery_type:
+                self._charge, self._charge_ns = vehicle.decode_charge(payload), now_ns
+            elif publisher != self._publisher and self._heard_ns and now_ns - self._heard_ns < _HEIR_NS:
+                self._rejected["second_publisher"] += 1
+            else:
+                self._take(now_ns, vehicle.decode_odometry(payload))
+                self._publisher = publisher
+        except WireError as error:
+            self._rejected[error.reason.replace(" ", "_")] += 1
+
+    def _take(self, now_ns: int, message: vehicle.OdometryMessage) -> None:
+        roll, pitch, yaw = angles_of(message.quaternion)
+        velocity = levelled(message.velocity, roll, pitch)
+        height_m = message.position[2] - self._settings.ros2.standing_z_m
+        if self._heard_ns:
+            self._rate_hz += 0.1 * (NS_PER_S / max(1, now_ns - self._heard_ns) - self._rate_hz)
+        self._heard_ns, self._velocity = now_ns, velocity
+        self._flight.see(now_ns, height_m, velocity[2], self._asked)
+        state = self._flight.state(self._asked, math.hypot(*velocity))
+        sample = MotionSample(now_ns, velocity[:2], roll, pitch, vehicle_ns=message.stamp_ns or None)
+        report = self._plausibility.update(sample, state)
+        if report.of(*LIMITS.essential) is Health.BAD:
+            return
+        variance = self._settings.velocity_std_m_s**2
+        odometry = Odometry(
+            header=self._bus.header(self.name, now_ns),
+            velocity_m_s=velocity,
+            velocity_covariance=(variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance),
+            yaw_rad=yaw,
+            roll_rad=roll,
+            pitch_rad=pitch,
+            height_m=max(0.0, height_m + _STANDING_M),
+        )
+        self._bus.publish(ODOMETRY, odometry)
+
+    # -- sender loop --------------------------------------------------------------------------------------------------
+
+    def view(self, now_ns: int) -> VehicleView:
+        """Return what the vehicle last said."""
+        fresh = self._heard_ns > 0 and now_ns - self._heard_ns < _FRESH_NS
+        known = self._charge_ns > 0 and now_ns - self._charge_ns < _CHARGE_NS
+        trouble = self._link.trouble
+        unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
+        scale, (x, y, z) = self._settings.velocity_scale, self._velocity
+        state = self._flight.state(self._asked, math.hypot(x, y, z))
+        charge = self._charge if known else None
+        return VehicleView(state, fresh, charge, trouble, not trouble, unsound, (scale * x, scale * y, z))
+
+    def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
+        """Say what the decision means to the vehicle; its climb after a take-off order is its own."""
+        if decision.action is not self._asked:
+            self._asked = decision.action
+            self._said_ns.clear()
+        match decision.action:
+            # Where that order is a switch, one more would undo it.
+            case Action.CUT if self._flight.airborne or Order.CUT not in self._said_ns:
+                self._order(now_ns, Order.CUT)
+            case Action.LAND:
+                self._order(now_ns, Order.LAND)
+            case Action.TAKE_OFF if not self._flight.airborne:
+                self._order(now_ns, Order.TAKE_OFF)
+            case Action.FLY:
+                self._fly(now_ns, *self._limited(decision))
+            case Action.HOVER:
+                self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
+            case Action.IDLE | Action.CLEAR if self._is_due(now_ns, None):
+                self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
+
+    def _limited(self, decision: WatchdogDecision) -> tuple[Vector3, float]:
+        limits, (forward, left, up) = self._settings.limits, decision.velocity_m_s
+        # A velocity beyond its limit keeps its direction.
+        share = min(1.0, limits.max_speed_m_s / max(math.hypot(forward, left), 1e-9))
+        rise = max(-limits.max_climb_m_s, min(limits.max_climb_m_s, up))
+        fastest = limits.max_yaw_rate_rad_s
+        return (share * forward, share * left, rise), max(-fastest, min(fastest, decision.yaw_rate_rad_s))
+
+    def _fly(self, now_ns: int, velocity: Vector3, turn_rad_s: float) -> None:
+        self._note(now_ns, self._settings.ros2.velocity, self._link.fly(velocity, turn_rad_s))
+
+    def _order(self, now_ns: int, order: Order) -> None:
+        if self._is_due(now_ns, order):
+            self._note(now_ns, str(getattr(self._settings.ros2, order)), self._link.order(order))
+
+    def _is_due(self, now_ns: int, order: Order | None) -> bool:
+        if now_ns - self._said_ns.get(order, -_PAUSE_NS[order]) < _PAUSE_NS[order]:
+            return False
+        self._said_ns[order] = now_ns
+        return True
+
+    def _note(self, now_ns: int, name: str, payload: bytes) -> None:
+        if payload:
+            self._log.sent(now_ns, recorded(self._settings.ros2.topic(name), payload))
+
+    def health(self, now_ns: int) -> LinkHealth:
+        """Return rate and refusals of the link, and in flight what keeps it from hearing or obeying."""
+        silent = now_ns - self._heard_ns > _FRESH_NS
+        asked = _ORDERS.get(self._asked)
+        refused = "" if asked is None else self._link.refused.get(asked, "")
+        detail = f"it refused to {_WORDS[asked]}: {refused}" if asked and refused else ""
+        if self._flight.airborne and not detail:
+            detail = self._link.trouble
+        return LinkHealth(None, 0.0 if silent else self._rate_hz, dict(self._rejected), detail)
+
+    def flush(self) -> None:
+        """Publish the raw messages that wait."""
+        self._log.flush()
+
+    def close(self) -> None:
+        """Leave the router."""
+        self._link.close()
+        self._log.flush()
+
+
+def recorded(name: str, payload: bytes) -> bytes:
+    """Return what the recording has of a message: its name, a zero, its bytes."""
+    return name.encode() + b"\0" + payload
+
+
+def run(child: HostProcess) -> int:
+    """Fly one vehicle until a stop is requested; the process entry."""
+    settings = read_section(Ros2DriverSettings, child.section)
+    flown = Ros2Vehicle(settings, child.bus)
+    try:
+        go_first()
+        return run_hosts(child, [VehicleHost(child, flown, settings.authority)], RATE_HZ)
+    finally:
+        flown.close()

@@ -1,0 +1,75 @@
+"""Whether a vehicle flies, by its height and what it was told: no message of ROS 2 says it. Pure."""
+
+import math
+from dataclasses import dataclass
+
+from drivers.rmw_zenoh.wire.vehicle import Quaternion, Vector3
+from drivers.watchdog_types import Action
+from groundstation.bus.messages import FlightState
+
+_AIRBORNE_M, _STILL_M_S, _CLIMB_M_S = 0.2, 0.25, 0.15
+_STANDS_NS = 500_000_000
+# Share of the height of its take-off at which that is over.
+_UP = 0.7
+# While a vehicle is told one of these, a low height may be a low flight.
+_FLOWN = frozenset({Action.FLY, Action.HOVER})
+
+
+@dataclass(slots=True)
+class FlightWatch:
+    """Follows one vehicle; take_off_m: the height that its take-off climbs to.
+
+    Lower than 0.2 m and still for 0.5 s it stands, unless it was told to fly: a height that drifts must not make a
+    vehicle in the air a standing one, which nobody would land any more.
+    """
+
+    take_off_m: float
+    airborne: bool = False
+    heard: bool = False
+    climbed: bool = False
+    _low_since_ns: int | None = None
+
+    def see(self, now_ns: int, height_m: float, climb_m_s: float, asked: Action) -> None:
+        """Take in a height above where it stood [m] and a climb rate [m/s]; asked: what it is being told."""
+        low = height_m < _AIRBORNE_M
+        if not low or abs(climb_m_s) > _CLIMB_M_S:
+            self._low_since_ns = None
+        elif self._low_since_ns is None:
+            self._low_since_ns = now_ns
+        stands = self._low_since_ns is not None and now_ns - self._low_since_ns >= _STANDS_NS
+        if not low:
+            self.airborne = True
+        elif not self.heard or (stands and asked not in _FLOWN):
+            self.airborne = False
+        self.climbed = self.airborne and (self.climbed or asked is not Action.TAKE_OFF or self._is_up(height_m))
+        self.heard = True
+
+    def _is_up(self, height_m: float) -> bool:
+        return height_m >= _UP * self.take_off_m
+
+    def state(self, asked: Action, speed_m_s: float) -> FlightState:
+        """Return the state of the flight while it is told something and has a speed."""
+        if not self.heard:
+            return FlightState.UNKNOWN
+        if not self.airborne:
+            return FlightState.LANDED
+        if asked is Action.LAND:
+            return FlightState.LANDING
+        if not self.climbed:
+            return FlightState.TAKING_OFF
+        return FlightState.HOVERING if asked is Action.HOVER and speed_m_s < _STILL_M_S else FlightState.FLYING
+
+
+def angles_of(quaternion: Quaternion) -> Vector3:
+    """Return roll, pitch and yaw [rad; FLU: right side down, nose down, counter-clockwise positive]."""
+    x, y, z, w = quaternion
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def levelled(velocity: Vector3, roll: float, pitch: float) -> Vector3:
+    """Return a velocity of the vehicle's tilted axes along its heading, its left, and up [m/s]."""
+    x, y, z = velocity
+    left, up = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
+    return x * math.cos(pitch) + up * math.sin(pitch), left, up * math.cos(pitch) - x * math.sin(pitch)

@@ -1,0 +1,57 @@
+"""Vehicles behind a ROS 2 node as a kind of vehicle."""
+
+from collections.abc import Iterator, Sequence
+
+from drivers.ros2.names import HOVER, LAND
+from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
+from drivers.vehicle_settings import a_process_each, values_of
+from groundstation.vehicles import ErrorHabits, Finding, Offer, StopDatagrams, VehicleKind, VehicleOrder
+
+
+def _own(order: VehicleOrder) -> Ros2Section:
+    own = order.sections.get("ros2")
+    return own if isinstance(own, Ros2Section) else Ros2Section()
+
+
+def _settings(order: VehicleOrder) -> Ros2DriverSettings:
+    return Ros2DriverSettings(**values_of(order), ros2=_own(order))
+
+
+def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
+    (order,) = orders
+    way = _settings(order).model_dump_json()
+    return StopDatagrams(_own(order).port, HOVER, LAND, "drivers.ros2.voice:Ros2Voice", way)
+
+
+def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
+    taken: dict[tuple[str, int, int, str], str] = {}
+    for order in orders:
+        own, address = _own(order), order.drone.address
+        for key in ("odometry", "battery", "velocity", "take_off", "land", "cut"):
+            topic = own.topic(getattr(own, key))
+            other = taken.setdefault((address, own.port, own.domain, topic), f"{order.name}.{key}")
+            if other != f"{order.name}.{key}":
+                yield order.name, (("ros2", key), f"/{topic} is already that of {other}: give each its namespace")
+
+
+# Whatever the node's odometry is made of; that of an optical flow is assumed.
+KIND = VehicleKind(
+    name="ros2",
+    summary="vehicles behind a ROS 2 node (Odometry in, Twist out)",
+    driver="drivers.ros2.driver:run",
+    habits=ErrorHabits(0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True),
+    processes=a_process_each(_settings),
+    stop=_stop,
+    sections={"ros2": Ros2Section},
+    check=_check,
+    shares_address=True,
+    emulator="sim_bridge.devices.ros2:EMULATION",
+    example={"ros2": {"namespace": "drone"}},
+    offers={
+        "ros2": Offer(
+            "a ROS 2 node",
+            of_drone="    ros2: {namespace: drone_{id}}\n",
+            pictures="ros2://{address}/camera/image/compressed",
+        )
+    },
+)

@@ -1,0 +1,169 @@
+"""The driver of a vehicle behind a ROS 2 node, its fail-safe voice and its emulator, through a router on loopback."""
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+from drivers.rmw_zenoh.wire import graph, vehicle
+from drivers.ros2.driver import Ros2Vehicle
+from drivers.ros2.names import HOVER, LAND
+from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
+from drivers.ros2.voice import Ros2Voice
+from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import FlightState
+from groundstation.bus.topics import ODOMETRY, RAW_RX, RAW_TX
+from groundstation.errors import GroundStationError
+from sim_bridge.devices.ros2 import Ros2Emulator
+from sim_bridge.devices.tello import TelloBody
+from sim_bridge.scenario import Scenario
+from sim_bridge.site import SiteDrone
+from sim_bridge.world.noise import generator_of
+
+ADDRESS = "127.64.91.11"
+DRONE = SiteDrone.model_validate(
+    {"kind": "ros2", "pad_m": (0.0, 0.0), "pad_yaw_deg": 30.0, "marker": {"code": 1, "position_m": (0.0, 0.0, 0.08)}}
+)
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind((ADDRESS, 0))
+        return int(probe.getsockname()[1])
+
+
+class Room:
+    """An emulated vehicle whose time passes by calls, and its driver without a loop."""
+
+    def __init__(self, **own: Any) -> None:
+        self.section = Ros2Section(port=free_port(), namespace="drone_1", domain=3, **own)
+        self.settings = Ros2DriverSettings(name="drone_1", address=ADDRESS, pad_m=(0.0, 0.0), ros2=self.section)
+        self.body = TelloBody(DRONE, Scenario(), 0.005, generator_of(1, "ros2"))
+        self.node = Ros2Emulator("drone_1", ADDRESS, self.section.model_dump(), self.body)
+        exchange = MemoryExchange()
+        self.heard = MemoryBus(exchange, "lab", "view").subscribe([ODOMETRY, RAW_RX, RAW_TX])
+        self.driver = Ros2Vehicle(self.settings, MemoryBus(exchange, "lab", "drone_1"))
+
+    def until(self, condition: Callable[[], bool], action: Action = Action.IDLE, velocity=(0.0, 0.0, 0.0)) -> None:
+        """Let time pass, the driver told an action twenty times a second, until something holds."""
+        deadline = time.monotonic() + 8.0
+        tick = 0
+        while not condition():
+            assert time.monotonic() < deadline, (self.driver.view(time.monotonic_ns()), self.body.airframe.z)
+            self.turn()
+            if tick % 10 == 0:
+                time.sleep(0.002)  # the network's threads
+                self.driver.apply(time.monotonic_ns(), WatchdogDecision(DriverMode.TRACK, action, velocity, 0.0))
+            tick += 1
+
+    def turn(self) -> None:
+        self.node.receive()
+        self.body.step((0.0, 0.0, 0.0))
+        self.body.sense()
+        self.node.send()
+
+    @property
+    def state(self) -> FlightState:
+        return self.driver.view(time.monotonic_ns()).flight_state
+
+    def ready(self) -> bool:
+        view = self.driver.view(time.monotonic_ns())
+        return view.configured and view.fresh and view.battery is not None
+
+    def close(self) -> None:
+        self.driver.close()
+        self.node.close()
+
+
+@pytest.fixture(params=[{}, {"orders": "services", "velocity_type": "twist_stamped", "distro": "humble"}])
+def room(request: pytest.FixtureRequest) -> Iterator[Room]:
+    room = Room(**request.param)
+    yield room
+    room.close()
+
+
+def test_it_flies_by_topics_and_by_services(room: Room) -> None:
+    room.until(room.ready)
+    assert room.state is FlightState.LANDED
+    room.until(lambda: room.state is FlightState.FLYING, Action.TAKE_OFF)
+    room.until(lambda: room.body.airframe.vx > 0.2, Action.FLY, (3.0, 0.0, 0.0))  # of which 0.6 is allowed
+    forward, _ = room.body.airframe.velocity_stabilized()
+    assert 0.2 < forward < 0.8
+    room.until(lambda: not room.body.motors_on, Action.CUT)
+    room.until(lambda: room.state is FlightState.LANDED, Action.CUT)
+    room.driver.flush()
+    topics = {received.key.topic for received in room.heard.drain()}
+    assert topics == {ODOMETRY, RAW_RX, RAW_TX}
+
+
+def test_the_voice_of_a_dead_driver_stops_and_lands_it() -> None:
+    room = Room()
+    voice = Ros2Voice(room.settings.model_dump_json(), 3)
+    try:
+        room.until(room.ready)
+        room.until(lambda: room.state is FlightState.FLYING, Action.TAKE_OFF)
+        room.until(lambda: room.body.airframe.vx > 0.2, Action.FLY, (0.6, 0.0, 0.0))
+        for _ in range(60):
+            voice.say(HOVER, ())
+            for _ in range(10):
+                room.turn()
+            time.sleep(0.001)
+        assert room.body.wanted[0] == (0.0, 0.0, 0.0)
+        assert room.body.airframe.velocity_stabilized()[0] < 0.15
+        deadline = time.monotonic() + 5.0
+        while room.body.motors_on and time.monotonic() < deadline:
+            voice.say(LAND, ())
+            room.turn()
+            time.sleep(0.0005)
+        assert not room.body.motors_on
+    finally:
+        voice.close()
+        room.close()
+
+
+def test_a_voice_without_a_router_says_so() -> None:
+    settings = Ros2DriverSettings(name="drone_1", address=ADDRESS, pad_m=(0.0, 0.0), ros2=Ros2Section(port=free_port()))
+    voice = Ros2Voice(settings.model_dump_json(), 2)
+    try:
+        for word in (HOVER, LAND):
+            with pytest.raises(OSError, match="no ROS 2 Zenoh router"):
+                voice.say(word, ())
+    finally:
+        voice.close()
+
+
+def test_what_is_missing_on_the_other_side_is_named() -> None:
+    room = Room(velocity_type="twist_stamped")
+    port = room.section.port
+    wrong = room.settings.model_copy(update={"ros2": Ros2Section(port=port, namespace="drone_1", domain=3)})
+    driver = Ros2Vehicle(wrong, MemoryBus(MemoryExchange(), "lab", "drone_1"))
+    try:
+        assert driver.view(0).not_ready == f"no ROS 2 Zenoh router answers at tcp/{ADDRESS}:{port}"
+        room.until(lambda: "router" not in driver.view(0).not_ready)
+        assert driver.view(0).not_ready == "nobody in domain 3 takes geometry_msgs/msg/Twist from /drone_1/cmd_vel"
+    finally:
+        driver.close()
+        room.close()
+    with pytest.raises(GroundStationError, match="cannot listen on"):
+        Ros2Emulator("drone_2", "203.0.113.1", {"port": 7447}, room.body)
+
+
+def test_a_second_publisher_is_not_believed_and_what_is_no_message_is_counted() -> None:
+    room = Room()
+    try:
+        room.until(room.ready)
+        session = room.node._session
+        key = graph.topic_key(3, "drone_1/odom", vehicle.ODOMETRY, "RIHS01_x")
+        aloft = vehicle.OdometryMessage(9, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        stranger = graph.attachment(1, 9, b"another-publishe")
+        rejected = lambda: room.driver.health(time.monotonic_ns()).rejected  # noqa: E731
+        session.put(key, vehicle.encode_odometry(aloft, "odom", "x"), attachment=stranger)
+        session.put(graph.topic_key(3, "drone_1/battery", vehicle.BATTERY, "RIHS01_x"), b"\0\1\0\0")
+        room.until(lambda: {"second_publisher", "short"} <= set(rejected()))
+        assert room.state is FlightState.LANDED
+    finally:
+        room.close()

@@ -8,6 +8,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of
 from groundstation import plug_ins
 from groundstation.adapters import split_zone, with_zone
 from groundstation.geometry.board import VALID_CODES, Checkerboard
@@ -24,20 +25,24 @@ class SourceKind(StrEnum):
     HTTP = "http"
     ARDRONE = "ardrone"
     RTSP = "rtsp"
+    ROS2 = "ros2"
     DEVICE = "device"
     FILE = "file"
     PLUG_IN = "plug-in"
 
 
-_PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554}
+_PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554, SourceKind.ROS2: ROUTER_PORT}
+# Libraries open these, through any adapter.
+_ANY_ADAPTER = frozenset({SourceKind.RTSP, SourceKind.ROS2})
 
 
 @dataclass(frozen=True, slots=True)
 class SourceAddress:
     """A source taken apart.
 
-    path: of the stream with its query, of the device, of the file or folder; host: of a plug-in, its scheme; login:
-    "user:password", or "" for none; interface: the network adapter that it is behind, or "" for any.
+    path: of the stream with its query, of the topic, of the device, of the file or folder; host: of a plug-in, its
+    scheme; login: "user:password", or "" for none; interface: the network adapter that it is behind, or "" for any;
+    domain: of ROS 2.
     """
 
     kind: SourceKind
@@ -46,6 +51,7 @@ class SourceAddress:
     path: str = ""
     login: str = field(default="", repr=False)
     interface: str = ""
+    domain: int = 0
 
 
 def parse_source(text: str) -> SourceAddress:
@@ -62,7 +68,7 @@ def parse_source(text: str) -> SourceAddress:
     if unusable or scheme not in kinds:
         raise ValueError(
             "must be an address such as http://192.168.1.50:8080/video.mjpg, ardrone://192.168.1.1, "
-            "rtsp://192.168.1.60/stream, /dev/video0 or /a/video.mp4"
+            "rtsp://192.168.1.60/stream, ros2://192.168.1.20/camera/image/compressed, /dev/video0 or /a/video.mp4"
         )
     parts = urlsplit(text)
     try:
@@ -73,8 +79,12 @@ def parse_source(text: str) -> SourceAddress:
     if not parts.hostname:
         raise ValueError(f"must name a host, as in {scheme}://192.168.1.50")
     host, interface = split_zone(parts.hostname)
-    if interface and kinds[scheme] is SourceKind.RTSP:
-        raise ValueError(f"cannot be behind an adapter (%{interface}): the library that opens rtsp:// takes any")
+    if interface and kinds[scheme] in _ANY_ADAPTER:
+        raise ValueError(f"cannot be behind an adapter (%{interface}): the library that opens {scheme}:// takes any")
+    if kinds[scheme] is SourceKind.ROS2:
+        if not (topic := parts.path.strip("/")):
+            raise ValueError("must name a topic, as in ros2://192.168.1.20/camera/image/compressed")
+        return SourceAddress(SourceKind.ROS2, host, port, topic, domain=domain_of(parts.query))
     path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
     login = "" if parts.username is None else f"{unquote(parts.username)}:{unquote(parts.password or '')}"
     return SourceAddress(kinds[scheme], host, port, path, login, interface)

@@ -28,7 +28,7 @@ def _video(name: str, drone: Drone) -> Iterator[tuple[KeyPath, str]]:
     if source.host == drone.address and source.interface not in ("", drone.interface):
         yield path, f"must come through the vehicle's interface {drone.interface} (got {source.interface})"
     # A library or a plug-in opens the connection, and would take any adapter: another vehicle's pictures.
-    opened_elsewhere = source.kind in (SourceKind.RTSP, SourceKind.PLUG_IN)
+    opened_elsewhere = source.kind in (SourceKind.RTSP, SourceKind.ROS2, SourceKind.PLUG_IN)
     if opened_elsewhere and urlsplit(drone.camera.source).hostname == drone.address:
         scheme = drone.camera.source.partition(":")[0]
         remedy = f"; a plug-in that can is told %{drone.interface} after the address"

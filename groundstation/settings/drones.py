@@ -55,8 +55,8 @@ class OnboardCameraSettings(SettingsSection):
     """The camera that a drone carries: source, lens, mounting."""
 
     source: Source
-    """Where the images come from: http://, rtsp:// or ardrone:// address, /dev/videoN, video file or folder of images.
-    """
+    """Where the images come from: http://, rtsp://, ros2:// or ardrone:// address, /dev/videoN, video file or folder
+    of images."""
     calibration: CalibrationSettings
     """Lens calibration: the name of a file beside the field file, or its content."""
     position_m: OnVehicle = (0.0, 0.0, 0.0)

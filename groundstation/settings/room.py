@@ -129,7 +129,7 @@ class WorldCameraSettings(SettingsSection):
     """A camera fixed in the world."""
 
     source: Source
-    """Where the images come from: http:// or rtsp:// address, /dev/videoN, video file or folder of images."""
+    """Where the images come from: http://, rtsp:// or ros2:// address, /dev/videoN, video file or folder of images."""
     host: HostName = ""
     """Name of the host that the camera's driver runs on, as the site admitted it. Empty: the host of the run."""
     calibration: CalibrationSettings

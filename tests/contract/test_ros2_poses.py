@@ -91,10 +91,8 @@ def test_poses_come_through_a_router_that_starts_later(source: Ros2Source, port:
     codec, frames = Ros2Codec(), list[CapturedFrame]()
     try:
         deadline = time.monotonic() + 10.0
-        while (
-            not (source.rejected["type"] and any(len(frame.poses) == 2 for frame in frames))
-            and time.monotonic() < deadline
-        ):
+        while not (source.rejected["type"] and any(len(one.poses) == 2 for one in frames)):
+            assert time.monotonic() < deadline, frames
             for body, kind in (("cf1", KINDS[0]), ("cf2", KINDS[2])):
                 key = graph.topic_key(7, f"/vrpn_mocap/{body}/pose", kind, codec.hash_of(kind))
                 node.put(key, written(kind, "world"))

@@ -16,7 +16,8 @@ from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.signature import SIGNED, digest
 from drivers.mavlink.wire.verification import Signing
-from drivers.rmw_zenoh.wire import vehicle
+from drivers.rmw_zenoh.wire import pictures, vehicle
+from drivers.rmw_zenoh.wire.cdr import CdrWriter
 
 # AR.Drone
 
@@ -156,10 +157,13 @@ def use(message: object) -> None:
 # ROS 2
 
 _STILL = vehicle.OdometryMessage(9, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0))
+_RAW = CdrWriter().header(9, "").numbers("I", 2, 3).text("mono8").numbers("B", 0).numbers("I", 3).blob(bytes(6)).payload
 ROS2 = (
     (vehicle.encode_odometry(_STILL, "odom", "base_link"), vehicle.decode_odometry),
     (vehicle.encode_battery(9, 0.5), vehicle.decode_charge),
     (vehicle.encode_answer(False, "no GPS"), vehicle.decode_answer),
+    (CdrWriter().header(9, "").text("jpeg").blob(b"\xff\xd8\xff\xd9").payload, pictures.decode_compressed),
+    (_RAW, pictures.decode_raw),
     (vehicle.encode_twist((0.1, 0.2, 0.3), 0.4, 9), lambda payload: vehicle.decode_twist(payload, True)),
 )
 

@@ -7,6 +7,7 @@ from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import FrameSource
 from drivers.camera.sources.mjpeg import MjpegReader
 from drivers.camera.sources.reader_thread import Drain, Reader
+from drivers.camera.sources.ros2 import Ros2Reader
 from groundstation import plug_ins
 from groundstation.errors import DriverError, without_password
 
@@ -30,6 +31,8 @@ def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -
             return ArDroneReader(address.host, address.port, address.interface)
         case SourceKind.RTSP:
             return rtsp(source, f"{address.host}:{address.port}")
+        case SourceKind.ROS2:
+            return Ros2Reader(address.host, address.port, address.path, address.domain)
         case SourceKind.DEVICE:
             return device(address.path, size)
         case SourceKind.FILE:

@@ -3,7 +3,8 @@
 On the floor the pad of the field file is fed, or where it landed last: the tracker has no estimate of a robot that is
 landed. Once the take-off has begun it has one, which is fed if it goes on from there.
 A position that observations do not keep sharp is not fed: it would be the autopilot's own dead reckoning. What counts
-is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well.
+is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well. Nothing is fed while
+sightings far from the estimate are being weighed.
 """
 
 import math
@@ -50,6 +51,9 @@ class VisionFeed:
             self._epoch, self._last = estimate.epoch, None
             self.resets += 1
         if len(entity.mean) < 4 or len(entity.velocity_m_s) < 3 or len(entity.covariance) != 16:
+            return None
+        if entity.contradicted:  # the belief follows this autopilot's velocity, and would tell it that it is right
+            self._newest = None
             return None
         header = estimate.header
         stamp_ns = header.stamp_ns if header.clock == self._clock and header.stamp_ns <= now_ns else now_ns

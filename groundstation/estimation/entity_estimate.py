@@ -27,4 +27,5 @@ def entity_estimate(
         converged=converged,
         age_s=joint.age_s(name),
         unlocalised_s=unlocalised_s,
+        contradicted=joint.contradicted(name),
     )

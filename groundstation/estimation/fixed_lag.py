@@ -175,6 +175,14 @@ class FixedLagFilter:
         memory = self._state.memory[self._index[name]]
         return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
 
+    def contradicted(self, name: str) -> bool:
+        """Return whether sightings far from an entity's place are being weighed against it, for twice the time that
+        this takes: whatever then was not believed is not heeded any longer."""
+        memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
+        now, wild = self._seconds(self._now_ns), memory["wild"]
+        lately = now - float(memory["wild_at"]) <= within_s and now - float(wild["since"]) <= 2.0 * within_s
+        return bool(wild["count"] >= 2 and lately)
+
     def airborne(self, robot: str) -> bool:
         """Return whether a robot flies, as far as is known."""
         return bool(self._state.memory["admitted"][self._index[robot]])

@@ -125,4 +125,5 @@ class CopterLink:
 
 def _is_good(estimate: EntityEstimate) -> bool:
     worst = max(estimate.covariance[i] for i in (0, 5, 10))
-    return estimate.converged and estimate.age_s <= _VISION.max_age_s and worst <= _VISION.max_std_m**2
+    known = estimate.converged and worst <= _VISION.max_std_m**2
+    return known and not estimate.contradicted and estimate.age_s <= _VISION.max_age_s

@@ -26,6 +26,8 @@ class EntityEstimate(msgspec.Struct, frozen=True):
     """Time since the last observation that corrected it [s]."""
     unlocalised_s: float = 0.0
     """For how long a flying robot may not have been where it is believed [s]; 0 while it is known."""
+    contradicted: bool = False
+    """Whether sightings far from this place are being weighed against it: nothing should be told by it meanwhile."""
 
 
 class TargetSearch(msgspec.Struct, frozen=True):

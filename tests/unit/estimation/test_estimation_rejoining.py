@@ -62,6 +62,22 @@ class Team:
         return float(x), float(y)
 
 
+def test_a_robot_is_contradicted_until_it_is_believed_elsewhere() -> None:
+    team, told = Team(), []
+    for _ in range(15):
+        team.watch(0.1, a=(0.8, 0.0))
+        told.append(team.filter.contradicted("a"))
+        assert not team.filter.contradicted("b")
+    changes = [told[0], *(told[k] for k in range(1, 15) if told[k] != told[k - 1])]
+    assert changes == [False, True, False], "from the second sighting on, until it is found"
+    assert told.count(True) <= 7 and [name for _, name in team.given_up] == ["a"]
+
+
+def test_a_camera_that_is_not_heeded_contradicts_for_a_moment_only() -> None:
+    team = Team().watch(1.5, a=(0.8, 0.0), b=(0.8, 0.0))
+    assert len(team.given_up) <= 1 and not any(team.filter.contradicted(name) for name in PLACES)
+
+
 def test_a_robot_that_was_carried_off_is_found_at_once() -> None:
     team = Team().watch(1.5, a=(0.8, 0.0))
     assert [name for _, name in team.given_up] == ["a"]

@@ -19,9 +19,9 @@ def feed() -> VisionFeed:
     return feed
 
 
-def believe(feed: VisionFeed, now_ns: int, x: float, y: float, z: float) -> None:
+def believe(feed: VisionFeed, now_ns: int, x: float, y: float, z: float, contradicted: bool = False) -> None:
     covariance = tuple(4e-4 if place % 5 == 0 else 0.0 for place in range(16))
-    entity = EntityEstimate("drone", "robot", (x, y, z, 0.3), covariance, (0.0, 0.0, 0.0), True, 0.1)
+    entity = EntityEstimate("drone", "robot", (x, y, z, 0.3), covariance, (0.0, 0.0, 0.0), True, 0.1, 0.0, contradicted)
     header = Header(now_ns, clock.clock_id(), "team", "tracker", 1)
     feed.hear(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
 
@@ -68,3 +68,13 @@ def test_a_vehicle_aloft_is_fed_no_old_estimate(feed: VisionFeed) -> None:
     assert place(feed, NOW + 66 * MS, aloft=True) is not None
     assert place(feed, NOW + 400 * MS, aloft=True) is None
     assert feed.lost_s(NOW + 1033 * MS) == pytest.approx(1.0)
+
+
+def test_nothing_is_fed_while_sightings_contradict_the_estimate(feed: VisionFeed) -> None:
+    believe(feed, NOW + 33 * MS, *PAD, 0.5)
+    assert place(feed, NOW + 33 * MS, aloft=True) is not None
+    believe(feed, NOW + 66 * MS, *PAD, 0.5, contradicted=True)
+    assert place(feed, NOW + 66 * MS, aloft=True) is None
+    assert feed.lost_s(NOW + 133 * MS) == pytest.approx(0.1)
+    believe(feed, NOW + 133 * MS, *PAD, 0.5)
+    assert place(feed, NOW + 133 * MS, aloft=True) is not None

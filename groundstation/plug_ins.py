@@ -4,7 +4,7 @@ Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera
 `skein.world_sensors` (schemes of motion capture sources), `skein.markers` (dictionaries of square tags).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -37,7 +37,7 @@ def planner(name: str, parameters: object, sensors: object) -> Any:
     Made as that one is, from its parameters and the team's sensors, and used by its `plan`.
     """
     try:
-        return load(PLANNERS, name)(parameters, sensors)
+        return made(PLANNERS, name, ("plan",), parameters, sensors)
     except PlugInError as error:
         raise SettingsError([f"planner.plug_in: {error}"]) from error
 
@@ -45,25 +45,55 @@ def planner(name: str, parameters: object, sensors: object) -> Any:
 @cache
 def tag_family(name: str) -> Any:
     """Return the `groundstation.geometry.tag.TagFamily` of a dictionary, made once; raises PlugInError."""
-    make = load(MARKERS, name)
+    family = made(MARKERS, name, ("count", "bits", "corner_std_px", "finder", "black_cells"))
     try:
-        family = make()
         if min(int(family.count), int(family.bits), float(family.corner_std_px)) <= 0:
             raise ValueError("count, bits and corner_std_px must be positive")
-        _ = family.finder, family.black_cells
     except Exception as error:
         raise PlugInError(f"{name} cannot be used: {type(error).__name__}: {error}") from error
     return family
 
 
+def made(group: str, name: str, uses: Sequence[str], *arguments: object) -> Any:
+    """Return what a plug-in makes of arguments; raises PlugInError, also where that lacks one of `uses`."""
+    source, make = _loaded(group, name)
+    try:
+        one = make(*arguments)
+        if missing := [each for each in uses if not hasattr(one, each)]:
+            raise TypeError(f"{type(one).__name__} without {', '.join(missing)}")
+    except (Exception, SystemExit) as error:
+        raise PlugInError(f"{name} cannot be used: {source}: {reason(error)}") from error
+    return one
+
+
 def load(group: str, name: str) -> Any:
     """Return the object of one plug-in; raises PlugInError."""
+    return _loaded(group, name)[1]
+
+
+def reason(error: BaseException) -> str:
+    """Return what an operator is told of somebody's exception."""
+    return f"{type(error).__name__}: {error}"
+
+
+def doubles(group: str) -> dict[str, str]:
+    """Return the names that several plug-ins of a group have, with all of these: which one was meant is not known."""
+    sources: dict[str, list[str]] = {}
+    for name, source, _ in entries(group):
+        sources.setdefault(name, []).append(source)
+    return {name: " and ".join(found) for name, found in sources.items() if len(found) > 1}
+
+
+def _loaded(group: str, name: str) -> tuple[str, Any]:
+    if name in (several := doubles(group)):
+        raise PlugInError(f"{name} cannot be used: {several[name]} have the same name: uninstall all but one")
     for found, source, entry in entries(group):
-        if found != name:
-            continue
-        try:
-            return entry.load()
-        except Exception as error:
-            raise PlugInError(f"{name} cannot be used: {source}: {type(error).__name__}: {error}") from error
+        if found == name:
+            try:
+                if not callable(make := entry.load()):
+                    raise TypeError(f"is of type {type(make).__name__}, nothing that can be called")
+                return source, make
+            except (Exception, SystemExit) as error:  # whoever ends the program at import ends nothing here
+                raise PlugInError(f"{name} cannot be used: {source}: {reason(error)}") from error
     known = ", ".join(names(group)) or "none is installed"
     raise PlugInError(f"{name} is not known; known in {group}: {known}")

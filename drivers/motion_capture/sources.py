@@ -23,6 +23,9 @@ _DATAGRAMS = 64
 _WAITING_FRAMES = 64
 
 
+_USED = ("rejected", "detail", "poll", "close")
+
+
 class Source(Protocol):
     """Where frames come from; rejected: what was refused, by reason; detail: what is wrong, in words."""
 
@@ -43,13 +46,12 @@ def open_source(address: SystemAddress) -> Source:
     """
     if address.scheme in OURS:
         module, _, name = OURS[address.scheme].reader.partition(":")
-        reader = getattr(importlib.import_module(module), name)
-    else:
-        try:
-            reader = plug_ins.load(plug_ins.WORLD_SENSORS, address.scheme)
-        except plug_ins.PlugInError as error:
-            raise DriverError(f"motion capture source {address.scheme}://: {error}") from None
-    source: Source = reader(address)
+        ours: Source = getattr(importlib.import_module(module), name)(address)
+        return ours
+    try:
+        source: Source = plug_ins.made(plug_ins.WORLD_SENSORS, address.scheme, _USED, address)
+    except plug_ins.PlugInError as error:
+        raise DriverError(f"motion capture source {address.scheme}://: {error}") from None
     return source
 
 

@@ -36,6 +36,7 @@ def doctor(field: str, as_json: bool) -> int:
 
 def _examine(name: str) -> "list[Finding]":
     from groundstation.doctor import network, processor, storage
+    from groundstation.doctor.plug_ins import plug_in_findings
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
 
@@ -52,5 +53,6 @@ def _examine(name: str) -> "list[Finding]":
         storage.speed(folder),
         network.port(field.console.port, "console"),
         *network.power_saving(),
+        *plug_in_findings(),
     ]
     return [finding for finding in found if finding is not None]

@@ -3,13 +3,14 @@
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverSection, vehicle_order
 from groundstation.supervisor.process_spec import FailsafeDatagrams
-from groundstation.vehicles import kind_named
+from groundstation.vehicles import StopDatagrams, kind_named
+from groundstation.vehicles.registry import ask
 
 
 def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagrams:
     """Return what the vehicles of a driver are sent."""
     drone = field.drones[section.entity]
-    stop = kind_named(drone.kind).stop([vehicle_order(field, name) for name in section.entities])
+    stop: StopDatagrams = ask(kind_named(drone.kind), "stop", [vehicle_order(field, name) for name in section.entities])
     # Who cannot hover for so long without its driver is landed sooner.
     land_after_s = min(field.safety.land_after_s, stop.hovers_s)
     return FailsafeDatagrams(

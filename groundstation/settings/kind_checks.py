@@ -7,6 +7,7 @@ from groundstation.field.drones import drone_from_values
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
 from groundstation.vehicles import VehicleOrder, all_kinds, kind_named
+from groundstation.vehicles.registry import ask
 
 
 def findings_of_kinds(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, str]]:
@@ -22,7 +23,7 @@ def findings_of_kinds(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, st
             order = VehicleOrder(name, index, values, SafetyValues(), 0.0, False, drone.sections)
             teams.setdefault(drone.kind, []).append(order)
     for kind, team in teams.items():
-        for name, (below, text) in kind_named(kind).check(team):
+        for name, (below, text) in ask(kind_named(kind), "check", team):
             yield ("drones", name, *below), text
 
 

@@ -15,6 +15,7 @@ from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.vehicles import VehicleOrder, kind_named
+from groundstation.vehicles.registry import ask
 
 # What a driver process of a camera talks to; that of a vehicle, its kind.
 CAMERA = "camera"
@@ -81,7 +82,7 @@ def _with_source(drone: Drone, stream: tuple[str, int] | None, plain: bool) -> D
 def _moved(drone: Drone, address: str | None) -> Drone:
     if address is None:
         return drone
-    sections = kind_named(drone.kind).moved(address.rpartition(".")[0] + ".1", drone.sections)
+    sections = ask(kind_named(drone.kind), "moved", address.rpartition(".")[0] + ".1", drone.sections)
     update: dict[str, object] = {"address": address, "interface": "", "serial_number": ""}  # an emulator has its own
     for key, section in drone.sections.items():
         update[key] = section.model_copy(update=sections.get(key, {}))
@@ -153,5 +154,5 @@ def _vehicles(field: Field) -> list[DriverSection]:
     return [
         DriverSection(process.vehicles[0], kind, process.vehicles[0], process.section, process.vehicles, host)
         for (kind, host), group in orders.items()
-        for process in kind_named(kind).processes(group)
+        for process in ask(kind_named(kind), "processes", group)
     ]

@@ -9,7 +9,7 @@ from typing import Any
 
 from groundstation import plug_ins
 from groundstation.errors import SettingsError
-from groundstation.vehicles.kind import VehicleKind
+from groundstation.vehicles.kind import ErrorHabits, KindSection, VehicleKind
 
 _OURS = "drivers"
 
@@ -43,13 +43,27 @@ def load(reference: str) -> Any:
 @cache
 def _found() -> tuple[dict[str, VehicleKind], dict[str, str]]:
     kinds: dict[str, VehicleKind] = {}
-    refused: dict[str, str] = {}
+    several = plug_ins.doubles(plug_ins.VEHICLES)
+    refused = {name: f"{who} have the same name: uninstall all but one" for name, who in several.items()}
     for name, source, get in (*_ours(), *_of_others()):
+        if name in several and name not in kinds:
+            continue
         try:
             kinds[name] = _sound(name, get(), kinds)
-        except Exception as error:  # noqa: BLE001 - a plug-in is anybody's program: its failure is told, ours goes on
-            refused[name] = f"{source}: {type(error).__name__}: {error}"
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - anybody's program: its failure is told, ours goes on
+            refused[name] = f"{source}: {plug_ins.reason(error)}"
     return kinds, refused
+
+
+def ask(kind: VehicleKind, part: str, *arguments: object) -> Any:
+    """Return what a function of a kind answers, an iterator's items as a list; raises SettingsError where it fails."""
+    try:
+        answer = getattr(kind, part)(*arguments)
+        return list(answer) if isinstance(answer, Iterator) else answer
+    except SettingsError:
+        raise
+    except Exception as error:
+        raise SettingsError([f"kind: {kind.name}: {part} fails: {plug_ins.reason(error)}"]) from error
 
 
 def _ours() -> Iterator[tuple[str, str, Callable[[], object]]]:
@@ -68,13 +82,31 @@ def _of_others() -> Iterator[tuple[str, str, Callable[[], object]]]:
 
 def _sound(name: str, kind: object, known: dict[str, VehicleKind]) -> VehicleKind:
     if not isinstance(kind, VehicleKind):
-        raise TypeError(f"is a {type(kind).__name__}, no groundstation.vehicles.VehicleKind")
+        raise TypeError(f"is of type {type(kind).__name__}, no groundstation.vehicles.VehicleKind")
     if kind.name != name:
         raise ValueError(f"calls itself {kind.name}: the entry point and the kind must have the same name")
     if name in known:
         raise ValueError("there is a kind of this name already")
+    _require_parts(kind)
     taken = {key: other.name for other in known.values() for key in other.sections}
     for key in kind.sections:
         if key in taken:
             raise ValueError(f"its section {key} is that of {taken[key]}")
     return kind
+
+
+def _require_parts(kind: VehicleKind) -> None:
+    if not isinstance(kind.habits, ErrorHabits):
+        raise TypeError(f"habits are a {type(kind.habits).__name__}, no ErrorHabits")
+    for part in ("processes", "stop", "check", "moved"):
+        if not callable(getattr(kind, part)):
+            raise TypeError(f"{part} is a {type(getattr(kind, part)).__name__}, no function")
+    for part in ("driver", "emulator", "true_pose"):
+        place = getattr(kind, part)
+        if (place or part == "driver") and ":" not in str(place):
+            raise ValueError(f'{part} must be "module:attribute" (got {place!r})')
+    for key, section in kind.sections.items():
+        if not (isinstance(section, type) and issubclass(section, KindSection)):
+            raise TypeError(f"its section {key} is no class derived from KindSection")
+    if lost := sorted(kind.required - set(kind.sections)):
+        raise ValueError(f"it requires {', '.join(lost)}, which are no sections of it")

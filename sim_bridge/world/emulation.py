@@ -96,7 +96,10 @@ def emulation_of(kind: str) -> Emulation:
     reference = kind_named(kind).emulator
     if not reference:
         raise SettingsError([f"kind: {kind} has no emulator: it cannot be simulated"])
-    emulation: Emulation = load(reference)
+    try:
+        emulation: Emulation = load(reference)
+    except (ImportError, AttributeError) as error:
+        raise SettingsError([f"kind: {kind}: its emulator {reference} cannot be loaded: {error}"]) from error
     return emulation
 
 

@@ -11,6 +11,8 @@ from drivers.camera.sources.ros2 import Ros2Reader
 from groundstation import plug_ins
 from groundstation.errors import DriverError, without_password
 
+_READER = ("name", "decoder", "rejected", "read", "interrupt")
+
 
 def open_source(source: str, size: tuple[int, int] | None = None) -> FrameSource:
     """Return the reader of a source, already at work; raises DriverError for an address of no known kind.
@@ -38,5 +40,5 @@ def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -
         case SourceKind.FILE:
             return FileReader(address.path)
         case SourceKind.PLUG_IN:
-            reader: Reader = plug_ins.load(plug_ins.CAMERAS, address.host)(source, size)
+            reader: Reader = plug_ins.made(plug_ins.CAMERAS, address.host, _READER, source, size)
             return reader

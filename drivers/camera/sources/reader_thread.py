@@ -155,6 +155,8 @@ class Drain:
                 return
             except (OSError, DriverError) as error:
                 self._detail = f"{self._reader.name}: {error}"
+            except Exception as error:  # noqa: BLE001 - a reader may be anybody's program: its fault is told, and it goes on
+                self._detail = f"{self._reader.name}: {type(error).__name__}: {error}"
             self._connected = False
             back_off_s = _FIRST_BACK_OFF_S if self._received > before else min(2 * back_off_s, _LAST_BACK_OFF_S)
             self._closing.wait(back_off_s)

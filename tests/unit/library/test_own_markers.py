@@ -114,8 +114,8 @@ def test_a_detector_that_fails_costs_the_picture_and_not_the_camera(monkeypatch:
 REFUSED = [
     ("LAB_TAGS", 8, r"drones.drone_1.marker.id: must be in 0..7 of LAB_TAGS"),
     ("torn", 3, r"drones.drone_1.marker.dictionary: torn cannot be used: my-lab .*no_such_module"),
-    ("hollow", 3, r"drones.drone_1.marker.dictionary: hollow cannot be used: TypeError"),
-    ("nothing", 3, r"drones.drone_1.marker.dictionary: nothing cannot be used: ValueError: count"),
+    ("hollow", 3, r"drones.drone_1.marker.dictionary: hollow cannot be used: my-lab .*TypeError"),
+    ("nothing", 3, r"drones.drone_1.marker.dictionary: nothing cannot be used: .*without finder"),
     ("DICT_MINE", 3, r"drones.drone_1.marker.dictionary: must be one of .*LAB_TAGS"),
 ]
 

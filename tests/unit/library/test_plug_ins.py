@@ -1,5 +1,6 @@
 """Planners and camera sources of other packages: found by name, used, and named when they cannot be loaded."""
 
+import re
 import sys
 from unittest.mock import Mock
 
@@ -8,9 +9,13 @@ import pytest
 
 from drivers.camera.settings import SourceKind, parse_source
 from drivers.camera.sources.opening import open_source
+from drivers.motion_capture.settings import SystemAddress
+from drivers.motion_capture.sources import open_source as open_system
 from groundstation import plug_ins
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.doctor.plug_ins import plug_in_findings
 from groundstation.errors import DriverError, SettingsError
+from groundstation.geometry.tag import tag_fault
 from groundstation.library import Topology, belief_of, field_named, plan_step, planner_of
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
 
@@ -41,23 +46,68 @@ class Static:
 
     def interrupt(self):
         pass
+
+
+class Idle:
+    def __init__(self, *made_from):
+        pass
+
+
+class Sulking:
+    def __init__(self, *made_from):
+        raise RuntimeError("no licence")
+
+
+class Stumbling(Static):
+    def read(self, drain):
+        raise ValueError("no picture of mine")
+
+
+FIGURE = 3
 '''
-ENTRIES = """[skein.planners]
+FAULTS = """
+idle = lab_plug_ins:Idle
+sulking = lab_plug_ins:Sulking
+figure = lab_plug_ins:FIGURE
+ending = lab_ending:Nobody
+"""
+ENTRIES = (
+    """[skein.planners]
 calm = lab_plug_ins:Calm
 broken = no_such_module:Planner
-[skein.cameras]
+"""
+    + FAULTS
+    + """[skein.cameras]
+stumbling = lab_plug_ins:Stumbling
 static = lab_plug_ins:Static
 torn = no_such_module:Reader
 """
+    + FAULTS
+    + "[skein.world_sensors]"
+    + FAULTS
+    + "[skein.markers]"
+    + FAULTS
+)
+REASONS = {
+    "idle": "TypeError: Idle without ",
+    "sulking": "RuntimeError: no licence",
+    "figure": "TypeError: is of type int",
+    "ending": "SystemExit: no display",
+}
+
+
+def _install(folder, package, entries):
+    info = folder / f"{package.replace('-', '_')}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(entries)
 
 
 @pytest.fixture(autouse=True)
 def _installed(tmp_path, monkeypatch):
     (tmp_path / "lab_plug_ins.py").write_text(CODE)
-    info = tmp_path / "lab_plug_ins-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-plug-ins\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRIES)
+    (tmp_path / "lab_ending.py").write_text("import sys\n\nsys.exit('no display')\n")
+    _install(tmp_path, "lab-plug-ins", ENTRIES)
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("lab_plug_ins", None)
@@ -85,6 +135,42 @@ def test_a_planner_that_is_not_installed_is_refused_at_its_line():
 def test_a_planner_that_cannot_be_loaded_is_named():
     with pytest.raises(SettingsError, match=r"planner.plug_in: broken cannot be used: lab-plug-ins .*no_such_module"):
         plug_ins.planner("broken", None, None)
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_each_fault_of_a_plug_in_is_named_where_it_is_used(name):
+    words = rf"{name} cannot be used: lab-plug-ins .*{REASONS[name]}"
+    with pytest.raises(SettingsError, match=rf"planner.plug_in: {words}"):
+        plug_ins.planner(name, None, None)
+    with pytest.raises(DriverError, match=words):
+        open_source(f"{name}://north")
+    with pytest.raises(DriverError, match=words):
+        open_system(SystemAddress(name, "127.0.0.1", 1))
+    assert re.match(f"dictionary {words}", tag_fault(name, 1))
+    assert plug_ins.load(plug_ins.PLANNERS, "calm").__name__ == "Calm", "the others work"
+
+
+def test_two_packages_of_one_name_are_both_named_and_none_is_used(tmp_path):
+    _install(tmp_path, "lab-twin", "[skein.cameras]\nstatic = lab_plug_ins:Static\n")
+    with pytest.raises(DriverError, match=r"static .*lab-plug-ins .* and lab-twin .* have the same name"):
+        open_source("static://north")
+
+
+def test_a_fault_while_reading_is_told_and_reading_goes_on():
+    source = open_source("stumbling://north")
+    try:
+        assert source.take_newest(0.05) is None
+        assert source.detail == "stumbling://north: ValueError: no picture of mine" and not source.connected
+    finally:
+        source.close()
+
+
+def test_the_doctor_loads_each_and_names_those_that_fail():
+    found = {finding.subject: finding for finding in plug_in_findings()}
+    assert found["skein.planners calm"].level == "OK"
+    for name in ("broken", "figure", "ending"):
+        assert found[f"skein.planners {name}"].level == "SHOULD"
+        assert "lab-plug-ins" in found[f"skein.planners {name}"].found
 
 
 def test_a_source_of_another_package_is_read():

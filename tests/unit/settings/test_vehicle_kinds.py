@@ -38,6 +38,28 @@ KIND = VehicleKind(
     commands=KindCommands("blimp_kind:blimp", "Meet blimps.", ("inflate",)),
 )
 """
+ODD = """
+from dataclasses import replace
+
+from blimp_kind import KIND
+
+
+def fail(*orders):
+    raise ZeroDivisionError("of their own")
+
+
+UNHABITUAL = replace(KIND, name="unhabitual", habits=None)
+PLACELESS = replace(KIND, name="placeless", driver="nowhere")
+FAILING = replace(KIND, name="failing", check=fail, processes=fail, stop=fail, commands=None)
+TWIN = replace(KIND, name="twin")
+"""
+ODD_ENTRIES = """[skein.vehicles]
+unhabitual = odd_kinds:UNHABITUAL
+placeless = odd_kinds:PLACELESS
+failing = odd_kinds:FAILING
+twin = odd_kinds:TWIN
+ending = ending_kind:KIND
+"""
 ENTRIES = "[skein.vehicles]\nblimp = blimp_kind:KIND\nbroken = no_such_module:KIND\nodd = blimp_kind:FOREIGN\n"
 
 
@@ -53,14 +75,18 @@ def unknown(field: Field) -> Field:
     return field.model_copy(update={"drones": field.drones | {name: drone.model_copy(update={"kind": "zeppelin"})}})
 
 
+def install(folder: Path, package: str, entries: str) -> None:
+    info = folder / f"{package.replace('-', '_')}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(entries)
+
+
 @pytest.fixture
 def plug_ins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A foreign package that is installed: a module and the entry points that its installation wrote."""
     (tmp_path / "blimp_kind.py").write_text(FOREIGN)
-    info = tmp_path / "lab_blimp-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-blimp\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRIES)
+    install(tmp_path, "lab-blimp", ENTRIES)
     monkeypatch.syspath_prepend(tmp_path)
     registry._found.cache_clear()
     yield
@@ -159,6 +185,24 @@ def test_a_plug_in_that_cannot_be_loaded_is_named_and_the_rest_works() -> None:
     assert "odd" in refused_kinds()
     with pytest.raises(SettingsError, match=r"kind: broken cannot be used: lab-blimp .*no_such_module"):
         kind_named("broken")
+
+
+@pytest.mark.usefixtures("plug_ins")
+def test_an_unsound_kind_is_named_and_the_rest_works(tmp_path: Path) -> None:
+    (tmp_path / "odd_kinds.py").write_text(ODD)
+    (tmp_path / "ending_kind.py").write_text("import sys\n\nsys.exit('no display')\n")
+    install(tmp_path, "lab-odd", ODD_ENTRIES)
+    install(tmp_path, "lab-twin", "[skein.vehicles]\ntwin = odd_kinds:TWIN\nardrone = odd_kinds:TWIN\n")
+    refused = refused_kinds()
+    assert "lab-odd" in refused["unhabitual"] and "no ErrorHabits" in refused["unhabitual"]
+    assert 'driver must be "module:attribute"' in refused["placeless"]
+    assert "SystemExit: no display" in refused["ending"]
+    assert "lab-odd" in refused["twin"] and "lab-twin" in refused["twin"] and "twin" not in all_kinds()
+    assert "lab-twin" in refused["ardrone"] and all_kinds()["ardrone"].summary.startswith("Parrot")
+    options = ["drones.drone_3.kind=failing", "drones.drone_3.mavlink=null", "types.ardupilot.mavlink=null"]
+    with pytest.raises(SettingsError, match="kind: failing: check fails: ZeroDivisionError: of their own"):
+        load_field(CONFIG / "mixed-team.yaml", options=options)
+    sys.modules.pop("odd_kinds", None)
 
 
 # Shared code that still names a kind, and why. The list may only shrink.

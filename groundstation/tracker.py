@@ -153,6 +153,7 @@ class Tracker:
             self._report_joining(correction)
         velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
         self._notices += self._mounts.advance(now_ns, velocities, corrections, self.airborne)
+        self._notices += self._intake.ranges.take_notices()
         self._heed_absence(now_ns)
         self._topology = self._topology_now()
         if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):

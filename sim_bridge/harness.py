@@ -12,6 +12,7 @@ from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.natnet import NatnetEmulator
+from sim_bridge.devices.range_gateway import RangeGateway
 from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
@@ -118,8 +119,14 @@ class Harness:
 
     def _open_capture(self, name: str, place: tuple[str, int]) -> None:
         order, world = self._order, self.world
-        rng, system = generator_of(order.seed, f"capture {name}"), order.site.motion_capture[name]
-        faults, errors = order.scenario.faults, order.scenario.cameras.mounting_errors
+        rng, errors = generator_of(order.seed, f"capture {name}"), order.scenario.cameras.mounting_errors
+        if name in order.site.ranging:
+            ranging, drones = order.site.ranging[name], order.site.drones
+            gateway = RangeGateway(name, place, ranging, world.bodies, drones, world.states, rng, errors)
+            self._stage.add(name, gateway, gateway.fileno())
+            return
+        system = order.site.motion_capture[name]
+        faults = order.scenario.faults
         server = NatnetEmulator(name, place, system, world.bodies, world.states, rng, faults, errors)
         self._stage.add(name, server, server.fileno())
 

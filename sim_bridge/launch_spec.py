@@ -55,7 +55,7 @@ class LaunchSpec:
 
     addresses: loopback address of each emulated drone; streams: address and port of each emulated
     camera, by the name of the world-fixed camera or of the drone that carries it; real: drones and targets that exist;
-    captures: address and port of each emulated motion capture system.
+    captures: address and port of each emulated motion capture or ranging system.
     """
 
     child: ChildSpec
@@ -85,8 +85,10 @@ def read_order(path: Path) -> LaunchSpec:
     scenario = parse_scenario(json.dumps(envelope.scenario))
     if strangers := sorted(set(envelope.real) - set(site.bodies)):
         raise SettingsError([f"{path}: real: {name!r} is no body of the field" for name in strangers])
-    if strangers := sorted(set(envelope.captures) - set(site.motion_capture)):
-        raise SettingsError([f"{path}: captures: {name!r} is no motion capture system" for name in strangers])
+    if strangers := sorted(set(envelope.captures) - {*site.motion_capture, *site.ranging}):
+        raise SettingsError(
+            [f"{path}: captures: {name!r} is no motion capture or ranging system" for name in strangers]
+        )
     _check_faults(scenario.faults, site, envelope.streams, envelope.real)
     strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
     if strangers:

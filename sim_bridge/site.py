@@ -153,6 +153,27 @@ class SiteCapture(_Part):
     observes: tuple[str, ...] = ("robots",)
 
 
+class SiteTransponder(_Part):
+    """A transponder of a ranging system on a drone."""
+
+    name: str = ""
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class SiteRanging(_Part):
+    """A ranging system: anchors in the world, transponders on drones, noise, and the share of ranges by reflections."""
+
+    anchors: dict[str, tuple[float, float, float]]
+    volume_m: SiteVolume
+    transponders: dict[str, SiteTransponder] = {}
+    rate_hz: float = 10.0
+    delay_ms: float = 20.0
+    range_std_m: float = 0.08
+    bias_std_m: float = 0.05
+    outlier_share: float = 0.02
+    reach_m: float = 30.0
+
+
 class TargetMarker(MarkerPrint):
     """The marker of the target, flat, `height_m` above the floor."""
 
@@ -178,6 +199,7 @@ class Site(_Part):
     room: SimulatedRoom
     cameras: dict[str, SiteCamera] = {}
     motion_capture: dict[str, SiteCapture] = {}
+    ranging: dict[str, SiteRanging] = {}
     truth: dict[str, str] = {}
     drones: dict[str, SiteDrone]
     target: SingleTarget | None = None

@@ -64,6 +64,8 @@ ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR, _DRIVER)
 """Driver to tracker: velocity, attitude and height as the vehicle measured them."""
 OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _CAMERA)
 """Camera or motion capture driver to tracker: one marker that a camera saw, one body that was captured."""
+RANGE = Topic("range", m.RangeObservation, 10, Quality.SENSOR, _CAMERA)
+"""Ranging driver to tracker: one robot's distances to the anchors."""
 SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: a completely searched picture, and the owners of the markers in it."""
 BODY_POSES = Topic("body_poses", m.BodyPoses, 30, Quality.SENSOR, _CAMERA)
@@ -126,6 +128,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         IMU,
         ODOMETRY,
         OBSERVATION,
+        RANGE,
         SEARCHED_PICTURE,
         BODY_POSES,
         VEHICLE_STATUS,

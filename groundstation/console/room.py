@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone, camera_name
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import MotionCapture, WorldCamera
+from groundstation.field.room import Volume, WorldCamera
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
 
@@ -26,7 +26,7 @@ def scene_from_field(field: ResolvedField, truth: bool) -> Json:
         "room": msgspec.to_builtins(field.room),
         "drones": [_drone(name, drone) for name, drone in field.drones.items()],
         "cameras": [_world_camera(name, camera) for name, camera in field.cameras.items()],
-        "volumes": [_volume(name, one, name in field.truth.values()) for name, one in field.motion_capture.items()],
+        "volumes": [_volume(name, box, name in field.truth.values()) for name, box in field.volumes.items()],
         "targets": [{"name": name, "height_m": target.marker.height_m} for name, target in field.tracked.items()],
         "horizon": {"steps": planner.horizon_steps, "step_s": planner.step_s},
         "hysteresis": planner.hysteresis,
@@ -79,8 +79,8 @@ def _world_camera(name: str, camera: WorldCamera) -> Json:
     return {"name": name, "position_m": camera.position_m, "rays": rays, "observes": camera.observes}
 
 
-def _volume(name: str, system: MotionCapture, is_truth: bool) -> Json:
-    return {"name": name, "truth": is_truth, **msgspec.to_builtins(system.volume_m)}
+def _volume(name: str, box: Volume, is_truth: bool) -> Json:
+    return {"name": name, "truth": is_truth, **msgspec.to_builtins(box)}
 
 
 def _rays(lens: CameraIntrinsics, rotation: Array) -> list[list[float]]:

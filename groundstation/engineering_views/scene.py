@@ -59,7 +59,9 @@ class SearchCell:
 
 
 class ViewScene:
-    """Where everything is, as far as the messages so far say; volumes: what motion capture systems see [m; world]."""
+    """Where everything is, as far as the messages so far say; volumes: the boxes of motion capture and ranging
+    systems [m; world].
+    """
 
     def __init__(self, field: ResolvedField | None) -> None:
         self.field = field
@@ -131,8 +133,7 @@ class ViewScene:
 
 
 def _volumes(field: ResolvedField) -> dict[str, Sides]:
-    boxes = {name: system.volume_m for name, system in field.motion_capture.items()}
-    return {name: (box.x_m, box.y_m, box.z_m) for name, box in boxes.items()}
+    return {name: (box.x_m, box.y_m, box.z_m) for name, box in field.volumes.items()}
 
 
 def _ring(position_m: tuple[float, float, float], covariance: Array) -> Array:

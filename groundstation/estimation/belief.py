@@ -49,7 +49,7 @@ class JointBelief:
 @lru_cache(maxsize=64)
 def _core_of(layout: StateLayout, without: frozenset[str]) -> tuple[StateLayout, tuple[IntArray, ...]]:
     """Return the layout of the core, and its entries as indices of rows and columns."""
-    blocks = [b for b in layout.blocks if b.kind is not EntityKind.CAMERA and b.name not in without]
+    blocks = [b for b in layout.blocks if b.kind in (EntityKind.ROBOT, EntityKind.TARGET) and b.name not in without]
     kept = [block.start + i for block in blocks for i in range(CORE_SIZE)]
     core = StateLayout()
     for block in blocks:

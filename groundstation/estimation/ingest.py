@@ -11,6 +11,7 @@ from groundstation.bus.messages import (
     Message,
     Odometry,
     PoseHypothesis,
+    RangeObservation,
     RelativeObservation,
     VehicleStatus,
     Verdict,
@@ -19,6 +20,7 @@ from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.frozen_sensor import FreezeWatch
 from groundstation.estimation.measurement import Measurement
+from groundstation.estimation.range_intake import RangeIntake
 
 _AIRBORNE = {
     FlightState.FLYING: True,
@@ -64,6 +66,7 @@ class Intake:
         self._newest_status: dict[str, int] = {}
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
         self._attitudes = AttitudeIntake(joint.parameters.inertial)
+        self.ranges = RangeIntake(joint, joint.parameters.ranging)
         self._joins_early = joint.parameters.joins_early
         self._standing: dict[str, tuple[int, bool]] = {}
 
@@ -73,7 +76,7 @@ class Intake:
             if message.header.clock == self._clock:
                 self._offsets[message.of] = message.offset_ns
             return Verdict.ACCEPTED
-        if not isinstance(message, Odometry | RelativeObservation | VehicleStatus | ImuSample):
+        if not isinstance(message, Odometry | RelativeObservation | RangeObservation | VehicleStatus | ImuSample):
             return Verdict.ACCEPTED
         stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
@@ -88,6 +91,8 @@ class Intake:
             return self._odometry(message, stamp_ns, now_ns)
         if isinstance(message, RelativeObservation):
             return self._observation(key, message, stamp_ns, now_ns)
+        if isinstance(message, RangeObservation):
+            return self._range(key, message, stamp_ns, now_ns)
         return self._status(message, stamp_ns, now_ns)
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
@@ -125,6 +130,7 @@ class Intake:
         # A vehicle that tells whole numbers repeats them as long as it stands.
         if frozen and not self._standing.get(entity, (0, False))[1]:
             return Verdict.FROZEN
+        self.ranges.hear(message, stamp_ns)
         return self._filter.add_motion(entity, self._attitudes.motion(message, stamp_ns), now_ns)
 
     def _observation(self, key: str, message: RelativeObservation, stamp_ns: int, now_ns: int) -> Verdict:
@@ -153,6 +159,19 @@ class Intake:
         )
         tie = f"{key}#{message.subject}#{message.header.seq}"
         return self._filter.add_observation(measurement, tie, now_ns) or Verdict.ACCEPTED
+
+    def _range(self, key: str, message: RangeObservation, stamp_ns: int, now_ns: int) -> Verdict:
+        values = (*message.ranges_m.values(), *(message.position_m or ()), message.std_m)
+        if not _plausible(*values, *message.covariance) or not message.std_m > 0.0:
+            return Verdict.IMPLAUSIBLE
+        if message.position_m is not None and (
+            len(message.position_m) != 3 or not _is_covariance(message.covariance, 3)
+        ):
+            return Verdict.SINGULAR
+        told = tuple(sorted(message.ranges_m.items()))
+        if len(told) > 1 and self._sight_watch.is_frozen((message.observer, "", message.subject), told, stamp_ns):
+            return Verdict.FROZEN
+        return self.ranges.take(key, message, stamp_ns, now_ns)
 
     def _tilt(self, message: RelativeObservation, stamp_ns: int) -> tuple[float, float]:
         return self._attitudes.tilt(message.observer, stamp_ns, (message.roll_rad, message.pitch_rad))

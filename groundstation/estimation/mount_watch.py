@@ -36,7 +36,8 @@ class MountWatch:
         }
         mounts = {name: rotation for name, rotation in fixed.items() if name in parameters.world_cameras}
         robots = [name for name, model in parameters.entities.items() if model.kind is EntityKind.ROBOT]
-        self._roots, self._cameras, self._robots = frozenset(fixed), frozenset(mounts), frozenset(robots)
+        ranging = frozenset(parameters.ranging)
+        self._roots, self._cameras, self._robots = frozenset(fixed) | ranging, frozenset(mounts), frozenset(robots)
         self._jumps, self._ties = SightJumps(mounts), TiedContradictions(mounts, robots)
         self._seen: dict[Pair, Vector] = {}
         self._moved: set[str] = set()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from groundstation.estimation.models import (
+    Anchor,
     ConstantVelocityTarget,
     CoordinatedTurnTarget,
     FixedMount,
@@ -15,11 +16,13 @@ from groundstation.estimation.models import (
     MountedCamera,
     ObservationModel,
     OdometryRobot,
+    RangeSensor,
 )
 from groundstation.estimation.models.odometry_robot import AERIAL
+from groundstation.estimation.ranged_robot import RangedRobot, range_sensor
 from groundstation.field.drones import FieldDrone, OnboardCamera
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import MotionCapture, WorldCamera
+from groundstation.field.room import MotionCapture, Ranging, WorldCamera, anchor_entity
 from groundstation.field.targets import Target
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
@@ -34,6 +37,8 @@ WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
 STAMP_STD_S = 0.0115
 # Of a motion capture system's, which tells its own delay but for that of the network [s].
 CAPTURE_STAMP_STD_S = 0.002
+# The ranges of one round are taken one after the other, and stamped alike [s].
+RANGE_STAMP_STD_S = 0.02
 # A calibrated velocity scale is good to this, and creeps by this in a second.
 _SCALE_STD, _SCALE_DRIFT = 0.04, 0.002
 _VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
@@ -56,7 +61,8 @@ class EstimatorParameters:
     wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
     over at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where
     they publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to
-    take off. world_cameras: sensors that hang in the room, and can be bumped.
+    take off. world_cameras: sensors that hang in the room, and can be bumped. ranging: by
+    system, who has a transponder.
     """
 
     entities: Mapping[str, MotionModel]
@@ -70,6 +76,7 @@ class EstimatorParameters:
     inertial: Mapping[str, float] = field(default_factory=dict)
     joins_early: frozenset[str] = frozenset()
     world_cameras: frozenset[str] = frozenset()
+    ranging: Mapping[str, Mapping[str, RangedRobot]] = field(default_factory=dict)
 
 
 def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
@@ -83,6 +90,9 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         name: _world_camera(name, camera) for name, camera in resolved.cameras.items()
     }
     cameras |= {name: _capture(name, system) for name, system in resolved.sensing_capture.items()}
+    for name, system in resolved.ranging.items():
+        entities |= {anchor_entity(name, one): Anchor(at, system.bias_std_m) for one, at in system.anchors.items()}
+        cameras |= _ranges(name, system, drones)
     cameras |= {name: _onboard_camera(name, drone.camera) for name, drone in drones.items()}
     return EstimatorParameters(
         entities,
@@ -94,6 +104,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         },
         joins_early=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.flies_on_estimate),
         world_cameras=frozenset(resolved.cameras),
+        ranging={name: _ranged(system, drones) for name, system in resolved.ranging.items()},
     )
 
 
@@ -163,6 +174,29 @@ def _capture(name: str, system: MotionCapture) -> MountedCamera:
         observes_targets="targets" in system.observes,
         stamp_std_s=CAPTURE_STAMP_STD_S,
     )
+
+
+def _ranges(name: str, system: Ranging, drones: Mapping[str, FieldDrone]) -> dict[str, ObservationModel]:
+    """Return a sensor for each pair of an anchor and a drone."""
+    return {
+        range_sensor(name, anchor, drone): RangeSensor(
+            anchor_entity(name, anchor), system.transponder(drone).position_m, system.reach_m, RANGE_STAMP_STD_S
+        )
+        for anchor in system.anchors
+        for drone in drones
+    }
+
+
+def _ranged(system: Ranging, drones: Mapping[str, FieldDrone]) -> dict[str, RangedRobot]:
+    return {
+        name: RangedRobot(
+            system.transponder(name).position_m,
+            math.radians(drone.pad_yaw_deg),
+            math.radians(system.pad_heading_std_deg),
+            math.radians(drone.odometry.yaw_rate_std_deg_s),
+        )
+        for name, drone in drones.items()
+    }
 
 
 def _world_camera(name: str, camera: WorldCamera) -> MountedCamera:

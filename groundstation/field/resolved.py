@@ -14,7 +14,7 @@ from groundstation.field.behaviour import (
     SafetyValues,
 )
 from groundstation.field.drones import FieldDrone, camera_name, gathered
-from groundstation.field.room import LensCalibration, MotionCapture, Room, WorldCamera
+from groundstation.field.room import LensCalibration, MotionCapture, Ranging, Room, Volume, WorldCamera, anchor_entity
 from groundstation.field.targets import SingleTarget, Target, WeightedTarget
 
 
@@ -26,6 +26,7 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     room: Room
     cameras: dict[str, WorldCamera] = {}
     motion_capture: dict[str, MotionCapture] = {}
+    ranging: dict[str, Ranging] = {}
     truth: dict[Literal["from"], str] = {}
     drones: dict[str, FieldDrone]
     target: SingleTarget | None = None
@@ -48,9 +49,20 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return {name: one for name, one in self.motion_capture.items() if name != self.truth.get("from")}
 
     @property
+    def volumes(self) -> dict[str, Volume]:
+        """Return the box of each motion capture system and ranging system by name."""
+        boxes = {name: one.volume_m for name, one in self.motion_capture.items()}
+        return boxes | {name: one.volume_m for name, one in self.ranging.items()}
+
+    @property
+    def anchor_systems(self) -> dict[str, str]:
+        """Return the ranging system of each anchor, by the estimator's name of it."""
+        return {anchor_entity(name, anchor): name for name, one in self.ranging.items() for anchor in one.anchors}
+
+    @property
     def world_sensors(self) -> tuple[str, ...]:
-        """Return the names of what is fixed in the world and observes: cameras, then motion capture."""
-        return (*self.cameras, *self.sensing_capture)
+        """Return the names of what is fixed in the world and observes: cameras, motion capture, ranging."""
+        return (*self.cameras, *self.sensing_capture, *self.ranging)
 
     @property
     def calibrations(self) -> dict[str, LensCalibration]:

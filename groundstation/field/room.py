@@ -96,6 +96,39 @@ class Volume(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     z_m: Interval
 
 
+class Transponder(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A ranging system's name of the transponder on a robot ("": the robot's), and where it sits [m; base]."""
+
+    name: str = ""
+    position_m: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Ranging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A ranging system: its anchors' places [m; world], where it reaches, and how well it measures."""
+
+    source: str
+    anchors: dict[str, Vector3]
+    volume_m: Volume
+    host: str = ""
+    transponders: dict[str, Transponder] = {}
+    rate_hz: float = 10.0
+    delay_ms: float = 20.0
+    range_std_m: float = 0.08
+    bias_std_m: float = 0.05
+    outlier_share: float = 0.02
+    reach_m: float = 30.0
+    pad_heading_std_deg: float = 10.0
+
+    def transponder(self, robot: str) -> Transponder:
+        """Return the transponder of a robot; without an entry it has the robot's name and place."""
+        return self.transponders.get(robot, Transponder())
+
+
+def anchor_entity(system: str, anchor: str) -> str:
+    """Return the name by which the estimator, and what became of its ranges, knows an anchor."""
+    return f"{system}_{anchor}"
+
+
 class MotionCapture(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A motion capture system, fixed in the world: place [m; world] and heading of its axes, what it sees, how well."""
 

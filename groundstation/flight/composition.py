@@ -23,6 +23,7 @@ from groundstation.settings.schema import Field
 from groundstation.settings.sections import (
     CAMERA,
     MOTION_CAPTURE,
+    RANGING,
     DriverSection,
     core_section,
     driver_sections,
@@ -36,7 +37,11 @@ from groundstation.supervisor.run import SOURCE
 from groundstation.supervisor.site import certificate_name, hosts
 from groundstation.vehicles import kind_named
 
-_SENSOR_DRIVERS = {CAMERA: "drivers.camera.driver:run", MOTION_CAPTURE: "drivers.motion_capture.driver:run"}
+_SENSOR_DRIVERS = {
+    CAMERA: "drivers.camera.driver:run",
+    MOTION_CAPTURE: "drivers.motion_capture.driver:run",
+    RANGING: "drivers.ranging.driver:run",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +74,11 @@ def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) ->
 
 
 def _captures(field: Field, network: Network) -> dict[str, tuple[str, int]]:
-    """Return where the emulated motion capture systems listen: behind the cameras."""
+    """Return where the emulated motion capture and ranging systems listen: behind the cameras."""
     first = len(field.cameras) + len(field.drones)
-    systems = enumerate(field.motion_capture.items(), start=first)
-    return {name: network.of(system.host).stream(index) for index, (name, system) in systems}
+    hosts = {name: one.host for name, one in field.motion_capture.items()}
+    hosts |= {name: one.host for name, one in field.ranging.items()}
+    return {name: network.of(host).stream(index) for index, (name, host) in enumerate(hosts.items(), start=first)}
 
 
 def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:

@@ -9,6 +9,9 @@ from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.settings.schema import Field
 
+# What tells positions in the world.
+_IN_WORLD = FixedCamera(0.0, (0.0, 0.0, 1.0))
+
 
 @dataclass(frozen=True, slots=True)
 class FlightPlan:
@@ -39,7 +42,8 @@ def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan
         cameras[name] = FixedCamera(camera.position_m[2], (right, down, forward))
     for name in field.motion_capture:
         if name != field.truth.get("from"):
-            cameras[name] = FixedCamera(0.0, (0.0, 0.0, 1.0))
+            cameras[name] = _IN_WORLD
+    cameras |= dict.fromkeys(field.ranging, _IN_WORLD)
     limits = TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
     resolved = field_from_json(field.model_dump_json().encode())
     return FlightPlan(duration_s, asks, cameras, limits, field=resolved)

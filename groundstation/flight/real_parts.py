@@ -138,7 +138,7 @@ def notes(field: Field, parts: RealParts) -> list[str]:
     if emulated and (fixed := sorted(parts.cameras & set(field.cameras))):
         who = " and ".join(fixed)
         lines.append(f"{who} is real and does not see what is emulated: {', '.join(emulated)}")
-    if emulated and set(field.cameras) <= parts.cameras and not field.motion_capture:
+    if emulated and set(field.cameras) <= parts.cameras and not field.volumes:
         lines.append(
             "no world-fixed camera is emulated: unless they see each other or markers on the floor, emulated drones "
             "are not seen by any camera, and land"

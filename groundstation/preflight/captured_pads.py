@@ -1,4 +1,4 @@
-"""Where a motion capture system has the standing drones, against their pads. Pure."""
+"""Where motion capture and ranging systems have the standing drones, against their pads. Pure."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -10,37 +10,47 @@ from groundstation.preflight.stand import PadSighting
 
 # A person sets a drone on its cross to a centimetre; who is farther off stands somewhere else.
 _ASIDE_M, _TURNED_RAD = 0.25, math.radians(25.0)
+# Ranges of one place are off by as much again as lasts of them, times what the anchors' places make of it.
+_RANGED_SIGMAS = 4.0
+
+_BODIES = "check that it streams rigid bodies, their names, up, position_m and yaw_deg in the field file"
+_RADIOS = "check that its gateway runs, the names of transponders and anchors, and that four anchors answer"
+_UNFOLLOWED = "check its body's or transponder's name in the system, and what hides it"
+_ELSEWHERE = "check who has its name in the system, where it stands, and the system's axes or anchors in the field file"
 
 
 def captured_pad_findings(
     field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
 ) -> Iterator[Finding]:
-    """Yield what motion capture says of drones on their pads: not followed, elsewhere, or well."""
-    for system in field.sensing_capture:
+    """Yield what motion capture and ranges say of drones on their pads: not followed, elsewhere, or well."""
+    remedies = dict.fromkeys(field.sensing_capture, _BODIES) | dict.fromkeys(field.ranging, _RADIOS)
+    for system, remedy in remedies.items():
         known = {s.drone: s for s in sightings if s.camera == system and s.drone in field.drones}
         if not known and not flew:
-            remedy = "check that it streams rigid bodies, their names, up, position_m and yaw_deg in the field file"
             yield Finding(Level.MUST, system, "follows none of the drones", remedy)
             continue
         for name in field.drones:
             if name in known:
-                yield _judged(name, known[name], field.drones)
+                yield _judged(name, known[name], field.drones, _aside_limit_m(field, system))
             elif name not in flew:
-                remedy = "check its body's name in the system, and what hides its markers"
-                yield Finding(Level.SHOULD, name, f"{system} does not follow it", remedy)
+                yield Finding(Level.SHOULD, name, f"{system} does not follow it", _UNFOLLOWED)
 
 
-def _judged(name: str, seen: PadSighting, drones: Mapping[str, FieldDrone]) -> Finding:
+def _aside_limit_m(field: ResolvedField, system: str) -> float:
+    ranging = field.ranging.get(system)
+    return _ASIDE_M if ranging is None else _ASIDE_M + _RANGED_SIGMAS * ranging.bias_std_m
+
+
+def _judged(name: str, seen: PadSighting, drones: Mapping[str, FieldDrone], aside_limit_m: float) -> Finding:
     pad = drones[name]
     aside_m = _aside_m(seen, pad)
-    others = [other for other, drone in drones.items() if other != name and _aside_m(seen, drone) < _ASIDE_M]
-    if aside_m >= _ASIDE_M:
+    others = [other for other, drone in drones.items() if other != name and _aside_m(seen, drone) < aside_limit_m]
+    if aside_m >= aside_limit_m:
         where = f", on the pad of {others[0]}" if others else ""
         found = f"{seen.camera} has it {aside_m:.2f} m from its pad{where}"
-        remedy = "check whose body has its name in the system, where it stands, and the system's axes in the field file"
-        return Finding(Level.MUST, name, found, remedy)
+        return Finding(Level.MUST, name, found, _ELSEWHERE)
     turned = math.remainder(seen.yaw_rad - math.radians(pad.pad_yaw_deg), math.tau)
-    if abs(turned) >= _TURNED_RAD:
+    if abs(turned) >= _TURNED_RAD:  # ranges know no heading: theirs is no number
         found = f"{seen.camera} has its heading {math.degrees(turned):.0f} deg off that of its pad"
         remedy = "turn it, or define its body anew while it looks along the system's x axis (or give bodies.yaw_deg)"
         return Finding(Level.MUST, name, found, remedy)

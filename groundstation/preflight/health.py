@@ -52,13 +52,13 @@ def camera_findings(
     if len(dark) == len(fixed):
         remedy = "check power, source and network of one at least: without it nobody knows where the drones are"
         yield Finding(Level.MUST, "cameras", "no sensor that is fixed in the world sends anything", remedy)
-    for name in (*field.cameras, *field.motion_capture, *map(camera_name, field.drones)):
+    for name in (*field.cameras, *field.motion_capture, *field.ranging, *map(camera_name, field.drones)):
         status = statuses.get(name)
         if status is None or not status.connected:
             why = status.detail if status is not None and status.detail else "nothing arrives"
             yield Finding(Level.SHOULD, name, why, "check its power, its source and its network")
             continue
-        what = "frames" if name in field.motion_capture else "pictures"
+        what = "frames" if name in field.motion_capture else "ranges" if name in field.ranging else "pictures"
         seen = f", sees {', '.join(sees[name])}" if sees.get(name) else ""
         found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} sightings{seen}"
         good = status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS

@@ -5,7 +5,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from groundstation.bus.messages import RelativeObservation
+from groundstation.bus.messages import RangeObservation, RelativeObservation
 from groundstation.preflight.stand import PadSighting
 
 _WINDOW_NS = 12_000_000_000
@@ -23,12 +23,12 @@ class PadRecord:
         self._cameras = frozenset(cameras)
         self._seen: dict[tuple[str, str], deque[tuple[int, tuple[float, ...]]]] = {}
 
-    def see(self, sighting: RelativeObservation, now_ns: int) -> None:
-        """Take a sighting; those by drones are passed over."""
-        if sighting.observer in self._cameras:
-            yaw = float("nan") if sighting.yaw_rad is None else sighting.yaw_rad
+    def see(self, sighting: RelativeObservation | RangeObservation, now_ns: int) -> None:
+        """Take a sighting, or ranges that tell a place; those by drones are passed over."""
+        if sighting.observer in self._cameras and sighting.position_m is not None:
+            yaw = sighting.yaw_rad if isinstance(sighting, RelativeObservation) else None
             rows = self._seen.setdefault((sighting.observer, sighting.subject), deque(maxlen=_MOST))
-            rows.append((now_ns, (*sighting.position_m, yaw)))
+            rows.append((now_ns, (*sighting.position_m, float("nan") if yaw is None else yaw)))
 
     def forget(self, drone: str) -> None:
         """Begin anew with a drone that flew, or was carried."""

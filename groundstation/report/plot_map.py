@@ -54,8 +54,8 @@ def _draw_room(axes: Axes, data: RunData) -> None:
             side, ha = (1, "right") if index % 2 == 0 else (-1, "left")  # neighbours do not hide each other
             axes.annotate(f"{height:g} m", (x + side * half_x, y - half_y), xytext=(-3 * side, 3),
                           textcoords="offset points", ha=ha, va="bottom", fontsize=8, color=_CAMERA)  # fmt: skip
-    for name, system in data.resolved.motion_capture.items():
-        (x_low, x_high), (y_low, y_high) = system.volume_m.x_m, system.volume_m.y_m
+    for name, volume in data.resolved.volumes.items():
+        (x_low, x_high), (y_low, y_high) = volume.x_m, volume.y_m
         box = Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fc=_CAMERA, alpha=0.06, lw=0, zorder=0)
         axes.add_patch(box)
         axes.add_patch(Rectangle(box.xy, x_high - x_low, y_high - y_low, fill=False, ec=_CAMERA, lw=0.7, ls=":"))
@@ -118,4 +118,5 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
 def _world_view(data: RunData) -> str:
     """Return what the dotted boxes show."""
     cameras = ["ceiling view\nat slot heights"] if data.resolved.cameras else []
-    return "\n".join([*cameras, *(["motion capture"] if data.resolved.motion_capture else [])])
+    systems = {"motion capture": data.resolved.motion_capture, "ranging": data.resolved.ranging}
+    return "\n".join([*cameras, *(name for name, given in systems.items() if given)])

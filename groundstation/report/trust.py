@@ -136,8 +136,10 @@ def _shift(camera: str, what: str, errors: Sequence[float], std: float) -> Surve
 def _links(data: RunData) -> list[LinkForecast]:
     start_s, end_s = tracking_interval(data) or (0.0, data.end_s)
     seen: defaultdict[tuple[str, str], list[float]] = defaultdict(list)
+    systems = data.resolved.anchor_systems  # plans count on all its anchors together
     for item in data.innovations:
-        seen[item.message.observer, item.message.subject].append(item.time_s)
+        observer = systems.get(item.message.observer, item.message.observer)
+        seen[observer, item.message.subject].append(item.time_s)
     looked_at = {edge: np.sort(times) for edge, times in seen.items()}
     planned: defaultdict[tuple[str, str], list[tuple[float, bool]]] = defaultdict(list)
     plans = [item for item in data.plans if start_s <= item.time_s < end_s]

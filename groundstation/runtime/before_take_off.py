@@ -7,11 +7,12 @@ from groundstation.bus.messages import (
     CameraStatus,
     Event,
     FlightState,
+    RangeObservation,
     RelativeObservation,
     Severity,
     VehicleStatus,
 )
-from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, VEHICLE_STATUS
+from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, RANGE, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.judge import judge, open_musts
@@ -29,7 +30,7 @@ class BeforeTakeOff:
 
     def __init__(self, bus: Bus, field: ResolvedField) -> None:
         self._bus, self._field = bus, field
-        self._inbox = bus.subscribe([OBSERVATION, VEHICLE_STATUS, CAMERA_STATUS])
+        self._inbox = bus.subscribe([OBSERVATION, RANGE, VEHICLE_STATUS, CAMERA_STATUS])
         self._vehicles: dict[str, VehicleStatus] = {}
         self._cameras: dict[str, CameraStatus] = {}
         self._flew: set[str] = set()
@@ -39,7 +40,7 @@ class BeforeTakeOff:
         """Take in what has arrived."""
         for received in self._inbox.drain():
             match received.message:
-                case RelativeObservation() as sighting if sighting.subject not in self._flew:
+                case RelativeObservation() | RangeObservation() as sighting if sighting.subject not in self._flew:
                     self._record.see(sighting, now_ns)
                 case CameraStatus() as status:
                     self._cameras[status.header.entity] = status

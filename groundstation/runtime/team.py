@@ -1,11 +1,18 @@
-"""What the operator knows of each drone: what it says of itself, and how high the fixed cameras see its marker."""
+"""What the operator knows of each drone: what it says of itself, and how high what is fixed in the room sees it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import FlightState, Odometry, RelativeObservation, VehicleStatus
-from groundstation.bus.topics import OBSERVATION, ODOMETRY, VEHICLE_STATUS
+from groundstation.bus.messages import (
+    FlightState,
+    Odometry,
+    RangeObservation,
+    RelativeObservation,
+    Vector3,
+    VehicleStatus,
+)
+from groundstation.bus.topics import OBSERVATION, ODOMETRY, RANGE, VEHICLE_STATUS
 from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
 
 _FRESH_NS = 1_500_000_000
@@ -82,7 +89,7 @@ class TeamStatus:
     def __init__(self, bus: Bus, drones: tuple[str, ...], cameras: Mapping[str, FixedCamera]) -> None:
         self.members = {name: Member() for name in drones}
         self._cameras = cameras
-        self._events = bus.subscribe([VEHICLE_STATUS, OBSERVATION])
+        self._events = bus.subscribe([VEHICLE_STATUS, OBSERVATION, RANGE])
         self._odometry = bus.subscribe([ODOMETRY], newest=True)
 
     def update(self, now_ns: int) -> None:
@@ -92,7 +99,9 @@ class TeamStatus:
                 case VehicleStatus() as status:
                     self._hear(status, now_ns)
                 case RelativeObservation() as sighting:
-                    self._see(sighting, now_ns)
+                    self._see(sighting.observer, sighting.subject, sighting.position_m, now_ns)
+                case RangeObservation(position_m=(_, _, _) as place) as told:
+                    self._see(told.observer, told.subject, place, now_ns)
                 case Odometry() as odometry:
                     self._measure(odometry, now_ns)
 
@@ -104,11 +113,11 @@ class TeamStatus:
             member.state, member.mode, member.detail = status.flight_state, status.mode, status.detail
             member.heard_ns = now_ns
 
-    def _see(self, sighting: RelativeObservation, now_ns: int) -> None:
+    def _see(self, observer: str, subject: str, position_m: Vector3, now_ns: int) -> None:
         # Only fixed cameras know how high they are themselves, whatever is wrong with the drones.
-        camera, member = self._cameras.get(sighting.observer), self.members.get(sighting.subject)
+        camera, member = self._cameras.get(observer), self.members.get(subject)
         if camera is not None and member is not None:
-            member.marker.see(now_ns, camera.height_of(sighting.position_m))
+            member.marker.see(now_ns, camera.height_of(position_m))
 
     def _measure(self, odometry: Odometry, now_ns: int) -> None:
         member = self.members.get(odometry.header.entity)

@@ -4,10 +4,19 @@ import math
 
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import LensCalibration, MotionCapture, WorldCamera
+from groundstation.field.room import LensCalibration, MotionCapture, Ranging, Volume, WorldCamera
 from groundstation.field.targets import Marker
+from groundstation.geometry.multilateration import horizontal_std_m
 from groundstation.geometry.rotations import world_from_downward_optical
-from groundstation.sensing.models import Box, Frustum, Noise, OnboardCameraModel, SensorSuite, WorldCameraModel
+from groundstation.sensing.models import (
+    SIGHTINGS_PER_S,
+    Box,
+    Frustum,
+    Noise,
+    OnboardCameraModel,
+    SensorSuite,
+    WorldCameraModel,
+)
 
 BORDER_SQUARES = 3.5
 """Half the diagonal of a board, in squares of it: the whole board must be in the picture."""
@@ -17,6 +26,11 @@ FAR_M = 200.0
 
 CAPTURE_BORDER_M = 0.1
 """A body this near to the border of a motion capture system's box is counted on no more."""
+
+HEIGHT_KNOWN = 0.5
+"""Deviation of a vehicle's own height beside that of one range."""
+
+_WORST_DILUTION = 10.0  # of ranges by anchors that stand in a line: such a system tells next to nothing
 
 DETECTION_PX = 10.0
 """A square must be this large to be found with certainty; bounds the range of world-fixed cameras."""
@@ -37,7 +51,8 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
     reach = field.planner.planned_range_m
     return SensorSuite(
         world={name: _world(camera, square) for name, camera in field.cameras.items()}
-        | {name: _captured(system) for name, system in field.sensing_capture.items()},
+        | {name: _captured(system) for name, system in field.sensing_capture.items()}
+        | {name: _ranged(system) for name, system in field.ranging.items()},
         onboard={name: _onboard(drone, smallest, reach) for name, drone in drones.items()},
         marker_height_m=heights | {name: target.marker.height_m for name, target in targets.items()},
         obstacles=tuple(Box(one.centre_m, one.size_m) for one in field.room.obstacles.values()),
@@ -62,8 +77,31 @@ def _world(camera: WorldCamera, square_m: float) -> WorldCameraModel:
 
 
 def _captured(system: MotionCapture) -> WorldCameraModel:
-    """Return a box as the view of an eye so far above it that its sides are all but upright."""
+    """Return the view of a motion capture system's box."""
+    std_m = math.hypot(system.pose_std_m, system.position_std_m)
+    noise = Noise(std_m, 0.0, 0.0, math.radians(math.hypot(system.heading_std_deg, system.attitude_std_deg)))
+    return _view_of(system.volume_m, noise, "targets" in system.observes)
+
+
+def _ranged(system: Ranging) -> WorldCameraModel:
+    """Return the view of a ranging system's box, with what its ranges tell at worst there of a place in the plane.
+
+    White noise counts by how often they come beside sightings; what lasts for seconds counts in full, once.
+    """
     box = system.volume_m
+    middle = [sum(span) / 2 for span in (box.x_m, box.y_m, box.z_m)]
+    corners = [(x, y, middle[2]) for x in (*box.x_m, middle[0]) for y in (*box.y_m, middle[1])]
+    reached = [[at for at in system.anchors.values() if math.dist(at, one) <= system.reach_m] for one in corners]
+    each = [horizontal_std_m(near, one, 1.0, HEIGHT_KNOWN) for near, one in zip(reached, corners, strict=True)]
+    dilution = min(max(each), _WORST_DILUTION)
+    rounds = system.rate_hz * (1.0 - system.outlier_share)
+    white_m = system.range_std_m * math.sqrt(SIGHTINGS_PER_S / rounds)
+    std_m = dilution * math.hypot(white_m, system.bias_std_m)
+    return _view_of(box, Noise(std_m, 0.0, 0.0, math.pi), targets=False)
+
+
+def _view_of(box: Volume, noise: Noise, targets: bool) -> WorldCameraModel:
+    """Return a box as the view of an eye so far above it that its sides are all but upright."""
     middle = ((box.x_m[0] + box.x_m[1]) / 2, (box.y_m[0] + box.y_m[1]) / 2)
     half = ((box.x_m[1] - box.x_m[0]) / 2, (box.y_m[1] - box.y_m[0]) / 2)
     position = (*middle, box.z_m[1] + FAR_M)
@@ -71,9 +109,7 @@ def _captured(system: MotionCapture) -> WorldCameraModel:
     view = Frustum(
         half[0] / FAR_M, half[1] / FAR_M, math.hypot(FAR_M + box.z_m[1] - box.z_m[0], *half), CAPTURE_BORDER_M
     )
-    std_m = math.hypot(system.pose_std_m, system.position_std_m)
-    noise = Noise(std_m, 0.0, 0.0, math.radians(math.hypot(system.heading_std_deg, system.attitude_std_deg)))
-    return WorldCameraModel(position, view, noise, observes_targets="targets" in system.observes)
+    return WorldCameraModel(position, view, noise, observes_targets=targets)
 
 
 def _onboard(drone: FieldDrone, square_m: float, range_m: float) -> OnboardCameraModel:

@@ -148,6 +148,10 @@ class Box:
         return (*self.centre_m, self.size_m[2] / 2.0)
 
 
+SIGHTINGS_PER_S = 12.0
+"""Sightings of what is in view that a plan counts on."""
+
+
 @dataclass(frozen=True, slots=True)
 class SensorSuite:
     """All cameras and marker heights of the team, and what is known to hide markers.
@@ -159,7 +163,7 @@ class SensorSuite:
     onboard: Mapping[str, OnboardCameraModel]
     marker_height_m: Mapping[str, float]
     softness: Softness = Softness()
-    sightings_per_s: float = 12.0
+    sightings_per_s: float = SIGHTINGS_PER_S
     obstacles: tuple[Box, ...] = ()
 
     def marker(self, name: str, mean: Array, is_robot: bool) -> Array:

@@ -44,7 +44,8 @@ def _views(field: Field) -> Iterator[Finding]:
         unseen -= seen
         if not seen:
             yield path, "and its place leave no pad in its view: it knows of a drone only after that has flown there"
-    for box in (one.volume_m for name, one in field.motion_capture.items() if name != field.truth.get("from")):
+    boxes = [one.volume_m for name, one in field.motion_capture.items() if name != field.truth.get("from")]
+    for box in (*boxes, *(one.volume_m for one in field.ranging.values())):
         unseen -= {name for name in unseen if _within(box.x_m, pads[name][0]) and _within(box.y_m, pads[name][1])}
     for name in sorted(unseen):
         yield ("drones", name, "pad_m"), "is in view of nothing fixed: nobody knows where it is when it takes off"

@@ -7,6 +7,7 @@ from itertools import combinations
 
 from drivers.camera.settings import parse_source
 from groundstation.errors import without_password
+from groundstation.field.room import anchor_entity
 from groundstation.settings.adapter_checks import findings_of_adapters
 from groundstation.settings.behaviour import Bus, EstimatorSettings, PlannerSettings, SafetySettings
 from groundstation.settings.document import KeyPath
@@ -15,6 +16,8 @@ from groundstation.settings.host_checks import findings_of_hosts
 from groundstation.settings.kind_checks import findings_of_kinds
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.motion_capture import MotionCaptureSettings
+from groundstation.settings.ranging import RangingSettings
+from groundstation.settings.ranging_checks import findings_of_ranging
 from groundstation.settings.room import CalibrationSettings, RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
 from groundstation.vehicles import all_kinds, kind_named
@@ -37,6 +40,7 @@ class Parts:
     room: RoomSettings | None = None
     cameras: dict[str, WorldCameraSettings] = field(default_factory=dict)
     motion_capture: dict[str, MotionCaptureSettings] = field(default_factory=dict)
+    ranging: dict[str, RangingSettings] = field(default_factory=dict)
     truth: str | None = None
     given: frozenset[str] = frozenset()
     drones: dict[str, Drone] = field(default_factory=dict)
@@ -110,11 +114,14 @@ def _team(parts: Parts) -> Iterator[Finding]:
 
 def _root(parts: Parts) -> Iterator[Finding]:
     """Every sensing topology starts from what is fixed in the world."""
-    if parts.truth is not None and (parts.truth not in parts.given or parts.truth in parts.cameras):
+    if parts.truth is not None and (parts.truth not in parts.given or parts.truth in {*parts.cameras, *parts.ranging}):
         known = ", ".join(parts.motion_capture) or "there is none"
         yield ("truth", "from"), f"must name a motion capture system of the field: {known} (got {parts.truth})"
     if not parts.given - {parts.truth}:
-        yield ("cameras",), "one camera at least, or a motion capture system that is not the truth, must be given"
+        yield (
+            ("cameras",),
+            ("one camera at least, or a motion capture system that is not the truth, or ranging, must be given"),
+        )
 
 
 def _captured(parts: Parts) -> Iterator[Finding]:
@@ -125,6 +132,10 @@ def _captured(parts: Parts) -> Iterator[Finding]:
                 yield ("motion_capture", name, "bodies", entity), f"{entity} is no drone or target of the field"
         called = [(("motion_capture", name, "bodies", n), body.name or n, n) for n, body in system.bodies.items()]
         yield from _unique(called, "the body's name")
+
+
+def _ranged(parts: Parts) -> Iterator[Finding]:
+    yield from findings_of_ranging(parts.ranging, parts.drones, parts.room)
 
 
 def _pads(parts: Parts) -> Iterator[Finding]:
@@ -187,7 +198,9 @@ def _kinds(parts: Parts) -> Iterator[Finding]:
 
 
 def _hosts(parts: Parts) -> Iterator[Finding]:
-    yield from findings_of_hosts(parts.drones, parts.cameras, parts.motion_capture, parts.bus)
+    yield from findings_of_hosts(
+        parts.drones, parts.cameras, {"motion_capture": parts.motion_capture, "ranging": parts.ranging}, parts.bus
+    )
 
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
@@ -211,6 +224,9 @@ def _names(parts: Parts) -> Iterator[Finding]:
     named: list[tuple[KeyPath, str]] = [(("drones", name), name) for name in parts.drones]
     named += [(("cameras", name), name) for name in parts.cameras]
     named += [(("motion_capture", name), name) for name in parts.motion_capture]
+    for name, system in parts.ranging.items():
+        named.append((("ranging", name), name))
+        named += [(("ranging", name, "anchors", one), anchor_entity(name, one)) for one in system.anchors]
     if parts.target is not None:
         named.append((("target", "name"), parts.target.name))
     named += [(("targets", name), name) for name in parts.targets]
@@ -223,7 +239,9 @@ def _names(parts: Parts) -> Iterator[Finding]:
 def _kind_of(path: KeyPath) -> str:
     """Return what kind of thing a path of the field file names."""
     kinds = {"drones": "a drone", "cameras": "a camera", "targets": "a target"}
-    return (kinds | {"motion_capture": "a motion capture system"}).get(str(path[0]), "the target")
+    return (kinds | {"motion_capture": "a motion capture system", "ranging": "a ranging system"}).get(
+        str(path[0]), "the target"
+    )
 
 
 def _heights(parts: Parts) -> Iterator[Finding]:
@@ -278,6 +296,7 @@ _CHECKS: tuple[Callable[[Parts], Iterator[Finding]], ...] = (
     _cameras_above_fence,
     _root,
     _captured,
+    _ranged,
     _team,
     _pads,
     _distinct,

@@ -98,8 +98,8 @@ def _draw_top(axes: "Axes", field: Field, paths: Paths) -> None:
             length, width = footprint(camera, marker_height(field, slot))
             label = f"a drone at {slot:g} m is seen by {name}"
             _box(axes, (x - length, x + length), (y - width, y + width), edgecolor=colour, label=label)
-    for name, system in field.motion_capture.items():
-        _box(axes, system.volume_m.x_m, system.volume_m.y_m, linestyle=":", edgecolor="black", label=f"seen by {name}")
+    for name, volume in field.volumes.items():
+        _box(axes, volume.x_m, volume.y_m, linestyle=":", edgecolor="black", label=f"seen by {name}")
     for name, drone in field.drones.items():
         heading = drone.pad_yaw_rad
         axes.plot(*drone.pad_m, "ko", markerfacecolor="none")
@@ -121,8 +121,8 @@ def _draw_side(axes: "Axes", field: Field, paths: Paths) -> None:
         length, _ = footprint(camera, 0.0)
         axes.fill([x, x - length, x + length], [z, 0.0, 0.0], color="grey", alpha=0.12)
         axes.plot(x, z, "k^")
-    for system in field.motion_capture.values():
-        _box(axes, system.volume_m.x_m, system.volume_m.z_m, linestyle=":", edgecolor="black")
+    for volume in field.volumes.values():
+        _box(axes, volume.x_m, volume.z_m, linestyle=":", edgecolor="black")
     boards = {name: target.marker.height_m for name, target in field.tracked.items()}
     for name, board in boards.items():
         along = [x for x, _ in paths.get(name, [])] or [0.0]

@@ -1,30 +1,39 @@
 """What must hold of devices that another host runs."""
 
 from collections.abc import Iterator, Mapping
+from typing import Protocol
 
 from groundstation.errors import without_password
 from groundstation.settings.behaviour import Bus
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
-from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.room import WorldCameraSettings
+from groundstation.settings.values import HostName
+
+
+class OnHost(Protocol):
+    """A device that another host may run."""
+
+    @property
+    def host(self) -> HostName:
+        """The name of that host, "" for the run's own."""
 
 
 def findings_of_hosts(
     drones: Mapping[str, Drone],
     cameras: Mapping[str, WorldCameraSettings],
-    systems: Mapping[str, MotionCaptureSettings],
+    systems: Mapping[str, Mapping[str, OnHost]],
     bus: Bus | None,
 ) -> Iterator[tuple[KeyPath, str]]:
     """Return hosts that cannot reach the run, are called as a device, or would need a password that stays here."""
     hosts: dict[KeyPath, str] = {("drones", name, "host"): drone.host for name, drone in drones.items()}
     hosts |= {("cameras", name, "host"): camera.host for name, camera in cameras.items()}
-    hosts |= {("motion_capture", name, "host"): system.host for name, system in systems.items()}
+    hosts |= {(kind, name, "host"): one.host for kind, own in systems.items() for name, one in own.items()}
     sources: dict[KeyPath, tuple[str, str]] = {
         ("drones", name, "camera", "source"): (one.host, one.camera.source) for name, one in drones.items()
     }
     sources |= {("cameras", name, "source"): (one.host, one.source) for name, one in cameras.items()}
-    named = {*drones, *cameras, *systems}
+    named = {*drones, *cameras, *(name for own in systems.values() for name in own)}
     for path, host in hosts.items():
         if host in named:
             yield path, f"must not be called as a device of the field (got {host})"

@@ -3,6 +3,7 @@
 from typing import Any
 
 from groundstation.settings.drones import Drone, OnboardCameraSettings
+from groundstation.settings.levels import FIXED
 from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 
@@ -39,7 +40,7 @@ def field_file_schema() -> dict[str, Any]:
     }
     schema["required"] = sorted({*schema["required"], "schema_version"})
     schema["anyOf"] = [{"required": ["target"]}, {"required": ["targets"]}]
-    schema["allOf"] = [{"anyOf": [{"required": ["cameras"]}, {"required": ["motion_capture"]}]}]
+    schema["allOf"] = [{"anyOf": [{"required": [section]} for section in FIXED]}]
     return {"$schema": _DIALECT, **schema, "title": "Field file"}
 
 

@@ -9,7 +9,9 @@ from groundstation.errors import SettingsError, without_password
 from groundstation.settings.document import KeyPath, Node, SourceLine, dotted, parse, read
 from groundstation.settings.wording import problem
 
-NAMED = ("drones", "cameras", "motion_capture", "targets", "types")
+# Sections of what is fixed in the world, and all that are mappings of names.
+FIXED = ("cameras", "motion_capture", "ranging")
+NAMED = ("drones", *FIXED, "targets", "types")
 
 
 def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:

@@ -12,7 +12,7 @@ from groundstation.settings.cautions import cautions
 from groundstation.settings.checks import Parts, findings
 from groundstation.settings.document import KeyPath, Node, SourceLine, read
 from groundstation.settings.drones import Drone
-from groundstation.settings.levels import NAMED, Calibrations, Levels, with_option
+from groundstation.settings.levels import FIXED, NAMED, Calibrations, Levels, with_option
 from groundstation.settings.schema import SCHEMA_VERSION, Field
 from groundstation.settings.wording import ordered, problem, problem_of_error
 
@@ -140,8 +140,9 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
     return Parts(
         cameras=named("cameras"),
         motion_capture=named("motion_capture"),
+        ranging=named("ranging"),
         truth=_text(plain.get("truth"), "from"),
-        given=frozenset(_keys(plain.get("cameras")) + _keys(plain.get("motion_capture"))),
+        given=frozenset(name for section in FIXED for name in _keys(plain.get(section))),
         drones=named("drones"),
         targets=named("targets"),
         **{name: sound(Field.model_fields[name].annotation, name) for name in single},

@@ -44,6 +44,11 @@ def summary_of(field: Field) -> str:
             f"camera {name}: {without_password(camera.source)}, {camera.position_m[2]:g} m up, looks {camera.looking},"
         )
         lines.append(f"  observes {' and '.join(camera.observes)}")
+    lines += [f"motion capture {name}: {system.source}" for name, system in field.motion_capture.items()]
+    lines += [
+        f"ranging {name}: {system.source}, {len(system.anchors)} anchors, observes drones"
+        for name, system in field.ranging.items()
+    ]
     lines += [line for name, drone in field.drones.items() for line in _drone_lines(name, drone)]
     lines += [_target_line(name, target) for name, target in field.tracked.items()]
     lines += ["", *_safety_lines(field)]

@@ -13,7 +13,8 @@ from groundstation.settings.behaviour import (
     SafetySettings,
 )
 from groundstation.settings.drones import Drone
-from groundstation.settings.motion_capture import MotionCaptureSettings
+from groundstation.settings.motion_capture import MotionCaptureSettings, VolumeSettings
+from groundstation.settings.ranging import RangingSettings
 from groundstation.settings.room import RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
 from groundstation.settings.values import Name, SettingsSection
@@ -35,10 +36,12 @@ class Field(SettingsSection):
     room: RoomSettings
     """The room and its fence."""
     cameras: dict[Name, WorldCameraSettings] = Constraint(default_factory=dict)
-    """Cameras fixed in the world, by name. Every sensing topology starts from what is fixed in the world: a camera or a
-    motion capture system at least."""
+    """Cameras fixed in the world, by name. Every sensing topology starts from what is fixed in the world: a camera, a
+    motion capture system or a ranging system at least."""
     motion_capture: dict[Name, MotionCaptureSettings] = Constraint(default_factory=dict)
     """Motion capture systems, by name."""
+    ranging: dict[Name, RangingSettings] = Constraint(default_factory=dict)
+    """Ranging systems (UWB and other radios), by name."""
     truth: dict[Literal["from"], Name] = Constraint(default_factory=dict)
     """What judges a flight: `from`, the name of a motion capture system. It is recorded, every report has the errors of
     the estimate against it, and the tracker does not hear it."""
@@ -60,6 +63,12 @@ class Field(SettingsSection):
     """The operator's web page."""
     bus: Bus = Bus()
     """The router of the run's messages."""
+
+    @property
+    def volumes(self) -> dict[str, VolumeSettings]:
+        """Return the box of each motion capture system and ranging system by name."""
+        boxes = {name: one.volume_m for name, one in self.motion_capture.items()}
+        return boxes | {name: one.volume_m for name, one in self.ranging.items()}
 
     @property
     def tracked(self) -> dict[str, TrackedBody]:

@@ -7,11 +7,13 @@ from types import MappingProxyType
 
 from drivers.camera.settings import parse_source
 from drivers.motion_capture.settings import emulated_source
+from drivers.ranging.settings import emulated_source as emulated_gateway
 from groundstation.field.drones import camera_name
 from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
 from groundstation.settings.capture_sections import capture_section
 from groundstation.settings.drones import Drone
 from groundstation.settings.motion_capture import MotionCaptureSettings
+from groundstation.settings.ranging_sections import ranging_section
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.vehicles import VehicleOrder, kind_named
@@ -21,6 +23,8 @@ from groundstation.vehicles.registry import ask
 CAMERA = "camera"
 # And that of a motion capture system.
 MOTION_CAPTURE = "motion_capture"
+# And that of a ranging system.
+RANGING = "ranging"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +53,12 @@ def rerouted(
 
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
     port), spoken to as the field's own source is where that is the vehicle's own video, else by HTTP. captures: motion
-    capture system -> (address, port), spoken to by NatNet. This, and that a drone may have any serial number, is all
-    that simulation changes. streams_only: drones whose cameras are never their own video. Raises KeyError for a name
-    that is not in the field.
+    capture or ranging system -> (address, port), spoken to by NatNet or as a gateway of ranges. This, and that a drone
+    may have any serial number, is all that simulation changes. streams_only: drones whose cameras are never their own
+    video. Raises KeyError for a name that is not in the field.
     """
     for name in (*addresses, *streams, *captures):
-        if name not in field.drones and name not in field.cameras and name not in field.motion_capture:
+        if name not in {*field.drones, *field.cameras, *field.motion_capture, *field.ranging}:
             raise KeyError(name)
     drones = {
         name: _moved(_with_source(drone, streams.get(name), name in streams_only), addresses.get(name))
@@ -65,7 +69,13 @@ def rerouted(
         for name, camera in field.cameras.items()
     }
     systems = {name: _emulated(one, captures.get(name)) for name, one in field.motion_capture.items()}
-    return field.model_copy(update={"drones": drones, "cameras": cameras, "motion_capture": systems})
+    ranging = {
+        name: one.model_copy(update={"source": emulated_gateway(*captures[name])}) if name in captures else one
+        for name, one in field.ranging.items()
+    }
+    return field.model_copy(
+        update={"drones": drones, "cameras": cameras, "motion_capture": systems, "ranging": ranging}
+    )
 
 
 def _emulated(system: MotionCaptureSettings, place: tuple[str, int] | None) -> MotionCaptureSettings:
@@ -130,7 +140,11 @@ def driver_sections(field: Field) -> list[DriverSection]:
         DriverSection(name, MOTION_CAPTURE, name, capture_section(field, name).model_dump_json(), (name,), system.host)
         for name, system in field.motion_capture.items()
     ]
-    return _vehicles(field) + fixed + captured + carried
+    ranged = [
+        DriverSection(name, RANGING, name, ranging_section(field, name).model_dump_json(), (name,), system.host)
+        for name, system in field.ranging.items()
+    ]
+    return _vehicles(field) + fixed + captured + ranged + carried
 
 
 def vehicle_order(field: Field, name: str) -> VehicleOrder:

@@ -22,6 +22,7 @@ from sim_bridge.study.camera_model import Eye, eyes_of
 from sim_bridge.study.capture_model import CaptureEye, captures_of
 from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.mavlink_copter import CopterLink
+from sim_bridge.study.ranging_model import RangingEye, ranging_of
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
 from sim_bridge.study.wrong_figures import WrongFigures
@@ -115,9 +116,10 @@ class Study:
             name: Pilot(drone, world.onboard[name], field.drones[name].odometry.velocity_scale, lifetime)
             for name, drone in world.of(Quadrotor).items()
         }
-        self._eyes: list[Eye | CaptureEye] = [
+        self._eyes: list[Eye | CaptureEye | RangingEye] = [
             *eyes_of(self.site, scenario.cameras, options.outliers, options.seed),
             *captures_of(self.site, scenario.cameras.mounting_errors, options.seed),
+            *ranging_of(self.site, scenario.cameras.mounting_errors, options.seed),
         ]
         self._exposures = Exposures(self._eyes)
         fence = field.room.fence
@@ -183,6 +185,9 @@ class Study:
             if world.ticks % _STATUS_TICKS == 0:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
         for eye in self._exposures.due(world.time_s):
+            if isinstance(eye, RangingEye):
+                self._range(eye, now_ns)
+                continue
             delay_ms = eye.lateness_ms
             if delay_ms is None:
                 delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
@@ -193,6 +198,10 @@ class Study:
                 self._send(arrival_ns, f"observation/{eye.name}", self._wrong.reported(sighting))
             if (searched := eye.searched(seen, now_ns, CLOCK)) is not None:
                 self._send(now_ns + round(delay_ms * 1e6), f"searched_picture/{eye.name}", searched)
+
+    def _range(self, system: RangingEye, now_ns: int) -> None:
+        for told in system.look(self.world, now_ns, CLOCK):
+            self._send(now_ns + round(system.lateness_ms * 1e6), f"range/{system.name}", told)
 
     def _send(self, arrival_ns: int, key: str, message: Message) -> None:
         heapq.heappush(self._queue, (arrival_ns, next(self._order), key, message))

@@ -53,7 +53,7 @@ class FlightScore:
         """Compare a belief with the truth (rows of the truth board) at one time; ages_s: since each robot was seen."""
         self.unseen_s = max(self.unseen_s, *ages_s.values(), 0.0)
         for block in belief.layout.blocks:
-            if block.kind is EntityKind.CAMERA:
+            if block.kind not in (EntityKind.ROBOT, EntityKind.TARGET):
                 continue
             state, part = truth[block.name], belief.mean_of(block.name)
             covariance = belief.covariance_of(block.name)

@@ -14,6 +14,7 @@ from groundstation.recording.file_topics import DATAGRAM_TOPICS, IMAGE_TOPICS, S
 from groundstation.recording.schemas import description_of, recorded_type, viewer_schema
 
 ALL = list(TOPICS.values())
+SQUARE = ("Odometry", "RelativeObservation", "RangeObservation", "PoseHypothesis")
 
 
 def _example(kind: Any, *, full: bool) -> Any:
@@ -33,7 +34,7 @@ def _example(kind: Any, *, full: bool) -> Any:
         hints = get_type_hints(kind)
         values = {name: _example(hints[name], full=full) for name in kind.__struct_fields__}
         for name in ("velocity_covariance", "covariance"):
-            if name in values and kind.__name__ in ("Odometry", "RelativeObservation", "PoseHypothesis"):
+            if name in values and kind.__name__ in SQUARE:
                 size = 9 if name == "velocity_covariance" or values.get("yaw_rad") is None else 16
                 values[name] = (0.0,) * size
         if kind is SearchMap:

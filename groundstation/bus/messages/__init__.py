@@ -36,6 +36,7 @@ from groundstation.bus.messages.sensing import (
     ImuSample,
     Odometry,
     PoseHypothesis,
+    RangeObservation,
     RelativeObservation,
     SearchedPicture,
 )
@@ -74,6 +75,7 @@ __all__ = [
     "PoseHypothesis",
     "ProcessStatus",
     "Quaternion",
+    "RangeObservation",
     "RelativeObservation",
     "SearchMap",
     "SearchedPicture",

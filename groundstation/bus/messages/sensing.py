@@ -84,6 +84,27 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
         require_square("covariance", self.covariance, (3,) if self.yaw_rad is None else (4,))
 
 
+class RangeObservation(Message, frozen=True, kw_only=True):
+    """The ranges of one robot's transponder to the anchors of a ranging system; stamped with their measurement."""
+
+    observer: str
+    """The ranging system."""
+    subject: str
+    """The robot."""
+    ranges_m: dict[str, float]
+    """Distance of the transponder to each anchor that answered, by the anchor's name [m]."""
+    std_m: float
+    """Standard deviation of one of them [m], what lasts for seconds left out."""
+    position_m: Vector3 | None = None
+    """Where they put the transponder by themselves [m; world]; none: too few, or they contradict each other."""
+    covariance: tuple[float, ...] = (0.0,) * 9
+    """Covariance of that position [m^2], 3x3 row-major."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_square("covariance", self.covariance, (3,))
+
+
 class SearchedPicture(Message, frozen=True, kw_only=True):
     """A picture that a camera searched all over for markers, also when it shows none; stamped with the exposure."""
 

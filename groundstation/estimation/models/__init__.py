@@ -11,8 +11,10 @@ from groundstation.estimation.models.manoeuvring import ManoeuvringTarget
 from groundstation.estimation.models.odometry_robot import OdometryRobot
 from groundstation.estimation.models.protocol import DrivenModel, MotionModel, ObservationModel, SwitchingModel
 from groundstation.estimation.models.range_bearing import RangeBearingSensor
+from groundstation.estimation.models.ranging import Anchor, RangeSensor
 
 __all__ = [
+    "Anchor",
     "CommandedRobot",
     "ConstantVelocityTarget",
     "CoordinatedTurnTarget",
@@ -26,5 +28,6 @@ __all__ = [
     "ObservationModel",
     "OdometryRobot",
     "RangeBearingSensor",
+    "RangeSensor",
     "SwitchingModel",
 ]

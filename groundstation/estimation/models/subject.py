@@ -9,24 +9,29 @@ from groundstation.kernel import kernel
 
 
 @kernel(inlined=True)
-def lean(entity: EntityRow, event: EventRow, offset: Vector) -> None:
-    """Write where the marker is from the entity's centre [base_stabilized]: what accelerates leans, and it with it."""
+def lean(x: float, y: float, z: float, event: EventRow, offset: Vector) -> None:
+    """Write where a point (x, y, z) of the subject [base] is [base_stabilized]: what accelerates leans."""
     roll, pitch = event.subject_roll, event.subject_pitch
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    x, y, z = entity.place_x, entity.place_y, entity.place_z
     offset[Y], up = cr * y - sr * z, sr * y + cr * z
     offset[X], offset[Z] = cp * x + sp * up, cp * up - sp * x
 
 
 @kernel(inlined=True)
-def marker_offset(entity: EntityRow, event: EventRow, yaw: float, offset: Vector) -> None:
-    """Write where the marker is from the entity's centre [world's axes] for a given heading."""
-    offset[X], offset[Y], offset[Z] = entity.place_x, entity.place_y, entity.place_z
-    if entity.at_yaw < 0:
-        return
-    lean(entity, event, offset)
+def offset_in_world(x: float, y: float, z: float, event: EventRow, yaw: float, offset: Vector) -> None:
+    """Write where a point (x, y, z) of the subject [base] is from its centre [world's axes] for a given heading."""
+    lean(x, y, z, event, offset)
     c, n = math.cos(yaw), math.sin(yaw)
     offset[X], offset[Y] = c * offset[X] - n * offset[Y], n * offset[X] + c * offset[Y]
+
+
+@kernel(inlined=True)
+def marker_offset(entity: EntityRow, event: EventRow, yaw: float, offset: Vector) -> None:
+    """Write where the marker is from the entity's centre [world's axes] for a given heading."""
+    if entity.at_yaw < 0:
+        offset[X], offset[Y], offset[Z] = entity.place_x, entity.place_y, entity.place_z
+        return
+    offset_in_world(entity.place_x, entity.place_y, entity.place_z, event, yaw, offset)
 
 
 @kernel(inlined=True)

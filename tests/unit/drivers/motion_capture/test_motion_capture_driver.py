@@ -79,7 +79,7 @@ class Rig:
 @pytest.fixture
 def rig(request, monkeypatch):
     clock = SimpleNamespace(ns=10**12)
-    for module in ("drivers.motion_capture.driver", "drivers.motion_capture.sources"):
+    for module in ("drivers.stream_health", "drivers.motion_capture.sources"):
         monkeypatch.setattr(f"{module}.clock.now_ns", lambda: clock.ns)
     faults, observed = getattr(request, "param", ((), ("drone_1", "drone_2")))
     place = (HOST, a_port())

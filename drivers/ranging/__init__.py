@@ -1,0 +1,1 @@
+"""Radios that tell how far a robot is from anchors at surveyed places."""

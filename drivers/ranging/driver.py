@@ -1,0 +1,96 @@
+"""The ranging process: rounds of ranges in; the same, placed and checked, and status out."""
+
+import math
+from collections import Counter
+
+from pydantic import ValidationError
+
+from drivers.base import HostProcess
+from drivers.ranging.gateway import Gateway
+from drivers.ranging.settings import RangingSection, parse_source
+from drivers.ranging.wire.ranges import Round
+from drivers.stream_health import StreamHealth, StreamNames
+from groundstation.bus.messages import RangeObservation
+from groundstation.bus.topics import RANGE
+from groundstation.errors import SettingsError
+from groundstation.geometry.multilateration import fix_from_ranges, likely_in
+from groundstation.time_units import NS_PER_MS
+
+_POLL_S = 0.02
+
+
+def run(child: HostProcess) -> int:
+    """Serve one system until a stop is requested; returns the exit code."""
+    try:
+        settings = RangingSection.model_validate_json(child.section)
+    except ValidationError as error:
+        problems = [f"ranging: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
+        raise SettingsError(problems) from None
+    gateway = Gateway(*parse_source(settings.source))
+    try:
+        driver = RangingDriver(child, settings, gateway)
+        while not child.stop_requested and child.supervisor_alive:
+            driver.turn()
+    finally:
+        gateway.close()
+    return 0
+
+
+class RangingDriver:
+    """Turns rounds of one system into messages; `turn` is one pass of its loop (at most 20 ms of waiting)."""
+
+    def __init__(self, child: HostProcess, settings: RangingSection, gateway: Gateway) -> None:
+        self._child, self._settings, self._gateway = child, settings, gateway
+        self._robots = {one.name: one.entity for one in settings.transponders}
+        self._likely = likely_in(settings.volume_m)
+        self._newest_ns: dict[str, int] = {}
+        remedy = f"check the gateway, whether its radios run, and its address {settings.source}"
+        names = StreamNames("ranging", settings.name, "range", settings.source, remedy)
+        self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
+        self.counts: Counter[str] = Counter()
+
+    def turn(self) -> None:
+        """Wait shortly for rounds, handle them, and keep up heartbeat, status and the watch over silence."""
+        for arrival_ns, told in self._gateway.poll(_POLL_S):
+            self._handle(arrival_ns, told)
+        self._health.watch("", "", self.counts + self._gateway.rejected)
+
+    def _handle(self, arrival_ns: int, told: Round) -> None:
+        self._health.came(arrival_ns)
+        robot = self._robots.get(told.transponder)
+        if robot is None:
+            self.counts["unknown transponder"] += 1
+            return
+        stamp_ns = arrival_ns - round((self._settings.delay_ms + told.age_ms) * NS_PER_MS)
+        if stamp_ns <= self._newest_ns.get(robot, 0):
+            self._health.skipped += 1  # overtaken on the way
+            return
+        self._newest_ns[robot] = stamp_ns
+        self._health.used(stamp_ns)
+        ranges_m = self._known(told.m)
+        if ranges_m:
+            self._health.reported += 1
+            self._child.bus.publish(RANGE, self._message(robot, ranges_m, stamp_ns))
+
+    def _known(self, told: dict[str, float]) -> dict[str, float]:
+        """Return the ranges to anchors of the field that are within reach; the others are counted."""
+        kept = {anchor: m for anchor, m in told.items() if anchor in self._settings.anchors}
+        self.counts["unknown anchor"] += len(told) - len(kept)
+        near = {anchor: m for anchor, m in kept.items() if m <= self._settings.reach_m}
+        self.counts["beyond reach"] += len(kept) - len(near)
+        return near
+
+    def _message(self, robot: str, ranges_m: dict[str, float], stamp_ns: int) -> RangeObservation:
+        settings = self._settings
+        std_m = math.hypot(settings.range_std_m, settings.bias_std_m)
+        places = [settings.anchors[anchor] for anchor in ranges_m]
+        fix = fix_from_ranges(places, [*ranges_m.values()], std_m, *self._likely)
+        return RangeObservation(
+            header=self._child.bus.header(settings.name, stamp_ns),
+            observer=settings.name,
+            subject=robot,
+            ranges_m=ranges_m,
+            std_m=settings.range_std_m,
+            position_m=None if fix is None else fix.position_m,
+            covariance=(0.0,) * 9 if fix is None else tuple(fix.covariance.ravel().tolist()),
+        )

@@ -1,0 +1,54 @@
+"""The client of a gateway: asks it once a second, and hands over the rounds that it answers with."""
+
+import select
+import socket
+from collections import Counter
+from contextlib import suppress
+
+from drivers.ranging.wire import ranges
+from groundstation.bus import clock
+from groundstation.time_units import NS_PER_S
+
+_ASK_AGAIN_NS = NS_PER_S
+_DATAGRAMS = 64
+
+
+class Gateway:
+    """One socket; rejected: what was refused, by reason."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.rejected: Counter[str] = Counter()
+        self._place = (host, port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._asked_ns = 0
+
+    def poll(self, wait_s: float) -> list[tuple[int, ranges.Round]]:
+        """Return the rounds that came with their arrival [ns], the oldest first; waits for the first so long."""
+        now_ns = clock.now_ns()
+        if now_ns - self._asked_ns >= _ASK_AGAIN_NS:
+            self._asked_ns = now_ns
+            with suppress(OSError):  # a network that is down now may be up later
+                self._socket.sendto(ranges.ASK, self._place)
+        select.select([self._socket], [], [], wait_s)
+        return self._read()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _read(self) -> list[tuple[int, ranges.Round]]:
+        rounds = []
+        for _ in range(_DATAGRAMS):
+            try:
+                datagram, sender = self._socket.recvfrom(ranges.LARGEST + 1)
+            except OSError:
+                break
+            if sender[1] != self._place[1]:
+                self.rejected["stranger"] += 1
+                continue
+            try:
+                rounds.append((clock.now_ns(), ranges.decode(datagram)))
+            except ranges.WireError as error:
+                self.rejected[error.reason] += 1
+        return rounds

@@ -1,0 +1,138 @@
+"""Ranges to the filter, and how a robot joins by them: placed where one round of ranges puts it.
+
+A single range places nothing, and ranges tell no heading to who stands. The heading is that of the pad until a robot
+has flown, then the last that was believed of it, each carried on by the vehicle's own; where that jumped (a reset) it
+is unknown, and something else has to see the robot first.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.bus.messages import Odometry, RangeObservation, Severity, Verdict
+from groundstation.bus.notice import Notice
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.measurement import SensorReading
+from groundstation.estimation.ranged_robot import RangedRobot, range_sensor
+from groundstation.geometry.rotations import rotation_z
+from groundstation.time_units import NS_PER_S
+
+# A fix that is farther from the belief than so many deviations of both, and this [m], contradicts it: the belief is of
+# now, the fix of a little before.
+_SIGMAS, _APART_M = 5.0, 0.2
+# A robot is placed this much less surely than its fix says (variance): the ranges that follow are off by the same
+# biases, which must not count twice.
+_LESS_SURE = 25.0
+
+
+@dataclass(slots=True)
+class _Heading:
+    """A vehicle's own heading, and the world's less it, as last known (None: unknown) with variance and time."""
+
+    own_rad: float = 0.0
+    reset: int = 0
+    stamp_ns: int = 0
+    offset_rad: float | None = None
+    variance: float = 0.0
+    known_ns: int = 0
+    flew: bool = False
+
+
+class RangeIntake:
+    """Feeds a filter with ranges; robots: who has a transponder, by system."""
+
+    def __init__(self, joint: FixedLagFilter, robots: Mapping[str, Mapping[str, RangedRobot]]) -> None:
+        self._filter, self._robots = joint, robots
+        ranged = {name: one for own in robots.values() for name, one in own.items()}
+        self._ranged, self._headings = ranged, {name: _Heading() for name in ranged}
+        self._contradictions: dict[str, tuple[int, int]] = {}
+        self._notices: list[Notice] = []
+
+    def take_notices(self) -> list[Notice]:
+        """Return and forget what the operator should know."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def hear(self, message: Odometry, stamp_ns: int) -> None:
+        """Take a vehicle's own heading."""
+        name = message.header.entity
+        heading, robot = self._headings.get(name), self._ranged.get(name)
+        if heading is None or robot is None or stamp_ns < heading.stamp_ns:
+            return
+        if message.reset != heading.reset:
+            heading.offset_rad = None
+        heading.own_rad, heading.reset, heading.stamp_ns = message.yaw_rad, message.reset, stamp_ns
+        heading.flew = heading.flew or self._filter.airborne(name)
+        if not heading.flew:
+            heading.offset_rad = robot.pad_yaw_rad - message.yaw_rad
+            heading.variance, heading.known_ns = robot.pad_yaw_std_rad**2, stamp_ns
+
+    def take(self, key: str, message: RangeObservation, stamp_ns: int, now_ns: int) -> Verdict:
+        """Take one round of ranges, whose shape and numbers were checked; ACCEPTED if any of it may count."""
+        robot = self._robots.get(message.observer, {}).get(message.subject)
+        if robot is None or message.header.entity != message.observer:
+            return Verdict.UNKNOWN_ENTITY
+        if self._joins(message, robot, stamp_ns, now_ns):
+            return Verdict.ACCEPTED
+        refusals, variance = [], message.std_m**2
+        for anchor, range_m in message.ranges_m.items():
+            sensor = range_sensor(message.observer, anchor, message.subject)
+            reading = SensorReading(stamp_ns, sensor, message.subject, (range_m,), (variance,))
+            tie = f"{key}#{message.subject}#{anchor}#{message.header.seq}"
+            refusal = self._filter.add_observation(reading, tie, now_ns)
+            if refusal is not None:
+                refusals.append(refusal)
+        return refusals[0] if len(refusals) == len(message.ranges_m) else Verdict.ACCEPTED
+
+    def _joins(self, message: RangeObservation, robot: RangedRobot, stamp_ns: int, now_ns: int) -> bool:
+        """Place a robot that flies and has no belief, or one that a round of ranges after the other contradicts."""
+        name, point = message.subject, message.position_m
+        belief = self._filter.belief()
+        known = name in belief.layout
+        if known:
+            self._remember(name, belief)
+        if point is None or not self._filter.airborne(name):
+            return False
+        if known and not self._insists(message, belief, robot, stamp_ns):
+            return False
+        heading = self._headings[name]
+        if heading.offset_rad is None:
+            return False
+        yaw = math.remainder(heading.offset_rad + heading.own_rad, math.tau)
+        drifted = robot.yaw_drift**2 * max(0.0, (stamp_ns - heading.known_ns) / NS_PER_S)
+        place = np.array(point) - rotation_z(yaw) @ np.array(robot.transponder_m)
+        variances = [*(_LESS_SURE * np.diag(_square(message.covariance))).tolist(), heading.variance + drifted]
+        self._filter.place(name, [*place.tolist(), yaw], variances, stamp_ns, now_ns)
+        self._contradictions.pop(name, None)
+        how = "re-initialised" if known else "localised"
+        severity = Severity.WARNING if known else Severity.INFO
+        self._notices.append(Notice(severity, f"{name} {how} by {message.observer}", entity=name))
+        return True
+
+    def _remember(self, name: str, belief: JointBelief) -> None:
+        heading = self._headings[name]
+        heading.offset_rad = float(belief.mean_of(name)[3]) - heading.own_rad
+        heading.variance, heading.known_ns = float(belief.covariance_of(name)[3, 3]), belief.stamp_ns
+
+    def _insists(self, message: RangeObservation, belief: JointBelief, robot: RangedRobot, stamp_ns: int) -> bool:
+        """Count rounds in a row that put a robot elsewhere; True when they are enough and last long enough."""
+        name, mean = message.subject, belief.mean_of(message.subject)
+        there = mean[:3] + rotation_z(float(mean[3])) @ np.array(robot.transponder_m)
+        both = _square(message.covariance) + belief.covariance_of(name)[:3, :3]
+        limit_m = _APART_M + _SIGMAS * math.sqrt(float(np.trace(both)))
+        if math.dist(message.position_m or there, there) <= limit_m:
+            self._contradictions.pop(name, None)
+            return False
+        count, since_ns = self._contradictions.get(name, (0, stamp_ns))
+        self._contradictions[name] = count + 1, since_ns
+        settings = self._filter.parameters
+        lasted = stamp_ns - since_ns >= settings.divergence_s * NS_PER_S
+        return lasted and count + 1 >= settings.divergence_count
+
+
+def _square(covariance: tuple[float, ...]) -> Array:
+    return np.array(covariance).reshape(3, 3)

@@ -1,0 +1,24 @@
+"""What the estimator knows of a robot with a transponder, and how it calls its ranges."""
+
+from dataclasses import dataclass
+
+from groundstation.bus.messages import Vector3
+from groundstation.field.room import anchor_entity
+
+
+@dataclass(frozen=True, slots=True)
+class RangedRobot:
+    """What joining by ranges needs: transponder [m; base], heading on the pad [rad] and how well it is kept there.
+
+    yaw_drift: of the vehicle's own heading [rad per root second].
+    """
+
+    transponder_m: Vector3
+    pad_yaw_rad: float
+    pad_yaw_std_rad: float
+    yaw_drift: float
+
+
+def range_sensor(system: str, anchor: str, robot: str) -> str:
+    """Return the filter's name of the sensor between an anchor and a robot's transponder."""
+    return f"{anchor_entity(system, anchor)}/{robot}"

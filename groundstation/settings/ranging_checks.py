@@ -1,0 +1,27 @@
+"""What must hold of ranging systems beside the team and the room."""
+
+from collections.abc import Container, Iterator, Mapping
+
+from groundstation.settings.document import KeyPath
+from groundstation.settings.ranging import RangingSettings
+from groundstation.settings.room import RoomSettings
+
+
+def findings_of_ranging(
+    systems: Mapping[str, RangingSettings], drones: Container[str], room: RoomSettings | None
+) -> Iterator[tuple[KeyPath, str]]:
+    """Return transponders that nobody carries or two do, and anchors outside of the room."""
+    for name, system in systems.items():
+        holders: dict[str, str] = {}
+        for drone, one in system.transponders.items():
+            path, called = ("ranging", name, "transponders", drone), one.name or drone
+            if drone not in drones:
+                yield path, f"{drone} is no drone of the field"
+            if called in holders:
+                yield path, f"the transponder's name {called} is already that of {holders[called]}"
+            holders.setdefault(called, drone)
+        if room is not None:
+            x, y, z = room.size_m
+            for anchor, place in system.anchors.items():
+                if abs(place[0]) > x / 2 or abs(place[1]) > y / 2 or not 0.0 <= place[2] <= z:
+                    yield ("ranging", name, "anchors", anchor), "must be inside the room"

@@ -1,0 +1,79 @@
+"""An emulated gateway of ranges: measures every drone in turn against all anchors, and tells who asked.
+
+WIRE (docs/reference/ranges.md 2): who asks is told for as long as it is heard.
+"""
+
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+
+import numpy as np
+
+from drivers.ranging.wire.ranges import LARGEST, Round, encode
+from groundstation.arrays import Array
+from sim_bridge.listening import open_udp
+from sim_bridge.ranges import Radios
+from sim_bridge.site import SiteRanging, SiteTransponder
+
+Address = tuple[str, int]
+_TICK_S = 0.005
+_DATAGRAMS_PER_TICK = 64
+_FORGOTTEN_TICKS = 2000  # a client that is silent for 10 s is gone
+
+
+class RangeGateway:
+    """A socket and radios around the states of all bodies; `sim_bridge.world.emulation.Emulator`.
+
+    states: returns a row for each body, as `World.states` has them; errors: whether radios have errors that last.
+    """
+
+    def __init__(
+        self, name: str, place: Address, system: SiteRanging, bodies: Iterable[str], drones: Iterable[str],
+        states: Callable[[], Array], rng: np.random.Generator, errors: bool = True,
+    ) -> None:  # fmt: skip
+        self.silent = self.deaf = False
+        self._system, self._states = system, states
+        self._rows = {body: row for row, body in enumerate(bodies)}
+        self._drones = tuple(drones)
+        self._socket = open_udp(f"emulated {name}", *place)
+        self._radios = Radios(system, errors, rng)
+        self._heard: dict[Address, int] = {}
+        self._waiting: list[tuple[int, bytes]] = []
+        self._ticks = 0
+        self._every = max(1, round(1.0 / (system.rate_hz * _TICK_S)))
+
+    def fileno(self) -> int:
+        """Return the descriptor of its port."""
+        return self._socket.fileno()
+
+    def receive(self) -> None:
+        """Hear all who ask."""
+        for _ in range(_DATAGRAMS_PER_TICK):
+            try:
+                _, sender = self._socket.recvfrom(LARGEST)
+            except OSError:
+                return
+            if not self.deaf:
+                self._heard[sender] = self._ticks
+
+    def send(self) -> None:
+        """End a tick: measure who is due, and send what has been on its way long enough."""
+        self._ticks += 1
+        late = round(self._system.delay_ms / 1000 / _TICK_S)
+        for index, drone in enumerate(self._drones):
+            if (self._ticks + index * self._every // len(self._drones)) % self._every == 0:
+                row = self._states()[self._rows[drone]]
+                ranges_m = {} if np.isnan(row[0]) else self._radios.ranges_m(drone, row)
+                if ranges_m:
+                    called = self._system.transponders.get(drone, SiteTransponder()).name or drone
+                    rounded = {anchor: round(m, 3) for anchor, m in ranges_m.items() if m > 0.0}
+                    self._waiting.append((self._ticks + late, encode(Round(called, rounded))))
+        self._heard = {one: heard for one, heard in self._heard.items() if self._ticks - heard < _FORGOTTEN_TICKS}
+        while self._waiting and self._waiting[0][0] <= self._ticks:
+            _, datagram = self._waiting.pop(0)
+            for client in () if self.silent else self._heard:
+                with suppress(OSError):
+                    self._socket.sendto(datagram, client)
+
+    def close(self) -> None:
+        """Close the port."""
+        self._socket.close()

@@ -1,0 +1,192 @@
+"""The ranging driver against the emulated gateway on loopback, and datagrams that are none."""
+
+import math
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.ranging import driver as process
+from drivers.ranging.driver import RangingDriver
+from drivers.ranging.gateway import Gateway
+from drivers.ranging.settings import RangingSection, parse_source
+from drivers.ranging.wire.ranges import Round, WireError, decode, encode
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import CameraStatus, RangeObservation
+from groundstation.bus.topics import CAMERA_STATUS, RANGE
+from groundstation.errors import SettingsError
+from sim_bridge.devices.range_gateway import RangeGateway
+from sim_bridge.site import SiteRanging
+
+HOST, MS = "127.0.0.1", 1_000_000
+ANCHORS = {
+    "a": (-3.0, -3.0, 2.5),
+    "b": (3.0, -3.0, 2.5),
+    "c": (3.0, 3.0, 2.5),
+    "d": (-3.0, 3.0, 2.5),
+    "e": (0.0, 3.0, 0.2),
+}
+WIDE = {"x_m": (-3.0, 3.0), "y_m": (-3.0, 3.0), "z_m": (-0.1, 2.5)}
+PLACES = {"drone_1": (0.5, 0.2, 1.5), "cart": (0.0, 0.0, 0.0), "drone_2": (-0.9, 0.1, 1.4)}
+
+
+class FakeChild:
+    stop_requested, supervisor_alive, supervisor_fresh = False, True, True
+
+    def __init__(self, bus: MemoryBus, section: str) -> None:
+        self.bus, self.name, self.section = bus, "uwb", section
+        self.told: list[str] = []
+
+    def ready(self, detail: str = "") -> None:
+        self.told.append("READY")
+
+    def degrade(self, detail: str) -> None:
+        self.told.append(f"DEGRADED {detail}")
+
+    def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:
+        self.told.append(f"{text}; {remedy}")
+
+    def beat(self) -> None: ...
+    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
+
+
+@dataclass
+class Rig:
+    """Emulated gateway, driver, and somebody who listens; `run` lets both turn, the gateway by hand."""
+
+    gateway: RangeGateway
+    driver: RangingDriver
+    child: FakeChild
+    heard: Any
+    clock: SimpleNamespace
+
+    def run(self, ticks: int) -> list[Any]:
+        for tick in range(ticks):
+            self.clock.ns += 5 * MS
+            self.gateway.receive()
+            self.gateway.send()
+            if tick % 10 == 0:
+                self.driver.turn()
+        self.driver.turn()
+        return [one.message for one in self.heard.drain()]
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
+    clock = SimpleNamespace(ns=10**12)
+    monkeypatch.setattr("groundstation.bus.clock.now_ns", lambda: clock.ns)
+    monkeypatch.setattr("drivers.ranging.driver._POLL_S", 0.001)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((HOST, 0))
+        place = (HOST, int(probe.getsockname()[1]))
+
+    def states() -> np.ndarray:
+        return np.array([[*at, 0, 0, 0, 0.0, 0.0, 0.3, 0, 0, 0, 0] for at in PLACES.values()])
+
+    radios = {"drone_1": {"name": "0x1", "position_m": (0.0, 0.0, 0.1)}}
+    system = SiteRanging.model_validate(
+        {"anchors": ANCHORS, "volume_m": WIDE, "transponders": radios, "range_std_m": 1e-4, "outlier_share": 0.0}
+    )
+    drones, rng = ("drone_1", "drone_2"), np.random.default_rng(1)
+    gateway = RangeGateway("uwb", place, system, PLACES, drones, states, rng, errors=False)
+    section = RangingSection.model_validate(
+        {
+            "name": "uwb",
+            "source": f"ranges://{HOST}:{place[1]}",
+            "anchors": {name: at for name, at in ANCHORS.items() if name != "e"},
+            "transponders": ({"entity": "drone_1", "name": "0x1"}, {"entity": "drone_2", "name": "drone_2"}),
+            "volume_m": tuple(WIDE.values()),
+            "silent_after_s": 0.3,
+        }
+    )
+    exchange = MemoryExchange()
+    child: Any = FakeChild(MemoryBus(exchange, "lab", "uwb"), section.model_dump_json())
+    heard = MemoryBus(exchange, "lab", "test").subscribe([RANGE, CAMERA_STATUS])
+    client = Gateway(*parse_source(section.source))
+    yield Rig(gateway, RangingDriver(child, section, client), child, heard, clock)
+    client.close()
+    gateway.close()
+
+
+def test_rounds_come_with_their_place_and_the_time_they_were_measured_at(rig: Rig) -> None:
+    rig.driver.turn()
+    told = [one for one in rig.run(100) if isinstance(one, RangeObservation)]
+    assert {one.subject for one in told} == {"drone_1", "drone_2"} and len(told) >= 6
+    full = [one for one in told if one.subject == "drone_1" and one.position_m is not None]
+    assert full and all(math.dist(one.position_m or (), (0.5, 0.2, 1.6)) < 0.02 for one in full)
+    assert set().union(*(one.ranges_m for one in told)) == {"a", "b", "c", "d"}
+    assert rig.driver.counts["unknown anchor"] > 0
+    assert all(one.header.entity == "uwb" and rig.clock.ns - one.header.stamp_ns >= 15 * MS for one in told)
+    assert rig.child.told[0] == "READY"
+
+
+def test_silence_is_told_with_its_remedy_and_so_is_its_end(rig: Rig) -> None:
+    rig.driver.turn()
+    rig.run(100)
+    rig.gateway.silent = True
+    silent = [one for one in rig.run(200) if isinstance(one, CameraStatus)]
+    assert not silent[-1].connected and silent[-1].detail == "no range for 0.3 s"
+    assert "ranging uwb: no range for 0.3 s; check the gateway" in " ".join(rig.child.told)
+    rig.gateway.silent = False
+    well = [one for one in rig.run(200) if isinstance(one, CameraStatus)]
+    assert well[-1].connected and well[-1].detections > 0 and rig.child.told[-2] == "READY"
+
+
+def test_strangers_and_what_nobody_carries_are_counted(rig: Rig) -> None:
+    rig.driver._handle(10**12 + 1, Round("0x9", {"a": 1.0}))
+    rig.driver._handle(10**12 + 2, Round("0x1", {"a": 99.0}))
+    rig.driver._handle(10**12 + 1, Round("0x1", {"a": 2.0}))
+    assert not [one for one in rig.run(1) if isinstance(one, RangeObservation) and one.subject == "drone_1"]
+    assert rig.driver.counts["unknown transponder"] == rig.driver.counts["beyond reach"] == 1
+
+
+@pytest.mark.parametrize(
+    ("datagram", "reason"),
+    [
+        (b"", "damaged"),
+        (b"\xff{", "damaged"),
+        (b'{"transponder": "t"}', "damaged"),
+        (b'{"transponder": "t", "m": {}}', "damaged"),
+        (b'{"transponder": "t", "m": {"a": "1"}}', "damaged"),
+        (b'{"transponder": "t", "m": {"a": -1}}', "impossible"),
+        (b'{"transponder": "t", "m": {"a": 1e9}}', "impossible"),
+        (b'{"transponder": "t", "m": {"a": 1}, "age_ms": 1e9}', "impossible"),
+        (b'{"transponder": "t", "m": {"a": 1}}' + b" " * 1400, "too long"),
+        (b'{"transponder": "' + b"t" * 200 + b'", "m": {"a": 1}}', "damaged"),
+    ],
+)
+def test_what_is_no_round_is_refused_by_its_reason(datagram: bytes, reason: str) -> None:
+    with pytest.raises(WireError) as refused:
+        decode(datagram)
+    assert refused.value.reason == reason
+
+
+def test_a_round_survives_the_wire_and_unknown_keys_are_passed_over() -> None:
+    told = Round("0x1", {"a": 1.25, "b": 3.5}, 4.0)
+    assert decode(encode(told)) == told
+    assert decode(b'{"transponder": "0x1", "m": {"a": 1}, "quality": [1]}') == Round("0x1", {"a": 1.0})
+
+
+def test_a_wrong_section_is_told_by_its_key() -> None:
+    child: Any = SimpleNamespace(section='{"name": "uwb"}')
+    with pytest.raises(SettingsError, match="ranging: source"):
+        process.run(child)
+
+
+def test_the_process_ends_when_it_is_asked_to(rig: Rig) -> None:
+    rig.child.stop_requested = True
+    child: Any = rig.child
+    assert process.run(child) == 0
+
+
+@pytest.mark.parametrize(
+    "text", ["udp://1.2.3.4", "ranges://", "ranges://h/p", "ranges://h:99999", "ranges://a b", "ranges://u@h"]
+)
+def test_a_wrong_address_is_refused_with_the_form(text: str) -> None:
+    with pytest.raises(ValueError, match=r"as in ranges://192\.168\.1\.6:7417"):
+        parse_source(text)
+    assert parse_source("ranges://10.0.0.7") == ("10.0.0.7", 7417)

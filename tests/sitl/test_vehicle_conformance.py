@@ -19,6 +19,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(300)]
         ("mavlink", [], "epochs,unheard"),
         ("mavlink", ["--with", "mavlink.flavour=ardupilot"], "orphaned,limits"),
         pytest.param("tello", [], "square,cut,stranger", marks=pytest.mark.exhaustive),
+        pytest.param("ros2", [], "killed,square", marks=pytest.mark.exhaustive),
+        pytest.param("ros2", ["--with", "ros2.orders=services"], "cut", marks=pytest.mark.exhaustive),
         pytest.param("ardrone", [], "damaged", marks=pytest.mark.exhaustive),
         pytest.param("mavlink", [], "lossy", marks=pytest.mark.exhaustive),
         pytest.param("mavlink", ["--with", "mavlink.flavour=ardupilot"], "damaged_aloft", marks=pytest.mark.exhaustive),

@@ -6,13 +6,14 @@ here. Units are in the key names; a pair of numbers is a range that each drone d
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, Literal, assert_never
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, assert_never
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, create_model
 from pydantic_core import PydanticCustomError
 
-from drivers.ardrone.wire.tags import OPTION_SIZES
 from groundstation.errors import SettingsError
+from groundstation.vehicles import VehicleKind, all_kinds
+from groundstation.vehicles.registry import load
 from sim_bridge.fault_kinds import Fault
 from sim_bridge.section import Section
 from sim_bridge.surroundings import FloorZone, LinkBursts, Obstacle, ScenarioExpectation
@@ -30,6 +31,7 @@ from sim_bridge.target_paths import (
 
 # Between targets of which the scenario says nothing by name.
 _APART_TURNS, _APART_M = 0.15, 1.0
+_Figures = TypeVar("_Figures", bound=Section)
 Gain = Annotated[float, Field(ge=0.3, le=1.5)]
 Delay = Annotated[float, Field(ge=0, le=500)]
 Jump = Annotated[float, Field(ge=0, le=180)]
@@ -80,8 +82,9 @@ def _beside(scenario: TargetScenario, rank: int) -> TargetScenario:
 
 
 def _known_firmware(name: str) -> str:
-    if name not in OPTION_SIZES:
-        raise PydanticCustomError("firmware", f"known firmwares: {', '.join(OPTION_SIZES)}")
+    known = [firmware for kind in all_kinds().values() for firmware in kind.emulated_firmwares]
+    if name not in known:
+        raise PydanticCustomError("firmware", f"known firmwares: {', '.join(known)}")
     return name
 
 
@@ -144,34 +147,6 @@ class DroneScenario(Section):
         return self.firmware_by_drone.get(name, self.firmware)
 
 
-class CopterScenario(Section):
-    """Every emulated MAVLink vehicle: errors of its inertial sensors, battery, disturbances."""
-
-    configured: bool = True
-    """true: the vehicle has the parameters that indoor flight needs; false: those of the factory."""
-    attitude_noise_deg: Annotated[float, Field(ge=0, le=5)] = 0.3
-    """Noise of roll and pitch, one sigma [deg]."""
-    velocity_gain: Annotated[tuple[Gain, Gain], AfterValidator(rising)] | None = None
-    """Velocity that is reached divided by the one asked for; none: as each firmware on average, PX4 0.85, ArduPilot
-    1."""
-    hover_drift_m_s: Annotated[float, Field(ge=0, le=2)] = 0.0
-    """Steady horizontal drift while a velocity is asked for, zero included, one sigma per axis [m/s]."""
-    lift_off_velocity_m_s: Annotated[float, Field(ge=0, le=2)] = 0.0
-    """Error of the estimated horizontal velocity at lift-off, one sigma per axis [m/s]."""
-    one_partner: bool = False
-    """true: it answers only the first that spoke to it, until it is started again, as PX4's UDP link does."""
-    mavlink_1_until_greeted: bool = False
-    """true: it speaks MAVLink 1 until it hears MAVLink 2, as PX4 with MAV_PROTO_VER 0 does."""
-    gyro_bias_deg_s: Annotated[float, Field(ge=0, le=5)] = 0.05
-    """Bias of the gyroscopes, one sigma [deg/s]."""
-    battery: Annotated[tuple[Share, Share], AfterValidator(rising)] = (0.85, 1.0)
-    """Charge at the start, 0 to 1."""
-    battery_drain_per_min: Annotated[float, Field(ge=0, le=10)] = 0.05
-    """Charge that a minute of flight costs, as a share of the full charge."""
-    air_unrest_m_s2: Annotated[float, Field(ge=0, le=5)] = 0.08
-    """Random acceleration of a hovering vehicle by the air of the room, one sigma [m/s^2]."""
-
-
 class CameraScenario(Section):
     """Every emulated camera: its stream and the errors of its images."""
 
@@ -206,8 +181,8 @@ class CameraScenario(Section):
     """What lies on the floor."""
 
 
-class Scenario(Section):
-    """A scenario file; the defaults are the figures measured on real drones."""
+class CommonScenario(Section):
+    """A scenario file without the sections that kinds of vehicles bring."""
 
     schema_version: Literal[1] = 1
     """Version of the file format."""
@@ -220,8 +195,6 @@ class Scenario(Section):
     """What single targets do, by name."""
     drones: DroneScenario = DroneScenario()
     """Every emulated AR.Drone."""
-    mavlink: CopterScenario = CopterScenario()
-    """Every emulated MAVLink vehicle."""
     cameras: CameraScenario = CameraScenario()
     """Every emulated camera."""
     faults: tuple[Fault, ...] = ()
@@ -238,6 +211,43 @@ class Scenario(Section):
     def of_targets(self, names: Iterable[str]) -> dict[str, TargetScenario]:
         """Return what each target of a field does."""
         return {name: self.targets.get(name) or _beside(self.target, rank) for rank, name in enumerate(names)}
+
+    def of_kind(self, key: str, model: type[_Figures]) -> _Figures:
+        """Return the section that a kind of vehicle brings."""
+        section = getattr(self, key)
+        assert isinstance(section, model), f"{key} is no {model.__name__}"
+        return section
+
+
+def _section_of_kind(kind: VehicleKind, reference: str) -> tuple[Any, Any]:
+    """Return type and default of a section; of one that cannot be used, what refuses every scenario that has it."""
+    try:
+        model = load(reference)
+        return model, Field(default=model(), description=str(model.__doc__))
+    except Exception as error:  # noqa: BLE001 - a plug-in is anybody's program: its failure is told where it is used
+        told = {"kind": kind.name, "why": f"{type(error).__name__}: {error}"}
+
+    def refuse(_: object) -> None:
+        raise PydanticCustomError("kind", "the figures of {kind} cannot be used: {why}", told)
+
+    return Annotated[None, BeforeValidator(refuse)], Field(default=None, description=f"Of {kind.name}.")
+
+
+def _with_kinds() -> Any:
+    brought: dict[str, Any] = {
+        key: _section_of_kind(kind, reference)
+        for kind in all_kinds().values()
+        for key, reference in kind.scenario.items()
+        if key not in CommonScenario.model_fields
+    }
+    text = "A scenario file; the defaults are the figures measured on real drones."
+    return create_model("Scenario", __base__=CommonScenario, __module__=__name__, __doc__=text, **brought)
+
+
+if TYPE_CHECKING:
+    Scenario = CommonScenario
+else:
+    Scenario = _with_kinds()
 
 
 def parse_scenario(text: str | bytes) -> Scenario:

@@ -13,6 +13,7 @@ from drivers.ardrone.settings import (
     Video,
 )
 from drivers.ardrone.wire import at
+from drivers.ardrone.wire.tags import OPTION_SIZES
 from drivers.vehicle_settings import silence_limits, vehicle_limits
 from groundstation.vehicles import (
     DriverProcess,
@@ -172,6 +173,7 @@ KIND = VehicleKind(
     has_interface=True,
     emulator="sim_bridge.devices.ardrone_emulation:EMULATION",
     emulated_faults=frozenset({"propeller_blocked", "uniform_floor", "obstacle_below"}),
+    emulated_firmwares=tuple(OPTION_SIZES),
     offers={"ardrone": Offer("AR.Drone 2", _OFFER, pictures="ardrone://{address}")},
     commands=KindCommands("groundstation.cli.ardrone:ardrone", "Probe an AR.Drone without flying it.", ("probe",)),
 )

@@ -182,6 +182,7 @@ KIND = VehicleKind(
     check=_check,
     moved=_moved,
     emulator="sim_bridge.devices.mavlink_emulation:EMULATION",
+    scenario={"mavlink": "sim_bridge.mavlink_scenario:CopterScenario"},
     true_pose="sim_bridge.real.mavlink_truth:of_drone",
     example={"mavlink": {"flavour": "px4", "system_id": 1}},
     offers={"px4": _offer("px4", "PX4"), "ardupilot": _offer("ardupilot", "ArduPilot")},

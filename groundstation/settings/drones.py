@@ -107,7 +107,7 @@ class OdometryCalibration(SettingsSection):
 
 def _is_kind(name: str) -> str:
     known = [f"'{one}'" for one in all_kinds()]
-    if name in refused_kinds():
+    if name in refused_kinds() and name not in all_kinds():
         raise PydanticCustomError("kind", "cannot be used: {why}", {"why": refused_kinds()[name]})
     if f"'{name}'" not in known:
         raise PydanticKnownError("literal_error", {"expected": " or ".join((", ".join(known[:-1]), known[-1]))})

@@ -137,9 +137,10 @@ class VehicleKind:
     has the local address. emulator: "module:attribute" of a sim_bridge.world.emulation.Emulation, "" if there is none.
     example: what a field file may say of one in its sections; the conformance kit flies that one. offers: types of it
     by name for `groundstation new`; none: one with the sections of the example. commands: its own part of the command
-    line. emulated_faults: faults of a scenario that its emulator can have and others cannot. true_pose:
-    "module:function" of what hears from the simulator behind a real firmware where the vehicle is (a
-    sim_bridge.real.followers.PoseFeed), "" if none tells.
+    line. emulated_faults: faults of a scenario that its emulator can have and others cannot; emulated_firmwares: names
+    that a scenario may give its firmware; scenario: sections of a scenario file that only its emulator reads, each as
+    "module:class" of a sim_bridge.section.Section. true_pose: "module:function" of what hears from the simulator behind
+    a real firmware where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells.
     """
 
     name: str
@@ -162,4 +163,6 @@ class VehicleKind:
     offers: Mapping[str, Offer] = field(default_factory=dict)
     commands: KindCommands | None = None
     emulated_faults: frozenset[str] = frozenset()
+    emulated_firmwares: tuple[str, ...] = ()
+    scenario: Mapping[str, str] = field(default_factory=dict)
     true_pose: str = ""

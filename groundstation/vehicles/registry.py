@@ -89,7 +89,8 @@ def _sound(name: str, kind: object, known: dict[str, VehicleKind]) -> VehicleKin
         raise ValueError("there is a kind of this name already")
     _require_parts(kind)
     taken = {key: other.name for other in known.values() for key in other.sections}
-    for key in kind.sections:
+    taken |= {f"{key} of a scenario": other.name for other in known.values() for key in other.scenario}
+    for key in (*kind.sections, *(f"{key} of a scenario" for key in kind.scenario)):
         if key in taken:
             raise ValueError(f"its section {key} is that of {taken[key]}")
     return kind

@@ -9,6 +9,7 @@ from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
 from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.launch_spec import LaunchSpec
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.site import Lens, SiteDrone
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.wrong_values import WrongValues
@@ -42,12 +43,12 @@ def open_vehicle(
     vehicle = MavlinkEmulator(
         name,
         (order.addresses[name], identity.port),
-        Parameters(flavour, identity.system_id, order.scenario.mavlink.configured),
+        Parameters(flavour, identity.system_id, order.scenario.of_kind("mavlink", CopterScenario).configured),
         copter,
         calls=(identity.local_address, identity.port) if identity.listen else None,
         video=video,
         wrong=wrong,
     )
-    scenario = order.scenario.mavlink
+    scenario = order.scenario.of_kind("mavlink", CopterScenario)
     vehicle.habits = LinkHabits(scenario.one_partner, scenario.mavlink_1_until_greeted)
     return vehicle

@@ -49,13 +49,13 @@ class TelloBody:
     def __init__(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> None:
         draw = standard_normals(rng)
         self.airframe = Airframe(*drone.pad_m, drone.pad_yaw_rad)
-        self.battery = float(rng.uniform(*scenario.mavlink.battery))
+        self.battery = float(rng.uniform(*scenario.drones.battery))
         self.wind = (0.0, 0.0)
         self.motors_on = False
         self.wanted: tuple[Vector3, float] = (_STILL, 0.0)
         self._tick_s = tick_s
         self._flow_error = tuple(GaussMarkov(0.03, 0.5, tick_s, draw) for _ in range(2))
-        self._unrest = tuple(GaussMarkov(scenario.mavlink.air_unrest_m_s2, 0.8, tick_s, draw) for _ in range(2))
+        self._unrest = tuple(GaussMarkov(scenario.drones.air_unrest_m_s2, 0.8, tick_s, draw) for _ in range(2))
         self.flow = (0.0, 0.0)
 
     @property

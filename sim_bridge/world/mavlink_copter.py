@@ -11,7 +11,7 @@ from enum import Enum, auto
 
 import numpy as np
 
-from sim_bridge.scenario import CopterScenario
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.downwash import wake_between
 from sim_bridge.world.mavlink_estimator import InertialEstimate

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from sim_bridge.scenario import CopterScenario
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 

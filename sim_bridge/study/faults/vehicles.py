@@ -17,6 +17,7 @@ from groundstation.bus.messages import Severity
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site
 from sim_bridge.study.faults.ardrone_device import MemoryArDrone
@@ -83,8 +84,9 @@ def devices_of(
         flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
         calls = (identity.local_address, identity.port) if identity.listen else None
         place = (addresses[name], identity.port)
+        configured = scenario.of_kind("mavlink", CopterScenario).configured
         devices[name] = MavlinkEmulator(
-            name, place, Parameters(flavour, identity.system_id, scenario.mavlink.configured), copter,
+            name, place, Parameters(flavour, identity.system_id, configured), copter,
             calls=calls, wrong=wrong[name],
         )  # fmt: skip
     return devices

@@ -36,7 +36,7 @@ from groundstation.bus.topics import (
 from sim_bridge.devices import mavlink
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.scenario import CopterScenario
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_NS, TICK_S
 

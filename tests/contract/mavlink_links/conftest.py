@@ -12,7 +12,7 @@ import pytest
 from drivers.mavlink.wire.names import Flavour
 from sim_bridge.devices.mavlink import MavlinkEmulator
 from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.scenario import CopterScenario
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_S
 

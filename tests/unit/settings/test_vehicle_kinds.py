@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 from groundstation.cli import main as cli
 from groundstation.cli.exits import ExitCode
@@ -17,6 +18,7 @@ from groundstation.settings.schema import Field
 from groundstation.settings.sections import driver_sections, rerouted
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.vehicles import all_kinds, kind_named, refused_kinds, registry
+from sim_bridge import scenario
 
 ROOT = Path(__file__).parents[3]
 CONFIG = ROOT / "config"
@@ -25,6 +27,14 @@ REFUSED = r"kind: zeppelin is not known; known: .*ardrone, mavlink"
 FOREIGN = """
 import click
 from groundstation.vehicles import DriverProcess, ErrorHabits, KindCommands, StopDatagrams, VehicleKind
+from sim_bridge.section import Section
+
+
+class Figures(Section):
+    '''Every emulated blimp.'''
+
+    leak: float = 0.1
+
 
 blimp = click.Group("blimp", {"inflate": click.Command("inflate", callback=lambda: print("inflated"))})
 KIND = VehicleKind(
@@ -35,6 +45,7 @@ KIND = VehicleKind(
     processes=lambda orders: [DriverProcess((one.name,), '{"name": "' + one.name + '"}') for one in orders],
     stop=lambda orders: StopDatagrams(7000, b"hover", b"land"),
     example={"blimp": {}},
+    scenario={"blimps": "blimp_kind:Figures", "balloons": "no_such_module:Figures"},
     commands=KindCommands("blimp_kind:blimp", "Meet blimps.", ("inflate",)),
 )
 """
@@ -49,12 +60,14 @@ def fail(*orders):
 
 
 UNHABITUAL = replace(KIND, name="unhabitual", habits=None)
+GREEDY = replace(KIND, name="greedy")
 PLACELESS = replace(KIND, name="placeless", driver="nowhere")
-FAILING = replace(KIND, name="failing", check=fail, processes=fail, stop=fail, commands=None)
+FAILING = replace(KIND, name="failing", check=fail, processes=fail, stop=fail, commands=None, scenario={})
 TWIN = replace(KIND, name="twin")
 """
 ODD_ENTRIES = """[skein.vehicles]
 unhabitual = odd_kinds:UNHABITUAL
+greedy = odd_kinds:GREEDY
 placeless = odd_kinds:PLACELESS
 failing = odd_kinds:FAILING
 twin = odd_kinds:TWIN
@@ -170,6 +183,16 @@ def test_a_foreign_kind_has_commands_of_its_own(
 
 
 @pytest.mark.usefixtures("plug_ins")
+def test_a_foreign_kind_has_its_own_section_in_a_scenario() -> None:
+    judged = scenario._with_kinds()
+    assert judged.model_validate_json('{"blimps": {"leak": 2}}').blimps.leak == 2.0
+    assert judged().blimps.leak == 0.1 and judged().mavlink.configured
+    with pytest.raises(ValidationError, match=r"the figures of blimp cannot be used: .*no_such_module"):
+        judged.model_validate_json('{"balloons": {}}')
+    assert judged.model_validate_json("{}").drones.downwash
+
+
+@pytest.mark.usefixtures("plug_ins")
 def test_a_new_field_may_have_any_kind() -> None:
     room = NewRoom(8, 6, 4.5, "http://192.168.1.50:8080/video.mjpg")
     for type_name, (kind, _) in offers().items():
@@ -197,6 +220,7 @@ def test_an_unsound_kind_is_named_and_the_rest_works(tmp_path: Path) -> None:
     assert "lab-odd" in refused["unhabitual"] and "no ErrorHabits" in refused["unhabitual"]
     assert 'driver must be "module:attribute"' in refused["placeless"]
     assert "SystemExit: no display" in refused["ending"]
+    assert "its section blimps of a scenario is that of blimp" in refused["greedy"]
     assert "lab-odd" in refused["twin"] and "lab-twin" in refused["twin"] and "twin" not in all_kinds()
     assert "lab-twin" in refused["ardrone"] and all_kinds()["ardrone"].summary.startswith("Parrot")
     options = ["drones.drone_3.kind=failing", "drones.drone_3.mavlink=null", "types.ardupilot.mavlink=null"]
@@ -209,7 +233,6 @@ def test_an_unsound_kind_is_named_and_the_rest_works(tmp_path: Path) -> None:
 NAMED = {
     "groundstation/cli/bench.py",  # benches of one codec and one link, by their names
     "groundstation/cli/tlog.py",  # a log format of one protocol
-    "sim_bridge/scenario.py",  # figures of the emulated AR.Drones and MAVLink vehicles
     "sim_bridge/standalone.py",  # emulators for programs of others
 }
 KIND_WORD = re.compile(r"ardrone|mavlink", re.IGNORECASE)

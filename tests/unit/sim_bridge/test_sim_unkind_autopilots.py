@@ -16,7 +16,8 @@ from drivers.mavlink.wire.telemetry import Heartbeat
 from groundstation.settings.scenario import load_scenario
 from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
 from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.scenario import CopterScenario, parse_scenario
+from sim_bridge.mavlink_scenario import CopterScenario
+from sim_bridge.scenario import parse_scenario
 from sim_bridge.world.mavlink_copter import PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_S
 
@@ -39,7 +40,7 @@ def fly(vehicle: MavlinkCopter, velocity: tuple[float, float, float], seconds: f
 
 
 def test_the_shipped_scenario_is_as_measured() -> None:
-    mavlink = parse_scenario(json.dumps(load_scenario(SCENARIO))).mavlink
+    mavlink = parse_scenario(json.dumps(load_scenario(SCENARIO))).of_kind("mavlink", CopterScenario)
     assert 1.0 <= mavlink.attitude_noise_deg <= 2.6 and mavlink.velocity_gain == (0.8, 0.9)
     assert 0.3 <= mavlink.lift_off_velocity_m_s <= 0.9 and mavlink.hover_drift_m_s > 0.0
     assert mavlink.one_partner and mavlink.mavlink_1_until_greeted

@@ -18,8 +18,9 @@ from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_px4 import Px4
 from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part, exchanged
+from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.mounting import turned_about
-from sim_bridge.scenario import CopterScenario, DroneScenario, parse_scenario
+from sim_bridge.scenario import DroneScenario, parse_scenario
 from sim_bridge.world.airframe import GRAVITY_M_S2
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard

@@ -18,20 +18,25 @@ from sim_bridge.site import Site, SiteDrone, parse_site
 
 
 class PoseSource(StrEnum):
-    """From whom the room learns where a real body is: its firmware's simulator, the tracker, nobody."""
+    """From whom the room learns where a real body is: its firmware's simulator, motion capture, the tracker, nobody."""
 
     AUTOPILOT = "autopilot"
+    CAPTURE = "capture"
     ESTIMATE = "estimate"
     NONE = "none"
 
 
+_UNSEEN = frozenset({PoseSource.ESTIMATE, PoseSource.NONE})
+
+
 class RealBody(BaseModel):
-    """A body that exists; address: where its firmware's simulator sends its true state."""
+    """A body that exists; address: where its firmware's simulator sends its true state; system: that follows it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     source: PoseSource
     address: tuple[str, int] | None = None
+    system: str = ""
 
 
 class _Envelope(BaseModel):
@@ -70,7 +75,7 @@ class LaunchSpec:
     @property
     def unseen(self) -> frozenset[str]:
         """Return the bodies that emulated cameras must not show: their places are the tracker's, or nobody's."""
-        return frozenset(name for name, body in self.real.items() if body.source is not PoseSource.AUTOPILOT)
+        return frozenset(name for name, body in self.real.items() if body.source in _UNSEEN)
 
 
 def read_order(path: Path) -> LaunchSpec:

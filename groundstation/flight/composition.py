@@ -70,15 +70,16 @@ def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) ->
         if name not in real.drones
     }
     streams = _streams(field, network, real)
-    return rerouted(field, addresses, streams, frozenset(real.drones), _captures(field, network))
+    return rerouted(field, addresses, streams, frozenset(real.drones), _captures(field, network, real))
 
 
-def _captures(field: Field, network: Network) -> dict[str, tuple[str, int]]:
+def _captures(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
     """Return where the emulated motion capture and ranging systems listen: behind the cameras."""
     first = len(field.cameras) + len(field.drones)
     hosts = {name: one.host for name, one in field.motion_capture.items()}
     hosts |= {name: one.host for name, one in field.ranging.items()}
-    return {name: network.of(host).stream(index) for index, (name, host) in enumerate(hosts.items(), start=first)}
+    places = {name: network.of(host).stream(index) for index, (name, host) in enumerate(hosts.items(), start=first)}
+    return {name: place for name, place in places.items() if name not in real.systems}
 
 
 def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
@@ -179,8 +180,11 @@ def _sim_bridge(field: Field, simulation: Simulation) -> ProcessSpec:
         "scenario": simulation.scenario,
         "addresses": {name: drone.address for name, drone in field.drones.items() if name not in real.drones},
         "streams": _streams(field, network, real),
-        "captures": _captures(field, network),
-        "real": {name: {"source": body.source, "address": body.address} for name, body in real.bodies.items()},
+        "captures": _captures(field, network, real),
+        "real": {
+            name: {"source": body.source, "address": body.address, "system": body.system}
+            for name, body in real.bodies.items()
+        },
         "seed": simulation.seed,
     }
     return replace(rows.SIM_BRIDGE, section=json.dumps(order), keep_open=(network.lock,))

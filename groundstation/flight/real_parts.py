@@ -10,28 +10,32 @@ from groundstation.field.drones import camera_name
 from groundstation.settings.schema import Field
 from groundstation.vehicles import all_kinds, kind_named
 
-AUTOPILOT, ESTIMATE, NONE = "autopilot", "estimate", "none"
+AUTOPILOT, ESTIMATE, NONE, CAPTURE = "autopilot", "estimate", "none", "capture"
 _LOOPBACK = "127.0.0.1"
 
 
 @dataclass(frozen=True, slots=True)
 class RealBody:
-    """A real drone or target; source: who says where it is; address: where its firmware's simulator sends that."""
+    """A real drone or target; source: who says where it is; address: where its firmware's simulator sends that;
+    system: the motion capture system that follows it.
+    """
 
     source: str
     address: tuple[str, int] | None = None
+    system: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class RealParts:
     """What of a field is not emulated: drones and targets by name, cameras by the names that their streams have.
 
-    A world-fixed camera has its own name, one that a drone carries the drone's.
+    A world-fixed camera has its own name, one that a drone carries the drone's. systems: of motion capture and ranging.
     """
 
     drones: Mapping[str, RealBody] = of_class(default_factory=dict)
     cameras: frozenset[str] = frozenset()
     targets: frozenset[str] = frozenset()
+    systems: frozenset[str] = frozenset()
 
     @property
     def bodies(self) -> dict[str, RealBody]:
@@ -41,7 +45,7 @@ class RealParts:
     @property
     def names(self) -> tuple[str, ...]:
         """Return everything that is real, drones first."""
-        return (*self.drones, *sorted(self.targets), *sorted(self.cameras - set(self.drones)))
+        return (*self.drones, *sorted(self.targets), *sorted(self.cameras - set(self.drones)), *sorted(self.systems))
 
 
 ALL_EMULATED = RealParts()
@@ -52,6 +56,7 @@ def parse_real(field: Field, options: Iterable[str]) -> RealParts:
     drones: dict[str, RealBody] = {}
     cameras: set[str] = set()
     targets: set[str] = set()
+    systems: set[str] = set()
     carried = {camera_name(name): name for name in field.drones}
     for option in options:
         name, equals, source = option.partition("=")
@@ -65,10 +70,13 @@ def parse_real(field: Field, options: Iterable[str]) -> RealParts:
             cameras.add(name)
         elif name in field.tracked:
             targets.add(name)
+        elif name in field.volumes:
+            systems.add(name)
         else:
-            known = ", ".join((*field.drones, *field.cameras, *carried, *field.tracked))
+            known = ", ".join((*field.drones, *field.cameras, *field.volumes, *carried, *field.tracked))
             raise OperatorMistake(f"--real {name}: the field has no such part, only {known}")
-    parts = RealParts(drones, frozenset(cameras), frozenset(targets))
+    systems |= {body.system for body in drones.values() if body.system}
+    parts = RealParts(drones, frozenset(cameras), frozenset(targets), frozenset(systems))
     _require_sense(field, parts)
     return parts
 
@@ -77,6 +85,8 @@ def _body(field: Field, name: str, source: str) -> RealBody:
     kind, _, place = source.partition(":")
     if kind == ESTIMATE and not place:
         return RealBody(ESTIMATE)
+    if kind in field.motion_capture and not place:
+        return RealBody(CAPTURE, system=kind)
     if kind == AUTOPILOT:
         if not kind_named(field.drones[name].kind).true_pose:
             told = ", ".join(kind.name for kind in all_kinds().values() if kind.true_pose)
@@ -84,7 +94,7 @@ def _body(field: Field, name: str, source: str) -> RealBody:
         return RealBody(AUTOPILOT, _address(name, source, place))
     raise OperatorMistake(
         f"--real {name}={source}: the source of its pose is autopilot:PORT (the port on which the simulator behind its "
-        "firmware tells the truth) or estimate; motion capture cannot be read"
+        "firmware tells the truth), estimate, or the name of a motion capture system of the field"
     )
 
 
@@ -101,23 +111,25 @@ def _address(name: str, source: str, place: str) -> tuple[str, int]:
 
 
 def _require_sense(field: Field, parts: RealParts) -> None:
-    fixed = parts.cameras & set(field.cameras)
+    fixed = parts.cameras & set(field.cameras) | parts.systems - set(field.truth.values())
     for name, body in parts.drones.items():
         if body.source == ESTIMATE and not fixed:
             # A fence judged by emulated cameras alone is no fence: they would show the drone where it is believed.
+            sensor = next(iter((*field.cameras, *field.volumes)))
             raise OperatorMistake(
                 f"--real {name}: nothing real says where it is, so nothing would hold it inside of the fence: make a "
-                f"camera that sees it real as well (--real {next(iter(field.cameras))}), or, if the simulator of its "
+                f"camera or system that sees it real as well (--real {sensor}), or, if the simulator of its "
                 f"firmware flies it, name the port of its true pose (--real {name}=autopilot:PORT)"
             )
     for name in sorted(parts.cameras - set(field.cameras) - set(parts.drones)):
         raise OperatorMistake(f"--real {camera_name(name)}: {name}, which carries it, must be real as well")
-    if parts.targets and not parts.cameras:
-        raise OperatorMistake(f"--real {min(parts.targets)}: no camera is real, so nothing can see it")
+    if parts.targets and not parts.cameras | parts.systems:
+        raise OperatorMistake(f"--real {min(parts.targets)}: no sensor is real, so nothing can see it")
     addresses = [body.address for body in parts.drones.values() if body.address is not None]
     if len(set(addresses)) < len(addresses):
         raise OperatorMistake("--real: two drones have the same port for their true pose")
     everything = len(parts.drones) == len(field.drones) and parts.cameras >= {*field.cameras, *field.drones}
+    everything = everything and parts.systems >= set(field.volumes)
     if everything and len(parts.targets) == len(field.tracked):
         raise OperatorMistake("--real: nothing is left to emulate; use: groundstation fly")
 
@@ -135,12 +147,14 @@ def notes(field: Field, parts: RealParts) -> list[str]:
         elif body.address is not None:
             place = f"{body.address[0]}:{body.address[1]}"
             lines.append(f"{name} is real; its true pose is taken from {place} and begins on its pad")
-    if emulated and (fixed := sorted(parts.cameras & set(field.cameras))):
+        elif body.system:
+            lines.append(f"{name} is real; the room has it where {body.system} sees its body")
+    if emulated and (fixed := sorted(parts.cameras & set(field.cameras) | parts.systems)):
         who = " and ".join(fixed)
         lines.append(f"{who} is real and does not see what is emulated: {', '.join(emulated)}")
-    if emulated and set(field.cameras) <= parts.cameras and not field.volumes:
+    if emulated and set(field.cameras) <= parts.cameras and set(field.volumes) <= parts.systems:
         lines.append(
-            "no world-fixed camera is emulated: unless they see each other or markers on the floor, emulated drones "
-            "are not seen by any camera, and land"
+            "nothing that is fixed in the world is emulated: unless they see each other or markers on the floor, "
+            "emulated drones are not seen by any camera, and land"
         )
     return lines

@@ -9,6 +9,7 @@ from groundstation.bus.topics import ESTIMATE
 from groundstation.vehicles import kind_named
 from groundstation.vehicles.registry import load
 from sim_bridge.launch_spec import PoseSource, RealBody
+from sim_bridge.real.captured import CaptureFeed
 from sim_bridge.site import Site
 from sim_bridge.world.puppet import OutsidePose, Puppet
 
@@ -94,4 +95,6 @@ def _feed(name: str, body: RealBody, site: Site, bus: Bus) -> PoseFeed:
     if body.source is PoseSource.AUTOPILOT and body.address is not None:
         feed: PoseFeed = load(kind_named(drone.kind).true_pose)(name, body.address, drone)
         return feed
+    if body.source is PoseSource.CAPTURE:
+        return CaptureFeed(name, body.system, bus)
     return EstimateFeed(name, bus)

@@ -5,6 +5,7 @@ is flown by poses from outside. What it prints is the truth that judges.
 """
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -22,6 +23,10 @@ import pytest
 
 from drivers.mavlink.parameters import needed
 from drivers.mavlink.wire.names import Flavour
+from sim_bridge.devices.natnet import NatnetEmulator
+from sim_bridge.real.mavlink_truth import AutopilotTruth
+from sim_bridge.real.placed import Placement
+from sim_bridge.site import SiteCapture
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
@@ -146,6 +151,71 @@ def test_a_foreign_firmware_flies_in_the_team_and_ctrl_c_lands_it_with_the_other
     assert heights(tmp_path)[-1] < 0.1
     report = run.report()
     assert report["landed"] and report["target_rmse_m"] <= 0.15, run.said
+
+
+class Hall(threading.Thread):
+    """Motion capture of the hall that the stand-in flies in: its server streams the one body that is there.
+
+    The other drone is emulated, and located by emulated ranges: no pictures of fixed cameras, which cost the most.
+    """
+
+    BOX: ClassVar = {"x_m": (-3.5, 3.5), "y_m": (-2.6, 2.6), "z_m": (-0.1, 2.7)}
+    PLACE = ("127.95.1.7", 25651)
+    OPTIONS = ("--set", "drones.drone_3=null", "--set", "cameras=null")
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self._truth = AutopilotTruth("drone_2", ("127.0.0.1", 25648), 1, Placement((-0.45, -0.5), math.radians(48)))
+        self._row, self._over = np.full((1, 13), np.nan), threading.Event()
+        system = SiteCapture.model_validate({"volume_m": self.BOX})
+        rng = np.random.default_rng(1)
+        self._server = NatnetEmulator("mocap", self.PLACE, system, ["drone_2"], lambda: self._row, rng, errors=False)
+
+    def run(self) -> None:
+        begun, ticks = time.monotonic(), 0
+        while not self._over.wait(max(0.0, begun + 0.005 * ticks - time.monotonic())):
+            ticks += 1
+            pose = self._truth.latest(time.monotonic_ns())
+            if pose is not None:
+                self._row = np.array([[*pose.position, *pose.velocity, *pose.attitude, *pose.rates, 0.0]])
+            self._server.receive()
+            self._server.send()
+
+    def field(self, folder: Path) -> Path:
+        path = field(folder, "flavour: ardupilot, system_id: 1", STAND_IN)
+        box = ", ".join(f"{axis}: {list(span)}" for axis, span in self.BOX.items())
+        capture = "motion_capture:\n  mocap:\n    source: natnet://{}:{}\n".format(*self.PLACE)
+        anchors = "{a: [-3.9, -2.9, 2.9], b: [3.9, -2.9, 2.9], c: [3.9, 2.9, 2.9], d: [-3.9, 2.9, 0.3]}"
+        radios = f"ranging:\n  uwb:\n    source: ranges://10.0.0.1\n    anchors: {anchors}\n"
+        volume = f"    volume_m: {{{box}}}\n"
+        path.write_text(path.read_text() + capture + volume + radios + volume)
+        return path
+
+    def close(self) -> None:
+        self._over.set()
+        self.join(5.0)
+        self._server.close()
+        self._truth.close()
+
+
+@pytest.mark.exhaustive
+@pytest.mark.usefixtures("stand_in")
+def test_a_drone_that_motion_capture_follows_flies_in_the_team(tmp_path: Path, started: Callable[..., Run]) -> None:
+    hall = Hall()
+    hall.start()
+    try:
+        path = hall.field(tmp_path)
+        run = started(path, "--real", "drone_2=mocap", "--duration", "12", *Hall.OPTIONS)
+        run.until("To take off and track press Enter", 120)
+        run.press_enter()
+        run.until("drone_2: TRACK sent / received / accepted / effective", 90)
+        run.process.wait(90)
+        assert max(heights(tmp_path)) > 0.5 and heights(tmp_path)[-1] < 0.1
+        report = run.report()
+        assert report["landed"] and report["target_rmse_m"] <= 0.15, run.said
+        assert "the room has it where mocap sees its body" in run.said
+    finally:
+        hall.close()
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

@@ -41,7 +41,7 @@ def test_only_what_is_emulated_is_rerouted(team: Field) -> None:
     order = sections["sim_bridge"]
     assert sorted(order["addresses"]) == ["drone_1", "drone_3"]
     assert sorted(order["streams"]) == ["ceiling_east", "drone_1", "drone_2", "drone_3"]
-    assert order["real"] == {"drone_2": {"source": "autopilot", "address": ["127.0.0.1", 19410]}}
+    assert order["real"] == {"drone_2": {"source": "autopilot", "address": ["127.0.0.1", 19410], "system": ""}}
 
 
 def test_stops_reach_real_and_emulated_drones(team: Field) -> None:
@@ -68,7 +68,7 @@ def test_a_real_ardrone_has_an_emulated_camera_of_its_own(team: Field) -> None:
         (["drone_9"], "no such part, only drone_1"),
         (["ceiling_west=estimate"], "only a drone has a source"),
         (["drone_2"], "nothing real says where it is"),
-        (["drone_2=mocap"], "motion capture cannot be read"),
+        (["drone_2=mocap"], "or the name of a motion capture system of the field"),
         (["drone_2=autopilot:lots"], "is no PORT"),
         (["drone_2=autopilot"], "is no PORT"),
         (["drone_1=autopilot:19410"], "only simulators of firmware tell a true pose"),
@@ -92,7 +92,36 @@ def test_the_operator_is_told_what_emulated_cameras_cannot_do(team: Field) -> No
     said = " ".join(notes(team, real))
     assert "cannot correct" in said and "does not see what is emulated: drone_1, drone_3" in said
     both = parse_real(team, ["ceiling_west", "ceiling_east"])
-    assert "no world-fixed camera is emulated" in " ".join(notes(team, both))
+    assert "nothing that is fixed in the world is emulated" in " ".join(notes(team, both))
+
+
+@pytest.fixture(scope="module")
+def hall() -> Field:
+    """The lab with its ceiling camera, and with motion capture as the truth."""
+    return load_field(CONFIG / "mocap-truth.yaml", ())
+
+
+def test_a_drone_may_be_where_motion_capture_follows_it_and_that_system_is_not_emulated(hall: Field) -> None:
+    processes = table(hall, "drone_2=mocap")
+    order = json.loads(processes["sim_bridge"].section)
+    assert order["real"] == {"drone_2": {"source": "capture", "address": None, "system": "mocap"}}
+    assert order["captures"] == {} and "ceiling" in order["streams"]
+    assert json.loads(processes["mocap"].section)["source"] == hall.motion_capture["mocap"].source
+    real = parse_real(hall, ["drone_2=mocap"])
+    assert real.drones == {"drone_2": RealBody("capture", system="mocap")} and real.names == ("drone_2", "mocap")
+    said = " ".join(notes(hall, real))
+    assert "the room has it where mocap sees its body" in said
+    assert "mocap is real and does not see what is emulated: drone_1" in said
+
+
+def test_a_real_system_holds_a_drone_inside_of_the_fence_unless_it_is_the_truth(hall: Field) -> None:
+    rooted = load_field(CONFIG / "mocap-lab.yaml", ())
+    assert parse_real(rooted, ["drone_2", "mocap"]).systems == {"mocap"}
+    assert "nothing that is fixed in the world is emulated" in " ".join(notes(rooted, parse_real(rooted, ["mocap"])))
+    with pytest.raises(OperatorMistake, match="nothing real says where it is"):
+        parse_real(hall, ["drone_2", "mocap"])
+    with pytest.raises(OperatorMistake, match="--real mocap"):
+        parse_real(rooted, ["drone_2"])
 
 
 def test_a_run_with_a_real_drone_asks_before_it_takes_off(team: Field) -> None:

@@ -1,0 +1,63 @@
+"""The pose of a real body as a motion capture system of the field follows it: from its driver, over the bus."""
+
+import math
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import BodyPose, BodyPoses, Quaternion
+from groundstation.bus.topics import BODY_POSES
+from groundstation.time_units import NS_PER_S
+from sim_bridge.world.puppet import OutsidePose, Vector3
+
+# A velocity is that between two frames at most so far apart [s]; a frame is carried on by it, for no longer than this.
+_APART_S, _CARRIED_S = 0.2, 0.1
+
+_Stamped = tuple[int, BodyPose]
+
+
+class CaptureFeed:
+    """`latest` returns where a body was in the newest frame, carried on to now; refused ones do not count."""
+
+    def __init__(self, name: str, system: str, bus: Bus) -> None:
+        self._name, self._system = name, system
+        self._inbox = bus.subscribe([BODY_POSES])
+        self._last: _Stamped | None = None
+
+    def latest(self, now_ns: int) -> OutsidePose | None:
+        """Return the newest pose in the room, None without a new one; now_ns: on the boot clock."""
+        pose = None
+        for received in self._inbox.drain():
+            message = received.message
+            if isinstance(message, BodyPoses) and message.header.entity == self._system:
+                pose = self._follow(message, now_ns) or pose
+        return pose
+
+    def close(self) -> None:
+        """Hold nothing: the bus ends its subscriptions."""
+
+    def _follow(self, frame: BodyPoses, now_ns: int) -> OutsidePose | None:
+        body = next((one for one in frame.bodies if one.name == self._name), None)
+        if body is None or self._name in frame.refused:
+            return None
+        before, self._last = self._last, (frame.header.stamp_ns, body)
+        return _pose(before, self._last, now_ns)
+
+
+def _pose(before: _Stamped | None, newest: _Stamped, now_ns: int) -> OutsidePose:
+    stamp_ns, body = newest
+    roll, pitch, yaw = _euler(body.attitude)
+    velocity, yaw_rate = (0.0, 0.0, 0.0), 0.0
+    if before is not None and 0.0 < (apart_s := (stamp_ns - before[0]) / NS_PER_S) <= _APART_S:
+        x, y, z = ((b - a) / apart_s for a, b in zip(before[1].position_m, body.position_m, strict=True))
+        velocity = (x, y, z)
+        yaw_rate = math.remainder(yaw - _euler(before[1].attitude)[2], math.tau) / apart_s
+    ahead_s = min(max(0.0, (now_ns - stamp_ns) / NS_PER_S), _CARRIED_S)
+    px, py, pz = (p + ahead_s * v for p, v in zip(body.position_m, velocity, strict=True))
+    return OutsidePose((px, py, pz), velocity, (roll, pitch, yaw + ahead_s * yaw_rate), (0.0, 0.0, yaw_rate))
+
+
+def _euler(attitude: Quaternion) -> Vector3:
+    """Return roll, pitch, yaw [rad] of a quaternion (w, x, y, z)."""
+    w, x, y, z = attitude
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

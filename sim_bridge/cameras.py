@@ -177,7 +177,7 @@ class Cameras:
     def wait_until_serving(self, should_stop: Callable[[], bool]) -> None:
         """Return when every stream accepts connections; raises GroundStationError naming the one that does not."""
         deadline = time.monotonic() + _START_LIMIT_S
-        for spec in self._specs:
+        for spec in (one for one in self._specs if one.own is None or one.own.listens):
             while not should_stop() and not _accepts(spec.address, spec.port):
                 if spec.camera in self.ended() or time.monotonic() > deadline:
                     raise GroundStationError(

@@ -14,6 +14,7 @@ from groundstation.adapters import split_zone, with_zone
 from groundstation.geometry.board import VALID_CODES, Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.tag import SquareTag
+from groundstation.vehicles import all_kinds
 
 _Positive = Annotated[float, Field(gt=0)]
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
@@ -23,15 +24,15 @@ class SourceKind(StrEnum):
     """What pictures can come from."""
 
     HTTP = "http"
-    ARDRONE = "ardrone"
     RTSP = "rtsp"
     ROS2 = "ros2"
     DEVICE = "device"
     FILE = "file"
+    VEHICLE = "vehicle"
     PLUG_IN = "plug-in"
 
 
-_PORTS = {SourceKind.HTTP: 80, SourceKind.ARDRONE: 5555, SourceKind.RTSP: 554, SourceKind.ROS2: ROUTER_PORT}
+_PORTS = {SourceKind.HTTP: 80, SourceKind.RTSP: 554, SourceKind.ROS2: ROUTER_PORT}
 # Libraries open these, through any adapter.
 _ANY_ADAPTER = frozenset({SourceKind.RTSP, SourceKind.ROS2})
 
@@ -42,7 +43,7 @@ class SourceAddress:
 
     path: of the stream with its query, of the topic, of the device, of the file or folder; host: of a plug-in, its
     scheme; login: "user:password", or "" for none; interface: the network adapter that it is behind, or "" for any;
-    domain: of ROS 2.
+    domain: of ROS 2; vehicle: whose own video it is, the scheme of its kind.
     """
 
     kind: SourceKind
@@ -52,6 +53,7 @@ class SourceAddress:
     login: str = field(default="", repr=False)
     interface: str = ""
     domain: int = 0
+    vehicle: str = ""
 
 
 def parse_source(text: str) -> SourceAddress:
@@ -65,20 +67,24 @@ def parse_source(text: str) -> SourceAddress:
     unusable = not mark or not rest or any(character.isspace() for character in text)
     if not unusable and scheme not in kinds and scheme in plug_ins.names(plug_ins.CAMERAS):
         return SourceAddress(SourceKind.PLUG_IN, host=scheme, path=rest)
-    if unusable or scheme not in kinds:
+    vehicles = {} if scheme in kinds else {one.camera: one for one in all_kinds().values() if one.reader}
+    if unusable or (scheme not in kinds and scheme not in vehicles):
+        own = "".join(f"{each}://192.168.1.1, " for each in vehicles)
         raise ValueError(
-            "must be an address such as http://192.168.1.50:8080/video.mjpg, ardrone://192.168.1.1, "
+            f"must be an address such as http://192.168.1.50:8080/video.mjpg, {own}"
             "rtsp://192.168.1.60/stream, ros2://192.168.1.20/camera/image/compressed, /dev/video0 or /a/video.mp4"
         )
     parts = urlsplit(text)
     try:
-        port = parts.port or _PORTS[kinds[scheme]]
+        port = parts.port or (vehicles[scheme].camera_port if scheme in vehicles else _PORTS[kinds[scheme]])
     except ValueError:
         escape = " (a / in a password is written %2F)" if "@" in rest else ""
         raise ValueError(f"the port is no number from 1 to 65535{escape}") from None
     if not parts.hostname:
         raise ValueError(f"must name a host, as in {scheme}://192.168.1.50")
     host, interface = split_zone(parts.hostname)
+    if scheme in vehicles:
+        return SourceAddress(SourceKind.VEHICLE, host, port, interface=interface, vehicle=scheme)
     if interface and kinds[scheme] in _ANY_ADAPTER:
         raise ValueError(f"cannot be behind an adapter (%{interface}): the library that opens {scheme}:// takes any")
     if kinds[scheme] is SourceKind.ROS2:

@@ -34,7 +34,13 @@ _AIRBORNE_CM = 20
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
 _STILL_M_S = 0.25
 # Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
-_PAUSE_NS = {text.SDK: 1_000_000_000, text.TAKE_OFF: 4_000_000_000, text.LAND: 500_000_000, text.EMERGENCY: 100_000_000}
+_PAUSE_NS = {
+    text.SDK: 1_000_000_000,
+    text.TAKE_OFF: 4_000_000_000,
+    text.LAND: 500_000_000,
+    text.EMERGENCY: 100_000_000,
+    text.STREAM_ON: 3_000_000_000,
+}
 # Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
 LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
 
@@ -176,6 +182,8 @@ class Tello:
                 self._repeat(now_ns, text.SDK)
         if not self._ready:
             self._repeat(now_ns, text.SDK)
+        elif self._settings.tello.video and not flies:
+            self._repeat(now_ns, text.STREAM_ON)
 
     def _sticks(self, decision: WatchdogDecision) -> bytes:
         own, limits, (forward, left, up) = self._settings.tello, self._settings.limits, decision.velocity_m_s

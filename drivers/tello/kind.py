@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from drivers.tello.settings import TelloDriverSettings, TelloSection
-from drivers.tello.wire.text import COMMAND_PORT, LAND, rc
+from drivers.tello.wire.text import COMMAND_PORT, LAND, VIDEO_PORT, rc
 from drivers.vehicle_settings import a_process_each, values_of
 from groundstation.vehicles import ErrorHabits, KindSection, StopDatagrams, VehicleKind, VehicleOrder
 
@@ -28,6 +28,9 @@ KIND = VehicleKind(
     stop=lambda orders: StopDatagrams(COMMAND_PORT, rc(0, 0, 0, 0), LAND),
     sections={"tello": TelloSection},
     required=frozenset({"tello"}),
+    camera="tello",
+    camera_port=VIDEO_PORT,
+    reader="drivers.tello.video:TelloReader",
     has_interface=True,
     moved=_moved,
     emulator="sim_bridge.devices.tello:EMULATION",

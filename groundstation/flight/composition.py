@@ -89,7 +89,7 @@ def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple
     for index, (name, drone) in enumerate(field.drones.items()):
         source = parse_source(drone.camera.source)
         # A drone sends its own video from its own address; a real one is none of ours, so its emulated camera is apart.
-        if source.kind == kind_named(drone.kind).camera and name not in real.drones:
+        if source.vehicle and source.vehicle == kind_named(drone.kind).camera and name not in real.drones:
             streams[name] = (network.of(drone.host).drone_address(index), source.port)
     return {name: stream for name, stream in streams.items() if name not in real.cameras}
 

@@ -20,7 +20,7 @@ from groundstation.settings.ranging import RangingSettings
 from groundstation.settings.ranging_checks import findings_of_ranging
 from groundstation.settings.room import CalibrationSettings, RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
-from groundstation.vehicles import all_kinds, kind_named
+from groundstation.vehicles import kind_named
 
 Finding = tuple[KeyPath, str]
 
@@ -205,19 +205,18 @@ def _hosts(parts: Parts) -> Iterator[Finding]:
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
     """A vehicle's video is taken from that very vehicle."""
-    own = {kind.camera for kind in all_kinds().values()}
     for name, camera in parts.cameras.items():
-        if parse_source(camera.source).kind in own:
+        if parse_source(camera.source).vehicle:
             yield ("cameras", name, "source"), "must not be a vehicle's own video: drones carry their cameras"
     for name, drone in parts.drones.items():
         source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
-        if source.kind not in own:
+        if not source.vehicle:
             continue
-        if kind_named(drone.kind).camera != source.kind:
-            yield path, f"must not be another kind's own video ({source.kind}://) for kind: {drone.kind}"
+        if kind_named(drone.kind).camera != source.vehicle:
+            yield path, f"must not be another kind's own video ({source.vehicle}://) for kind: {drone.kind}"
         elif source.host != drone.address:
             got = without_password(drone.camera.source)
-            yield path, f"must be this drone's own address, {source.kind}://{drone.address} (got {got})"
+            yield path, f"must be this drone's own address, {source.vehicle}://{drone.address} (got {got})"
 
 
 def _names(parts: Parts) -> Iterator[Finding]:

@@ -102,7 +102,7 @@ def _moved(drone: Drone, address: str | None) -> Drone:
 def _source(source: str, stream: tuple[str, int] | None, own: str = "") -> str:
     if stream is None:
         return source
-    if own and parse_source(source).kind == own:
+    if own and parse_source(source).vehicle == own:
         return f"{own}://{stream[0]}:{stream[1]}"
     return f"http://{stream[0]}:{stream[1]}/video.mjpg"
 

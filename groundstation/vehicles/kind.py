@@ -128,19 +128,21 @@ class VehicleKind:
 
     name: the word for `kind` in the field file. summary: a line for people. driver: "module:function" of the driver
     process. sections: keys of the field file that only this kind has; required: those that must be given.
-    processes: who shares a driver process, with its settings; stop: what vehicles of one process are sent when it is
-    dead. check: (drone, finding) for what is wrong between the sections of this kind. standing_m: height of the base
-    above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme of the
-    vehicle's own video, "" if it has none. has_serial_number: the driver knows the vehicle's own. has_interface:
-    driver and fail-safe datagrams use the drone's network adapter and no other. shares_address: its vehicles may have
-    one address, and `check` tells them apart. moved: changes of sections in a simulated network, where this computer
-    has the local address. emulator: "module:attribute" of a sim_bridge.world.emulation.Emulation, "" if there is none.
-    example: what a field file may say of one in its sections; the conformance kit flies that one. offers: types of it
-    by name for `groundstation new`; none: one with the sections of the example. commands: its own part of the command
-    line. emulated_faults: faults of a scenario that its emulator can have and others cannot; emulated_firmwares: names
-    that a scenario may give its firmware; scenario: sections of a scenario file that only its emulator reads, each as
-    "module:class" of a sim_bridge.section.Section. true_pose: "module:function" of what hears from the simulator behind
-    a real firmware where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells.
+    processes: who shares a driver process, with its settings; stop: what vehicles of one process are sent when it
+    is dead. check: (drone, finding) for what is wrong between the sections of this kind. standing_m: height of the
+    base above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme
+    of the vehicle's own video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of what
+    is called with address and interface and reads it, as the sources of `drivers.camera` do. has_serial_number: the
+    driver knows the vehicle's own. has_interface: driver and fail-safe datagrams use the drone's network adapter
+    and no other. shares_address: its vehicles may have one address, and `check` tells them apart. moved: changes of
+    sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
+    sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
+    sections; the conformance kit flies that one. offers: types of it by name for `groundstation new`; none: one
+    with the sections of the example. commands: its own part of the command line. emulated_faults: faults of a
+    scenario that its emulator can have and others cannot; emulated_firmwares: names that a scenario may give its
+    firmware; scenario: sections of a scenario file that only its emulator reads, each as "module:class" of a
+    sim_bridge.section.Section. true_pose: "module:function" of what hears from the simulator behind a real firmware
+    where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells.
     """
 
     name: str
@@ -154,6 +156,8 @@ class VehicleKind:
     check: Callable[[Sequence[VehicleOrder]], Iterator[tuple[str, Finding]]] = _no_findings
     standing_m: tuple[float, float] = (0.08, 0.04)
     camera: str = ""
+    camera_port: int = 0
+    reader: str = ""
     has_serial_number: bool = False
     has_interface: bool = False
     shares_address: bool = False

@@ -6,29 +6,23 @@ its parameter sets every 15 pictures; for a late reader, frames are dropped up t
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import NamedTuple
 
-import av
 import numpy as np
-from av.video.frame import PictureType
 from numpy.typing import NDArray
 
 from drivers.ardrone.wire.pave import FrameType, PaveFrame, encode_frame
+from sim_bridge.devices.h264 import GreyStream
 from sim_bridge.devices.stream_server import Client, StreamServer
 
 PORT = 5555
 _AVC = 4
-_IDR_PERIOD = 15
 _START_CODE = b"\x00\x00\x00\x01"
 _SHORT_CODE = b"\x00\x00\x01"
-_SEI = 6
 # WIRE (docs/reference/ardrone.md 5.4): values of video:video_codec whose live stream is 720p; the others are 360p.
 _CODECS_720P = frozenset({0x83})
 _BOTTOM = 1
 _MANUAL_BITRATE = 2
-# WIRE (docs/reference/ardrone.md 6): pictures as the sensor sees them are of limited range: 16 to 235.
-_LIMITED = np.rint(16 + np.arange(256) * (219 / 255)).astype(np.uint8)
 
 
 class VideoMode(NamedTuple):
@@ -83,24 +77,13 @@ class VideoEncoder:
     def __init__(self, mode: VideoMode, fps: float, header_bytes: int, number: int = 0, position: int = 0) -> None:
         self.mode, self.number, self.position = mode, number, position
         self._header_bytes = header_bytes
-        self._index = 0
-        self._codec = _codec(mode, fps)
-        width, height = mode.size
-        self._planes = np.full((height * 3 // 2, width), 128, dtype=np.uint8)
+        self._stream = GreyStream(mode.size, fps, mode.bits_per_picture * fps)
 
     def encode(self, picture: NDArray[np.uint8], timestamp_ms: int, want_idr: bool) -> EncodedPicture:
         """Return a picture (h, w) of the mode's size as the next PaVE frame."""
-        height = picture.shape[0]
-        np.take(_LIMITED, picture, out=self._planes[:height])
-        frame = av.VideoFrame.from_ndarray(self._planes, format="yuv420p")
-        frame.pts = self._index
-        frame.pict_type = PictureType.I if want_idr else PictureType.NONE
-        self._index += 1
-        (packet,) = self._codec.encode(frame)  # no look-ahead: each picture comes out at once
-        payload = bytes(packet)
-        kind = FrameType.IDR if packet.is_keyframe else FrameType.PREDICTED
-        sizes = parameter_sizes(payload) if packet.is_keyframe else (0, 0)
-        payload = _without_remarks(payload, sum(sizes))
+        payload, is_key = self._stream.encode(picture, want_idr)
+        kind = FrameType.IDR if is_key else FrameType.PREDICTED
+        sizes = parameter_sizes(payload) if is_key else (0, 0)
         width, height = self.mode.size
         self.number += 1
         pave = PaveFrame(
@@ -116,7 +99,7 @@ class VideoEncoder:
         )
         data = encode_frame(pave, self.position, self._header_bytes)
         self.position += len(data)
-        return EncodedPicture(data, packet.is_keyframe)
+        return EncodedPicture(data, is_key)
 
 
 def parameter_sizes(payload: bytes) -> tuple[int, int]:
@@ -127,38 +110,6 @@ def parameter_sizes(payload: bytes) -> tuple[int, int]:
         return 0, 0
     third -= payload[third - 1] == 0
     return second, third - second
-
-
-def _without_remarks(payload: bytes, start: int) -> bytes:
-    """Return the payload without a SEI unit at a place: the encoder signs its first picture, which no drone does."""
-    unit = payload.find(_SHORT_CODE, start) + len(_SHORT_CODE)
-    if payload[unit] & 0x1F != _SEI:
-        return payload
-    end = payload.find(_SHORT_CODE, unit)
-    end -= payload[end - 1] == 0
-    return payload[:start] + payload[end:]
-
-
-def _codec(mode: VideoMode, fps: float) -> av.VideoCodecContext:
-    codec = av.CodecContext.create("libx264", "w")
-    assert isinstance(codec, av.VideoCodecContext)
-    codec.width, codec.height = mode.size
-    codec.pix_fmt = "yuv420p"
-    codec.framerate = Fraction(fps).limit_denominator(1000)
-    codec.time_base = 1 / codec.framerate
-    codec.thread_count = 1
-    codec.bit_rate = round(mode.bits_per_picture * fps)
-    kbits = round(codec.bit_rate / 1000)
-    parameters = f"keyint={_IDR_PERIOD}:min-keyint=1:scenecut=0:vbv-maxrate={kbits}:vbv-bufsize={max(1, kbits // 2)}"
-    # Real drones encode in hardware: better than x264's fastest preset at the same rate, so it is not the fastest.
-    codec.options = {
-        "preset": "superfast",
-        "tune": "zerolatency",
-        "profile": "baseline",
-        "forced-idr": "1",
-        "x264-params": f"{parameters}:annexb=1:repeat-headers=1",
-    }
-    return codec
 
 
 class ArDroneVideoServer(StreamServer):

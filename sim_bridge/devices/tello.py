@@ -17,6 +17,8 @@ from drivers.tello.wire.text import (
     SDK,
     STATE_PORT,
     STOP,
+    STREAM_OFF,
+    STREAM_ON,
     TAKE_OFF,
     State,
     parse_rc,
@@ -24,6 +26,7 @@ from drivers.tello.wire.text import (
 )  # fmt: skip
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.listening import open_udp
+from sim_bridge.own_video import OwnVideo
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
@@ -41,6 +44,9 @@ _RESPONSE_S, _CLIMB_S, _TURN_S, _TILT_S, _MOST_M_S2 = 0.35, 0.25, 0.15, 0.12, 2.
 _DATAGRAMS_PER_TICK = 64
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 _FULL_M_S, _FULL_TURN_RAD_S = 1.0, math.radians(100.0)
+
+
+_WORDS = (TAKE_OFF, LAND, EMERGENCY, STOP, STREAM_ON, STREAM_OFF)
 
 
 class TelloBody:
@@ -120,9 +126,15 @@ class TelloEmulator:
         self._body, self._wrong = body, wrong
         self._socket = open_udp(f"emulated {name}", address, COMMAND_PORT)
         self._partner: tuple[str, int] | None = None
+        self._streams = False
         self._order = b""
         self._ticks = self._quiet_ticks = self._motor_ticks = 0
         self._start_yaw = body.airframe.yaw
+
+    @property
+    def video_settings(self) -> tuple[str, ...]:
+        """Return who gets its video: the address that said `command`, once `streamon` was said."""
+        return (self._partner[0],) if self._streams and self._partner is not None else ()
 
     def fileno(self) -> int:
         """Return the descriptor of its port."""
@@ -142,14 +154,16 @@ class TelloEmulator:
         sticks = parse_rc(data)
         if data == SDK:
             self._partner = source
-        elif self._partner is None or (sticks is None and data not in (TAKE_OFF, LAND, EMERGENCY, STOP)):
+        elif self._partner is None or (sticks is None and data not in _WORDS):
             self._answer(source, b"unknown command: " + data[:32])
             return
         self._quiet_ticks = 0
         if sticks is not None:
             self._fly(sticks)
             return
-        if data == EMERGENCY:
+        if data in (STREAM_ON, STREAM_OFF):
+            self._streams = data == STREAM_ON
+        elif data == EMERGENCY:
             self._body.motors_on, self._order = False, b""
         elif data == LAND and self._body.motors_on:
             self._order = LAND
@@ -238,6 +252,10 @@ class TelloEmulation:
     def body(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> TelloBody:
         """Return a Tello on its pad."""
         return TelloBody(drone, scenario, tick_s, rng)
+
+    def video(self, name: str, scenario: Scenario) -> OwnVideo:
+        """Return its video."""
+        return OwnVideo("sim_bridge.render.tello_output:TelloOutput", repeats=False, listens=False)
 
     def open(self, name: str, body: TelloBody, onboard: None, order: LaunchSpec) -> TelloEmulator:
         """Return the listening emulator of a Tello."""

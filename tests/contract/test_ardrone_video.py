@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.ardrone.video import Assembly
 from drivers.ardrone.wire.configuration import CONFIGURATION
 from drivers.ardrone.wire.pave import FrameReader, PaveFrame
-from drivers.camera.sources.ardrone import Assembly
 from drivers.camera.sources.h264 import H264Decoder
 from drivers.camera.sources.opening import open_source
 from groundstation.errors import DriverError

@@ -1,7 +1,6 @@
 """From a source's address to its reader."""
 
 from drivers.camera.settings import SourceAddress, SourceKind, parse_source
-from drivers.camera.sources.ardrone import ArDroneReader
 from drivers.camera.sources.container import device, rtsp
 from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import FrameSource
@@ -10,6 +9,8 @@ from drivers.camera.sources.reader_thread import Drain, Reader
 from drivers.camera.sources.ros2 import Ros2Reader
 from groundstation import plug_ins
 from groundstation.errors import DriverError, without_password
+from groundstation.vehicles import all_kinds
+from groundstation.vehicles.registry import load
 
 _READER = ("name", "decoder", "rejected", "read", "interrupt")
 
@@ -29,8 +30,6 @@ def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -
     match address.kind:
         case SourceKind.HTTP:
             return MjpegReader(address.host, address.port, address.path, address.login, address.interface)
-        case SourceKind.ARDRONE:
-            return ArDroneReader(address.host, address.port, address.interface)
         case SourceKind.RTSP:
             return rtsp(source, f"{address.host}:{address.port}")
         case SourceKind.ROS2:
@@ -39,6 +38,17 @@ def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -
             return device(address.path, size)
         case SourceKind.FILE:
             return FileReader(address.path)
+        case SourceKind.VEHICLE:
+            return _own_video(address)
         case SourceKind.PLUG_IN:
             reader: Reader = plug_ins.made(plug_ins.CAMERAS, address.host, _READER, source, size)
             return reader
+
+
+def _own_video(address: SourceAddress) -> Reader:
+    (reader,) = (kind.reader for kind in all_kinds().values() if kind.camera == address.vehicle)
+    try:
+        made: Reader = load(reader)((address.host, address.port), address.interface)
+    except (ImportError, AttributeError, TypeError) as error:
+        raise ValueError(f"{reader} cannot be used: {plug_ins.reason(error)}") from error
+    return made

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 COMMAND_PORT = 8889
 STATE_PORT = 8890
+VIDEO_PORT = 11111
 SDK, TAKE_OFF, LAND, EMERGENCY, STOP = b"command", b"takeoff", b"land", b"emergency", b"stop"
+STREAM_ON, STREAM_OFF = b"streamon", b"streamoff"
 OK = b"ok"
 _LARGEST = 1024
 

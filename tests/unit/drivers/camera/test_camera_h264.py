@@ -7,8 +7,8 @@ import av
 import numpy as np
 import pytest
 
+from drivers.ardrone.video import Assembly
 from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame
-from drivers.camera.sources.ardrone import Assembly
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
 from drivers.camera.sources.jitter_filter import SenderClock

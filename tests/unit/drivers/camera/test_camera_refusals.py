@@ -60,8 +60,8 @@ def test_any_bytes_have_a_size_or_none():
     ("text", "address"),
     [
         ("http://10.0.0.5/a?b=1", SourceAddress(SourceKind.HTTP, "10.0.0.5", 80, "/a?b=1")),
-        ("ardrone://192.168.1.1", SourceAddress(SourceKind.ARDRONE, "192.168.1.1", 5555, "/")),
-        ("ardrone://192.168.1.1:5600", SourceAddress(SourceKind.ARDRONE, "192.168.1.1", 5600, "/")),
+        ("ardrone://192.168.1.1", SourceAddress(SourceKind.VEHICLE, "192.168.1.1", 5555, vehicle="ardrone")),
+        ("ardrone://192.168.1.1:5600", SourceAddress(SourceKind.VEHICLE, "192.168.1.1", 5600, vehicle="ardrone")),
         ("rtsp://me:pass@cam/live", SourceAddress(SourceKind.RTSP, "cam", 554, "/live", "me:pass")),
         ("http://me:p%40ss%2F@cam/", SourceAddress(SourceKind.HTTP, "cam", 80, "/", "me:p@ss/")),
         ("/dev/video2", SourceAddress(SourceKind.DEVICE, path="/dev/video2")),

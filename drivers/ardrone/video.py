@@ -16,7 +16,6 @@ from groundstation.bus import clock
 from groundstation.errors import DriverError
 from groundstation.time_units import NS_PER_MS
 
-PORT = 5555
 _READ_BYTES = 1 << 18
 # WIRE (docs/reference/ardrone.md 6): codecs of PaVE frames.
 _CODECS = {1: "VLIB (AR.Drone 1)", 2: "P264 (AR.Drone 1)", 3: "MPEG-4.2"}
@@ -73,8 +72,8 @@ def _is_next(last: PaveFrame, frame: PaveFrame) -> bool:
 class ArDroneReader:
     """Listens to the video of one drone."""
 
-    def __init__(self, host: str, port: int, interface: str = "") -> None:
-        self._line = Line(host, port, interface)
+    def __init__(self, address: tuple[str, int], interface: str = "") -> None:
+        self._line = Line(*address, interface)
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
         self.decoder: PictureDecoder | None = H264Decoder(self.rejected)

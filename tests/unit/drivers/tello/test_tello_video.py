@@ -1,0 +1,87 @@
+"""A Tello's video: pictures cut into datagrams without numbers, and several vehicles that send to one port."""
+
+import socket
+import time
+from contextlib import ExitStack, closing
+
+import numpy as np
+import pytest
+
+from drivers.camera.sources.frames import Packet
+from drivers.camera.sources.opening import open_source
+from drivers.tello.wire.text import VIDEO_PORT
+from drivers.tello.wire.video import WHOLE_BYTES, Assembly, cut, unit_kinds
+from groundstation.arrays import Image
+from sim_bridge.devices.h264 import GreyStream
+
+SIZE = (320, 240)
+PARAMETERS, KEY, PICTURE = {7, 8}, {5}, {1}
+
+
+def picture(level: int) -> Image:
+    noise = np.random.default_rng(level).integers(0, 40, (SIZE[1], SIZE[0]))
+    return np.asarray(noise + level, dtype=np.uint8)
+
+
+@pytest.fixture(scope="module")
+def units() -> list[bytes]:
+    stream = GreyStream(SIZE, 15.0, 2e6)
+    return [stream.encode(picture(40 + number), want_idr=number == 0)[0] for number in range(6)]
+
+
+def test_pictures_survive_being_cut(units: list[bytes]) -> None:
+    assembly, found = Assembly(), []
+    for unit in units:
+        found += [done for datagram in cut(unit) if (done := assembly.feed(datagram))]
+    assert [one.data.rstrip(b"\0") for one in found] == [unit.rstrip(b"\0") for unit in units]
+    assert [one.starts for one in found] == [True] + [False] * 5
+    assert unit_kinds(units[0]) >= PARAMETERS | KEY and unit_kinds(units[1]) >= PICTURE
+
+
+def test_parameter_sets_in_datagrams_of_their_own_begin_the_next_picture(units: list[bytes]) -> None:
+    place = units[0].find(b"\0\0\1\x65")
+    sets, key = units[0][:place], units[0][place:]
+    assembly = Assembly()
+    assert assembly.feed(sets) is None
+    done = [one for datagram in cut(key) if (one := assembly.feed(datagram))]
+    assert [one.starts for one in done] == [True]
+
+
+def test_a_picture_that_fills_its_datagrams_ends_all_the_same() -> None:
+    full = b"\0\0\1\x41" + b"\x55" * (2 * WHOLE_BYTES - 4)
+    sizes = [len(datagram) for datagram in cut(full)]
+    assert sizes == [WHOLE_BYTES, WHOLE_BYTES, 1]
+    assert [bool(Assembly().feed(datagram)) for datagram in cut(full)] == [False, False, False]
+    assembly = Assembly()
+    assert [bool(assembly.feed(datagram)) for datagram in cut(full)] == [False, False, True]
+
+
+def test_what_is_no_video_is_counted() -> None:
+    assembly = Assembly()
+    assert assembly.feed(b"ok") is None and assembly.skipped == 2
+    for _ in range(1000):
+        assert assembly.feed(b"\xff" * WHOLE_BYTES) is None
+    assert assembly.skipped > 1 << 20
+
+
+def send(udp: socket.socket, unit: bytes) -> None:
+    for datagram in cut(unit):
+        udp.sendto(datagram, ("127.0.0.70", VIDEO_PORT))
+
+
+def test_two_vehicles_that_send_to_one_port_are_kept_apart(units: list[bytes]) -> None:
+    pictures = (units[0], GreyStream(SIZE, 15.0, 2e6).encode(picture(180), want_idr=True)[0])
+    addresses = ("127.0.0.71", "127.0.0.72")
+    newest: dict[int, Packet] = {}
+    with ExitStack() as stack:
+        sources = [stack.enter_context(closing(open_source(f"tello://{address}"))) for address in addresses]
+        senders = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in addresses]
+        for udp, address in zip(senders, addresses, strict=True):
+            udp.bind((address, 0))
+        deadline = time.monotonic() + 10.0
+        while sum(source.received > 20 for source in sources) < 2 and time.monotonic() < deadline:
+            for udp, unit in zip(senders, pictures, strict=True):
+                send(udp, unit)
+            newest |= {number: taken for number, source in enumerate(sources) if (taken := source.take_newest(0.01))}
+    levels = [float(newest[number].picture.grey().mean()) for number in range(2)]  # type: ignore[union-attr]
+    assert levels == pytest.approx([16 + 60 * 219 / 255, 16 + 200 * 219 / 255], abs=8)

@@ -101,6 +101,7 @@ def _hold_by_tablet(open_page: Any) -> None:
     stranger.close()
 
 
+@pytest.mark.exhaustive
 def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
     live: runtime_file.RuntimeRecord, served: str, record_property: Callable[[str, object], None]
 ) -> None:

@@ -19,7 +19,7 @@ def sitl(tmp_path: Path) -> Iterator[Callable[..., SitlRun]]:
     def start(*arguments: str, terminal: int | None = None, program: tuple[str, ...] = COMMAND) -> SitlRun:
         folder = tmp_path / f"run{len(runs)}"
         folder.mkdir()
-        verb = arguments if arguments[:1] == ("demo",) else ("sitl", "lab", *arguments)
+        verb = arguments if arguments[:1] in (("demo",), ("sitl",)) else ("sitl", "lab", *arguments)
         runs.append(SitlRun(folder, *verb, terminal=terminal, program=program))
         return runs[-1]
 

@@ -19,6 +19,7 @@ from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
 from groundstation.control.view import spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
+from groundstation.estimation.attitude_intake import Lean
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.entity_estimate import entity_estimate
 from groundstation.estimation.fixed_lag import FixedLagFilter
@@ -161,9 +162,9 @@ class Tracker:
         self._watch_plan(now_ns)
         return self._belief
 
-    def tilt_of(self, message: RelativeObservation) -> tuple[float, float]:
-        """Return the observer's (roll, pitch) [rad] of a sighting as the filter takes them."""
-        return self._intake.tilt_of(message)
+    def lean_of(self, message: RelativeObservation) -> Lean:
+        """Return how a sighting's observer leans, as the filter takes it."""
+        return self._intake.lean_of(message)
 
     def take_corrections(self) -> list[Correction]:
         """Return and forget what became of the observations since the last call."""

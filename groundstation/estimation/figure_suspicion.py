@@ -6,25 +6,40 @@ their surveys; its evidence is that of a linear Gaussian model.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.arrays import Matrix, Vector
+from groundstation.arrays import Array, Matrix, Vector
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.linear import cholesky
 from groundstation.estimation.sight_loops import Gap, Key
+from groundstation.field.room import WorldCamera
 
-# How well each figure is known (one sigma), and how wrong a suspect may be: shares, [rad], [s].
+TILTED = "tilted"
+"""What is wrong with a fixed camera's roll and pitch together."""
+
+# How well each figure is known (one sigma), and how wrong a suspect may be: shares, [rad], [s], [m].
 _SURVEYED = {
     "print": 0.003,
     "focal": 0.004,
     "pan": math.radians(0.5),
     "tilt": math.radians(0.8),
-    "delay": 0.012,
+    "delay": 0.008,
 }
-_WRONG = {"print": 0.08, "focal": 0.08, "pan": math.radians(5.0), "tilt": math.radians(5.0), "delay": 0.08}
+# A tilt of a vehicle that is levelled by its IMU.
+_LEVELLED_RAD = math.radians(0.5)
+_WRONG = {
+    "print": 0.08,
+    "focal": 0.08,
+    "pan": math.radians(5.0),
+    "tilt": math.radians(5.0),
+    "delay": 0.08,
+    "z": 0.1,
+    "roll": math.radians(5.0),
+    "pitch": math.radians(5.0),
+}
 # What is told only from so far on: less does not harm.
 _WORTH_TELLING = {
     "print": 0.02,
@@ -32,11 +47,13 @@ _WORTH_TELLING = {
     "pan": math.radians(1.2),
     "tilt": math.radians(1.5),
     "delay": 0.03,
+    "z": 0.06,
+    TILTED: math.radians(1.2),
 }
 _BLOCK_S, _FORGETTING_S = 1.0, 40.0
-_LEAST_IN_BLOCK = 3
-# Of a block's mean: a detector's own bias, and a lean that is another one than told, for as many blocks as it lasts.
-_BIAS_M, _LEAN_RAD, _LASTS = 0.015, math.radians(0.8), 2.0
+_LEAST_IN_BLOCK, _OUTLYING = 3, 4.0
+# What puts a loop wrong lasts for as many blocks.
+_LASTS = 2.0
 _SURE, _REFUTED, _RULED_OUT = math.log(100.0), math.log(3.0), math.log(20.0)
 _PATIENCE = 3
 
@@ -62,15 +79,22 @@ class Charge:
 class FigureSuspicion:
     """Fed with gaps; `judge` once a second."""
 
-    def __init__(self, keys: Sequence[Key]) -> None:
-        self._keys = tuple(keys)
+    def __init__(self, keys: Sequence[Key], fixed: Mapping[str, WorldCamera]) -> None:
+        self._keys, self._fixed = tuple(keys), fixed
         n = len(self._keys)
         self._information, self._pull = np.zeros((n, n)), np.zeros(n)
         self._block: dict[str, list[Gap]] = {}
         self._block_ends_s = -math.inf
         self._held = 0
-        self._surveyed = np.array([_SURVEYED[part] for _, part in self._keys])
+        self._delays = np.array([part == "delay" for _, part in self._keys], dtype=np.float64)
+        self._surveyed = np.array([self._survey(who, part) for who, part in self._keys])
         self.charges: tuple[Charge, ...] = ()
+
+    def _survey(self, who: str, part: str) -> float:
+        if part in _SURVEYED:
+            return _SURVEYED[part]
+        camera = self._fixed[who]
+        return max(camera.position_std_m, 2e-3) if part == "z" else max(math.radians(camera.attitude_std_deg), 1e-3)
 
     def take(self, gap: Gap) -> None:
         """Take a loop that has closed."""
@@ -85,18 +109,37 @@ class FigureSuspicion:
         self._pull *= keep
         for gaps in self._block.values():
             if len(gaps) >= _LEAST_IN_BLOCK:
-                gap = np.median([one.gap_m for one in gaps], axis=0)
-                slope = np.mean([one.by_figure for one in gaps], axis=0)
-                far = float(np.mean([one.far_m for one in gaps]))
-                if not (np.isfinite(gap).all() and np.isfinite(slope).all()):
-                    continue
-                variance = _LASTS * (_BIAS_M**2 + (_LEAN_RAD * far) ** 2)
-                self._information += slope.T @ slope / variance
-                self._pull -= slope.T @ gap / variance
+                self._add(gaps)
         self._block.clear()
 
-    def judge(self) -> tuple[Charge, ...]:
-        """Return who is to be named now: nobody, one, or several that cannot be told apart; likeliest first."""
+    def _add(self, gaps: Sequence[Gap]) -> None:
+        """Add a second's median, in which a lean lasts, and how single loops differ from their mean.
+
+        Of the latter only delays count: derivatives by sizes hold the same noise as the loop itself.
+        """
+        apart, slopes = np.array([one.apart for one in gaps]), np.array([one.by_figure for one in gaps])
+        if not (np.isfinite(apart).all() and np.isfinite(slopes).all()):
+            return
+        steady = _LASTS * float(np.mean([one.std for one in gaps])) ** 2
+        self._take_rows(slopes.mean(axis=0), np.median(apart, axis=0), steady)
+        differing = np.abs(apart - np.median(apart, axis=0)).max(axis=1) < _OUTLYING * gaps[0].jitter
+        if differing.sum() >= _LEAST_IN_BLOCK:
+            apart, slopes = apart[differing], slopes[differing]
+            rows = self._delays * (slopes - slopes.mean(axis=0)).reshape(-1, len(self._keys))
+            self._take_rows(rows, (apart - apart.mean(axis=0)).ravel(), gaps[0].jitter ** 2)
+
+    def _take_rows(self, slopes: Array, apart: Vector, variance: float) -> None:
+        self._information += slopes.T @ slopes / variance
+        self._pull -= slopes.T @ apart / variance
+
+    def judge(self, levelled: Collection[str] = ()) -> tuple[Charge, ...]:
+        """Return who is to be named now: nobody, one, or several that cannot be told apart; likeliest first.
+
+        levelled: drones whose lean is told by an IMU, so that none of it passes for their cameras' tilt.
+        """
+        for place, (who, part) in enumerate(self._keys):
+            if part == "tilt":
+                self._surveyed[place] = _LEVELLED_RAD if who in levelled else _SURVEYED[part]
         nothing = self._evidence(())[0]
         charges = sorted(self._charges(nothing), key=lambda charge: -charge.lead)
         best = charges[0]
@@ -114,12 +157,17 @@ class FigureSuspicion:
         for suspect, places in self._suspects().items():
             evidence, sizes, stds = self._evidence(places)
             most = places[int(np.argmax(np.abs(sizes[list(places)])))]
-            yield Charge(suspect, float(sizes[most]), float(stds[most]), evidence - nothing)
+            size = float(np.hypot(*sizes[list(places)])) if suspect.part == TILTED else float(sizes[most])
+            yield Charge(suspect, size, float(stds[most]), evidence - nothing)
 
     def _suspects(self) -> Mapping[Suspect, tuple[int, ...]]:
         found: dict[Suspect, tuple[int, ...]] = {
-            Suspect(who, part): (place,) for place, (who, part) in enumerate(self._keys)
+            Suspect(who, part): (place,)
+            for place, (who, part) in enumerate(self._keys)
+            if part not in ("roll", "pitch")
         }
+        for name in self._fixed:
+            found[Suspect(name, TILTED)] = tuple(self._keys.index((name, part)) for part in ("roll", "pitch"))
         for part in ("pan", "tilt"):
             places = tuple(place for place, key in enumerate(self._keys) if key[1] == part)
             if len(places) > 1:

@@ -2,10 +2,9 @@
 
 import math
 
-import msgspec
-
 from groundstation.bus.messages import RelativeObservation, Severity
 from groundstation.bus.notice import Notice
+from groundstation.estimation.attitude_intake import Lean
 from groundstation.estimation.figure_suspicion import Charge, FigureSuspicion, Suspect
 from groundstation.estimation.sight_loops import SightLoops
 from groundstation.field.resolved import ResolvedField
@@ -21,21 +20,20 @@ class FigureWatch:
     def __init__(self, field: ResolvedField, clock: str) -> None:
         self._field, self._clock = field, clock
         self._loops = SightLoops(field)
-        self._suspicion = FigureSuspicion(self._loops.keys)
+        self._suspicion = FigureSuspicion(self._loops.keys, field.cameras)
         self._told: tuple[Suspect, ...] = ()
         self.cause = ""
 
-    def take(self, sighting: RelativeObservation, tilt: tuple[float, float]) -> None:
-        """Take a sighting that the tracker accepted, and its observer's (roll, pitch) [rad] as it has them."""
+    def take(self, sighting: RelativeObservation, lean: Lean) -> None:
+        """Take a sighting that the tracker accepted, and how its observer leans."""
         if sighting.header.clock == self._clock:
-            roll_rad, pitch_rad = tilt
-            self._loops.see(msgspec.structs.replace(sighting, roll_rad=roll_rad, pitch_rad=pitch_rad))
+            self._loops.see(sighting, lean)
 
     def notices(self, now_ns: int) -> list[Notice]:
         """Return a new finding, or the end of one. `cause` is the finding that stands, in a few words, or ""."""
         for gap in self._loops.gaps(now_ns / NS_PER_S):
             self._suspicion.take(gap)
-        charges = self._suspicion.judge()
+        charges = self._suspicion.judge(self._loops.levelled)
         suspects = tuple(sorted((one.suspect for one in charges), key=lambda s: (s.who, s.part)))
         before, self._told = self._told, suspects
         if suspects == before:
@@ -54,7 +52,8 @@ class FigureWatch:
         share = f"{100 * abs(charge.size):.1f} +- {100 * charge.std:.1f} %"
         degrees = f"{math.degrees(abs(charge.size)):.1f} +- {math.degrees(charge.std):.1f} deg"
         more = charge.size > 0.0
-        camera = f"{who}'s camera" if who else "every drone's camera"
+        fixed = who in self._field.cameras
+        camera = "every drone's camera" if not who else f"the camera {who}" if fixed else f"{who}'s camera"
         match part:
             case "print":
                 marker = f"{who}'s marker is" if who else "all markers are"
@@ -65,9 +64,14 @@ class FigureWatch:
                 return f"{camera} looks {degrees} farther to the {'left' if more else 'right'} than the field says"
             case "tilt":
                 return f"{camera} looks {degrees} {'lower' if more else 'higher'} than the field says"
+            case "z":
+                off = f"{100 * abs(charge.size):.0f} +- {100 * charge.std:.0f} cm"
+                return f"{camera} hangs {off} {'higher' if more else 'lower'} than the field says"
+            case "tilted":
+                return f"{camera} is tilted by {degrees} against the field"
             case _:
                 late = f"{1e3 * abs(charge.size):.0f} +- {1e3 * charge.std:.0f} ms"
-                pictures = f"{who}'s pictures" if who in self._field.cameras else f"the pictures of {who}'s camera"
+                pictures = f"{who}'s pictures" if fixed else f"the pictures of {who}'s camera"
                 return f"{pictures} are {late} {'older' if more else 'newer'} than configured"
 
     def _remedy(self, charge: Charge) -> str:
@@ -78,6 +82,8 @@ class FigureWatch:
             return f"calibrate the lens of {who} (groundstation calibrate camera)"
         if part == "delay":
             return "groundstation calibrate delay"
+        if part in ("z", "tilted"):
+            return f"fix the camera {who} where the field has it, or survey it anew (groundstation calibrate)"
         names = (who,) if who else tuple(self._field.drones)
         wanted = [f"drones.{name}.camera.{_SETTINGS[part]}: {self._now(name, part, charge.size):.1f}" for name in names]
         return f"fix the mounting, or set {', '.join(wanted)}"

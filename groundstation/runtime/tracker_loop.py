@@ -122,7 +122,7 @@ class Tracking:
             if verdict is None:
                 self._picture_age.take(message)
                 if isinstance(message, RelativeObservation):
-                    self._figures.take(message, tracker.tilt_of(message))
+                    self._figures.take(message, tracker.lean_of(message))
             else:
                 self._contradictions.refused(message, verdict, now_ns)
         tracker.advance(now_ns)

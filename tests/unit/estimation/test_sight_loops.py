@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import Header, RelativeObservation, Severity
+from groundstation.estimation.attitude_intake import Lean
+from groundstation.estimation.figure_suspicion import FigureSuspicion, Suspect
+from groundstation.estimation.sight_loops import Gap
 from groundstation.field.resolved import ResolvedField
-from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
+from groundstation.geometry.rotations import (
+    base_from_tilted_optical,
+    rotation_from_euler,
+    rotation_z,
+    world_from_downward_optical,
+)
 from groundstation.runtime.figure_watch import FigureWatch
 
 LEAN = math.radians(0.6)  # deviation of how a drone leans from what it tells, for five seconds at a time
@@ -17,7 +25,7 @@ TARGET_M = 0.4
 class Room:
     """Two drones that look at a target in the middle from both sides, and the ceiling camera over them.
 
-    prints: shares by name ("": all); pan_deg, tilt_deg: of drone_1's camera.
+    prints: shares by name ("": all); pan_deg, tilt_deg: of drone_1's camera; ceiling_deg: pitch of the ceiling camera.
     """
 
     def __init__(self, field: ResolvedField, seed: int, **wrong: float) -> None:
@@ -47,12 +55,15 @@ class Room:
         found = []
         ceiling = self.field.cameras["ceiling"]
         down = world_from_downward_optical(ceiling.rotation_deg)
+        turned = rotation_from_euler(0.0, math.radians(self.wrong.get("ceiling_deg", 0.0)), 0.0)
         for name, drone in self.field.drones.items():
             if self.rng.random() < 1.0 / 75.0 or at_s < 0.1:
                 self.lean[name] = LEAN * self.rng.standard_normal(2)
             base, yaw = self.place(name, at_s)
             marker = base + rotation_z(yaw) @ np.array(drone.marker.position_m)
-            found.append(self.sight("ceiling", name, at_s, down.T @ (marker - np.array(ceiling.position_m)), yaw))
+            found.append(
+                self.sight("ceiling", name, at_s, down.T @ turned.T @ (marker - np.array(ceiling.position_m)), yaw)
+            )
             off = self.wrong.get("pan_deg", 0.0), self.wrong.get("tilt_deg", 0.0)
             pan, tilt = off if name == "drone_1" else (0.0, 0.0)
             eye = drone.camera
@@ -60,7 +71,7 @@ class Room:
             tilt_rad = math.radians(eye.tilt_down_deg + tilt) + self.lean[name][1]
             relative = rotation_z(yaw).T @ (np.array([0.0, 0.0, TARGET_M]) - base) - np.array(eye.position_m)
             optical = base_from_tilted_optical(tilt_rad, pan_rad).T @ relative
-            found.append(self.sight(name, "turtlebot", at_s + 0.02, optical, 0.0))
+            found.append(self.sight(name, "turtlebot", at_s + 0.02, optical, -yaw - math.radians(pan)))
         return found
 
     def told(self, seconds: float) -> list[tuple[Severity, str, str]]:
@@ -74,7 +85,7 @@ class Room:
                         **{f: getattr(sighting, f) for f in sighting.__struct_fields__ if f != "header"},
                         header=Header(shifted, "c", sighting.observer, sighting.observer, 1),
                     ),
-                    (sighting.roll_rad, sighting.pitch_rad),
+                    Lean(sighting.roll_rad, sighting.pitch_rad),
                 )
             if picture % 15 == 14:
                 notices = watch.notices(round((at_s + 0.05) * 1e9))
@@ -94,6 +105,8 @@ def test_nothing_is_told_where_all_figures_are_right(lab_field: ResolvedField, s
         ({"all": 0.06}, "all markers are", "ruler"),
         ({"turtlebot": 0.08}, "turtlebot's marker is", "ruler"),
         ({"tilt_deg": 6.0}, "drone_1's camera looks", "drones.drone_1.camera.tilt_down_deg: 5"),
+        ({"pan_deg": 5.0}, "drone_1's camera looks", "drones.drone_1.camera.pan_left_deg: "),
+        ({"ceiling_deg": 4.0}, "the camera ceiling is tilted by", "survey it anew"),
     ],
 )
 def test_one_wrong_figure_is_told_with_size_and_remedy(
@@ -114,8 +127,43 @@ def test_figures_that_are_right_again_are_refuted(lab_field: ResolvedField) -> N
         if picture == 15 * 20:
             room.wrong = {}
         for sighting in room.pictures(picture / 15.0):
-            watch.take(sighting, (sighting.roll_rad, sighting.pitch_rad))
+            watch.take(sighting, Lean(sighting.roll_rad, sighting.pitch_rad))
         if picture % 15 == 14:
             states += [notice.severity for notice in watch.notices(round((picture / 15.0 + 0.05) * 1e9))]
     assert states[0] is Severity.WARNING and states[-1] is Severity.INFO
     assert watch.cause == ""
+
+
+def gaps_of_a_late_camera(late_s: float, seed: int, seconds: int) -> list[Gap]:
+    """Loops of a drone that sways: their slope by drone_1's delay is its speed, and a slow error lasts."""
+    rng, found = np.random.default_rng(seed), []
+    for count in range(seconds * 6):
+        at_s = count / 6.0
+        speed = 0.15 * math.sin(4.0 * at_s)
+        apart = 0.02 * math.sin(0.3 * at_s) - speed * late_s + 0.008 * rng.standard_normal()
+        slope = np.array([[0.0, speed, 0.0]])
+        found.append(Gap("loop", at_s, np.array([apart]), slope, 0.02, 0.012))
+    return found
+
+
+def test_a_late_camera_shows_within_a_second_where_what_lasts_does_not_count() -> None:
+    keys = (("", "print"), ("drone_1", "delay"), ("drone_2", "delay"))
+    for late_s, named in ((0.05, [Suspect("drone_1", "delay")]), (0.0, [])):
+        suspicion = FigureSuspicion(keys, {})
+        for gap in gaps_of_a_late_camera(late_s, 1, 30):
+            suspicion.take(gap)
+        charges = [suspicion.judge() for _ in range(3)][-1]
+        assert [one.suspect for one in charges] == named
+        assert all(abs(one.size - late_s) < 3.0 * one.std < 0.04 for one in charges)
+
+
+def test_an_imu_makes_a_smaller_tilt_suspect() -> None:
+    slope = np.array([[1.5]])
+    gaps = [Gap("loop", n / 5.0, np.array([-1.5 * math.radians(2.8)]), slope, 0.02, 0.012) for n in range(100)]
+    told = []
+    for levelled in ((), ("drone_1",)):
+        suspicion = FigureSuspicion((("drone_1", "tilt"),), {})
+        for gap in gaps:
+            suspicion.take(gap)
+        told.append([bool(suspicion.judge(levelled)) for _ in range(3)][-1])
+    assert told == [False, True]

@@ -17,6 +17,7 @@ from groundstation.bus.messages import (
     Verdict,
 )
 from groundstation.bus.notice import Notice
+from groundstation.estimation.attitude_intake import Lean
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
 from groundstation.runtime.figure_watch import FigureWatch
@@ -97,7 +98,7 @@ class Hover:
         )
         self.send(sighting)
         for which, watch in self.watches.items():
-            watch.take(sighting, (0.0, 0.0) if which == "raw" else self.tracker.tilt_of(sighting))
+            watch.take(sighting, Lean(0.0, 0.0) if which == "raw" else self.tracker.lean_of(sighting))
 
     @property
     def target_error_m(self) -> float:

@@ -89,7 +89,5 @@ def _ask_on_page(path: Path) -> None:
 
     server = FormServer(path, claim_port(ConsoleValues().port))
     click.echo(f"open {server.url} in a browser (Ctrl-C ends it; nothing is written before its button is pressed)")
-    try:
-        asyncio.run(server.serve())
-    except KeyboardInterrupt:
-        raise OperatorMistake("nothing was written") from None
+    if not asyncio.run(server.serve()):
+        raise OperatorMistake("nothing was written")

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import signal
 import socket
 from pathlib import Path
 
@@ -25,7 +26,7 @@ _FAREWELL_S = 0.3
 
 
 class FormServer:
-    """The form's page and its WebSocket; `written` is set once the field file lies at `path`."""
+    """The form's page and its WebSocket, for the field file at `path`."""
 
     def __init__(self, path: Path, listener: socket.socket) -> None:
         self._path, self._listener = path, listener
@@ -36,17 +37,22 @@ class FormServer:
         routes = [WebSocketRoute("/ws", self._socket), Route("/{path:path}", self._file)]
         self.asgi = Gate(Starlette(routes=routes), Door(self._code.code, str(self._code.path)))
         self.url = f"http://127.0.0.1:{listener.getsockname()[1]}/"
-        self.written = asyncio.Event()
+        self._over = asyncio.Event()
+        self._written = False
 
-    async def serve(self) -> None:
-        """Serve until the file is written."""
+    async def serve(self) -> bool:
+        """Serve until the file is written, or a signal ends it; return whether it was written."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self._over.set)
         server, serving = serve(self.asgi, self._listener, protocol(HalfOpen()))
         with self._code:
-            written = asyncio.create_task(self.written.wait())
-            await asyncio.wait({serving, written}, return_when=asyncio.FIRST_COMPLETED)
-            await asyncio.sleep(_FAREWELL_S)
+            over = asyncio.create_task(self._over.wait())
+            await asyncio.wait({serving, over}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.sleep(_FAREWELL_S if self._written else 0.0)
             server.should_exit = True
             await serving
+        return self._written
 
     async def _file(self, request: Request) -> Response:
         path = request.url.path
@@ -58,7 +64,7 @@ class FormServer:
     async def _socket(self, socket: WebSocket) -> None:
         await socket.accept()
         with contextlib.suppress(WebSocketDisconnect, ConnectionError, RuntimeError):
-            while not self.written.is_set():
+            while not self._over.is_set():
                 frame = await socket.receive()
                 if frame["type"] != "websocket.receive":
                     return
@@ -70,4 +76,5 @@ class FormServer:
                 reply = await asyncio.to_thread(reply_to, answers, self._path)
                 await socket.send_text(msgspec.json.encode(reply).decode())
                 if reply.written:
-                    self.written.set()
+                    self._written = True
+                    self._over.set()

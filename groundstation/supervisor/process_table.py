@@ -20,7 +20,8 @@ ROUTER = ProcessSpec(
     entry="groundstation.runtime.router:run",
     # Drones go on by themselves after pauses below 0.5 s; no router must come back so soon.
     restart_delay_s=0.5,
-    hang_limit_s=1.0,
+    # Under a flood it forwards, and beats late; without it drones hover and land by themselves.
+    hang_limit_s=2.0,
     stop_order=StopOrder.CONNECTS,
     on_bus=False,
 )

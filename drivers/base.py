@@ -1,12 +1,17 @@
-"""What a vehicle driver implements; the host does the rest."""
+"""What a vehicle driver implements; the host does the rest. And what every driver process is handed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
+
+from pydantic import BaseModel, ValidationError
 
 from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Severity
+from groundstation.errors import SettingsError
+
+_Settings = TypeVar("_Settings", bound=BaseModel)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,3 +91,12 @@ class HostProcess(Protocol):
 
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
         """Publish something that happened."""
+
+
+def read_sensor_section(model: type[_Settings], text: str, sensor: str) -> _Settings:
+    """Return the settings of a sensor's driver from JSON; raises SettingsError with a line for each mistake."""
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        problems = [f"{sensor}: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
+        raise SettingsError(problems) from None

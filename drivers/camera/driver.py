@@ -6,9 +6,8 @@ from collections import Counter
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from drivers.base import HostProcess
+from drivers.base import HostProcess, read_sensor_section
 from drivers.camera import convert
 from drivers.camera.context import Surroundings
 from drivers.camera.picture_quality import quality_of
@@ -22,7 +21,7 @@ from groundstation.bus import clock
 from groundstation.bus.jpeg import whole_size
 from groundstation.bus.messages import CameraStatus, SearchedPicture, Severity
 from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, SEARCHED_PICTURE, VIDEO
-from groundstation.errors import SettingsError, without_password
+from groundstation.errors import without_password
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
@@ -33,11 +32,7 @@ _LEVEL = (0.0, 0.0)
 
 def run(child: HostProcess) -> int:
     """Serve one camera until a stop is requested; returns the exit code."""
-    try:
-        settings = CameraDriverSettings.model_validate_json(child.section)
-    except ValidationError as error:
-        problems = [f"camera: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
-        raise SettingsError(problems) from None
+    settings = read_sensor_section(CameraDriverSettings, child.section, "camera")
     cv2.setNumThreads(1)
     lens = settings.calibration
     source = open_source(settings.source, (lens.width_px, lens.height_px))

@@ -2,9 +2,7 @@
 
 from collections import Counter
 
-from pydantic import ValidationError
-
-from drivers.base import HostProcess
+from drivers.base import HostProcess, read_sensor_section
 from drivers.motion_capture.body_watch import BodyWatch
 from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.convert import EntityPose, Placement, body_pose
@@ -13,7 +11,6 @@ from drivers.motion_capture.sources import Source, open_source
 from drivers.stream_health import StreamHealth, StreamNames
 from groundstation.bus.messages import BodyPoses, Severity
 from groundstation.bus.topics import BODY_POSES, OBSERVATION
-from groundstation.errors import SettingsError
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _POLL_S = 0.02
@@ -22,11 +19,7 @@ _CHECK = "check the system's definition of its markers, what hides them, and its
 
 def run(child: HostProcess) -> int:
     """Serve one system until a stop is requested; returns the exit code."""
-    try:
-        settings = MotionCaptureSection.model_validate_json(child.section)
-    except ValidationError as error:
-        problems = [f"motion capture: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
-        raise SettingsError(problems) from None
+    settings = read_sensor_section(MotionCaptureSection, child.section, "motion capture")
     source = open_source(parse_source(settings.source))
     try:
         driver = MotionCaptureDriver(child, settings, source)

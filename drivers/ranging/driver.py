@@ -3,16 +3,13 @@
 import math
 from collections import Counter
 
-from pydantic import ValidationError
-
-from drivers.base import HostProcess
+from drivers.base import HostProcess, read_sensor_section
 from drivers.ranging.gateway import Gateway
 from drivers.ranging.settings import RangingSection, parse_source
 from drivers.ranging.wire.ranges import Round
 from drivers.stream_health import StreamHealth, StreamNames
 from groundstation.bus.messages import RangeObservation
 from groundstation.bus.topics import RANGE
-from groundstation.errors import SettingsError
 from groundstation.geometry.multilateration import fix_from_ranges, likely_in
 from groundstation.time_units import NS_PER_MS
 
@@ -21,11 +18,7 @@ _POLL_S = 0.02
 
 def run(child: HostProcess) -> int:
     """Serve one system until a stop is requested; returns the exit code."""
-    try:
-        settings = RangingSection.model_validate_json(child.section)
-    except ValidationError as error:
-        problems = [f"ranging: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
-        raise SettingsError(problems) from None
+    settings = read_sensor_section(RangingSection, child.section, "ranging")
     gateway = Gateway(*parse_source(settings.source))
     try:
         driver = RangingDriver(child, settings, gateway)

@@ -2,21 +2,12 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
 from drivers.motion_capture.settings import parse_source
-from groundstation.settings.values import HostName, Interval, Name, OnVehicle, SettingsSection, Vector3
+from groundstation.settings.values import HostName, Interval, Name, OnVehicle, SettingsSection, Vector3, read_by
 
 Heading = Annotated[float, Field(ge=-180, le=180)]
-
-
-def _is_system(value: str) -> str:
-    try:
-        parse_source(value)
-    except ValueError as error:
-        raise PydanticCustomError("source", "{why}", {"why": str(error)}) from None
-    return value
 
 
 class RigidBodySettings(SettingsSection):
@@ -44,7 +35,7 @@ class VolumeSettings(SettingsSection):
 class MotionCaptureSettings(SettingsSection):
     """A motion capture system: a sensor that is fixed in the world, as cameras are."""
 
-    source: Annotated[str, AfterValidator(_is_system)]
+    source: Annotated[str, read_by(parse_source)]
     """Where it listens: natnet:// (OptiTrack's Motive), vicon://, qualisys:// or vrpn:// with its host; or ros2:// with
     the host of a ROS 2 Zenoh router and a path, for topics /PATH/BODY/pose; or the scheme of an installed plug-in
     (entry point `skein.world_sensors`)."""

@@ -2,20 +2,11 @@
 
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
 from drivers.ranging.settings import parse_source
 from groundstation.settings.motion_capture import VolumeSettings
-from groundstation.settings.values import HostName, Name, OnVehicle, SettingsSection, Vector3
-
-
-def _is_gateway(value: str) -> str:
-    try:
-        parse_source(value)
-    except ValueError as error:
-        raise PydanticCustomError("source", "{why}", {"why": str(error)}) from None
-    return value
+from groundstation.settings.values import HostName, Name, OnVehicle, SettingsSection, Vector3, read_by
 
 
 class TransponderSettings(SettingsSection):
@@ -30,7 +21,7 @@ class TransponderSettings(SettingsSection):
 class RangingSettings(SettingsSection):
     """A ranging system: a sensor that is fixed in the world, as cameras are, and observes drones only."""
 
-    source: Annotated[str, AfterValidator(_is_gateway)]
+    source: Annotated[str, read_by(parse_source)]
     """The gateway that is asked for ranges: ranges://192.168.1.6:7417, a program that speaks the datagrams of
     docs/reference/ranges.md 2 for the radios at hand."""
     host: HostName = ""

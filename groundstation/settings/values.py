@@ -1,5 +1,6 @@
 """Kinds of values that a field file is made of, and the base of its sections."""
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
@@ -38,12 +39,17 @@ def _rising(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-def _is_source(value: str) -> str:
-    try:
-        parse_source(value)
-    except ValueError as error:
-        raise PydanticCustomError("source", "{why}", {"why": str(error)}) from None
-    return value
+def read_by(parse: Callable[[str], object]) -> AfterValidator:
+    """Return a check that an address can be read, by a function that raises ValueError with the reason."""
+
+    def check(value: str) -> str:
+        try:
+            parse(value)
+        except ValueError as error:
+            raise PydanticCustomError("source", "{why}", {"why": str(error)}) from None
+        return value
+
+    return AfterValidator(check)
 
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
@@ -57,5 +63,5 @@ VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
 # Only the driver gets the password, from the attribute: a field that is written, recorded or shown is a dump.
-Source = Annotated[str, AfterValidator(_is_source), PlainSerializer(without_password)]
+Source = Annotated[str, read_by(parse_source), PlainSerializer(without_password)]
 AddressOrNone = Annotated[str, AfterValidator(lambda value: value and is_address(value))]

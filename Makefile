@@ -39,7 +39,7 @@ test-waiting: $(STAMP)-test
 
 test-computing: $(STAMP)-test
 	@mkdir -p $(COMPUTING) && code=0; \
-	COVERAGE_DATA=$(word 2,$(COVERAGE)) nice $(PYTEST) -m "not slow" -o cache_dir=$(COMPUTING) \
+	COVERAGE_DATA=$(word 2,$(COVERAGE)) .ci/background $(PYTEST) -m "not slow" -o cache_dir=$(COMPUTING) \
 		$(addprefix --ignore=,$(WAITING)) tests >$(COMPUTING)/log 2>&1 || code=$$?; \
 	cat $(COMPUTING)/log; exit $$code
 
@@ -55,7 +55,7 @@ slow-flights: $(STAMP)-test-slow
 
 slow-studies: $(STAMP)-test-slow
 	@mkdir -p $(STUDIES) && code=0; \
-	nice -n 15 $(PYTEST) -m "study and not exhaustive" --timeout 1800 -o cache_dir=$(STUDIES) tests \
+	.ci/background $(PYTEST) -m "study and not exhaustive" --timeout 1800 -o cache_dir=$(STUDIES) tests \
 		>$(STUDIES)/log 2>&1 || code=$$?; \
 	cat $(STUDIES)/log; exit $$code
 
@@ -67,7 +67,7 @@ test-exhaustive: $(STAMP)-test-slow
 test-firmware: $(STAMP)-test-slow
 	$(PYTEST) -m firmware --timeout 900 tests
 
-# Damaged inputs for every decoder: COUNT of each (test-slow: 100 000). DECODER=navdata, at, pave, ... takes one.
+# Damaged inputs for every decoder: COUNT of each (test-slow: 100 000; field files 20 000). DECODER=navdata, at, pave, ... takes one.
 fuzz: $(STAMP)-test
 	FUZZ_INPUTS=$(or $(COUNT),1000000) nice $(PYTEST) -m fuzz --timeout 7200 -k "many_damaged $(if $(DECODER),and $(DECODER))" tests/property
 

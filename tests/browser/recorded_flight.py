@@ -37,15 +37,22 @@ def start_recorder(endpoint: str, folder: Path) -> "subprocess.Popen[bytes]":
     return process
 
 
+def _until_it_records(path: Path) -> None:
+    """Wait until the file has grown by what was heard: a recording that began with the gust would always show it."""
+    deadline = time.monotonic() + 30
+    sizes: set[int] = set()
+    while len(sizes) < 3:
+        assert time.monotonic() < deadline, "the recorder does not start"
+        time.sleep(0.05)
+        if path.exists():
+            sizes.add(path.stat().st_size)
+
+
 def record(flight: FakeFlight, page: Any, folder: Path, seconds: float) -> Recorded:
     """Record a flight to its end; the page looks on live."""
     recorder = start_recorder(flight.endpoint, folder)
     try:
-        deadline = time.monotonic() + 20
-        while not (folder / "state.mcap").exists():
-            assert time.monotonic() < deadline, "the recorder does not start"
-            time.sleep(0.05)
-        page.page.wait_for_timeout(500)
+        _until_it_records(folder / "state.mcap")
         flight.event(m.Severity.WARNING, "a gust", "drone_1", "wait")
         page.there("hold").click()
         page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")

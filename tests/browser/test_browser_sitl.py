@@ -68,7 +68,7 @@ def test_land_all_reaches_the_emulated_drones(live: runtime_file.RuntimeRecord, 
         page.wait(lambda s: {"drone_1", "drone_2"} <= set(s["ellipses"]), 60.0)
         # Both carry their own camera, whose H.264 reaches the page as the JPEGs that its driver makes of it.
         for camera in ("ceiling", "drone_1_camera", "drone_2_camera"):
-            page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden", timeout=30_000)
+            page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden", timeout=60_000)
         page.page.wait_for_timeout(1500)
         page.shot("sitl_flying")
         _hold_by_tablet(open_page)

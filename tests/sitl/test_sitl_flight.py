@@ -38,7 +38,7 @@ def test_short_flight_lands_and_leaves_nothing(sitl: Start) -> None:
 
 
 @FAULTS
-def test_other_shells_hold_and_land_a_run_that_had_to_take_other_ports(sitl: Start) -> None:
+def test_other_shells_hold_resume_and_land_a_run_that_had_to_take_other_ports(sitl: Start) -> None:
     with ExitStack() as others:
         router = others.enter_context(
             socket.create_server(("::", 0), family=socket.AF_INET6, dualstack_ipv6=True)
@@ -51,23 +51,18 @@ def test_other_shells_hold_and_land_a_run_that_had_to_take_other_ports(sitl: Sta
         assert not run.record.endpoint.endswith(f":{router}")
         state = cli("monitor", "--run", name, "--json")
         assert set(json.loads(state.stdout)["vehicles"]) == set(run.record.drones), state.stderr
-        for verb in ("hold", "land"):
+        for verb in ("hold", "resume", "land"):
             result = cli(verb, "--run", name, "--json")
             assert result.returncode == 0, result.stdout + result.stderr
             answers = json.loads(result.stdout)
-            assert answers["confirmed"] and set(answers["drones"]) == set(run.record.drones)
+            assert answers["confirmed"]
+            assert verb == "resume" or set(answers["drones"]) == set(run.record.drones)
+            if verb == "hold":
+                run.until(lambda: all(run.mode(drone) == "HOLD" for drone in run.record.drones), 2, "all in HOLD")
+            elif verb == "resume":
+                run.until_tracking(5)
         run.until_landed(5)
         assert run.wait(30) == 0
-
-
-@FAULTS
-def test_hold_stops_the_motion_and_resume_goes_on(sitl: Start) -> None:
-    run = sitl()
-    run.until_tracking()
-    assert cli("hold", "--run", run.record.name).returncode == 0
-    run.until(lambda: all(run.mode(name) == "HOLD" for name in run.record.drones), 2, "all in HOLD")
-    assert cli("resume", "--run", run.record.name).returncode == 0
-    run.until_tracking(5)
 
 
 @FAULTS
@@ -97,11 +92,13 @@ def test_second_ctrl_c_stops_at_once_but_for_the_guardian(sitl: Start) -> None:
 
 
 @FAULTS
+@pytest.mark.timeout(600)
 def test_two_runs_at_once(sitl: Start) -> None:
+    """More than two cores can do in time: they start slowly."""
     first, second = sitl(), sitl()
     assert first.record.endpoint != second.record.endpoint
-    first.until_tracking(120)
-    second.until_tracking(120)
+    first.until_tracking(200)
+    second.until_tracking(200)
     assert "several ground stations" in cli("land").stderr
     for run in (first, second):
         assert cli("land", "--run", run.record.name).returncode == 0

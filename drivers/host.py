@@ -30,6 +30,7 @@ from groundstation.time_units import NS_PER_S
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS = 200_000_000
 _FLUSH_PERIOD_NS = 100_000_000
+_FLOOD_NS = 10_000_000
 _UNANSWERED_NS = 5_000_000_000
 _UNCONFIGURED_NS = 15_000_000_000
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
@@ -61,7 +62,7 @@ class VehicleHost:
         self._leases = self._bus.subscribe([LEASE], capacity=64)
         self._ignored: Counter[str] = Counter()
         self._started_ns = clock.now_ns()
-        self._next_status_ns = self._next_flush_ns = 0
+        self._next_status_ns = self._next_flush_ns = self._turned_ns = 0
         self._heard_ns = self._unconfigured_ns = self._started_ns
         self._announced = (self.watchdog.mode, self.watchdog.reason)
         self._silent = False
@@ -74,17 +75,21 @@ class VehicleHost:
         self._localised_ns: int | None = None
         self._intrusions = Refusals(_INTRUSIONS)
 
-    def call_on_orders(self, wake: Callable[[], None]) -> None:
-        """Have a function called, on the network's thread, whenever a setpoint or command arrives."""
-        self._setpoints.on_arrival = self._commands.on_arrival = wake
+    def call_on_commands(self, wake: Callable[[], None]) -> None:
+        """Have a function called, on the network's thread, whenever a command arrives."""
+        self._commands.on_arrival = wake
 
-    @property
-    def has_orders(self) -> bool:
-        """Whether a setpoint or command waits for the next turn."""
-        return self._setpoints.waiting or self._commands.waiting
+    def call_on_setpoints(self, wake: Callable[[], None]) -> None:
+        """Have a function called, on the network's thread, whenever a setpoint arrives."""
+        self._setpoints.on_arrival = wake
+
+    def is_due(self, now_ns: int) -> bool:
+        """Whether a setpoint or command cannot wait for the next turn; a flood of commands waits a little."""
+        return self._setpoints.waiting or (self._commands.waiting and now_ns - self._turned_ns >= _FLOOD_NS)
 
     def turn(self, now_ns: int) -> WatchdogDecision:
         """Run one cycle: orders, decision, command to the vehicle, reports."""
+        self._turned_ns = now_ns
         for received in self._leases.drain():
             if isinstance(received.message, Lease):
                 self._count("lease", self.watchdog.accept_lease(now_ns, received.message))
@@ -260,12 +265,14 @@ def run_hosts(
     rate_hz: float = RATE_HZ,
     before: Callable[[int], None] = lambda now_ns: None,
 ) -> int:
-    """Turn all hosts at the sender's rate until each is finished; returns the exit code 0.
+    """Turn all hosts at the sender's rate, and at once on a command, until each is finished; returns the exit code 0.
 
     before: what the vehicles of one link share, done ahead of each turn.
     """
     period_ns = round(1e9 / rate_hz)
     overruns = 0
+    for host in hosts:
+        host.call_on_commands(child.wake)
     deadline_ns = clock.now_ns()
     for tick in itertools.count(1):
         now_ns = clock.now_ns()
@@ -287,8 +294,8 @@ def run_hosts(
 
 
 def sleep_serving(child: HostProcess, hosts: Sequence[VehicleHost], deadline_ns: int) -> None:
-    """Sleep until the next turn; a host that has `child.wake` called on orders turns at once when one arrives."""
+    """Sleep until the next turn; a host whose orders call `child.wake` turns at once when one arrives."""
     while child.sleep_until(deadline_ns) and clock.now_ns() < deadline_ns:
         for host in hosts:
-            if host.has_orders:
-                host.turn(clock.now_ns())
+            if host.is_due(now_ns := clock.now_ns()):
+                host.turn(now_ns)

@@ -118,10 +118,10 @@ def share_interpreter(settings: MavlinkDriverSettings) -> None:
 
 
 def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) -> Sequence[VehicleHost]:
-    """Return a host, with its own watchdog, for each vehicle; orders wake the process."""
+    """Return a host, with its own watchdog, for each vehicle; its setpoints wake the process."""
     hosts = [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v)) for v in settings.vehicles]
     for host in hosts:
-        host.call_on_orders(child.wake)
+        host.call_on_setpoints(child.wake)
     return hosts
 
 

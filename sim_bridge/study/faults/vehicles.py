@@ -129,5 +129,5 @@ class Drivers:
             if due:
                 fleet.turn(now_ns)
             for host in hosts:
-                if due or host.has_orders:
+                if due or host.is_due(now_ns):
                     self.decisions[host.vehicle.name] = host.turn(now_ns)

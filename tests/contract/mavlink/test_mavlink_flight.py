@@ -88,7 +88,7 @@ def test_a_setpoint_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
     rig.track_on()
     rig.run(0.1)
     woken, came_ns, next_turn_ns = [], rig.hand.now + 52_000_000, rig.hand.now + 10 * S
-    rig.host.call_on_orders(lambda: woken.append(rig.hand.now))
+    rig.host.call_on_setpoints(lambda: woken.append(rig.hand.now))
 
     def sleep_until(deadline_ns):
         rig.hand.now = came_ns if not woken else deadline_ns

@@ -93,7 +93,7 @@ def _hold_by_tablet(open_page: Any) -> None:
     assert "code=" not in tablet.page.url, "nobody reads it from the tablet's screen later"
     assert all(tablet.there(name).is_disabled() for name in ("take-off", "track", "resume"))
     tablet.there("hold").tap()
-    tablet.wait(lambda s: any(o["verb"] == "HOLD" and o["state"] == "confirmed" for o in s["orders"]), 10.0)
+    tablet.wait(lambda s: any(o["verb"] == "HOLD" and o["state"] == "confirmed" for o in s["orders"]), 30.0)
     tablet.shot("sitl_tablet")
     assert not tablet.troubles, tablet.troubles
     stranger = tablet.page.context.browser.new_context(**_TABLET)

@@ -49,6 +49,7 @@ def test_killed_recorder_and_camera_come_back_while_the_drones_track(sitl: Start
     assert not open_recording(run.run_dir / "state-2.mcap").damage
 
 
+@pytest.mark.exhaustive
 def test_killed_renderer_ends_or_heals_but_never_hides(sitl: Start) -> None:
     run = sitl()
     run.until_tracking()

@@ -26,7 +26,7 @@ GENTLE_M_S2 = 0.3
 DURATION_S, OUTLIERS = 25.0, 0.02
 # So many flights; the interval of few is wide.
 MANY = 50
-FLIGHTS = [pytest.param(8, id="8"), pytest.param(MANY, id="50", marks=pytest.mark.exhaustive)]
+FLIGHTS = [pytest.param(16, id="16"), pytest.param(MANY, id="50", marks=pytest.mark.exhaustive)]
 LOW, HIGH = 0.8, 1.3
 Reports = list[dict[str, Any]]
 

@@ -93,6 +93,7 @@ def test_too_few_pictures_are_refused():
 
 @pytest.mark.slow
 @pytest.mark.study
+@pytest.mark.exhaustive
 @pytest.mark.timeout(400)
 def test_the_command_judges(tmp_path):
     command = [sys.executable, "-m", "groundstation.cli.main", "bench", "vision", "--pictures", "8", "--json"]

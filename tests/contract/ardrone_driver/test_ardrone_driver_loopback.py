@@ -235,7 +235,8 @@ def test_a_stop_is_obeyed_when_it_comes_and_a_flood_of_orders_sends_no_flood(rig
 
 def test_a_command_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
     rig.take_off()
-    woken, slept = [], []
+    woken: list[int] = []
+    slept: list[int] = []
     rig.process.wake = lambda: woken.append(len(slept))
 
     def sleep_until(deadline_ns):

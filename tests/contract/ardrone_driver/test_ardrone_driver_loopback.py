@@ -223,37 +223,6 @@ def test_stopping_lands_first_and_then_ends(rig):
     assert rig.messages(VEHICLE_STATUS)[-1].mode == "LANDED"
 
 
-def test_a_stop_is_obeyed_when_it_comes_and_a_flood_of_orders_sends_no_flood(rig):
-    rig.take_off()
-    now_ns = rig.host._turned_ns
-    rig.order(Verb.HOLD)
-    assert not rig.host.is_due(now_ns + 9_000_000)
-    assert rig.host.is_due(now_ns + 10_000_000)
-    rig.until(lambda: rig.decision.mode == "HOLD")
-    assert not rig.host.is_due(now_ns + S)
-
-
-def test_a_command_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
-    rig.take_off()
-    woken: list[int] = []
-    slept: list[int] = []
-    rig.process.wake = lambda: woken.append(len(slept))
-
-    def sleep_until(deadline_ns):
-        slept.append(deadline_ns)
-        if len(slept) == 2:
-            raise InterruptedError
-        time.sleep(0.011)
-        rig.order(Verb.HOLD)
-        return True
-
-    rig.process.sleep_until = sleep_until
-    with pytest.raises(InterruptedError):
-        run_hosts(rig.process, [rig.host], rate_hz=1.0)
-    assert woken == [1] and slept[0] == slept[1], "the turn that was due has not come yet"
-    assert rig.host.watchdog.mode == "HOLD"
-
-
 def test_a_drone_that_never_answers_is_named_after_5_s(rig):
     rig.speaking = False
     now = time.monotonic_ns()

@@ -19,10 +19,10 @@ from groundstation.estimation.models import (
     RangeSensor,
 )
 from groundstation.estimation.models.odometry_robot import AERIAL
-from groundstation.estimation.ranged_robot import RangedRobot, range_sensor
+from groundstation.estimation.ranged_robot import RangedRobot
 from groundstation.field.drones import FieldDrone, OnboardCamera
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import MotionCapture, Ranging, WorldCamera, anchor_entity
+from groundstation.field.room import MotionCapture, Ranging, WorldCamera, ranging_link
 from groundstation.field.targets import Target
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
@@ -91,8 +91,10 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
     }
     cameras |= {name: _capture(name, system) for name, system in resolved.sensing_capture.items()}
     for name, system in resolved.ranging.items():
-        entities |= {anchor_entity(name, one): Anchor(at, system.bias_std_m) for one, at in system.anchors.items()}
-        cameras |= _ranges(name, system, drones)
+        for link, (anchor, drone) in _links(name, system, drones).items():
+            place_m = system.transponder(drone).position_m
+            entities[link] = Anchor(system.anchors[anchor], system.bias_std_m)
+            cameras[link] = RangeSensor(link, place_m, system.reach_m, RANGE_STAMP_STD_S)
     cameras |= {name: _onboard_camera(name, drone.camera) for name, drone in drones.items()}
     return EstimatorParameters(
         entities,
@@ -176,15 +178,9 @@ def _capture(name: str, system: MotionCapture) -> MountedCamera:
     )
 
 
-def _ranges(name: str, system: Ranging, drones: Mapping[str, FieldDrone]) -> dict[str, ObservationModel]:
-    """Return a sensor for each pair of an anchor and a drone."""
-    return {
-        range_sensor(name, anchor, drone): RangeSensor(
-            anchor_entity(name, anchor), system.transponder(drone).position_m, system.reach_m, RANGE_STAMP_STD_S
-        )
-        for anchor in system.anchors
-        for drone in drones
-    }
+def _links(name: str, system: Ranging, drones: Mapping[str, FieldDrone]) -> dict[str, tuple[str, str]]:
+    """Return the pairs of an anchor and a drone, by their names."""
+    return {ranging_link(name, anchor, drone): (anchor, drone) for anchor in system.anchors for drone in drones}
 
 
 def _ranged(system: Ranging, drones: Mapping[str, FieldDrone]) -> dict[str, RangedRobot]:

@@ -17,7 +17,8 @@ from groundstation.bus.notice import Notice
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import SensorReading
-from groundstation.estimation.ranged_robot import RangedRobot, range_sensor
+from groundstation.estimation.ranged_robot import RangedRobot
+from groundstation.field.room import ranging_link
 from groundstation.geometry.rotations import rotation_z
 from groundstation.time_units import NS_PER_S
 
@@ -80,7 +81,7 @@ class RangeIntake:
             return Verdict.ACCEPTED
         refusals, variance = [], message.std_m**2
         for anchor, range_m in message.ranges_m.items():
-            sensor = range_sensor(message.observer, anchor, message.subject)
+            sensor = ranging_link(message.observer, anchor, message.subject)
             reading = SensorReading(stamp_ns, sensor, message.subject, (range_m,), (variance,))
             tie = f"{key}#{message.subject}#{anchor}#{message.header.seq}"
             refusal = self._filter.add_observation(reading, tie, now_ns)

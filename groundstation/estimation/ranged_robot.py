@@ -1,9 +1,8 @@
-"""What the estimator knows of a robot with a transponder, and how it calls its ranges."""
+"""What the estimator knows of a robot with a transponder."""
 
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Vector3
-from groundstation.field.room import anchor_entity
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +16,3 @@ class RangedRobot:
     pad_yaw_rad: float
     pad_yaw_std_rad: float
     yaw_drift: float
-
-
-def range_sensor(system: str, anchor: str, robot: str) -> str:
-    """Return the filter's name of the sensor between an anchor and a robot's transponder."""
-    return f"{anchor_entity(system, anchor)}/{robot}"

@@ -14,7 +14,7 @@ from groundstation.field.behaviour import (
     SafetyValues,
 )
 from groundstation.field.drones import FieldDrone, camera_name, gathered
-from groundstation.field.room import LensCalibration, MotionCapture, Ranging, Room, Volume, WorldCamera, anchor_entity
+from groundstation.field.room import LensCalibration, MotionCapture, Ranging, Room, Volume, WorldCamera, ranging_link
 from groundstation.field.targets import SingleTarget, Target, WeightedTarget
 
 
@@ -55,9 +55,14 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return boxes | {name: one.volume_m for name, one in self.ranging.items()}
 
     @property
-    def anchor_systems(self) -> dict[str, str]:
-        """Return the ranging system of each anchor, by the estimator's name of it."""
-        return {anchor_entity(name, anchor): name for name, one in self.ranging.items() for anchor in one.anchors}
+    def ranging_links(self) -> dict[str, str]:
+        """Return the ranging system of each pair of an anchor and a robot, by the estimator's name of the pair."""
+        return {
+            ranging_link(name, anchor, robot): name
+            for name, system in self.ranging.items()
+            for anchor in system.anchors
+            for robot in self.drones
+        }
 
     @property
     def world_sensors(self) -> tuple[str, ...]:

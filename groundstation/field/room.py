@@ -124,9 +124,9 @@ class Ranging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         return self.transponders.get(robot, Transponder())
 
 
-def anchor_entity(system: str, anchor: str) -> str:
-    """Return the name by which the estimator, and what became of its ranges, knows an anchor."""
-    return f"{system}_{anchor}"
+def ranging_link(system: str, anchor: str, robot: str) -> str:
+    """Return the name by which the estimator knows the ranges between an anchor and a robot, and their bias."""
+    return f"{system}_{anchor}_{robot}"
 
 
 class MotionCapture(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -136,7 +136,7 @@ def _shift(camera: str, what: str, errors: Sequence[float], std: float) -> Surve
 def _links(data: RunData) -> list[LinkForecast]:
     start_s, end_s = tracking_interval(data) or (0.0, data.end_s)
     seen: defaultdict[tuple[str, str], list[float]] = defaultdict(list)
-    systems = data.resolved.anchor_systems  # plans count on all its anchors together
+    systems = data.resolved.ranging_links  # plans count on all its anchors together
     for item in data.innovations:
         observer = systems.get(item.message.observer, item.message.observer)
         seen[observer, item.message.subject].append(item.time_s)

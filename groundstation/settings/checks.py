@@ -7,7 +7,7 @@ from itertools import combinations
 
 from drivers.camera.settings import parse_source
 from groundstation.errors import without_password
-from groundstation.field.room import anchor_entity
+from groundstation.field.room import ranging_link
 from groundstation.settings.adapter_checks import findings_of_adapters
 from groundstation.settings.behaviour import Bus, EstimatorSettings, PlannerSettings, SafetySettings
 from groundstation.settings.document import KeyPath
@@ -225,7 +225,11 @@ def _names(parts: Parts) -> Iterator[Finding]:
     named += [(("motion_capture", name), name) for name in parts.motion_capture]
     for name, system in parts.ranging.items():
         named.append((("ranging", name), name))
-        named += [(("ranging", name, "anchors", one), anchor_entity(name, one)) for one in system.anchors]
+        named += [
+            (("ranging", name, "anchors", one), ranging_link(name, one, drone))
+            for one in system.anchors
+            for drone in parts.drones
+        ]
     if parts.target is not None:
         named.append((("target", "name"), parts.target.name))
     named += [(("targets", name), name) for name in parts.targets]

@@ -1,7 +1,7 @@
-"""Ranges to anchors fixed in the world: z = |transponder - anchor| + range_bias, the bias a state of the anchor.
+"""Ranges to anchors fixed in the world: z = |transponder - anchor| + range_bias, the bias a state of the pair.
 
-An anchor's error (its survey, its antenna's delay, a reflection that lasts) is the same in every range for seconds: as
-a state it does not average out, and what all robots' ranges tell of it is kept.
+What a pair of an anchor and a robot errs by (survey, delays of both antennas, a reflection that lasts) is the same in
+its ranges for seconds: as a state it does not average out.
 """
 
 import math
@@ -78,7 +78,7 @@ def prepare_range(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector,
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
-    """A radio at a surveyed place [m; world] whose ranges are off by a bias that lasts."""
+    """A radio at a surveyed place [m; world] as one robot hears it: its ranges are off by a bias that lasts."""
 
     kind: ClassVar[EntityKind] = EntityKind.LANDMARK
     labels: ClassVar[tuple[str, ...]] = ("range_bias",)

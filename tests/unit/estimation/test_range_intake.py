@@ -13,8 +13,8 @@ from groundstation.estimation.ingest import Intake
 from groundstation.estimation.models import Anchor, OdometryRobot, RangeSensor
 from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.parameters import EstimatorParameters
-from groundstation.estimation.ranged_robot import RangedRobot, range_sensor
-from groundstation.field.room import anchor_entity
+from groundstation.estimation.ranged_robot import RangedRobot
+from groundstation.field.room import ranging_link
 from groundstation.geometry.rotations import rotation_z
 
 MS = 1_000_000
@@ -36,8 +36,9 @@ class Desk:
     def __init__(self) -> None:
         robot = RangedRobot(RADIO, PAD_YAW, math.radians(10), math.radians(1))
         entities: dict[str, MotionModel] = {"drone": OdometryRobot(), "other": OdometryRobot()}
-        entities |= {anchor_entity("uwb", name): Anchor(place) for name, place in PLACES.items()}
-        sensors = {range_sensor("uwb", n, "drone"): RangeSensor(anchor_entity("uwb", n), RADIO, 9.0) for n in PLACES}
+        links = {ranging_link("uwb", name, "drone"): place for name, place in PLACES.items()}
+        entities |= {link: Anchor(place) for link, place in links.items()}
+        sensors = {link: RangeSensor(link, RADIO, 9.0) for link in links}
         self.filter = FixedLagFilter(EstimatorParameters(entities, sensors, ranging={"uwb": {"drone": robot}}))
         self.intake, self.seq, self.now = Intake(self.filter, sensors, "here"), 0, START
         self.rng = np.random.default_rng(2)
@@ -161,7 +162,7 @@ def test_a_reflection_moves_nobody(desk: Desk) -> None:
     desk.take(msgspec.structs.replace(told, ranges_m=told.ranges_m | {"a": told.ranges_m["a"] + 1.5}))
     desk.filter.advance(desk.now)
     assert math.dist(pose(desk)[:3], before[:3]) < 0.03
-    refused = [one for one in desk.filter.take_corrections() if one.observer == "uwb_a"][-1]
+    refused = [one for one in desk.filter.take_corrections() if one.observer == "uwb_a_drone"][-1]
     assert refused.verdict is Verdict.IMPLAUSIBLE and refused.nis is not None and refused.nis > 50.0
 
 

@@ -33,7 +33,7 @@ FIELD = Path(__file__).parents[3] / "config" / "uwb-lab.yaml"
         ("ranging.uwb.transponders.ghost={}", "ghost is no drone of the field"),
         ("ranging.uwb.transponders={drone_1: {name: a}, drone_2: {name: a}}", "the transponder's name a is already"),
         ("truth.from=uwb", "truth.from: must name a motion capture system of the field"),
-        ("target.name=uwb_a1", "the name uwb_a1 is already"),
+        ("target.name=uwb_a1_drone_1", "the name uwb_a1_drone_1 is already"),
         ("ranging.uwb.host=uwb", "must not be called as a device of the field"),
     ],
 )
@@ -57,10 +57,10 @@ def test_a_field_may_be_rooted_in_it_and_its_driver_gets_its_part(tmp_path: Path
     assert [one.host for one in driver_sections(field) if one.name == "uwb"] == [""]
 
 
-def test_the_estimator_has_anchors_and_a_sensor_for_each_pair() -> None:
+def test_the_estimator_has_a_bias_and_a_sensor_for_each_pair() -> None:
     parameters = parameters_from_field(resolved_field(load_field(FIELD)))
     anchors = {name: one for name, one in parameters.entities.items() if isinstance(one, Anchor)}
-    assert anchors["uwb_a5"].place_m == (0.0, -2.9, 0.2) and len(anchors) == 6
+    assert anchors["uwb_a5_drone_1"].place_m == (0.0, -2.9, 0.2) and len(anchors) == 12
     sensors = [one for one in parameters.sensors.values() if isinstance(one, RangeSensor)]
     assert len(sensors) == 12 and {one.transponder_m for one in sensors} == {(-0.05, 0.0, 0.05)}
     assert parameters.ranging["uwb"]["drone_2"].pad_yaw_rad == pytest.approx(math.radians(48))

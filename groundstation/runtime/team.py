@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
@@ -20,6 +21,17 @@ _ON_GROUND = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 _UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
 # The marker of a standing drone that no camera saw there.
 _STANDING_M = 0.1
+
+
+class TeamPhase(StrEnum):
+    """What the team is asked to do."""
+
+    GROUND = "GROUND"
+    TAKING_OFF = "TAKING_OFF"
+    UP = "UP"
+    TRACKING = "TRACKING"
+    HELD = "HELD"
+    LANDING = "LANDING"
 
 
 @dataclass(slots=True)

@@ -16,6 +16,7 @@ from groundstation.bus.messages.belief import (
     Verdict,
 )
 from groundstation.bus.messages.flight import (
+    OPERATOR,
     STOP_LIVES_NS,
     AckStage,
     Command,
@@ -44,6 +45,7 @@ from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthSt
 
 __all__ = [
     "RUN",
+    "OPERATOR",
     "STOP_LIVES_NS",
     "AckStage",
     "Alternative",

@@ -80,9 +80,18 @@ class Verb(StrEnum):
     CUT_MOTORS = "CUT_MOTORS"
     """Stop the motors at once: the drone falls."""
 
+    @property
+    def stops(self) -> bool:
+        """Whether everybody may give it, and drivers obey at once."""
+        return self in (Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS)
+
 
 STOP_LIVES_NS = 30_000_000_000
 """Whoever repeats a stop gives up before that: an older one is the ghost of a queue that stood still."""
+
+
+OPERATOR = "operator"
+"""In a command's scope: it asks the run's operator to see to the drones that are named beside it."""
 
 
 class Command(Message, frozen=True, kw_only=True):
@@ -93,7 +102,7 @@ class Command(Message, frozen=True, kw_only=True):
     verb: Verb
     """What to do."""
     scope: tuple[str, ...]
-    """Drones it is meant for; empty: all."""
+    """Drones it is meant for; empty: all; with OPERATOR: drones it is about."""
     issuer: str
     """Process that gave it."""
     expires_ns: int = 0

@@ -5,7 +5,8 @@ import time
 import pytest
 
 from drivers.host import run_hosts
-from groundstation.bus.messages import Verb
+from groundstation.bus.messages import OPERATOR, Command, Verb
+from groundstation.bus.topics import COMMAND
 
 S = 1_000_000_000
 
@@ -39,3 +40,16 @@ def test_a_command_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
         run_hosts(rig.process, [rig.host], rate_hz=1.0)
     assert woken == [1] and slept[0] == slept[1], "the turn that was due has not come yet"
     assert rig.host.watchdog.mode == "HOLD"
+
+
+@pytest.mark.parametrize(("scope", "told"), [((), 1), (("drone_1",), 1), ((OPERATOR, "drone_1"), 0)])
+def test_an_order_without_the_right_to_it_is_told_unless_it_asks_the_operator(rig, scope, told):
+    rig.connect()
+    header = rig.other.header("team")
+    stranger = Command(
+        header=header, id="x", verb=Verb.TAKEOFF, scope=scope, issuer="cli", expires_ns=time.monotonic_ns() + S
+    )
+    rig.other.publish(COMMAND, stranger)
+    rig.turn()
+    assert sum("TAKEOFF of" in text for _, text, _ in rig.process.events) == told
+    assert rig.decision.action == "IDLE"

@@ -22,8 +22,9 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.flight.looking import Looking
 from groundstation.preflight.stand import stand_of
 from groundstation.runtime.before_take_off import BeforeTakeOff
-from groundstation.runtime.operator import Operator, TeamPhase
+from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.runtime.team import TeamPhase
 
 MS = 1_000_000
 

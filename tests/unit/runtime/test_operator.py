@@ -19,8 +19,9 @@ from groundstation.bus.messages import (
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, OBSERVATION, ODOMETRY, VEHICLE_STATUS
 from groundstation.runtime.marker_height import FixedCamera
-from groundstation.runtime.operator import Operator, TeamPhase
+from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.runtime.team import TeamPhase
 
 MS = 1_000_000
 LIMITS = TakeOffLimits(connect_s=5, lift_off_s=15, unseen_s=10)

@@ -4,10 +4,11 @@ import pytest
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import AckStage, Command, CommandAck, FlightState, VehicleStatus, Verb
+from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, FlightState, VehicleStatus, Verb
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, VEHICLE_STATUS
-from groundstation.runtime.operator import OPERATOR, Operator, TeamPhase
+from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.runtime.team import TeamPhase
 
 S = 10**9
 UP, DOWN = FlightState.HOVERING, FlightState.LANDED

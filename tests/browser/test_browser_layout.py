@@ -65,6 +65,20 @@ def test_nothing_is_cut_off(stage: Any, size: tuple[int, int]) -> None:
     page.shot(f"layout_{size[0]}")
 
 
+@pytest.mark.exhaustive
+def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
+    """Half a minute must pass before a drain is believed."""
+    page = stage.open()
+    stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
+    page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
+    assert page.there("battery-lasts").inner_text() == "worst battery"
+    page.page.wait_for_timeout(31_000)
+    stage.flight.battery["drone_2"] = 0.5
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst, 1 min")
+    stage.flight.modes["drone_2"] = "LANDED"
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery")
+
+
 def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     page = stage.open()
     page.wait(lambda s: page.there("team-mode").inner_text() == "TRACK")

@@ -209,6 +209,10 @@ def test_link_telemetry_and_age_colours_at_their_thresholds(stage: Any) -> None:
     stage.flight.drones = ("drone_2",)
     assert becomes(page, "drone_1-heard", "class", "low") == "low"
     assert "stale" in (page.there("card-drone_1").get_attribute("class") or "")
+    page.wait(lambda s: page.there("drone_1-mode").inner_text() == "silent")
+    page.wait(lambda s: page.there("team-mode").inner_text() == "1 NOT HEARD")
+    opacity = "(node) => [...node.children].map((child) => getComputedStyle(child).opacity)"
+    assert set(page.there("card-drone_1").evaluate(opacity)) == {"0.55", "1"}, "its stops go out all the same"
     assert becomes(page, "drone_1-heard", "class", "empty") == "empty"
     assert "stale" not in (page.there("card-drone_2").get_attribute("class") or "")
 

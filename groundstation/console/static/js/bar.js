@@ -1,8 +1,8 @@
 // The bar on top: the team at a glance, how far the run is, and what it would accept.
 
 import { byId, el, seconds, text } from "./dom.js";
-import { oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
-import { ageS, replaying, store } from "./store.js";
+import { minutesLeft, oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
+import { ageS, droneNames, replaying, store } from "./store.js";
 
 const WALL_KEY = "skein-wall", OLD_S = 1, TOO_OLD_S = 4;
 
@@ -19,6 +19,8 @@ export function showBar() {
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();
   show("worst-battery", !battery ? "–" : battery.value === null ? `unknown ${battery.name}` : `${(100 * battery.value).toFixed(0)} % ${battery.name}`, battery?.level);
+  const least = Math.min(...droneNames().map(minutesLeft).filter((minutes) => minutes !== null));
+  text(byId("battery-lasts"), Number.isFinite(least) ? `worst, ${least < 1 ? "< 1" : Math.floor(least)} min` : "worst battery");
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));

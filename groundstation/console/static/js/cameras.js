@@ -31,7 +31,7 @@ const choose = () => watch(document.hidden ? [] : [...visible].sort());
 function feed(name) {
   const canvas = el("canvas", { width: 320, height: 180, role: "img", "aria-label": `Picture of ${name}` });
   const age = el("span", { class: "num" }), veil = el("span", { class: "pill veil", data: { level: "wait" } }, "no picture yet");
-  const root = el("figure", { class: "camera", data: { camera: name, testid: `camera-${name}` } }, canvas, veil, el("figcaption", {}, el("span", {}, name), age));
+  const root = el("figure", { class: "camera", data: { camera: name, testid: `camera-${name}` } }, el("figcaption", {}, el("span", {}, name), age), el("div", { class: "picture" }, canvas, veil));
   feeds.set(name, { root, canvas, age, veil, bitmap: null, stamp: null });
   return root;
 }

@@ -2,7 +2,9 @@
 
 import { ageS, droneNames, estimateAge, isTarget, entities, runOver, store } from "./store.js";
 
-const FRESH_S = 3, RECORDING_SILENT_S = 3;
+const HEARD_S = 1; // as in groundstation/monitor/alarms.py
+const RECORDING_SILENT_S = 3;
+const LEAST_DRAIN = 0.02, LEAST_MIN = 0.5;
 const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
 export const STAGES = ["pre-flight", "take-off", "track", "land", "over"];
 
@@ -13,7 +15,7 @@ export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTa
 
 // The most careful thing that any drone does is what the team does; [words, level].
 export function teamMode() {
-  const all = modes(), lost = statuses().filter((status) => ageS(status.at) > FRESH_S).length;
+  const all = modes(), lost = statuses().filter((status) => ageS(status.at) > HEARD_S).length;
   if (runOver()) return ["RUN OVER", "calm"];
   if (lost) return [`${lost} NOT HEARD`, "bad"];
   if (all.includes("CUT")) return ["CUT", "bad"];
@@ -33,6 +35,20 @@ export function stage() {
   return aloft() ? "track" : store.s.flight?.flown ? "land" : "pre-flight";
 }
 
+// When each drone that is aloft was first heard aloft, and its battery then.
+const tookOff = new Map();
+
+// Minutes until a battery is at the level that lands its drone, at the mean drain of this flight; null: not known yet.
+export function minutesLeft(name) {
+  const status = store.s.vehicles?.[name];
+  if (!status || status.battery === null || !ALOFT.has(status.mode)) { tookOff.delete(name); return null; }
+  const first = tookOff.get(name);
+  if (!first || status.at < first.at || status.battery > first.battery) { tookOff.set(name, { at: status.at, battery: status.battery }); return null; }
+  const minutes = (status.at - first.at) / 60_000, spent = first.battery - status.battery;
+  if (minutes < LEAST_MIN || spent < LEAST_DRAIN) return null;
+  return Math.max(0, (status.battery - leastBattery(name)) * minutes / spent);
+}
+
 // The least battery, and whose it is; null where a drone does not say.
 export function worstBattery() {
   const known = droneNames().map((name) => [name, store.s.vehicles?.[name]?.battery]);
@@ -43,9 +59,11 @@ export function worstBattery() {
   return { name, value, level: batteryLevel(name, value) };
 }
 
+const leastBattery = (name) => store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15;
+
 // Thresholds of the bar and of the cards: docs/explanation/console.md#thresholds.
 export function batteryLevel(name, value) {
-  const limit = store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15;
+  const limit = leastBattery(name);
   return value < limit + 0.05 ? "bad" : value < limit + 0.15 ? "warn" : "good";
 }
 

@@ -5,7 +5,7 @@ import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
 import { batteryLevel } from "./glance.js";
 import { colourOf } from "./palette.js";
-import { ageS, entity, estimateAge, seenBy, store } from "./store.js";
+import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
 
 const STALE_S = 1;
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
@@ -65,9 +65,10 @@ export function showTeam() {
 
 function showVehicle(name, { root, values, mode, detail }) {
   const status = store.s.vehicles?.[name], age = ageS(status?.at), stale = age > STALE_S || !store.connected;
+  const silent = status && age > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
-  text(mode, status ? status.mode.replace("_", " ").toLowerCase() : "no word yet");
-  mode.dataset.level = !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : LEVELS[status.mode] ?? "wait";
+  text(mode, silent ? "silent" : status ? status.mode.replace("_", " ").toLowerCase() : "no word yet");
+  mode.dataset.level = silent ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : LEVELS[status.mode] ?? "wait";
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";

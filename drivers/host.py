@@ -25,6 +25,7 @@ from groundstation.bus.messages import (
     VelocitySetpoint,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
+from groundstation.process.priority import go_first
 from groundstation.process.refusals import Refusals
 from groundstation.time_units import NS_PER_S
 
@@ -258,6 +259,21 @@ class VehicleHost:
 
     def _event(self, severity: Severity, text: str, remedy: str = "") -> None:
         self._child.event(severity, text, remedy, self.vehicle.name)
+
+
+def fly_one(
+    child: HostProcess,
+    vehicle: Vehicle,
+    limits: WatchdogLimits,
+    rate_hz: float = RATE_HZ,
+    before: Callable[[int], None] = lambda now_ns: None,
+) -> int:
+    """Fly one vehicle until a stop is requested, then close its link; see `run_hosts`."""
+    try:
+        go_first()
+        return run_hosts(child, [VehicleHost(child, vehicle, limits)], rate_hz, before)
+    finally:
+        vehicle.close()
 
 
 def run_hosts(

@@ -26,7 +26,7 @@ from drivers.ardrone.wire.options import DEMO, SPEED_REFERENCES
 from drivers.ardrone.wire.state import StateBit, bit_names
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
-from drivers.host import VehicleHost, run_hosts
+from drivers.host import fly_one
 from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor
@@ -36,7 +36,6 @@ from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
-from groundstation.process.priority import go_first
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
@@ -264,8 +263,4 @@ def run(child: HostProcess) -> int:
         for notice in drone.news():
             child.event(notice.severity, f"{drone.name}: {notice.text}", notice.remedy, drone.name)
 
-    try:
-        go_first()
-        return run_hosts(child, [VehicleHost(child, drone, settings.authority)], RATE_HZ, tell)
-    finally:
-        drone.close()
+    return fly_one(child, drone, settings.authority, RATE_HZ, tell)

@@ -5,7 +5,7 @@ from collections import Counter
 
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
-from drivers.host import VehicleHost, run_hosts
+from drivers.host import fly_one
 from drivers.plausibility.health import Health
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
@@ -22,7 +22,6 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Odometry, Vector3
 from groundstation.bus.topics import ODOMETRY
-from groundstation.process.priority import go_first
 from groundstation.time_units import NS_PER_S
 
 RATE_HZ = 20.0
@@ -184,9 +183,4 @@ def recorded(name: str, payload: bytes) -> bytes:
 def run(child: HostProcess) -> int:
     """Fly one vehicle until a stop is requested; the process entry."""
     settings = read_section(Ros2DriverSettings, child.section)
-    flown = Ros2Vehicle(settings, child.bus)
-    try:
-        go_first()
-        return run_hosts(child, [VehicleHost(child, flown, settings.authority)], RATE_HZ)
-    finally:
-        flown.close()
+    return fly_one(child, Ros2Vehicle(settings, child.bus), settings.authority, RATE_HZ)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from drivers.base import HostProcess, LinkHealth
 from drivers.datagrams import DatagramLog
-from drivers.host import VehicleHost, run_hosts
+from drivers.host import fly_one
 from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
@@ -24,7 +24,6 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Odometry, Vector3
 from groundstation.bus.topics import ODOMETRY
-from groundstation.process.priority import go_first
 
 RATE_HZ = 20.0
 _FRESH_NS = 300_000_000
@@ -225,9 +224,4 @@ class Tello:
 def run(child: HostProcess) -> int:
     """Fly one Tello until a stop is requested; the process entry."""
     settings = read_section(TelloDriverSettings, child.section)
-    tello = Tello(settings, child.bus)
-    try:
-        go_first()
-        return run_hosts(child, [VehicleHost(child, tello, settings.authority)], RATE_HZ)
-    finally:
-        tello.close()
+    return fly_one(child, Tello(settings, child.bus), settings.authority, RATE_HZ)

@@ -24,16 +24,17 @@ from groundstation.errors import GroundStationError
 
 _log = logging.getLogger(__name__)
 
-# Setpoints and sensor samples are small and late when batched; express sends each at once (docs/reference/zenoh.md 3).
+# Set-points go out at once, each in a batch of its own (express; docs/reference/zenoh.md 3).
+# Sensor samples share a batch with what waits: an idle link sends them as soon, and after a stall of the router a batch
+# takes all of them, where single batches run out at 16 and the recorder lost what the tracker had got.
 _PRIORITY = {
     Quality.CONTROL: ("REAL_TIME", True),
-    Quality.SENSOR: ("DATA_HIGH", True),
+    Quality.SENSOR: ("DATA_HIGH", False),
     Quality.STATE: ("DATA", False),
     Quality.BULK: ("DATA_LOW", False),
 }
-# Batches that wait for a link before what follows is dropped; 2 by default. An express message is a batch of its own.
-# 16, the most there can be, spares the recorder what the tracker got: a replay needs every message. Set-points keep
-# the short queue: a late one is worth nothing.
+# Batches that wait for a link before what follows is dropped; 2 by default, 16 is the most there can be. A replay needs
+# every message that the tracker got. Set-points keep the short queue.
 _QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
 
 

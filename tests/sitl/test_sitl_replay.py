@@ -24,14 +24,6 @@ def verdict_of(run: "SitlRun") -> tuple[int, dict[str, Any], str]:  # type: igno
 
 def test_a_recorded_flight_is_repeated_to_the_bit(sitl: Start) -> None:
     code, said, printed = verdict_of(sitl("--duration", "5"))
-    if said["comparison"]["missing_count"]:
-        # On a loaded machine the bus may lose what the tracker got on its way to the recorder. Nothing can repeat such
-        # a flight, and the verdict must say so; another flight, and only one, may prove what this one cannot.
-        assert code == 1 and not said["identical"]
-        assert said["comparison"]["missing"], printed
-        code, said, printed = verdict_of(sitl("--duration", "5"))
-        if said["comparison"]["missing_count"]:
-            pytest.skip("the bus lost messages on their way to the recorder in both flights: this machine is too busy")
     assert code == 0, printed
     assert said["identical"] and not said["foreign"]
     compared = said["comparison"]

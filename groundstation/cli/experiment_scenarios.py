@@ -32,7 +32,7 @@ _BATCH = 5
     "--strategies",
     default="ours",
     show_default=True,
-    help="Strategies, of ours,string,reversed,flat,two-level,relay,chase.",
+    help="Strategies, of ours,string,reversed,flat,two-level,no-topology,relay,chase,sampling,lattice,first-program.",
 )
 @click.option(
     "--duration", "seconds", type=FiniteRange(5, 3600), help="Seconds of tracking in each (default: as its file)."
@@ -48,10 +48,12 @@ def scenarios(
 
     NAMES: files, or names of shipped ones; none: all shipped ones that say what they expect. Drivers, watchdogs,
     estimator and planner are those that fly. Strategies beside ours: fixed topologies (string, the same reversed, flat,
-    two-level), the best of which the others are compared with afterwards, the
-    relay rule (the drone nearest to the target stays 0.9 m from it on the side of the ceiling camera's view, the others
-    look at it from there) and the chase (the nearest drone goes there from its own side). Figures count from when the
-    target was found; lost is an error above 0.5 m.
+    two-level), the best of which the others are compared with afterwards; no-topology (one solve, all sightings
+    count); the relay rule (the drone nearest to the target stays 0.9 m from it on the side of the ceiling camera's
+    view, the others look at it from there) and the chase (the nearest drone goes there from its own side); random
+    sampling and a lattice of motions, by the same cost; and the method's first program (discs with a hard edge, every
+    neighbour from rest, only the topology's sightings are fused). Figures count from when the target was found; lost
+    is an error above 0.5 m.
     """
     from groundstation.experiments.faults import flights_of
     from groundstation.experiments.runner import write_atomically

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
-STRATEGIES = ("ours", "string", "reversed", "flat", "two-level", "relay", "chase")
+STRATEGIES = (
+    "ours", "string", "reversed", "flat", "two-level", "no-topology", "relay", "chase", "sampling", "lattice",
+    "first-program",
+)  # fmt: skip
 FIXED = ("string", "reversed", "flat", "two-level")
 # Student's factor at 95 % by its expansion in 1 / degrees of freedom.
 _NORMAL_95 = 1.96
@@ -118,7 +121,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "viol",
         "switch",
     )
-    layout = "{:17s} {:9s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
+    layout = "{:17s} {:13s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
     lines = [layout.format(*head) + "  against the first [m]"]
     for row in rows:
         errors = [f"{value:.3f}" for value in row["rmse_m"] or ()] or ["never", "-", "-"]

@@ -115,12 +115,20 @@ def choose(current: Topology, costs: Mapping[Topology, float], required_gain: fl
 
 
 class Planner:
-    """Plans on belief snapshots. Its only memory is since when it has been asked about the same current topology."""
+    """Plans on belief snapshots. Its only memory is since when it has been asked about the same current topology.
 
-    def __init__(self, parameters: PlannerParameters, sensors: SensorSuite) -> None:
+    builder_of: makes the arrays of a problem; another one changes which sightings the cost counts on.
+    """
+
+    def __init__(
+        self,
+        parameters: PlannerParameters,
+        sensors: SensorSuite,
+        builder_of: Callable[[PlannerParameters, SensorSuite], ProblemBuilder] = ProblemBuilder,
+    ) -> None:
         self.parameters = parameters
         self.sensors = sensors
-        self._builder = ProblemBuilder(parameters, sensors)
+        self._builder = builder_of(parameters, sensors)
         self._held: tuple[Topology, int] | None = None
 
     def plan(

@@ -52,9 +52,10 @@ TRACKING_BY_S = 30.0
 
 
 class Arrivals:
-    """What the tracker takes in at each tick."""
+    """What the tracker takes in at each tick, of what it heeds."""
 
-    def __init__(self, bus: LocalBus) -> None:
+    def __init__(self, bus: LocalBus, heeds: Callable[[Message], bool]) -> None:
+        self._heeds = heeds
         self._subscription = bus.subscribe(TOPICS, capacity=8192)
         self._keys: dict[Key, str] = {}
         self.refused: Counter[str] = Counter()
@@ -65,7 +66,7 @@ class Arrivals:
         keys = self._keys
         ready = []
         for received in self._subscription.drain():
-            if received.message is None:
+            if received.message is None or not self._heeds(received.message):
                 continue
             if (key := keys.get(received.key)) is None:
                 key = keys[received.key] = str(received.key)
@@ -136,7 +137,7 @@ class FaultFlight:
         self._tracker_bus = self._bus("tracker")
         section = TrackerSection(field, epoch=1)
         feed = TrackerFeed(
-            Arrivals(self._tracker_bus), lambda planner: InlineWorker(planner_of(planner)), clock.clock_id()
+            Arrivals(self._tracker_bus, self.heeds), lambda planner: InlineWorker(planner_of(planner)), clock.clock_id()
         )
         self.tracking = Tracking(self._tracker_bus, section, feed)
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
@@ -233,6 +234,10 @@ class FaultFlight:
         believed = {name: self.believed(name) for name in self.world.drones}
         self.judge.see(now_s, truth, told, believed)
         self.watch()
+
+    def heeds(self, message: Message) -> bool:
+        """Return whether the tracker takes a message in: all of them, but in studies of other methods."""
+        return True
 
     def watch(self) -> None:
         """Look on as the team tracks, each time that it is judged: for other studies."""

@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from typing import Any
 
+from groundstation.bus.messages import Message
 from sim_bridge.link_bursts import with_bursts
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import JUDGE_S, FaultFlight
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
+from sim_bridge.study.scenarios.first_program import along_an_edge
 from sim_bridge.study.scenarios.strategies import STRATEGIES
 from sim_bridge.surroundings import ScenarioExpectation
 
@@ -25,10 +27,17 @@ class ScenarioFlight(FaultFlight):
     """A flight of a scenario under a strategy; `run` returns its figures."""
 
     def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, strategy: str) -> None:
-        super().__init__(drawn, sections, seconds, STRATEGIES[strategy])
-        self._strategy = strategy
+        chosen = STRATEGIES[strategy]
+        super().__init__(drawn, sections, seconds, chosen.planner_of)
+        self._strategy, self._edges_only = strategy, chosen.edges_only
         self._errors = TrackingErrors(JUDGE_S)
         self._switches, self._topology = 0, ""
+
+    def heeds(self, message: Message) -> bool:
+        """Return whether the strategy fuses a message; until the team tracks, all."""
+        if not (self._edges_only and self._topology):
+            return True
+        return along_an_edge(message, self.tracking.tracker.topology, self.world.targets)
 
     def watch(self) -> None:
         """Compare what is believed of the targets with the truth."""

@@ -167,6 +167,7 @@ KIND = VehicleKind(
     sections={"video": ArDroneVideo, "ardrone": ArDroneOwn},
     moved=_moved,
     check=_check,
+    flight_time_s=12 * 60.0,
     standing_m=(0.06, 0.015),  # on its feet
     camera="ardrone",
     camera_port=5555,

@@ -34,5 +34,6 @@ KIND = VehicleKind(
     has_interface=True,
     moved=_moved,
     emulator="sim_bridge.devices.tello:EMULATION",
+    flight_time_s=13 * 60.0,
     example={"tello": {}},
 )

@@ -142,7 +142,8 @@ class VehicleKind:
     scenario that its emulator can have and others cannot; emulated_firmwares: names that a scenario may give its
     firmware; scenario: sections of a scenario file that only its emulator reads, each as "module:class" of a
     sim_bridge.section.Section. true_pose: "module:function" of what hears from the simulator behind a real firmware
-    where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells.
+    where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells. flight_time_s: what a new
+    battery of the usual size lasts at most, None where vehicles of one kind differ or nobody tells.
     """
 
     name: str
@@ -170,3 +171,4 @@ class VehicleKind:
     emulated_firmwares: tuple[str, ...] = ()
     scenario: Mapping[str, str] = field(default_factory=dict)
     true_pose: str = ""
+    flight_time_s: float | None = None

@@ -2,14 +2,20 @@
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
+import numpy as np
+
+from groundstation.arrays import Array
 from groundstation.settings.room import ObstacleSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Paths = dict[str, list[tuple[float, float]]]
 
@@ -18,21 +24,67 @@ _TARGET_COLOUR = "tab:red"
 _OBSTACLE_COLOUR = "dimgrey"
 
 
-def draw(field: Field, output: Path, paths: Paths | None = None) -> None:
+@dataclass(frozen=True, slots=True)
+class Shade:
+    """Figures over the floor: middles of cells along x and y [m; world], values (rows: y, columns: x), and what of.
+
+    nan: none, which is hatched.
+    """
+
+    xs: Array
+    ys: Array
+    values: Array
+    label: str
+
+
+def draw(field: Field, output: Path | BinaryIO, paths: Paths | None = None, shade: Shade | None = None) -> None:
     """Write a picture of the field (PNG, SVG or PDF by the file's ending); paths: those of `paths_of`."""
+    kind = output.suffix[1:] if isinstance(output, Path) else "svg"
+    _figure(field, paths or {}, shade).savefig(output, dpi=110, format=kind)
+
+
+def svg_of(field: Field, paths: Paths, shade: Shade) -> str:
+    """Return the picture as SVG."""
+    buffer = BytesIO()
+    draw(field, buffer, paths, shade)
+    return buffer.getvalue().decode()
+
+
+def _figure(field: Field, paths: Paths, shade: Shade | None) -> "Figure":
     from matplotlib.figure import Figure
 
     width, depth, height = field.room.size_m
     figure = Figure(figsize=(width * 1.15 + 0.6, (depth + height) * 1.15 + 1.6), layout="constrained")
     top, side = figure.subplots(2, 1, sharex=True, height_ratios=(depth, height))
-    _draw_top(top, field, paths or {})
-    _draw_side(side, field, paths or {})
+    if shade is not None:
+        _draw_shade(figure, top, shade)
+    _draw_top(top, field, paths)
+    _draw_side(side, field, paths)
     for axes, (low, high), label in ((top, (-depth / 2, depth / 2), "y [m]"), (side, (0.0, height), "z [m]")):
         axes.set(xlim=(-width / 2, width / 2), ylim=(low, high), ylabel=label, aspect="equal")
         axes.grid(alpha=0.25)
     side.set_xlabel("x [m]")
     figure.suptitle(f"{field.site}: {width:g} x {depth:g} x {height:g} m")
-    figure.savefig(output, dpi=110)
+    return figure
+
+
+def _draw_shade(figure: "Figure", axes: "Axes", shade: Shade) -> None:
+    """Draw figures as colours under all else, and hatch where there are none."""
+    mesh = axes.pcolormesh(shade.xs, shade.ys, shade.values, cmap="viridis_r", shading="nearest", alpha=0.6)
+    figure.colorbar(mesh, ax=axes, label=shade.label, fraction=0.04, pad=0.01)
+    dx, dy = shade.xs[1] - shade.xs[0], shade.ys[1] - shade.ys[0]
+    label: str | None = "not seen"
+    for j, i in zip(*np.nonzero(np.isnan(shade.values)), strict=True):
+        x, y = float(shade.xs[i]), float(shade.ys[j])
+        _hatch(axes, (x - dx / 2, x + dx / 2), (y - dy / 2, y + dy / 2), label)
+        label = None
+
+
+def _hatch(axes: "Axes", x: tuple[float, float], y: tuple[float, float], label: str | None) -> None:
+    from matplotlib.patches import Rectangle
+
+    size = x[1] - x[0], y[1] - y[0]
+    axes.add_patch(Rectangle((x[0], y[0]), *size, fill=False, hatch="///", edgecolor="silver", lw=0, label=label))
 
 
 def paths_of(scenario: Mapping[str, Any], targets: Iterable[str]) -> Paths:

@@ -59,6 +59,9 @@ VERBS: dict[str, CommandRow] = {
     "doctor": CommandRow(
         "Prepare", "groundstation.cli.doctor:doctor", "What this machine lacks for flying, and the remedy."
     ),
+    "forecast": CommandRow(
+        "Prepare", "groundstation.cli.forecast:forecast", "How well the target will be known, before anybody flies."
+    ),
     "preflight": CommandRow(
         "Prepare", "groundstation.cli.preflight:preflight", "What forbids a take-off, and the remedy; nobody flies."
     ),

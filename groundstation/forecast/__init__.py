@@ -1,0 +1,1 @@
+"""What a field will be worth before anybody flies: how well, where not, and what a failure costs."""

@@ -1,0 +1,51 @@
+"""What is left of a team's view of the floor when one of its cameras or drones fails."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from groundstation.field.resolved import ResolvedField
+from groundstation.forecast.floor import PlaceForecast, PlaceForecaster, Spread, spread_of
+from groundstation.forecast.team import Place, Team
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """What fails, what is expected then at the same places, and whom nobody can place in the room any more."""
+
+    what: str
+    without: Spread
+    unlocalised: tuple[str, ...]
+
+
+def teams_without_one(team: Team) -> list[tuple[str, Team]]:
+    """Return the team without each one fixed sensor, drone's camera and drone, with its name for people."""
+    fixed = [(name, team.without_sensor(name)) for name in team.sensors.world]
+    onboard = [(f"{name}'s camera", team.without_sensor(name)) for name in team.sensors.onboard if name in team.robots]
+    return [*fixed, *onboard, *((name, team.without_robot(name)) for name in team.robots)]
+
+
+def failures(
+    field: ResolvedField, team: Team, places: Sequence[Place], told: Callable[[], None] = lambda: None
+) -> list[Failure]:
+    """Return what each single failure leaves at some places; told: called after each place."""
+    found = []
+    for what, left in teams_without_one(team):
+        if not left.robots:
+            gone = Spread(None, None, 1.0)
+            found.append(Failure(what, gone, (team.target,)))
+            continue
+        forecaster = PlaceForecaster(field, left)
+        seen = [_told(forecaster, place, told) for place in places]
+        found.append(Failure(what, spread_of(seen), _unlocalised(left, seen)))
+    return found
+
+
+def _told(forecaster: PlaceForecaster, place: Place, told: Callable[[], None]) -> PlaceForecast:
+    told()
+    return forecaster.at(place)
+
+
+def _unlocalised(team: Team, seen: Iterable[PlaceForecast]) -> tuple[str, ...]:
+    """Return whom no stand at any place lets a fixed sensor place, directly or through drones."""
+    placed = frozenset[str]().union(*(one.stand.placed for one in seen if one.stand is not None))
+    return tuple(name for name in (*team.robots, team.target) if name not in placed)

@@ -1,0 +1,163 @@
+"""How a team would stand for a target at one place, and how well it would know the target there."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.forecast.team import Place, Team
+from groundstation.forecast.views import Chain, Link, Obstruction, Views
+from groundstation.planning.planner import Planner
+from groundstation.planning.problem import PlanningScene, ProblemBuilder
+from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, YAW, CostProblem, EdgeTape, Tape, X, Y, Z
+from groundstation.planning.rollout import roll_out
+from groundstation.sensing.topology import Topology
+
+_ROUNDS, _SETTLED_M = 3, 0.2  # plans until the team stands; one that moves it less than this is the last
+_RESTS = 3  # horizons that it stands there, after which the covariance is as it stays
+_BEHIND_M, _APART_RAD = 1.0, math.radians(80.0)  # where it starts: towards the room's middle, side by side
+_ROBOT_STD_M, _YAW_STD, _TARGET_STD_M, _SPEED_STD_M_S = 0.05, 0.05, 0.1, 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class TeamStand:
+    """Where the team stands: poses (x, y, z, yaw) [m, rad; world], and what it knows there.
+
+    std_m: of the target's place in the floor plan, root of the trace; robot_std_m: likewise of each drone; placed: whom
+    fixed cameras show, directly or through drones that they show.
+    """
+
+    place: Place
+    topology: Topology
+    poses: Mapping[str, Array]
+    std_m: float
+    robot_std_m: Mapping[str, float]
+    placed: frozenset[str]
+
+
+class _Held(Planner):
+    """A planner that looks at no other topology than the present one."""
+
+    def options(self, current: Topology) -> tuple[Topology, ...]:
+        """Return none."""
+        return ()
+
+
+class StandSearch:
+    """Finds stands with the planner that flies, and judges them by its rollout."""
+
+    def __init__(self, team: Team) -> None:
+        self.team, self.views = team, Views(team)
+        self._parameters = replace(team.planner, min_dwell_s=0.0, hysteresis=0.0)
+        # Without the tail that attracts: it is no information.
+        soft = replace(team.sensors.softness, tail_share=0.0)
+        self._judge = ProblemBuilder(team.planner, replace(team.sensors, softness=soft))
+
+    def at(self, place: Place) -> TeamStand | Obstruction:
+        """Return the team's best stand for a target that stands at a place, or what leaves the place unseen.
+
+        Raises EstimatorFault when the expected uncertainty is not finite.
+        """
+        chain = self.views.chain_to(place)
+        if isinstance(chain, Obstruction):
+            return chain
+        scene, topology = self._start(place, chain)
+        stood = self._rested(place, scene, topology)
+        planned = self._planned(place, scene, topology, Planner(self._parameters, self.team.sensors))
+        holding = [one for one in (planned, stood) if self.team.target in one.placed]
+        return min(holding, key=lambda one: one.std_m) if holding else Obstruction.NOBODY_PLACES
+
+    def held(self, place: Place, topology: Topology) -> TeamStand:
+        """Return the team's stand in a topology that may not change, whether or not it sees the target there.
+
+        A chain to the place is where it starts from if it has as many drones as the topology has levels.
+        """
+        chain = self.views.chain_to(place)
+        if isinstance(chain, Obstruction) or len(chain) != len(topology.levels):
+            chain = ()
+        lowest_first = reversed([min(level) for level in topology.levels])
+        roles = tuple(Link(name, link.pose) for name, link in zip(lowest_first, chain, strict=False))
+        scene, _ = self._start(place, roles)
+        return self._planned(place, scene, topology, _Held(self._parameters, self.team.sensors))
+
+    def _planned(self, place: Place, scene: PlanningScene, topology: Topology, planner: Planner) -> TeamStand:
+        """Return the stand that the planner leads to."""
+        warm = None
+        for _ in range(_ROUNDS):
+            plan = planner.plan(_belief_of(scene), topology, warm, lambda: False)
+            topology, warm = plan.topology, plan.warm_start
+            controls = np.array([warm[name] for name in scene.robots])
+            controls[:, HEIGHT] -= self._judge.height_m
+            before, scene = scene.poses, self._after(scene, topology, controls)
+            if np.abs(scene.poses[:, :3] - before[:, :3]).max() < _SETTLED_M:
+                break
+        return self._rested(place, scene, topology)
+
+    def _rested(self, place: Place, scene: PlanningScene, topology: Topology) -> TeamStand:
+        """Return what the team knows once it has stood for a while."""
+        rest = np.zeros((len(scene.robots), ROBOT_CONTROLS))
+        rest[:, HEIGHT] = scene.poses[:, 2] - self._judge.height_m
+        for _ in range(_RESTS):
+            scene = self._after(scene, topology, rest)
+        stds, poses = np.sqrt(2.0 * np.diag(scene.prior)).tolist(), dict(zip(scene.robots, scene.poses, strict=True))
+        known = dict(zip(scene.robots, stds, strict=False))
+        return TeamStand(place, topology, poses, stds[len(poses)], known, self.views.placed(poses, place))
+
+    def _start(self, place: Place, chain: Chain) -> tuple[PlanningScene, Topology]:
+        """Return a chain at its stands, all others beside each other between the target and the middle of the fence."""
+        robots, fence = self.team.robots, self.team.planner.fence
+        stands = {link.robot: link.pose for link in chain}
+        inside, (mx, my) = fence.shrunk(self.team.planner.fence_margin_m), fence.center
+        inwards = math.atan2(my - place[1], mx - place[0])
+        poses = np.empty((len(robots), 4))
+        for i, name in enumerate(robots):
+            bearing = inwards + _APART_RAD * (i - 0.5 * (len(robots) - 1))
+            x, y = place[0] + _BEHIND_M * math.cos(bearing), place[1] + _BEHIND_M * math.sin(bearing)
+            x, y = inside.nearest(x, y)
+            height = self.team.planner.level_heights_m[0][0]
+            poses[i] = stands.get(name, (x, y, height, math.atan2(place[1] - y, place[0] - x)))
+        prior = np.diag([_ROBOT_STD_M**2] * len(robots) + [_TARGET_STD_M**2, _SPEED_STD_M_S**2])
+        moving = np.array([[*place, 0.0, 0.0]])
+        scene = PlanningScene(robots, (self.team.target,), poses, moving, prior, np.full(len(robots), _YAW_STD**2))
+        above = Topology.string(reversed([link.robot for link in chain]))
+        return scene, above.reconciled(robots)
+
+    def _after(self, scene: PlanningScene, topology: Topology, controls: Array) -> PlanningScene:
+        """Return the scene after one horizon of held controls (n, 4); the target stands still."""
+        problem = self._judge.build(scene, topology).cost
+        tape = _tape_for(problem)
+        roll_out(controls.ravel(), problem, tape)
+        poses = tape.path[-1][:, [X, Y, Z, YAW]].copy()
+        covariance = tape.covariances[-1]
+        prior = np.ascontiguousarray(0.5 * (covariance + covariance.T))
+        return replace(scene, poses=poses, prior=prior, yaw_variances=tape.yaws_after[-1].copy())
+
+
+def _tape_for(problem: CostProblem) -> Tape:
+    n, h, d = problem.poses.shape[0], problem.options.steps, problem.prior.shape[0]
+    return Tape(
+        np.empty((h + 1, n, 6)), np.empty((h, n, 4)), EdgeTape.rows(h * len(problem.edges)),
+        np.empty((h, d, d)), np.empty((h, d, d)), np.empty((h, n)), np.empty((h, n)), np.empty((h, n, 3)),
+    )  # fmt: skip
+
+
+def _belief_of(scene: PlanningScene) -> JointBelief:
+    """Return the belief whose scene this is, heights known."""
+    layout, n = StateLayout(), len(scene.robots)
+    for names, kind, core in (
+        (scene.robots, EntityKind.ROBOT, ROBOT_CORE),
+        (scene.targets, EntityKind.TARGET, TARGET_CORE),
+    ):
+        for name in names:
+            layout = layout.with_entity(name, kind, core)
+    x = np.array([*(4 * i for i in range(n)), 4 * n, 4 * n + 2])
+    covariance = np.zeros((layout.dim, layout.dim))
+    for axis in (0, 1):
+        covariance[np.ix_(x + axis, x + axis)] = scene.prior
+    yaws = 4 * np.arange(n) + 3
+    covariance[yaws, yaws] = scene.yaw_variances
+    return JointBelief(np.concatenate((scene.poses.ravel(), scene.moving.ravel())), covariance, layout, 0)

@@ -1,0 +1,37 @@
+"""The team of a forecast: who flies with which cameras, and who is missing when something fails."""
+
+from dataclasses import dataclass, replace
+
+from groundstation.field.resolved import ResolvedField
+from groundstation.planning.parameters import PlannerParameters, parameters_from_field
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.models import SensorSuite
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Team:
+    """Who flies with which cameras, and whom it tracks."""
+
+    robots: tuple[str, ...]
+    target: str
+    sensors: SensorSuite
+    planner: PlannerParameters
+
+    def without_sensor(self, name: str) -> "Team":
+        """Return the team when one camera, of a drone or fixed in the room, shows nothing."""
+        world = {one: model for one, model in self.sensors.world.items() if one != name}
+        onboard = {one: model for one, model in self.sensors.onboard.items() if one != name}
+        return replace(self, sensors=replace(self.sensors, world=world, onboard=onboard))
+
+    def without_robot(self, name: str) -> "Team":
+        """Return the team when one drone has landed."""
+        left = self.without_sensor(name)
+        return replace(left, robots=tuple(one for one in self.robots if one != name))
+
+
+def team_of(field: ResolvedField) -> Team:
+    """Return the whole team of a field, with the first of its targets."""
+    target = next(iter(field.tracked))
+    return Team(tuple(field.drones), target, sensors_from_field(field), parameters_from_field(field))

@@ -7,11 +7,9 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.estimation.belief import JointBelief
-from groundstation.kernel import Rows
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.planner import Planner, PlanResult
 from groundstation.planning.problem import PlanningScene, ProblemBuilder
-from groundstation.planning.records import EdgeRow
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
@@ -61,7 +59,7 @@ class FixedPlanner(Planner):
 class EveryPair(ProblemBuilder):
     """Problems without a topology: whoever may see something counts, and draws its camera there."""
 
-    def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Rows[EdgeRow], int]:
+    def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Any, int]:
         edges: Any = np.array(self._pairs.rows)
         edges["wanted"] = 1
         return edges, len(edges)

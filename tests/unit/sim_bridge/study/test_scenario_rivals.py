@@ -1,5 +1,6 @@
 """What the rivals of our planner decide, and on which sightings."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +27,8 @@ STRING = Topology.parse("drone_1/drone_2")
 POSES = {"drone_1": (-0.5, 0.0, 1.3, 0.0), "drone_2": (-1.2, 0.9, 1.3, 2.0)}
 
 
-def belief(target: tuple[float, float], poses: dict[str, tuple[float, ...]] = POSES) -> JointBelief:
-    layout, mean, variances = StateLayout(), [], []
+def belief(target: tuple[float, float], poses: Mapping[str, tuple[float, ...]] = POSES) -> JointBelief:
+    layout, mean, variances = StateLayout(), list[float](), list[float]()
     for name, pose in poses.items():
         layout = layout.with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
         mean += pose

@@ -5,8 +5,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from damage import Random, damaged_bytes
+from damage import Random, damaged_bytes, damaged_json
 from fuzzed_documents import damaged_field, damaged_sample, damaged_words, read_field, read_sample
+from fuzzed_sensors import RANGES, TELLO, damaged_natnet, read_natnet
 from fuzzed_wire import (
     COMMANDS,
     damaged_frame,
@@ -23,7 +24,10 @@ from fuzzed_wire import (
 
 from drivers.ardrone.wire import errors as ardrone_errors
 from drivers.mavlink.wire import errors as mavlink_errors
+from drivers.motion_capture.wire.natnet import WireError as NatNetError
+from drivers.ranging.wire import ranges
 from drivers.rmw_zenoh.wire.cdr import WireError as CdrError
+from drivers.tello.wire import text as tello
 from groundstation.console import protocol
 from groundstation.errors import MessageError, SettingsError
 
@@ -63,6 +67,9 @@ def _all() -> Iterable[Decoder]:
     yield Decoder("mavlink_1", damaged_old_frame, read_frames, mavlink_errors.WireError)
     yield Decoder("mavlink_2", damaged_frame, read_frames, mavlink_errors.WireError)
     yield Decoder("ros2", damaged_ros2, read_ros2, CdrError)
+    yield Decoder("natnet", damaged_natnet, read_natnet, NatNetError)
+    yield Decoder("ranges", lambda rng: damaged_json(rng, RANGES), ranges.decode, ranges.WireError)
+    yield Decoder("tello", lambda rng: bytes(damaged_bytes(rng, TELLO, b":;-.")), tello.parse_state, tello.WireError)
     yield Decoder("bus", damaged_sample, read_sample, MessageError)
     yield Decoder("console", damaged_words, protocol.decode, MessageError)
     yield Decoder("field", damaged_field, read_field, SettingsError)

@@ -170,6 +170,6 @@ def _verb(verb: Verb, text: str) -> click.Command:
 hold = _verb(Verb.HOLD, "Hover where they are: all drones, or the named ones.")
 land = _verb(Verb.LAND, "Land all drones, or the named ones. Without a router, the drivers are signalled to land.")
 cut_motors = _verb(Verb.CUT_MOTORS, "Stop the motors at once: the drones fall.")
-takeoff = _verb(Verb.TAKEOFF, "Take off, one drone after the other, each seen by a camera before the next.")
+takeoff = _verb(Verb.TAKEOFF, "Take off, one drone after the other, each localised before the next.")
 track = _verb(Verb.TRACK, "Let the tracker move the drones that are up.")
 resume = _verb(Verb.RESUME, "Go on after a hold or a restarted tracker.")

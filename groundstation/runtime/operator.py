@@ -282,7 +282,7 @@ class Operator:
         if order is not None:
             self._order(order, now_ns)
         for name in sequence.up[up:]:
-            self._say(f"{name}: in the air, seen by a camera")
+            self._say(f"{name}: in the air, localised")
         if sequence.mistake is not None:
             self._say(f"TAKE-OFF STOPPED: {sequence.mistake}")
         for name, reason in list(sequence.left_out.items())[left_out:]:

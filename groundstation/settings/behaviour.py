@@ -53,6 +53,11 @@ def _known_planner(name: str) -> str:
     if name and name not in known:
         told = {"known": ", ".join(known) or "none is installed"}
         raise PydanticCustomError("planner", "must be an installed planner: {known}", told)
+    if name:
+        try:
+            plug_ins.load(plug_ins.PLANNERS, name)
+        except plug_ins.PlugInError as error:
+            raise PydanticCustomError("planner", "{reason}", {"reason": str(error)}) from None
     return name
 
 

@@ -40,7 +40,7 @@ def test_mixed_team_tracks_and_lands(tmp_path):
     assert report["landed"] is True, said
     assert report["target_rmse_m"] <= 0.15, said
     assert report["max_fence_violation_m"] == 0.0, said
-    assert said.count("in the air, seen by a camera") == 3, said
+    assert said.count("in the air, localised") == 3, said
     assert not any(c["name"].startswith("topology") for c in report["criteria"]), "those belong to the demo"
     judge_tlogs(run)
 

@@ -132,6 +132,12 @@ def test_a_planner_that_is_not_installed_is_refused_at_its_line():
         field_named("lab", ["planner.plug_in=hasty"])
 
 
+@pytest.mark.parametrize("name", ["broken", "figure", "ending"])
+def test_a_planner_that_cannot_be_loaded_is_refused_by_the_check_of_the_field(name):
+    with pytest.raises(SettingsError, match=rf"planner.plug_in: {name} cannot be used: lab-plug-ins"):
+        field_named("lab", [f"planner.plug_in={name}"])
+
+
 def test_a_planner_that_cannot_be_loaded_is_named():
     with pytest.raises(SettingsError, match=r"planner.plug_in: broken cannot be used: lab-plug-ins .*no_such_module"):
         plug_ins.planner("broken", None, None)

@@ -188,7 +188,7 @@ def test_exchanged_drones_stop_the_take_off_and_the_one_that_flies_lands(scene: 
     assert sum(line.startswith(f"TAKE-OFF STOPPED: {mistake}") for line in scene.said) == 1
     assert str(scene.operator.mistake).startswith(mistake)
     assert "drone_2: left out, the take-off was stopped" in scene.said
-    assert not any("seen by a camera" in line for line in scene.said)
+    assert not any("localised" in line for line in scene.said)
 
 
 def test_a_mix_up_among_the_others_lets_who_was_seen_hover_without_tracking(scene: Scene) -> None:

@@ -93,6 +93,20 @@ def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     page.wait(lambda s: page.there("worst-battery").inner_text() == "unknown drone_1")
 
 
+def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -> None:
+    page = stage.open()
+    verdict = page.there("verdict")
+    known = "No alarms. 2 of 2 fly, the places of 2 of 2 are known. "
+    page.wait(lambda s: verdict.inner_text() == f"{known}The target is seen.")
+    stage.flight.modes = {"drone_1": "HOLD", "drone_2": "HOLD"}
+    page.wait(lambda s: verdict.inner_text().endswith("They hover because of an order or a failsafe: RESUME goes on."))
+    stage.flight.modes["drone_2"] = "LANDED"
+    page.wait(lambda s: "1 of 2 flies" in verdict.inner_text())
+    page.shot("verdict")
+    stage.flight.modes["drone_1"] = "LANDED"
+    page.wait(lambda s: verdict.inner_text().startswith("No alarms. Nobody flies."))
+
+
 def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     page = stage.open()
     page.wait(lambda s: page.there("take-off").get_attribute("title") == "no drone stands on the floor")

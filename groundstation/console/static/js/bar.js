@@ -3,6 +3,7 @@
 import { byId, el, seconds, text } from "./dom.js";
 import { minutesLeft, oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
 import { ageS, droneNames, replaying, store } from "./store.js";
+import { verdict } from "./verdict.js";
 
 const WALL_KEY = "skein-wall", OLD_S = 1, TOO_OLD_S = 4;
 
@@ -24,6 +25,7 @@ export function showBar() {
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
+  text(byId("verdict"), replaying() ? "" : verdict());
   showStages(stage());
 }
 
@@ -58,5 +60,5 @@ export function showMore(count) {
   const more = byId("more");
   if (count < 2) openAlarms(false);
   more.hidden = count < 2;
-  text(more, byId("alarms").classList.contains("open") ? "close" : `+ ${count - 1} more`);
+  text(more, byId("alarms").classList.contains("open") ? "close" : `+ ${count - 1} more alarm${count > 2 ? "s" : ""}`);
 }

@@ -1,0 +1,28 @@
+// One sentence on the whole team, where an alarm would stand: what it does, and what an operator may do about it.
+
+import { aloft, modes, stage, teamMode } from "./glance.js";
+import { droneNames, entity, estimateAge, store } from "./store.js";
+
+const LOCALISED_S = 1;
+
+const NEXT = {
+  "TAKING OFF": "Each is seen from outside before the next one rises.",
+  HOVER: "They hover and wait: TRACK begins the task.",
+  HOLD: "They hover because of an order or a failsafe: RESUME goes on.",
+  SEARCH: "Nobody sees the target: they look for it.",
+  LANDING: "Those that land stay down until a new TAKE OFF.",
+  CUT: "Motors were cut.",
+};
+
+// How many drones have a place that is newer than a second.
+function localised() {
+  return droneNames().filter((name) => { const body = entity(name); return body && body.age_s + estimateAge() < LOCALISED_S; }).length;
+}
+
+export function verdict() {
+  const all = droneNames().length, up = aloft(), [mode] = teamMode();
+  if (!all || !modes().length) return "No alarms. Nothing is heard of the drones yet.";
+  if (stage() === "over") return "The run is over: nothing flies.";
+  if (!up) return `No alarms. Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;
+  return `No alarms. ${up} of ${all} fl${up === 1 ? "ies" : "y"}, the places of ${localised()} of ${all} are known. ${NEXT[mode] ?? "The target is seen."}`;
+}

@@ -6,6 +6,7 @@ from typing import Protocol, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from drivers.plausibility.clock_drift import ClockFigures
 from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Severity
@@ -16,12 +17,13 @@ _Settings = TypeVar("_Settings", bound=BaseModel)
 
 @dataclass(frozen=True, slots=True)
 class LinkHealth:
-    """State of a driver's link; rejected: datagrams dropped, by reason."""
+    """State of a driver's link; rejected: datagrams dropped, by reason; clock: None where no time is told."""
 
     link_quality: float | None = None
     rate_hz: float = 0.0
     rejected: dict[str, int] = field(default_factory=dict)
     detail: str = ""
+    clock: ClockFigures | None = None
 
 
 class Vehicle(Protocol):

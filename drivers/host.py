@@ -162,6 +162,8 @@ class VehicleHost:
             rate_hz=health.rate_hz,
             rejected=health.rejected | self._ignored | self._refused(),
             detail=health.detail or self.watchdog.reason,
+            clock_drift_ppm=None if health.clock is None else health.clock.drift_ppm,
+            telemetry_late_ms=None if health.clock is None else health.clock.late_ms,
         )
         self._bus.publish(VEHICLE_STATUS, status)
         if refused := self._intrusions.news(now_ns, status.rejected):

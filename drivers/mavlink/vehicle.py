@@ -302,7 +302,8 @@ class MavlinkVehicle:
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
         lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
         detail = lost or self._session.detail(self._requests)
-        return LinkHealth(quality, rate_hz, dict(self._link.rejected + self._refused), detail)
+        rejected = dict(self._link.rejected + self._refused)
+        return LinkHealth(quality, rate_hz, rejected, detail, self._plausibility.clock.figures)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

@@ -8,6 +8,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from drivers.plausibility.clock_drift import ClockDrift
 from drivers.plausibility.clock_watch import ClockWatch
 from drivers.plausibility.health import ALL_GOOD, Finding, Health, HealthReport, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
@@ -45,13 +46,16 @@ class MotionSample:
 
 
 class MotionMonitor:
-    """Health of the sensors of one vehicle; `report` is replaced as a whole, so that another thread may read it."""
+    """Health of the sensors of one vehicle; `report` is replaced as a whole, so that another thread may read it.
+
+    clock: its clock against ours, on the floor as well.
+    """
 
     def __init__(self, limits: PlausibilityLimits) -> None:
         self.limits = limits
         self._contents, self._attitude, self._inertial = RepeatWatch(), RepeatWatch(), RepeatWatch()
         self._velocity = (StandstillWatch(), StandstillWatch())
-        self._clock = ClockWatch(limits.clock_wrap_s)
+        self._clock, self.clock = ClockWatch(limits.clock_wrap_s), ClockDrift()
         self.reset()
 
     def reset(self) -> None:
@@ -66,6 +70,8 @@ class MotionMonitor:
 
     def update(self, sample: MotionSample, state: FlightState) -> HealthReport:
         """Take a sample of a vehicle in some state; return what is known to be wrong now."""
+        if sample.vehicle_ns is not None:
+            self.clock.update(sample.stamp_ns, sample.vehicle_ns)
         if state not in AIRBORNE:
             if self._before is not None:
                 self.reset()

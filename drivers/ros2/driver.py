@@ -163,7 +163,8 @@ class Ros2Vehicle:
         detail = f"it refused to {_WORDS[asked]}: {refused}" if asked and refused else ""
         if self._flight.airborne and not detail:
             detail = self._link.trouble
-        return LinkHealth(None, 0.0 if silent else self._rate_hz, dict(self._rejected), detail)
+        rate_hz = 0.0 if silent else self._rate_hz
+        return LinkHealth(None, rate_hz, dict(self._rejected), detail, self._plausibility.clock.figures)
 
     def flush(self) -> None:
         """Publish the raw messages that wait."""

@@ -11,6 +11,8 @@ from groundstation.field.resolved import ResolvedField
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
 _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
+# A quartz keeps 100 ppm. Setpoints live for 300 ms, and odometry is dated by its arrival.
+_DRIFT_PPM, _LATE_MS = 1000.0, 150.0
 # Mean grey values beyond which black or white is lost. Edges of emulated pictures are 2 to 4 px wide, and 4.5 to 7 px
 # after a blur of 2 px (1 sigma), which costs far sightings.
 _DARK, _BRIGHT, _BLURRED_PX = 0.08, 0.92, 5.5
@@ -31,6 +33,20 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
             heard = "" if status.link_quality is None else f", {status.link_quality:.0%} of it arrives"
             found = f"telemetry {status.rate_hz:.0f} Hz{heard}"
             yield Finding(Level.SHOULD, name, found, "bring it nearer, or choose another radio channel")
+        yield from _clock(name, status)
+
+
+def _clock(name: str, status: VehicleStatus) -> Iterator[Finding]:
+    """Yield what is told of a drone's clock against ours; nothing where it tells no time."""
+    drift, late_ms = status.clock_drift_ppm, status.telemetry_late_ms
+    if drift is not None:
+        found = f"its clock goes {abs(drift):.0f} ppm {'fast' if drift > 0.0 else 'slow'}"
+        bad = abs(drift) > _DRIFT_PPM
+        remedy = "start it again; if that stays, its rates are wrong by as much: exchange it" if bad else ""
+        yield Finding(Level.SHOULD if bad else Level.OK, name, found, remedy)
+    if late_ms is not None and late_ms > _LATE_MS:
+        yield Finding(Level.SHOULD, name, f"its telemetry comes up to {late_ms:.0f} ms late",
+                      "a free radio channel, no other traffic on it, or a less busy machine")  # fmt: skip
 
 
 def _battery(name: str, status: VehicleStatus, lands_at: float) -> Finding:

@@ -47,6 +47,10 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     """Datagrams, setpoints and commands that were dropped, by reason."""
     detail: str = ""
     """What the operator should know, in words."""
+    clock_drift_ppm: float | None = None
+    """How much faster the vehicle's clock goes than ours [1e-6]; none: not known (yet)."""
+    telemetry_late_ms: float | None = None
+    """How late the latest telemetry of the last 30 s came, by the freshest of its half second [ms]; none: unknown."""
 
 
 class VelocitySetpoint(Message, frozen=True, kw_only=True):

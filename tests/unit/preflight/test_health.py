@@ -2,10 +2,10 @@
 
 import pytest
 
-from groundstation.bus.messages import CameraStatus, Header
+from groundstation.bus.messages import CameraStatus, FlightState, Header, VehicleStatus
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
-from groundstation.preflight.health import camera_findings
+from groundstation.preflight.health import camera_findings, drone_findings
 
 
 def findings(field: ResolvedField, **picture: float) -> list[Finding]:
@@ -37,3 +37,23 @@ def test_a_bad_picture_is_named_with_its_remedy(
 ) -> None:
     _, worse = findings(lab_field, **picture)
     assert worse.level is Level.SHOULD and words in worse.found and worse.remedy
+
+
+def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float | None) -> list[Finding]:
+    header = Header(0, "c", "drone_1", "drone_1", 1)
+    status = VehicleStatus(
+        header=header, flight_state=FlightState.LANDED, mode="LANDED", battery=0.9, rate_hz=200.0,
+        clock_drift_ppm=drift_ppm, telemetry_late_ms=late_ms,
+    )  # fmt: skip
+    found = drone_findings(field, {"drone_1": status})
+    return [one for one in found if one.subject == "drone_1" and "battery" not in one.found]
+
+
+def test_clocks_are_graded_by_how_fast_they_go_and_how_late_they_are_heard(lab_field: ResolvedField) -> None:
+    assert clock_findings(lab_field, None, None) == []
+    (good,) = clock_findings(lab_field, -40.0, 150.0)
+    assert (good.level, good.found, good.remedy) == (Level.OK, "its clock goes 40 ppm slow", "")
+    fast, late = clock_findings(lab_field, 1001.0, 151.0)
+    assert (fast.level, fast.found) == (Level.SHOULD, "its clock goes 1001 ppm fast") and fast.remedy
+    assert (late.level, late.found) == (Level.SHOULD, "its telemetry comes up to 151 ms late") and late.remedy
+    assert [one.level for one in clock_findings(lab_field, -1001.0, None)] == [Level.SHOULD]

@@ -1,0 +1,71 @@
+"""A vehicle's clock against ours: how fast it goes, how late its telemetry comes."""
+
+import numpy as np
+import pytest
+
+from drivers.plausibility.clock_drift import ClockDrift
+from drivers.plausibility.limits import PlausibilityLimits
+from drivers.plausibility.motion import MotionMonitor, MotionSample
+from groundstation.bus.messages import FlightState
+
+MS = 1_000_000
+BOOTED = 1_700_000_000_000 * MS
+
+
+def heard(seconds: float, ppm: float = 0.0, jitter_ms: float = 0.0, late_ms: float = 0.0) -> ClockDrift:
+    """Hear 100 packets a second, one of them late, of a clock that goes ppm faster."""
+    clock, rng = ClockDrift(), np.random.default_rng(3)
+    for number in range(round(100 * seconds)):
+        made_ns = BOOTED + 10 * MS * number
+        lag_ms = 2.0 + rng.exponential(jitter_ms) + (late_ms if number == 150 else 0.0)
+        vehicle_ns = round(10 * MS * number * (1.0 + 1e-6 * ppm))
+        clock.update(made_ns + round(lag_ms * MS), vehicle_ns)
+    return clock
+
+
+@pytest.mark.parametrize("ppm", [-3000.0, -40.0, 0.0, 250.0, 20_000.0])
+def test_a_clock_that_goes_fast_or_slow_is_measured(ppm: float) -> None:
+    figures = heard(10.0, ppm).figures
+    assert figures is not None and figures.drift_ppm == pytest.approx(ppm, abs=1e-3 * abs(ppm) + 0.1)
+
+
+def test_a_radio_that_scatters_hides_no_drift() -> None:
+    for ppm in (0.0, 1500.0):
+        figures = heard(8.0, ppm, jitter_ms=5.0).figures
+        assert figures is not None and figures.drift_ppm == pytest.approx(ppm, abs=120.0)
+
+
+def test_a_drift_is_not_told_before_it_is_known() -> None:
+    short = heard(2.0).figures
+    assert short is not None and short.drift_ppm is None
+    assert heard(0.3).figures is None
+    wild = heard(5.0, jitter_ms=200.0).figures
+    assert wild is not None and wild.drift_ppm is None
+
+
+def test_the_latest_packet_is_told_by_how_late_it_was() -> None:
+    figures = heard(10.0, late_ms=180.0).figures
+    assert figures is not None and figures.late_ms == pytest.approx(180.0, abs=0.1)
+    assert figures.drift_ppm == pytest.approx(0.0, abs=1.0)
+
+
+def test_a_clock_that_starts_over_is_compared_anew() -> None:
+    clock = heard(10.0, 5000.0)
+    last_ns = BOOTED + 10_000 * MS
+    clock.update(last_ns, 0)
+    assert clock.figures is None
+    for number in range(1000):
+        clock.update(last_ns + 10 * MS * number, 10 * MS * number)
+    assert clock.figures is not None and clock.figures.drift_ppm == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_vehicle_on_the_floor_is_listened_to_as_well() -> None:
+    monitor = MotionMonitor(PlausibilityLimits())
+    for number in range(600):
+        at_ns = 10 * MS * number
+        sample = MotionSample(BOOTED + at_ns, (0.0, 0.0), 0.0, 0.0, vehicle_ns=at_ns)
+        monitor.update(sample, FlightState.LANDED)
+    assert monitor.clock.figures is not None and monitor.clock.figures.drift_ppm == pytest.approx(0.0, abs=0.1)
+    silent = MotionMonitor(PlausibilityLimits())
+    silent.update(MotionSample(BOOTED, (0.0, 0.0), 0.0, 0.0), FlightState.LANDED)
+    assert silent.clock.figures is None

@@ -41,11 +41,15 @@ class FaultKind(StrEnum):
     CAPTURE_FROZEN = "capture_frozen"
     BODY_JUMPED = "body_jumped"
     BODIES_SWAPPED = "bodies_swapped"
+    RANGES_SILENT = "ranges_silent"
+    RANGES_FROZEN = "ranges_frozen"
+    RANGES_LONG = "ranges_long"
 
 
 class Part(Enum):
     """What can have a fault: any vehicle, one whose emulator has it (`VehicleKind.emulated_faults`), a camera, the
-    marker of a drone or target, a motion capture system, or its body on a drone or target."""
+    marker of a drone or target, a motion capture system, its body on a drone or target, a ranging system, or a
+    drone's radio for it."""
 
     VEHICLE = auto()
     ABLE_VEHICLE = auto()
@@ -53,6 +57,8 @@ class Part(Enum):
     MARKER = auto()
     CAPTURE = auto()
     BODY = auto()
+    RANGING = auto()
+    TRANSPONDER = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +102,9 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.CAPTURE_FROZEN: KindRules(Part.CAPTURE),
     FaultKind.BODY_JUMPED: KindRules(Part.BODY, (-5.0, 5.0), 0.5),
     FaultKind.BODIES_SWAPPED: KindRules(Part.BODY, other=True),
+    FaultKind.RANGES_SILENT: KindRules(Part.RANGING),
+    FaultKind.RANGES_FROZEN: KindRules(Part.RANGING),
+    FaultKind.RANGES_LONG: KindRules(Part.TRANSPONDER, (-5.0, 5.0), 0.5),
 }
 
 
@@ -116,17 +125,20 @@ class Fault(Section):
     address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen, picture_black: its
     images come, and repeat the last one, are black; wrong_board: the entity carries the board of the other;
     capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame; body_jumped: all
-    systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other."""
+    systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other; ranges_silent,
+    ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long: those of a drone are
+    value [m] too long, as behind a wall."""
     entity: str
-    """The drone, camera (of a drone's camera: the drone) or motion capture system; for boards and bodies a drone or
-    target."""
+    """The drone, camera (of a drone's camera: the drone), motion capture or ranging system; for boards and bodies a
+    drone or target."""
     start_s: Annotated[float, Field(ge=0)]
     """When it breaks [s after the simulator is ready]."""
     end_s: Annotated[float, Field(ge=0)] | None = None
     """When it heals [s after the simulator is ready]; none: it does not."""
     value: Annotated[float, Field(ge=-1000, le=1000)] | None = None
     """How much, as `kind` explains; none: 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1 deg/s, 30 deg, a charge of 1,
-    0.4 m (body_jumped: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop must be told."""
+    0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop must be
+    told."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Where value points: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""

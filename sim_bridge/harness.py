@@ -17,6 +17,7 @@ from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.link_bursts import with_bursts
+from sim_bridge.ranges import Radios
 from sim_bridge.real.followers import Followers
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
@@ -121,8 +122,9 @@ class Harness:
         order, world = self._order, self.world
         rng, errors = generator_of(order.seed, f"capture {name}"), order.scenario.cameras.mounting_errors
         if name in order.site.ranging:
-            ranging, drones = order.site.ranging[name], order.site.drones
-            gateway = RangeGateway(name, place, ranging, world.bodies, drones, world.states, rng, errors)
+            ranging, drones, faults = order.site.ranging[name], order.site.drones, order.scenario.faults
+            radios = Radios(ranging, errors, rng)
+            gateway = RangeGateway(name, place, ranging, world.bodies, drones, world.states, radios, faults)
             self._stage.add(name, gateway, gateway.fileno())
             return
         system = order.site.motion_capture[name]

@@ -123,6 +123,8 @@ def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], r
         Part.MARKER: list(site.bodies),
         Part.CAPTURE: sorted(site.motion_capture),
         Part.BODY: list(site.bodies),
+        Part.RANGING: sorted(site.ranging),
+        Part.TRANSPONDER: list(site.drones) if site.ranging else [],
     }
     problems = []
     for number, fault in enumerate(faults):

@@ -14,6 +14,8 @@ from groundstation.geometry.multilateration import fix_from_ranges, likely_in
 from groundstation.time_units import NS_PER_MS
 
 _POLL_S = 0.02
+# Noise of centimetres in several ranges does not repeat itself: a gateway that goes on telling its last round is stuck.
+_MOST_REPEATS = 3
 
 
 def run(child: HostProcess) -> int:
@@ -37,6 +39,7 @@ class RangingDriver:
         self._robots = {one.name: one.entity for one in settings.transponders}
         self._likely = likely_in(settings.volume_m)
         self._newest_ns: dict[str, int] = {}
+        self._last: dict[str, tuple[dict[str, float], int]] = {}
         remedy = f"check the gateway, whether its radios run, and its address {settings.source}"
         names = StreamNames("ranging", settings.name, "range", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -46,11 +49,16 @@ class RangingDriver:
         """Wait shortly for rounds, handle them, and keep up heartbeat, status and the watch over silence."""
         for arrival_ns, told in self._gateway.poll(_POLL_S):
             self._handle(arrival_ns, told)
-        self._health.watch("", "", self.counts + self._gateway.rejected)
+        stuck = sorted(robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS)
+        why = f"the ranges of {', '.join(stuck)} repeat themselves: restart the gateway" if stuck else ""
+        self._health.watch(why, why, self.counts + self._gateway.rejected)
 
     def _handle(self, arrival_ns: int, told: Round) -> None:
-        self._health.came(arrival_ns)
         robot = self._robots.get(told.transponder)
+        if robot is not None and self._repeats(robot, told.m):
+            self.counts["repeated"] += 1
+            return
+        self._health.came(arrival_ns)
         if robot is None:
             self.counts["unknown transponder"] += 1
             return
@@ -64,6 +72,13 @@ class RangingDriver:
         if ranges_m:
             self._health.reported += 1
             self._child.bus.publish(RANGE, self._message(robot, ranges_m, stamp_ns))
+
+    def _repeats(self, robot: str, ranges_m: dict[str, float]) -> bool:
+        """Return whether a robot's rounds have had the same contents too often."""
+        last, repeats = self._last.get(robot, ({}, 0))
+        repeats = repeats + 1 if ranges_m == last else 0
+        self._last[robot] = ranges_m, repeats
+        return repeats > _MOST_REPEATS
 
     def _known(self, told: dict[str, float]) -> dict[str, float]:
         """Return the ranges to anchors of the field that are within reach; the others are counted."""

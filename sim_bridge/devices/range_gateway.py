@@ -10,6 +10,7 @@ import numpy as np
 
 from drivers.ranging.wire.ranges import LARGEST, Round, encode
 from groundstation.arrays import Array
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.listening import open_udp
 from sim_bridge.ranges import Radios
 from sim_bridge.site import SiteRanging, SiteTransponder
@@ -23,21 +24,22 @@ _FORGOTTEN_TICKS = 2000  # a client that is silent for 10 s is gone
 class RangeGateway:
     """A socket and radios around the states of all bodies; `sim_bridge.world.emulation.Emulator`.
 
-    states: returns a row for each body, as `World.states` has them; errors: whether radios have errors that last.
+    states: returns a row for each body, as `World.states` has them.
     """
 
     def __init__(
         self, name: str, place: Address, system: SiteRanging, bodies: Iterable[str], drones: Iterable[str],
-        states: Callable[[], Array], rng: np.random.Generator, errors: bool = True,
+        states: Callable[[], Array], radios: Radios, faults: Iterable[Fault] = (),
     ) -> None:  # fmt: skip
         self.silent = self.deaf = False
-        self._system, self._states = system, states
+        self._name, self._system, self._states, self._faults = name, system, states, tuple(faults)
         self._rows = {body: row for row, body in enumerate(bodies)}
         self._drones = tuple(drones)
         self._socket = open_udp(f"emulated {name}", *place)
-        self._radios = Radios(system, errors, rng)
+        self._radios = radios
         self._heard: dict[Address, int] = {}
         self._waiting: list[tuple[int, bytes]] = []
+        self._last_m: dict[str, dict[str, float]] = {}
         self._ticks = 0
         self._every = max(1, round(1.0 / (system.rate_hz * _TICK_S)))
 
@@ -58,21 +60,35 @@ class RangeGateway:
     def send(self) -> None:
         """End a tick: measure who is due, and send what has been on its way long enough."""
         self._ticks += 1
+        now_s = self._ticks * _TICK_S
         late = round(self._system.delay_ms / 1000 / _TICK_S)
         for index, drone in enumerate(self._drones):
-            if (self._ticks + index * self._every // len(self._drones)) % self._every == 0:
-                row = self._states()[self._rows[drone]]
-                ranges_m = {} if np.isnan(row[0]) else self._radios.ranges_m(drone, row)
-                if ranges_m:
-                    called = self._system.transponders.get(drone, SiteTransponder()).name or drone
-                    rounded = {anchor: round(m, 3) for anchor, m in ranges_m.items() if m > 0.0}
-                    self._waiting.append((self._ticks + late, encode(Round(called, rounded))))
+            due = (self._ticks + index * self._every // len(self._drones)) % self._every == 0
+            if due and (told := self._round(drone, now_s)):
+                called = self._system.transponders.get(drone, SiteTransponder()).name or drone
+                self._waiting.append((self._ticks + late, encode(Round(called, told))))
         self._heard = {one: heard for one, heard in self._heard.items() if self._ticks - heard < _FORGOTTEN_TICKS}
         while self._waiting and self._waiting[0][0] <= self._ticks:
             _, datagram = self._waiting.pop(0)
-            for client in () if self.silent else self._heard:
+            dumb = self.silent or self._standing(FaultKind.RANGES_SILENT, self._name, now_s)
+            for client in () if dumb else self._heard:
                 with suppress(OSError):
                     self._socket.sendto(datagram, client)
+
+    def _round(self, drone: str, now_s: float) -> dict[str, float]:
+        """Return what is told of a drone [m, to the millimetre]."""
+        if drone in self._last_m and self._standing(FaultKind.RANGES_FROZEN, self._name, now_s):
+            return self._last_m[drone]
+        row = self._states()[self._rows[drone]]
+        ranges_m = {} if np.isnan(row[0]) else self._radios.ranges_m(drone, row)
+        detour = self._standing(FaultKind.RANGES_LONG, drone, now_s)
+        longer_m = detour.amount if detour else 0.0
+        told = {anchor: round(m + longer_m, 3) for anchor, m in ranges_m.items() if m + longer_m > 0.0}
+        self._last_m[drone] = told
+        return told
+
+    def _standing(self, kind: FaultKind, entity: str, now_s: float) -> Fault | None:
+        return next((f for f in self._faults if f.kind is kind and f.entity == entity and f.covers(now_s)), None)
 
     def close(self) -> None:
         """Close the port."""

@@ -20,6 +20,8 @@ from groundstation.bus.messages import CameraStatus, RangeObservation
 from groundstation.bus.topics import CAMERA_STATUS, RANGE
 from groundstation.errors import SettingsError
 from sim_bridge.devices.range_gateway import RangeGateway
+from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.ranges import Radios
 from sim_bridge.site import SiteRanging
 
 HOST, MS = "127.0.0.1", 1_000_000
@@ -76,7 +78,7 @@ class Rig:
 
 
 @pytest.fixture
-def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
+def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
     clock = SimpleNamespace(ns=10**12)
     monkeypatch.setattr("groundstation.bus.clock.now_ns", lambda: clock.ns)
     monkeypatch.setattr("drivers.ranging.driver._POLL_S", 0.001)
@@ -87,12 +89,12 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
     def states() -> np.ndarray:
         return np.array([[*at, 0, 0, 0, 0.0, 0.0, 0.3, 0, 0, 0, 0] for at in PLACES.values()])
 
-    radios = {"drone_1": {"name": "0x1", "position_m": (0.0, 0.0, 0.1)}}
+    carried = {"drone_1": {"name": "0x1", "position_m": (0.0, 0.0, 0.1)}}
     system = SiteRanging.model_validate(
-        {"anchors": ANCHORS, "volume_m": WIDE, "transponders": radios, "range_std_m": 1e-4, "outlier_share": 0.0}
+        {"anchors": ANCHORS, "volume_m": WIDE, "transponders": carried, "range_std_m": 2e-3, "outlier_share": 0.0}
     )
-    drones, rng = ("drone_1", "drone_2"), np.random.default_rng(1)
-    gateway = RangeGateway("uwb", place, system, PLACES, drones, states, rng, errors=False)
+    drones, radios = ("drone_1", "drone_2"), Radios(system, errors=False, rng=np.random.default_rng(1))
+    gateway = RangeGateway("uwb", place, system, PLACES, drones, states, radios, getattr(request, "param", ()))
     section = RangingSection.model_validate(
         {
             "name": "uwb",
@@ -134,6 +136,43 @@ def test_silence_is_told_with_its_remedy_and_so_is_its_end(rig: Rig) -> None:
     rig.gateway.silent = False
     well = [one for one in rig.run(200) if isinstance(one, CameraStatus)]
     assert well[-1].connected and well[-1].detections > 0 and rig.child.told[-2] == "READY"
+
+
+def broken(kind: FaultKind, entity: str, **rest: float) -> Fault:
+    return Fault.model_validate({"kind": kind, "entity": entity, "start_s": 0.5, "end_s": 1.5, **rest})
+
+
+@pytest.mark.parametrize("rig", [(broken(FaultKind.RANGES_FROZEN, "uwb", end_s=2.5),)], indirect=True)
+def test_rounds_that_repeat_themselves_are_silence(rig: Rig) -> None:
+    """A position that stands while the drone flies would win against its own velocity."""
+    rig.driver.turn()
+    before = [one for one in rig.run(100) if isinstance(one, RangeObservation)]
+    rig.run(60)
+    frozen = rig.run(300)
+    assert before and not [one for one in frozen if isinstance(one, RangeObservation)]
+    last = [one for one in frozen if isinstance(one, CameraStatus)][-1]
+    assert not last.connected and "the ranges of drone_1, drone_2 repeat themselves" in last.detail
+    assert last.rejected["repeated"] > 5
+    assert [one for one in rig.run(100) if isinstance(one, RangeObservation)]
+    assert rig.child.told[-2] == "READY"
+
+
+@pytest.mark.parametrize("rig", [(broken(FaultKind.RANGES_LONG, "drone_1", value=0.4),)], indirect=True)
+def test_an_emulated_detour_makes_one_drones_ranges_longer(rig: Rig) -> None:
+    rig.driver.turn()
+    rig.run(110)
+    told = [one for one in rig.run(80) if isinstance(one, RangeObservation) and "a" in one.ranges_m]
+    for name, own, longer in (("drone_1", (0.5, 0.2, 1.6), 0.4), ("drone_2", PLACES["drone_2"], 0.0)):
+        ranges = [one.ranges_m["a"] for one in told if one.subject == name]
+        assert ranges and np.allclose(ranges, math.dist(own, ANCHORS["a"]) + longer, atol=0.01)
+
+
+@pytest.mark.parametrize("rig", [(broken(FaultKind.RANGES_SILENT, "uwb"),)], indirect=True)
+def test_an_emulated_gateway_falls_silent_and_comes_back(rig: Rig) -> None:
+    rig.driver.turn()
+    rig.run(110)
+    assert not [one for one in rig.run(180) if isinstance(one, RangeObservation)]
+    assert [one for one in rig.run(100) if isinstance(one, RangeObservation)]
 
 
 def test_strangers_and_what_nobody_carries_are_counted(rig: Rig) -> None:

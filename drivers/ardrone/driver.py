@@ -50,7 +50,8 @@ _NO_AR1_VIDEO = Notice(
     "take the video section out of the field file and give the drone a camera of its own",
 )
 # Firmware limits tilt to 30 degrees and flies 5 m/s at most. WIRE: the TIME option wraps after 2048 s.
-LIMITS = PlausibilityLimits(clock_wrap_s=2048.0)
+# 30 degrees are 6 m/s^2. Between two packets of a recorded flight its velocity changed by 0.024 m/s at most.
+LIMITS = PlausibilityLimits(clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0)
 _log = logging.getLogger(__name__)
 
 

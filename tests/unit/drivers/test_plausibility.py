@@ -155,6 +155,18 @@ def test_one_jump_is_doubted_and_forgotten():
     assert worst is Health.SUSPECT and monitor.report.of(Sensor.VELOCITY) is Health.GOOD
 
 
+@pytest.mark.parametrize("period_ms", [5, 10])
+def test_an_ardrone_cannot_change_its_velocity_by_a_third_of_a_metre_per_second_at_once(period_ms):
+    """One jumped by 0.33 m/s as its ceiling camera went black, and drew the belief of the whole team along."""
+
+    def jump(sample, _):
+        return replace(sample, velocity_m_s=(sample.velocity_m_s[0] + 0.33, sample.velocity_m_s[1]))
+
+    first, said = judge(broken(jump, period_ms=period_ms), ARDRONE)
+    assert FAULT_S <= first[Sensor.VELOCITY, Health.SUSPECT] <= FAULT_S + 2 * period_ms / 1000
+    assert (Sensor.VELOCITY, Health.BAD) not in first and any("its velocity jumps by 0." in reason for reason in said)
+
+
 def test_what_recovers_is_good_again_after_a_second():
     monitor = MotionMonitor(ARDRONE)
     good_s = []

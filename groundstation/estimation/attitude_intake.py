@@ -51,11 +51,10 @@ class AttitudeIntake:
         """Return an odometry message as a sample, with the attitude that counts."""
         name, attitude, reset = message.header.entity, None, message.reset
         yaw_rad, roll_rad, pitch_rad = message.yaw_rad, message.roll_rad, message.pitch_rad
-        attitude_std_rad, velocity_std_m_s, yaw_std_rad = message.attitude_std_rad, 0.0, 0.0
+        attitude_std_rad, yaw_std_rad = message.attitude_std_rad, 0.0
+        velocity_std_m_s = math.sqrt(max(message.velocity_covariance[0], message.velocity_covariance[4], 0.0))
         inertial = self._inertial.get(name)
-        if inertial is None:
-            velocity_std_m_s = math.sqrt(max(message.velocity_covariance[0], message.velocity_covariance[4], 0.0))
-        else:
+        if inertial is not None:
             source = self._sources[name]
             if stamp_ns > source.newest_ns:
                 inertial.take_velocity(stamp_ns, message.velocity_m_s)

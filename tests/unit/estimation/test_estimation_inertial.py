@@ -198,3 +198,15 @@ def test_odometry_that_comes_late_counts_no_reset() -> None:
     after = resets(3.0, 1)
     assert after != resets(2.5, 0) == resets(1.0, 0)
     assert resets(4.0, 1) == after
+
+
+def test_a_velocity_that_the_driver_doubts_is_doubted_though_the_attitude_is_not_the_vehicles() -> None:
+    intake = AttitudeIntake({"drone_1": 1.0})
+    for number, std_m_s in enumerate((0.05, 0.5)):
+        header = Header(round((number + 1) * 1e9), "boot", "drone_1", "drone_1", 1)
+        covariance = (std_m_s**2, 0, 0, 0, std_m_s**2, 0, 0, 0, 1.0)
+        odometry = Odometry(
+            header=header, velocity_m_s=(0.0, 0.0, 0.0), velocity_covariance=covariance,
+            yaw_rad=0.0, roll_rad=0.0, pitch_rad=0.0, reset=0,
+        )  # fmt: skip
+        assert intake.motion(odometry, header.stamp_ns).velocity_std_m_s == pytest.approx(std_m_s)

@@ -52,7 +52,7 @@ class Flight:
             vx, vy = ((told(self.velocity) + noise) / SCALE).tolist()
             values: Any = {"yaw_rad": 0.0, "roll_rad": 1e-9 * self.seq, "pitch_rad": 0.0, "height_m": 1.3}
             header = self.header("drone_1")
-            self.send(Odometry(header=header, velocity_m_s=(vx, vy, 0.0), velocity_covariance=(0.01,) * 9, **values))
+            self.send(Odometry(header=header, velocity_m_s=(vx, vy, 0.0), velocity_covariance=(0.0025,) * 9, **values))
             if look and self.ticks % FRAME_TICKS == 0:
                 self.send(self.ceiling())
             self.tracker.advance(self.now)

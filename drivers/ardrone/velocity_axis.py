@@ -55,7 +55,7 @@ class Gains:
     overshoot_m_s: float = 0.2
     disturbance_m_s2: float = 0.2
     doubt_m_s: float = 0.3
-    doubt_m: float = 0.1
+    doubt_m: float = 0.05
     answer_s: float = 0.3
     lasting_s: float = 10.0
     seen_ticks: int = SEEN_TICKS

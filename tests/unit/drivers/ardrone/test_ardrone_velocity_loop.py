@@ -189,6 +189,13 @@ def test_a_velocity_stuck_at_0_cannot_wind_up_tilt(wanted, noise, sensed):
     assert found_s is not None and found_s <= 3.0 and max(speeds) <= 0.95
 
 
+@pytest.mark.parametrize(("wanted", "reported", "within_s"), [(0.0, 0.5, 1.0), (0.3, 0.8, 0.5), (0.3, -0.2, 1.1)])
+def test_a_speed_that_nobody_asked_for_is_noticed_within_a_second(wanted, reported, within_s):
+    """A drone that its drifting velocity led off was 0.8 m beside its belief until the driver stopped it."""
+    _, found_s = fly_blindly(wanted, 5.0, reported, noise=0.03)
+    assert found_s is not None and found_s <= within_s
+
+
 @pytest.mark.parametrize("wind", [-0.8, 0.8])
 def test_a_velocity_stuck_at_0_in_wind_is_noticed_in_time(wind):
     speeds, found_s = fly_blindly(0.5, 20.0, 0.0, noise=0.03, wind=wind)

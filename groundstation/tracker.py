@@ -264,16 +264,16 @@ class Tracker:
         belief, lookout = self._belief.core(), self.lookout
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
-        sight = Sight(
-            min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
-            lambda robots, targets: lookout.stands(robots, targets, belief),
-        )  # fmt: skip
-        wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
         drifts = {
             name: self._drifts[name].see(now_ns, belief.mean_of(name)[:3] + p.safety.reaction_s * velocity)
             for name, velocity in velocities.items()
         }
+        sight = Sight(
+            min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
+            lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
+        )  # fmt: skip
+        wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)
             for name, setpoint in wanted.items()

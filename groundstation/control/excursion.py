@@ -14,7 +14,10 @@ from groundstation.sensing.models import SensorSuite
 
 @dataclass
 class Excursions:
-    """Judges ways out of sight by uncertainty and time. `unseen_s`: since a camera last saw each robot."""
+    """Judges ways out of sight by uncertainty and time.
+
+    `unseen_s`: since a camera last saw each robot; `velocity_errors_m_s`: rms errors of their odometry.
+    """
 
     parameters: ControlParameters
     sensors: SensorSuite
@@ -22,12 +25,13 @@ class Excursions:
     def __post_init__(self) -> None:
         """Begin with robots that are seen."""
         self.unseen_s: dict[str, float] = {}
+        self.velocity_errors_m_s: dict[str, float] = {}
 
     def left_s(self, name: str, belief: JointBelief) -> float:
         """Return for how long a robot may stay out of sight from now on, until its place is known too badly [s]."""
         p = self.parameters
-        unseen_s = self.unseen_s.get(name, 0.0)
-        return time_left_s(spread_m(belief, name), unseen_s, p)
+        unseen_s, error_m_s = self.unseen_s.get(name, 0.0), self.velocity_errors_m_s.get(name, 0.0)
+        return time_left_s(spread_m(belief, name), unseen_s, p, error_m_s)
 
     def allowed_s(self, name: str, belief: JointBelief, places: Array) -> Array:
         """Return within how long a robot has to be at each place (n, 2), to be back in time; where it is seen: inf."""
@@ -42,11 +46,15 @@ class Excursions:
         return np.where(way_m > 0.0, back_s, math.inf)
 
 
-def time_left_s(spread: float, unseen_s: float, parameters: ControlParameters) -> float:
+def time_left_s(
+    spread: float, unseen_s: float, parameters: ControlParameters, velocity_error_m_s: float = 0.0
+) -> float:
     """Return how long a robot may go on unseen: until its deviation reaches the limit, or odometry is trusted no more.
 
-    Its deviation has grown with the time, and goes on so: a wrong velocity adds up evenly.
+    Its deviation has grown with the time, and goes on so: a wrong velocity adds up evenly. velocity_error_m_s: rms
+    error of the odometry; one that no sound odometry has adds up from now on, though it has not yet.
     """
     p = parameters
-    drift = max(p.drift_m_s, (spread - p.seen_std_m) / unseen_s if unseen_s > 1.0 else 0.0)
+    wrong = velocity_error_m_s if velocity_error_m_s > p.sound_error_m_s else 0.0
+    drift = max(p.drift_m_s, wrong, (spread - p.seen_std_m) / unseen_s if unseen_s > 1.0 else 0.0)
     return min((p.return_limit_m - spread) / drift, p.return_within_s - unseen_s)

@@ -10,6 +10,7 @@ from groundstation.control.parameters import ControlParameters
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.control.target_search import Search, SearchMode, SearchState
+from groundstation.control.view import velocity_error_m_s
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.room_map import RoomMap
 from groundstation.sensing.models import SensorSuite
@@ -50,6 +51,11 @@ class Lookout:
         """Return since when cameras should see which robots and do not [s]."""
         return self._robots.missed_s
 
+    @property
+    def velocity_errors_m_s(self) -> Mapping[str, float]:
+        """Return the rms error of each robot's odometry [m/s]."""
+        return self._excursions.velocity_errors_m_s
+
     def take(self, message: Message, in_our_time: bool = True) -> None:
         """Take in the mode of a driver, or a picture that was searched all over; one in foreign time does not count."""
         match message:
@@ -65,6 +71,9 @@ class Lookout:
         ages_s: since each airborne robot and each target was last seen; infinite: not in the belief.
         """
         self._excursions.unseen_s = {name: age_s for name, age_s in ages_s.items() if name in self._names}
+        self._excursions.velocity_errors_m_s = {
+            n: velocity_error_m_s(belief, n) for n in self._names if n in belief.layout
+        }
         for name in self._robots.advance(belief, self._excursions.unseen_s):
             text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))

@@ -18,10 +18,12 @@ class ControlParameters:
     height, and which stands of two robots keep; return_std_m: a robot outside the world-fixed views that is known
     worse than this flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
     that would then have been unseen for return_within_s (odometry may be worse than it says), each with return_margin_s
-    to turn round and be found, but never before return_soonest_s: so long a gap between sightings is usual; drift_m_s:
-    how fast a place becomes uncertain out of sight at least, seen_std_m: from where; regain_after_s: nobody has seen a
-    target for so long, those that track it turn to it and back off; hint_std_m: no plan goes by a
-    target that is known worse; max_plan_age_s: held controls of an older plan are not flown any more.
+    to turn round and be found, but never before return_soonest_s: so long a gap between sightings is usual;
+    return_drift_m_s: largest measured drift that is subtracted on the way back; drift_m_s: how fast a place becomes
+    uncertain out of sight at least, seen_std_m: from where; sound_error_m_s: a larger error of the odometry is not that
+    of a sound one; regain_after_s: nobody has seen a target for so long, those that track it turn to it and back off;
+    hint_std_m: no plan goes by a target that is known worse; max_plan_age_s: held controls of an older plan are not
+    flown any more.
     """
 
     search_height_m: float
@@ -37,7 +39,9 @@ class ControlParameters:
     return_soonest_s: float = 1.5
     return_margin_s: float = 1.5
     return_speed_m_s: float = 0.5
+    return_drift_m_s: float = 0.3
     drift_m_s: float = 0.03
+    sound_error_m_s: float = 0.12
     seen_std_m: float = 0.05
     regain_after_s: float = 0.35
     search_speed_m_s: float = 0.5

@@ -16,25 +16,33 @@ _FARTHEST_LOOK_M = 1.2
 
 
 def is_lost(
-    name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, unseen_s: float = 0.0
+    name: str,
+    belief: JointBelief,
+    parameters: ControlParameters,
+    sensors: SensorSuite,
+    unseen_s: float = 0.0,
+    velocity_error_m_s: float = 0.0,
 ) -> bool:
     """Return whether a robot must fly back now, or soon would be known too badly to be seen again.
 
-    By its own uncertainty, the way and its time; without any world-fixed view, when it is known too badly.
+    By its own uncertainty, the error of its odometry, the way and its time; without any world-fixed view, when it is
+    known too badly.
     """
     if unseen_s > max(parameters.return_soonest_s, parameters.return_within_s):
         return True
     mean, spread = belief.mean_of(name), spread_m(belief, name)
     if spread <= parameters.return_std_m and unseen_s <= parameters.return_soonest_s:
         return False
+    left_s = time_left_s(spread, unseen_s, parameters, velocity_error_m_s)
     marker = sensors.marker(name, mean, is_robot=True)
     if any(sensors.world_in_view(camera, marker) for camera in sensors.world):
-        return False
+        # Who is believed in view and not seen may be beside it: towards the middle it is seen the sooner.
+        return unseen_s > parameters.return_soonest_s and left_s < parameters.return_margin_s
     view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
     if view is None or unseen_s <= parameters.return_soonest_s:
         return spread > parameters.return_std_m
     way_m = way_back_m(float(mean[0]), float(mean[1]), view)
-    return time_left_s(spread, unseen_s, parameters) < way_m / parameters.return_speed_m_s + parameters.return_margin_s
+    return left_s < way_m / parameters.return_speed_m_s + parameters.return_margin_s
 
 
 def return_stand(mean: Array, view: Rectangle | None, looks_s: float = 0.0) -> Stand:

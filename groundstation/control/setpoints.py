@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import ControlParameters
@@ -20,6 +21,7 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
+_NO_DRIFT = np.zeros(3)
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
 
 
@@ -44,7 +46,8 @@ class Sight:
 
     target_age_s: since any target was last observed where it is believed, None if never; unseen_s: since a camera last
     saw each robot; missed_s: since when a camera should see a robot and does not; missing: targets that are to be
-    searched for: while others are tracked, one robot does.
+    searched for: while others are tracked, one robot does; velocity_errors_m_s: of each robot's odometry, rms;
+    drifts_m_s: motion of each robot besides what it is told (3) [m/s; world].
     """
 
     target_age_s: float | None = None
@@ -52,6 +55,8 @@ class Sight:
     missed_s: Mapping[str, float] = field(default_factory=dict)
     missing: Collection[str] = ()
     search: Stands = lambda _robots, _targets: {}
+    velocity_errors_m_s: Mapping[str, float] = field(default_factory=dict)
+    drifts_m_s: Mapping[str, Array] = field(default_factory=dict)
 
 
 NOTHING_SEEN = Sight()
@@ -96,7 +101,8 @@ def setpoints_from_plan(
             vx, vy, rate = _regained(name, plan, belief, parameters, sensors, sight)
             wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
         else:
-            wanted[name] = _towards(name, stands[name], phase, belief, robots, parameters)
+            drift = sight.drifts_m_s.get(name, _NO_DRIFT) if phase is FlightMode.RETURN else _NO_DRIFT
+            wanted[name] = _towards(name, stands[name], phase, belief, robots, parameters, drift)
     return wanted
 
 
@@ -123,7 +129,8 @@ def _regained(
 
 
 def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight) -> bool:
-    return name in sight.missed_s or is_lost(name, belief, parameters, sensors, sight.unseen_s.get(name, 0.0))
+    unseen_s, error_m_s = sight.unseen_s.get(name, 0.0), sight.velocity_errors_m_s.get(name, 0.0)
+    return name in sight.missed_s or is_lost(name, belief, parameters, sensors, unseen_s, error_m_s)
 
 
 def _scout(belief: JointBelief, tracking: Sequence[str], missing: Collection[str]) -> str | None:
@@ -173,13 +180,19 @@ def _towards(
     belief: JointBelief,
     robots: list[str],
     parameters: ControlParameters,
+    drift_m_s: Array,
 ) -> Setpoint:
-    """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots."""
+    """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
+
+    drift_m_s: motion besides what is told (3) [m/s; world], which is subtracted, as far as such a drift is believed.
+    """
     mean = belief.mean_of(name)
     velocity = _STAND_GAIN * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
     velocity *= min(1.0, most / max(speed, 1e-9))
+    size = float(np.hypot(*drift_m_s[:2]))
+    velocity[:2] -= drift_m_s[:2] * min(1.0, parameters.return_drift_m_s / max(size, 1e-9))
     for other in robots:
         away = mean[:2] - belief.mean_of(other)[:2]
         distance = float(np.linalg.norm(away))

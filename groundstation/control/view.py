@@ -7,6 +7,7 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
 VIEW_INSET_M = 0.3
+_VELOCITY_ERRORS = ("velocity_bias_x", "velocity_bias_y")
 _POINT_M = 1e-6  # a view that is narrower is a line
 
 
@@ -22,6 +23,16 @@ def spread_m(belief: JointBelief, name: str) -> float:
     P = belief.covariance_of(name)
     xx, xy, yy = float(P[0, 0]), float(P[0, 1]), float(P[1, 1])
     return math.sqrt(0.5 * (xx + yy + math.hypot(xx - yy, 2.0 * xy)))
+
+
+def velocity_error_m_s(belief: JointBelief, name: str) -> float:
+    """Return the rms error of a robot's reported velocity, as the belief has it: its mean and its deviation [m/s].
+
+    0 where the belief has no such states: in its core, and for vehicles without them.
+    """
+    block, variances = belief.layout.block(name), belief.covariance_of(name).diagonal()
+    entries = [block.labels.index(label) for label in _VELOCITY_ERRORS if label in block.labels]
+    return math.sqrt(max((float(belief.mean_of(name)[i] ** 2 + variances[i]) for i in entries), default=0.0))
 
 
 def way_back_m(x: float, y: float, view: Rectangle) -> float:

@@ -11,7 +11,7 @@ from groundstation.control.flight_mode import FlightMode
 from groundstation.control.parameters import control_from_field
 from groundstation.control.returning import is_lost
 from groundstation.control.setpoints import Sight, setpoints_from_plan
-from groundstation.control.view import way_back_m
+from groundstation.control.view import velocity_error_m_s, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.sensing.from_field import sensors_from_field
@@ -66,6 +66,41 @@ def test_a_drone_far_out_flies_back_by_its_uncertainty_and_its_way() -> None:
     assert not is_lost("drone_1", belief(far, 0.1), CONTROL, SENSORS, unseen_s=4.0)
     assert is_lost("drone_1", belief(far, 0.1), CONTROL, SENSORS, unseen_s=10.0)
     assert not is_lost("drone_1", belief(near, 0.1), CONTROL, SENSORS, unseen_s=10.0)
+
+
+def test_an_odometry_that_is_known_to_be_wrong_leaves_less_time_out_of_sight() -> None:
+    sound, wrong = (time_left_s(0.1, 3.0, CONTROL, error_m_s) for error_m_s in (0.06, 0.25))
+    assert sound == time_left_s(0.1, 3.0, CONTROL), "any odometry is off by so much"
+    assert wrong == pytest.approx((CONTROL.return_limit_m - 0.1) / 0.25)
+    far = belief(np.array([2.6, 0.0, 1.6, 0.0]), 0.1)
+    assert is_lost("drone_1", far, CONTROL, SENSORS, unseen_s=2.0, velocity_error_m_s=0.25)
+    assert not is_lost("drone_1", far, CONTROL, SENSORS, unseen_s=2.0, velocity_error_m_s=0.06)
+    assert not is_lost("drone_1", far, CONTROL, SENSORS, unseen_s=1.0, velocity_error_m_s=0.25)
+
+
+def test_who_should_be_in_view_and_is_not_seen_flies_to_its_middle_before_it_is_lost() -> None:
+    near = belief(np.array([0.3, 0.0, 1.6, 0.0]), 0.3)
+    assert is_lost("drone_1", near, CONTROL, SENSORS, unseen_s=3.0, velocity_error_m_s=0.25)
+    assert not is_lost("drone_1", near, CONTROL, SENSORS, unseen_s=3.0)
+    assert not is_lost("drone_1", near, CONTROL, SENSORS, unseen_s=1.0, velocity_error_m_s=0.25)
+
+
+def test_the_error_of_an_odometry_is_its_mean_and_its_deviation() -> None:
+    labels = (*ROBOT_CORE, "velocity_bias_x", "velocity_bias_y")
+    layout = StateLayout().with_entity("drone_1", EntityKind.ROBOT, labels)
+    mean, deviations = np.array([0.0, 0.0, 1.6, 0.0, 0.3, 0.1]), np.array([0.1, 0.1, 0.1, 0.1, 0.4, 0.2])
+    whole = JointBelief(mean, np.diag(deviations**2), layout, 0)
+    assert velocity_error_m_s(whole, "drone_1") == pytest.approx(0.5)
+    assert velocity_error_m_s(whole.core(), "drone_1") == 0.0
+
+
+def test_excursions_of_a_drone_whose_odometry_is_wrong_end_sooner() -> None:
+    excursions, here = Excursions(CONTROL, SENSORS), belief(np.array([0.0, 0.0, 1.6, 0.0]), 0.05)
+    trusted_s = excursions.left_s("drone_1", here)
+    excursions.velocity_errors_m_s = {"drone_1": 0.2}
+    left_s = excursions.left_s("drone_1", here)
+    assert left_s == pytest.approx((CONTROL.return_limit_m - 0.05) / 0.2)
+    assert left_s < trusted_s
 
 
 def test_places_from_which_it_could_not_be_back_in_time_are_not_gone_to() -> None:

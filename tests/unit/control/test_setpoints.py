@@ -154,6 +154,21 @@ def test_a_lost_robot_flies_back_towards_the_middle_of_the_view() -> None:
     assert out["drone_2"].phase is FlightMode.TRACK  # as uncertain, but in view: the camera will see it
 
 
+def test_the_way_back_is_flown_against_the_drift_that_was_measured() -> None:
+    at = belief((3.0, 0.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0), robot_std=0.4)
+
+    def back(drift: tuple[float, float]) -> np.ndarray:
+        sight = Sight(0.1, drifts_m_s={name: np.array([*drift, 0.0]) for name in NAMES})
+        out = setpoints_from_plan(plan((1.5, 1.5)), at, NAMES, CONTROL, SENSORS, sight)
+        assert (out["drone_1"].phase, out["drone_2"].phase) == (FlightMode.RETURN, FlightMode.TRACK)
+        assert out["drone_2"].velocity_m_s[:2] == (0.0, 0.1), "who tracks flies as planned"
+        return np.array(out["drone_1"].velocity_m_s[:2])
+
+    still = back((0.0, 0.0))
+    assert back((0.1, -0.2)) == pytest.approx(still - (0.1, -0.2))
+    assert back((0.0, 3.0)) == pytest.approx(still - (0.0, CONTROL.return_drift_m_s)), "no more than is believable"
+
+
 def test_an_airborne_drone_that_was_never_seen_hovers_and_a_grounded_one_gets_nothing() -> None:
     out = setpoints(belief((0, 1, 1.5, 0), (0, -1, 1.5, 0)), plan((1.5, 1.5)), airborne=("drone_1", "drone_9"))
     assert set(out) == {"drone_1", "drone_9"}

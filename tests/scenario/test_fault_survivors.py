@@ -30,6 +30,13 @@ BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
 # Bumped by 8.75 deg the ceiling camera saw nobody, then one drone half a metre aside, which the other saw where it was.
 BUMPED = (202, ["camera_bumped", "picture_frozen"])
 
+# A velocity that lies while nobody sees the drone, or as its only ceiling camera goes black.
+LYING = {
+    "drifting_slowly_while_it_tracks_unseen": (7003, ["velocity_drifting"]),
+    "drifting_unnoticed_in_the_corner_of_the_view": (7115, ["battery_drop", "velocity_drifting"]),
+    "jumping_as_the_ceiling_camera_goes_black": (7019, ["picture_black", "velocity_jumping"]),
+}
+
 
 @pytest.fixture(scope="module")
 def order() -> dict[str, Any]:
@@ -72,3 +79,12 @@ def test_a_bumped_ceiling_camera_is_named_and_not_believed(order: dict[str, Any]
     size = float(told.split("turned by ")[1].split()[0])
     assert size == pytest.approx(8.75, rel=0.25)
     assert set(flown["modes"].values()) <= {"LANDING", "LANDED"}
+
+
+@pytest.mark.slow
+@pytest.mark.study
+@pytest.mark.parametrize(("seed", "kinds"), LYING.values(), ids=LYING)
+def test_a_drone_whose_velocity_lies_does_not_fly_on_where_it_is_not(
+    order: dict[str, Any], seed: int, kinds: list[str]
+) -> None:
+    safely_flown(order, seed, kinds)

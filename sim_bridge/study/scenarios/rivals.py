@@ -1,1 +1,0 @@
-"""Planners of others to compare ours with: no topology, random samples, a lattice, and the method's first program."""

@@ -272,8 +272,9 @@ def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -
 
 
 def test_a_target_that_jumps_away_is_found_again() -> None:
+    """It took 17 to 60 s, by seed and processor; how soon it should be is judged by kidnap-2m and kidnap-3m."""
     resolved = lab()
-    path = realistic_path(50.0)
+    path = realistic_path(110.0)
     path[500:] = path[500:] * np.array([-0.5, 1.0])  # kidnapped after 10 s, to the other side
     world = World(resolved, pads(resolved.planner.level_heights_m[0][0]), path, seed=4)
     trace = fly(world, Topology.flat(world.names))

@@ -1,7 +1,9 @@
 """Runs of `groundstation sitl`, ended whatever a test does, and what reaches the drones' command ports."""
 
+import itertools
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -13,19 +15,22 @@ from wire_tap import WireTap
 
 @pytest.fixture
 def sitl(tmp_path: Path) -> Iterator[Callable[..., SitlRun]]:
-    """Start a run: `sitl("--duration", "10")`; its field is the lab unless the first argument names a verb."""
-    runs: list[SitlRun] = []
+    """Start a run: `sitl("--duration", "10")`; its field is the lab unless the first argument names a verb.
+
+    Each is closed whatever becomes of the others: one that flew on would take the processor from all later tests.
+    """
+    count, runs = itertools.count(), ExitStack()
 
     def start(*arguments: str, terminal: int | None = None, program: tuple[str, ...] = COMMAND) -> SitlRun:
-        folder = tmp_path / f"run{len(runs)}"
+        folder = tmp_path / f"run{next(count)}"
         folder.mkdir()
         verb = arguments if arguments[:1] in (("demo",), ("sitl",)) else ("sitl", "lab", *arguments)
-        runs.append(SitlRun(folder, *verb, terminal=terminal, program=program))
-        return runs[-1]
+        run = SitlRun(folder, *verb, terminal=terminal, program=program)
+        runs.callback(run.close)
+        return run
 
-    yield start
-    for run in runs:
-        run.close()
+    with runs:
+        yield start
 
 
 @pytest.fixture

@@ -128,7 +128,7 @@ class PlaceForecaster:
         return PlaceForecast(place, math.sqrt(np.trace(belief.covariance_of(self.team.target)[:2, :2])), "", stand)
 
     def _unplaced(self, place: Place) -> str:
-        return f"the drone that sees it is {self.search.views.why_unplaced(place)}"
+        return f"whoever sees it is {self.search.views.why_unplaced(place)}"
 
 
 def floor_map(

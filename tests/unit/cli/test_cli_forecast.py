@@ -21,7 +21,7 @@ def test_a_page_is_printed_in_eighty_columns_and_written(tmp_path: Path, capsys:
     assert cli.run(["forecast", "lab", "--path", "0,0 3.9,2.9", "-o", str(page)]) == ExitCode.OK
     text = capsys.readouterr().out
     assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
-    blind = "on the path: 1 of 3 places, first at (3.9, 2.9): the drone that sees it is out of the view of ceiling"
+    blind = "on the path: 1 of 3 places, first at (3.9, 2.9): whoever sees it is out of the view of ceiling"
     assert blind in " ".join(text.split())
     assert "without ceiling there is no tracking" in text
     assert "drone_1  10 min at most, until it lands at 15%" in text

@@ -44,7 +44,7 @@ def test_each_drone_of_a_chain_is_seen_by_the_one_above_and_the_last_by_the_ceil
 def test_a_corner_outside_of_all_views_is_blind_because_of_the_ceiling_camera(lab_field: ResolvedField) -> None:
     corner = PlaceForecaster(lab_field, team_of(lab_field)).at((3.9, 2.9))
     assert corner.std_m is None
-    assert corner.reason == "the drone that sees it is out of the view of ceiling"
+    assert corner.reason == "whoever sees it is out of the view of ceiling"
 
 
 def test_a_camera_whose_range_ends_is_named_for_its_range(team: Team) -> None:

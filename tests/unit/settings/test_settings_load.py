@@ -205,7 +205,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
         ":4: target.path.half_lenght_m: unknown key, did you mean half_length_m?",
         ":6: cameras.fps: must be <= 60 (got 90)",
         ":7: cameras.corner_noise: unknown key, did you mean corner_noise_px?",
-        f":9: faults[0].kind: must be {', '.join(kinds)} or 'bodies_swapped'"
+        f":9: faults[0].kind: must be {', '.join(kinds)} or 'ranges_long'"
         ' (got "camera_ct"), did you mean camera_cut?',
     ]
     path.write_text("schema_version: 1\ntarget:\n  path: {shape: figure_eigth}\n", encoding="utf-8")

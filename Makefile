@@ -131,7 +131,7 @@ $(STAMP): pyproject.toml requirements/run.txt
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(INSTALL) --only-binary :all: $(HASHED) requirements/run.txt
 	$(INSTALL) --no-build-isolation --editable .
-	@echo "compiling the kernels, once: half a minute"
+	@echo "compiling the kernels, once: a minute or two"
 	@$(BIN)/python -m groundstation.runtime.compile_kernels
 	@touch $@
 

@@ -17,7 +17,7 @@ _PEERS = ("naive", "numpy", "jax")
 def use_kernel_cache() -> None:
     """Let compiled kernels be kept and found again; say so when this start has to compile them."""
     if not numba_cache.activate(numba_cache.EVERYTHING).exists():
-        click.echo("compiling kernels (once per version, some 30 s)", err=True)
+        click.echo("compiling kernels (once per version, a minute or two)", err=True)
 
 
 def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:

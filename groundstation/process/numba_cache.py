@@ -33,20 +33,21 @@ def sources_hash(packages: Iterable[str] = FLIGHT) -> str:
     return digest.hexdigest()[:16]
 
 
-def activate(packages: Iterable[str] = FLIGHT) -> Path:
-    """Point numba to the cache of these packages' state and return it; call it before numba is imported.
-
-    A NUMBA_CACHE_DIR that somebody has set already is respected.
-    """
+def place(packages: Iterable[str] = FLIGHT) -> Path:
+    """Return the cache of these packages' state; a NUMBA_CACHE_DIR that somebody has set is respected."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        return Path(chosen)
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "skein"
-    folder = base / f"numba-{sources_hash(packages)}"
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
-    if not folder.exists():
-        _forget_old(base)
-        _begin_with(base / f"numba-{sources_hash(FLIGHT)}", folder)
+    return Path(chosen) if chosen else base / f"numba-{sources_hash(packages)}"
+
+
+def activate(packages: Iterable[str] = FLIGHT) -> Path:
+    """Point numba to the cache of these packages' state and return it; call it before numba is imported."""
+    folder = place(packages)
+    if not os.environ.get("NUMBA_CACHE_DIR"):
+        os.environ["NUMBA_CACHE_DIR"] = str(folder)
+        if not folder.exists():
+            _forget_old(folder.parent)
+            _begin_with(folder.parent / f"numba-{sources_hash(FLIGHT)}", folder)
     return folder
 
 

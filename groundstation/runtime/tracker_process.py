@@ -33,7 +33,7 @@ def run(child: Child) -> int:
     if numba_cache.is_complete(cache):
         child.starting("loading kernels")
     else:
-        child.starting("compiling kernels (once per version, some 30 s)")
+        child.starting("compiling kernels (once per version, a minute or two)")
         compile_kernels(cache)
     from groundstation.runtime.tracker_loop import TrackerSection, Tracking
     from groundstation.runtime.warm_up import warm_up

@@ -38,7 +38,8 @@ TRACKER = ProcessSpec(
     role="tracker",
     entry="groundstation.runtime.tracker_process:run",
     numbered=True,  # drivers obey the newest tracker, and hover until the operator resumes
-    start_limit_s=180.0,  # kernels that are compiled for the first time, on a busy machine, need minutes
+    kernels=True,
+    start_limit_s=180.0,  # one that had to be started again compiles what somebody deleted meanwhile
     hang_limit_s=0.5,  # as long as a drone flies on without setpoints
     stop_order=StopOrder.DECIDES,
 )

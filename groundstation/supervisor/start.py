@@ -4,6 +4,7 @@ import time
 
 from groundstation.bus.messages import Severity
 from groundstation.errors import GroundStationError
+from groundstation.supervisor import kernels
 from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.supervisor.process_spec import StopOrder
 from groundstation.supervisor.supervisor import Supervisor
@@ -23,13 +24,14 @@ class Start:
         self._supervisor = supervisor
 
     def run(self) -> None:
-        """Start guardian and router, then everything else at once; returns when the run can begin.
+        """Compile kernels where they lack, start guardian and router, then everything else; returns when it can begin.
 
         Raises GroundStationError when a required process cannot be started, fails or is late, Interrupted when the
         operator stops it.
         """
         supervisor = self._supervisor
         supervisor.prepare()
+        self._compile()
         first = [p for p in supervisor.processes if p.spec.stop_order >= StopOrder.CONNECTS]
         self._launch_all(first)
         self._wait_for(first)
@@ -46,6 +48,14 @@ class Start:
             if process.spec.on_terminal and not process.life:
                 self._supervisor.terminal.muted = True
                 self._supervisor.launch(process)
+
+    def _compile(self) -> None:
+        supervisor = self._supervisor
+        needed = any(process.spec.kernels for process in supervisor.processes)
+        if not needed or kernels.are_compiled():
+            return
+        if not kernels.compile_first(supervisor.terminal.say, lambda: supervisor.interrupts.stop_requested):
+            raise Interrupted("stopped while starting")
 
     def _launch_all(self, processes: list[ManagedProcess]) -> None:
         for process in processes:

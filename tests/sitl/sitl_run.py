@@ -46,10 +46,15 @@ class SitlRun:
         self.history: defaultdict[tuple[str, str], list[tuple[float, Message]]] = defaultdict(list)
         self._bus: ZenohBus | None = None
         self._pids: dict[int, int] = {}
-        self.record = self._find_record()
+        try:
+            self.record = self._find_record()
+        except BaseException:  # nobody else knows of it yet: one that flew on would take the processor from all others
+            self.close()
+            raise
 
-    def _find_record(self) -> runtime_file.RuntimeRecord:
-        for _ in range(600):
+    def _find_record(self, limit_s: float = 120.0) -> runtime_file.RuntimeRecord:
+        deadline = time.monotonic() + limit_s
+        while time.monotonic() < deadline:
             for record in runtime_file.live_records():
                 if record.supervisor.pid == self.process.pid:
                     self._bus = join(record, "view", Role.VIEW)

@@ -60,7 +60,9 @@ def served(live: runtime_file.RuntimeRecord, free_port: int) -> Iterator[str]:
     command = [sys.executable, "-m", "groundstation.cli.main", "console", "--port", str(free_port)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=dict(os.environ))
     url = f"http://127.0.0.1:{free_port}/"
-    eventually(lambda: answers(url), 30.0, "the console answers")  # a page that is refused says so on its console
-    yield url
-    process.terminate()
-    process.wait(10)
+    try:
+        eventually(lambda: answers(url), 30.0, "the console answers")  # a page that is refused says so on its console
+        yield url
+    finally:
+        process.terminate()
+        process.wait(10)

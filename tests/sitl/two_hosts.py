@@ -68,6 +68,15 @@ class TwoHosts:
                 start_new_session=True,
             )
 
+    def start(self, order: dict[str, Any]) -> "tuple[subprocess.Popen[bytes], SitlRun]":
+        """Start the other host and the run; neither is left alone."""
+        host = self.start_host()
+        try:
+            return host, self.start_run(order)
+        except BaseException:
+            end(host.pid)
+            raise
+
     def start_run(self, order: dict[str, Any]) -> SitlRun:
         """Start the demo, with the ordered devices on the other host."""
         settings = [f"{device}.host={HOST}" for device in order.get("devices", DEVICES)] + [f"bus.listen={HERE}"]
@@ -78,7 +87,7 @@ class TwoHosts:
 
 def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
     """Fly the demo to its end and return what the report says, and the offset that was measured."""
-    host, run = two.start_host(), two.start_run(order)
+    host, run = two.start(order)
     try:
         offsets = bus_of(run).subscribe([CLOCK])
         code = run.wait(order["duration_s"] + 120.0)
@@ -98,7 +107,7 @@ def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
 
 def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
     """Kill something in flight and return how long the drones stayed in the air, and how far each went [s, m]."""
-    host, run = two.start_host(), two.start_run(order)
+    host, run = two.start(order)
     victims = {"liaison": lambda: [run.pid(f"liaison_{HOST}")], "supervisor": lambda: [run.process.pid]}
     victims |= {"host": lambda: [host.pid], "driver": lambda: [named(host.pid)["drone_1"]]}
     # Not what stands for the drones themselves, and for the bus by which they are watched here.

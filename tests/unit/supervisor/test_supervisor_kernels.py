@@ -55,7 +55,12 @@ def test_a_start_compiles_only_what_lacks_and_only_for_who_needs_it(
     make: Callable[..., Supervisor], monkeypatch: pytest.MonkeyPatch, needed: bool, compiled: bool, times: int
 ) -> None:
     asked: list[str] = []
-    monkeypatch.setattr(kernels, "compile_first", lambda *_: asked.append("compile") is None)
+
+    def compile_first(*_: object) -> bool:
+        asked.append("compile")
+        return True
+
+    monkeypatch.setattr(kernels, "compile_first", compile_first)
     monkeypatch.setattr(kernels, "are_compiled", lambda: compiled)
     start(make(spec("tracker", "obedient", kernels=needed)))
     assert len(asked) == times

@@ -1,11 +1,11 @@
-"""Odometry and IMU samples on the bus, at most so often as the settings say."""
+"""Odometry and IMU samples on the bus, at most so often as the settings say; of the IMU the mean since the last."""
 
 from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import ImuSample, Odometry
+from groundstation.bus.messages import ImuSample, Odometry, Vector3
 from groundstation.bus.topics import IMU, ODOMETRY
 from groundstation.geometry.angles import quaternion_from_euler
 
@@ -33,6 +33,25 @@ class Decimator:
         return True
 
 
+class _InertialMean:
+    """Mean rates and specific force since they were last taken: integrated, they turn as far as all samples did."""
+
+    def __init__(self) -> None:
+        self._sums, self._count = [0.0] * 6, 0
+
+    def add(self, rates: Vector3, force: Vector3) -> None:
+        """Take a sample."""
+        for i, value in enumerate((*rates, *force)):
+            self._sums[i] += value
+        self._count += 1
+
+    def take(self) -> tuple[Vector3, Vector3]:
+        """Return (rates, force) and begin anew; at least one sample was added."""
+        wx, wy, wz, fx, fy, fz = (total / self._count for total in self._sums)
+        self._sums, self._count = [0.0] * 6, 0
+        return (wx, wy, wz), (fx, fy, fz)
+
+
 class NavdataPublisher:
     """Turns motions into messages stamped with their receipt; the estimator accounts for the delay."""
 
@@ -42,7 +61,7 @@ class NavdataPublisher:
         self._heading = HeadingWatch()
         self.heights = HeightWatch()
         self._odometry = Decimator(settings.odometry_hz)
-        self._imu = Decimator(settings.imu_hz)
+        self._imu, self._inertial = Decimator(settings.imu_hz), _InertialMean()
         self._covariances = {
             (suspect, sound): (std**2, 0.0, 0.0, 0.0, std**2, 0.0, 0.0, 0.0, climb_std**2)
             for suspect, std in ((False, settings.odometry.velocity_std_m_s), (True, _SUSPECT_STD_M_S))
@@ -60,14 +79,19 @@ class NavdataPublisher:
             self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset, sound, covariance))
         if max(all_values, health.of(Sensor.IMU)) is Health.BAD:
             return
-        if motion.rates_rad_s is not None and motion.specific_force_m_s2 is not None and self._imu.is_due(stamp_ns):
-            sample = ImuSample(
-                header=self._bus.header(self._name, stamp_ns),
-                angular_velocity_rad_s=motion.rates_rad_s,
-                specific_force_m_s2=motion.specific_force_m_s2,
-                attitude=quaternion_from_euler(motion.roll_rad, motion.pitch_rad, motion.yaw_rad),
-            )
-            self._bus.publish(IMU, sample)
+        if motion.rates_rad_s is not None and motion.specific_force_m_s2 is not None:
+            self._inertial.add(motion.rates_rad_s, motion.specific_force_m_s2)
+            if self._imu.is_due(stamp_ns):
+                self._bus.publish(IMU, self._imu_message(stamp_ns, motion))
+
+    def _imu_message(self, stamp_ns: int, motion: NavdataMotion) -> ImuSample:
+        rates, force = self._inertial.take()
+        return ImuSample(
+            header=self._bus.header(self._name, stamp_ns),
+            angular_velocity_rad_s=rates,
+            specific_force_m_s2=force,
+            attitude=quaternion_from_euler(motion.roll_rad, motion.pitch_rad, motion.yaw_rad),
+        )
 
     def _odometry_message(
         self, stamp_ns: int, motion: NavdataMotion, reset: int, sound: bool, covariance: tuple[float, ...]

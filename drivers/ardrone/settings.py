@@ -74,7 +74,7 @@ class ArDroneDriverSettings(DriverSection):
     flight: FlightConfiguration = FlightConfiguration()
     video: Video | None = None
     odometry_hz: Annotated[float, Field(gt=0, le=200)] = 100.0
-    imu_hz: Annotated[float, Field(ge=0, le=200)] = 100.0
+    imu_hz: Annotated[float, Field(ge=0, le=200)] = 25.0
     raw_datagrams: bool = True
     strict_checksum: bool = True
 

@@ -180,6 +180,12 @@ def of_part(faults: Iterable[Fault], *parts: Part) -> tuple[Fault, ...]:
     return tuple(fault for fault in faults if RULES[fault.kind].part in parts)
 
 
+def standing(faults: Iterable[Fault], kind: FaultKind, now_s: float, entity: str | None = None) -> Fault | None:
+    """Return the first fault of a kind that stands at a time, of an entity or of any."""
+    found = (f for f in faults if f.kind is kind and entity in (None, f.entity) and f.covers(now_s))
+    return next(found, None)
+
+
 def exchanged(faults: Iterable[Fault]) -> dict[str, str]:
     """Return whose body each vehicle's address leads to, where that is another one's."""
     pairs = [(f.entity, f.other) for f in faults if f.kind is FaultKind.IDS_SWAPPED and f.other is not None]

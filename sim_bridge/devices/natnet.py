@@ -13,7 +13,7 @@ import numpy as np
 from drivers.motion_capture.wire import natnet
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import rotation_from_euler, rotation_x, rotation_z
-from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
+from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.listening import open_udp
 from sim_bridge.mounting import surveyed
 from sim_bridge.site import SiteBody, SiteCapture
@@ -91,7 +91,7 @@ class NatnetEmulator:
         self._heard = {one: heard for one, heard in self._heard.items() if self._ticks - heard < _FORGOTTEN_TICKS}
         while self._waiting and self._waiting[0][0] <= self._ticks:
             _, datagram = self._waiting.pop(0)
-            if not self.silent and self._standing(FaultKind.CAPTURE_SILENT, now_s) is None:
+            if not self.silent and standing(self._faults, FaultKind.CAPTURE_SILENT, now_s, self._name) is None:
                 for client in self._heard:
                     self._answer(datagram, client)
 
@@ -103,19 +103,13 @@ class NatnetEmulator:
         with suppress(OSError):
             self._socket.sendto(datagram, client)
 
-    def _standing(self, kind: FaultKind, now_s: float) -> Fault | None:
-        """Return the fault of a kind that stands, of this system where it is one of systems."""
-        of_all = RULES[kind].part is not Part.CAPTURE
-        found = (f for f in self._faults if f.kind is kind and f.covers(now_s) and (of_all or f.entity == self._name))
-        return next(found, None)
-
     def _frame(self, now_s: float) -> natnet.Frame:
         exposed = self._ticks * round(_TICK_S * _TICKS_PER_S)
         sent = exposed + round(_PROCESSING_S * _TICKS_PER_S)
-        if self._frozen is not None and self._standing(FaultKind.CAPTURE_FROZEN, now_s) is not None:
+        if self._frozen is not None and standing(self._faults, FaultKind.CAPTURE_FROZEN, now_s, self._name) is not None:
             return replace(self._frozen, number=self._frames, exposed=exposed, sent=sent)
         at = dict(zip(self._bodies, self._states(), strict=True))
-        swapped = self._standing(FaultKind.BODIES_SWAPPED, now_s)
+        swapped = standing(self._faults, FaultKind.BODIES_SWAPPED, now_s)
         if swapped is not None and swapped.other is not None:
             at[swapped.entity], at[swapped.other] = at[swapped.other], at[swapped.entity]
         seen = [self._seen(entity, row, now_s) for entity, row in at.items() if not math.isnan(row[0])]
@@ -128,8 +122,8 @@ class NatnetEmulator:
         place_std, turn_std = self._system.pose_std_m, math.radians(self._system.heading_std_deg)
         base = rotation_from_euler(*(row[6:9] + turn_std * noise[3:]).tolist())
         origin = row[:3] + base @ np.array(body.position_m) + place_std * noise[:3]
-        jumped = self._standing(FaultKind.BODY_JUMPED, now_s)
-        if jumped is not None and jumped.entity == entity:
+        jumped = standing(self._faults, FaultKind.BODY_JUMPED, now_s, entity)
+        if jumped is not None:
             origin = origin + np.array([jumped.amount, 0.0, 0.0])
         origin = self._rotation.T @ (origin - self._origin)
         world_from_body = self._rotation.T @ base @ rotation_z(math.radians(body.yaw_deg))

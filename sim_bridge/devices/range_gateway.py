@@ -10,7 +10,7 @@ import numpy as np
 
 from drivers.ranging.wire.ranges import LARGEST, Round, encode
 from groundstation.arrays import Array
-from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.listening import open_udp
 from sim_bridge.ranges import Radios
 from sim_bridge.site import SiteRanging, SiteTransponder
@@ -70,25 +70,22 @@ class RangeGateway:
         self._heard = {one: heard for one, heard in self._heard.items() if self._ticks - heard < _FORGOTTEN_TICKS}
         while self._waiting and self._waiting[0][0] <= self._ticks:
             _, datagram = self._waiting.pop(0)
-            dumb = self.silent or self._standing(FaultKind.RANGES_SILENT, self._name, now_s)
+            dumb = self.silent or standing(self._faults, FaultKind.RANGES_SILENT, now_s, self._name)
             for client in () if dumb else self._heard:
                 with suppress(OSError):
                     self._socket.sendto(datagram, client)
 
     def _round(self, drone: str, now_s: float) -> dict[str, float]:
         """Return what is told of a drone [m, to the millimetre]."""
-        if drone in self._last_m and self._standing(FaultKind.RANGES_FROZEN, self._name, now_s):
+        if drone in self._last_m and standing(self._faults, FaultKind.RANGES_FROZEN, now_s, self._name):
             return self._last_m[drone]
         row = self._states()[self._rows[drone]]
         ranges_m = {} if np.isnan(row[0]) else self._radios.ranges_m(drone, row)
-        detour = self._standing(FaultKind.RANGES_LONG, drone, now_s)
+        detour = standing(self._faults, FaultKind.RANGES_LONG, now_s, drone)
         longer_m = detour.amount if detour else 0.0
         told = {anchor: round(m + longer_m, 3) for anchor, m in ranges_m.items() if m + longer_m > 0.0}
         self._last_m[drone] = told
         return told
-
-    def _standing(self, kind: FaultKind, entity: str, now_s: float) -> Fault | None:
-        return next((f for f in self._faults if f.kind is kind and f.entity == entity and f.covers(now_s)), None)
 
     def close(self) -> None:
         """Close the port."""

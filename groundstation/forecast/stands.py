@@ -13,8 +13,8 @@ from groundstation.forecast.team import Place, Team
 from groundstation.forecast.views import Chain, Link, Obstruction, Views
 from groundstation.planning.planner import Planner
 from groundstation.planning.problem import PlanningScene, ProblemBuilder
-from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, YAW, CostProblem, EdgeTape, Tape, X, Y, Z
-from groundstation.planning.rollout import roll_out
+from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, YAW, X, Y, Z
+from groundstation.planning.rollout import empty_tape, roll_out
 from groundstation.sensing.topology import Topology
 
 _ROUNDS, _SETTLED_M = 3, 0.2  # plans until the team stands; one that moves it less than this is the last
@@ -129,20 +129,12 @@ class StandSearch:
     def _after(self, scene: PlanningScene, topology: Topology, controls: Array) -> PlanningScene:
         """Return the scene after one horizon of held controls (n, 4); the target stands still."""
         problem = self._judge.build(scene, topology).cost
-        tape = _tape_for(problem)
+        tape = empty_tape(len(scene.robots), problem.options.steps, len(problem.edges), problem.prior.shape[0])
         roll_out(controls.ravel(), problem, tape)
         poses = tape.path[-1][:, [X, Y, Z, YAW]].copy()
         covariance = tape.covariances[-1]
         prior = np.ascontiguousarray(0.5 * (covariance + covariance.T))
         return replace(scene, poses=poses, prior=prior, yaw_variances=tape.yaws_after[-1].copy())
-
-
-def _tape_for(problem: CostProblem) -> Tape:
-    n, h, d = problem.poses.shape[0], problem.options.steps, problem.prior.shape[0]
-    return Tape(
-        np.empty((h + 1, n, 6)), np.empty((h, n, 4)), EdgeTape.rows(h * len(problem.edges)),
-        np.empty((h, d, d)), np.empty((h, d, d)), np.empty((h, n)), np.empty((h, n)), np.empty((h, n, 3)),
-    )  # fmt: skip
 
 
 def _belief_of(scene: PlanningScene) -> JointBelief:

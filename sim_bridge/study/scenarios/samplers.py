@@ -11,6 +11,7 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.planning.planner import Planner, PlanResult
 from groundstation.planning.problem import PlanningProblem, scene_from_belief
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS
+from groundstation.planning.starts import Starts
 from groundstation.sensing.topology import Topology
 from sim_bridge.study.scenarios.fixed_topologies import EveryPair, FixedPlanner
 
@@ -43,12 +44,8 @@ class TryingPlanner(FixedPlanner):
         if not scene.robots or not scene.targets:
             return super().plan(belief, current, warm_start, should_stop, max_evaluations)
         problem = self._builder.build(scene, topology)
-        last = np.zeros((len(scene.robots), ROBOT_CONTROLS))
-        for row, name in zip(last, scene.robots, strict=True):
-            if warm_start and name in warm_start:
-                row[:] = warm_start[name]
-                row[HEIGHT] -= self._builder.height_m
-        first = np.clip(last.ravel() / problem.scale, -1.0, 1.0)
+        starts = Starts(scene, self.parameters, self.sensors, problem.scale, self._builder.height_m)
+        first = self._warm(scene, warm_start, np.zeros(problem.scale.size), starts, problem.scale)
         tried, x, cost = self.best(problem, first)
         u = x * problem.scale
         return PlanResult(

@@ -1,9 +1,9 @@
 // One sentence on the whole team, where an alarm would stand: what it does, and what an operator may do about it.
 
-import { aloft, modes, stage, teamMode } from "./glance.js";
+import { aloft, modes, stage, targetAgeS, teamMode } from "./glance.js";
 import { droneNames, entity, estimateAge, store } from "./store.js";
 
-const LOCALISED_S = 1;
+const FRESH_S = 1;
 
 const NEXT = {
   "TAKING OFF": "Each is seen from outside before the next one rises.",
@@ -14,9 +14,14 @@ const NEXT = {
   CUT: "Motors were cut.",
 };
 
+function next(mode) {
+  if (mode === "TRACK") return targetAgeS() <= FRESH_S ? "The target is seen." : "Nobody sees the target just now.";
+  return NEXT[mode] ?? "";
+}
+
 // How many drones have a place that is newer than a second.
 function localised() {
-  return droneNames().filter((name) => { const body = entity(name); return body && body.age_s + estimateAge() < LOCALISED_S; }).length;
+  return droneNames().filter((name) => { const body = entity(name); return body && body.age_s + estimateAge() < FRESH_S; }).length;
 }
 
 export function verdict() {
@@ -24,5 +29,5 @@ export function verdict() {
   if (!all || !modes().length) return "No alarms. Nothing is heard of the drones yet.";
   if (stage() === "over") return "The run is over: nothing flies.";
   if (!up) return `No alarms. Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;
-  return `No alarms. ${up} of ${all} fl${up === 1 ? "ies" : "y"}, the places of ${localised()} of ${all} are known. ${NEXT[mode] ?? "The target is seen."}`;
+  return `No alarms. ${up} of ${all} fl${up === 1 ? "ies" : "y"}, the places of ${localised()} of ${all} are known. ${next(mode)}`.trim();
 }

@@ -12,7 +12,8 @@ _IDR_PERIOD = 15
 _SHORT_CODE = b"\x00\x00\x01"
 _SEI, _PARAMETERS = 6, (7, 8)
 # WIRE (docs/reference/ardrone.md 6): pictures as the sensor sees them are of limited range: 16 to 235.
-_LIMITED = np.rint(16 + np.arange(256) * (219 / 255)).astype(np.uint8)
+_BLACK, _RANGE = np.float32(16.0), np.float32(219.0 / 255.0)
+_NO_COLOUR = 128
 
 
 class GreyStream:
@@ -21,12 +22,17 @@ class GreyStream:
     def __init__(self, size: tuple[int, int], fps: float, bit_rate: float) -> None:
         self._index = 0
         self._codec = _codec(size, fps, bit_rate)
-        self._planes = np.full((size[1] * 3 // 2, size[0]), 128, dtype=np.uint8)
+        # One frame for all pictures: the encoder copies what it is given.
+        self._frame = av.VideoFrame(*size, "yuv420p")
+        luma, *colours = (np.asarray(memoryview(plane)) for plane in self._frame.planes)
+        self._luma = luma.reshape(size[1], -1)[:, : size[0]]
+        for colour in colours:
+            colour[...] = _NO_COLOUR
 
     def encode(self, picture: NDArray[np.uint8], want_idr: bool) -> tuple[bytes, bool]:
         """Return a picture (h, w) as an access unit, and whether a decoder can begin with it."""
-        np.take(_LIMITED, picture, out=self._planes[: picture.shape[0]])
-        frame = av.VideoFrame.from_ndarray(self._planes, format="yuv420p")
+        self._luma[...] = picture * _RANGE + (_BLACK + np.float32(0.5))
+        frame = self._frame
         frame.pts = self._index
         frame.pict_type = PictureType.I if want_idr else PictureType.NONE
         self._index += 1

@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import rotation_from_euler
-from sim_bridge.render.spec import BoardSpec, Mount, RenderSpec
+from sim_bridge.render.spec import BoardSpec, RenderSpec
 
 _POSITION, _VELOCITY, _ATTITUDE, _RATES = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 
@@ -18,12 +18,11 @@ def world_from_base(state: Array) -> Pose:
     return Pose(rotation_from_euler(*state[_ATTITUDE]), state[_POSITION])
 
 
-def moved(state: Array, seconds: float) -> Pose:
-    """Return the pose a body has a moment later, at constant velocity and body rates."""
-    pose = world_from_base(state)
+def moved(base: Pose, state: Array, seconds: float) -> Pose:
+    """Return the pose that a body (world_from_base, row) has a moment later, at constant velocity and body rates."""
     turn = state[_RATES] * seconds
     small = np.array([[1.0, -turn[2], turn[1]], [turn[2], 1.0, -turn[0]], [-turn[1], turn[0], 1.0]])
-    return Pose(pose.rotation @ small, pose.translation + state[_VELOCITY] * seconds)
+    return Pose(base.rotation @ small, base.translation + state[_VELOCITY] * seconds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,58 +55,56 @@ class CameraScene:
     rolling: tuple[Pose, Pose] | None = None
 
 
-def camera_pose(mount: Mount, bodies: tuple[str, ...], states: Array) -> Pose:
-    """Return world_from_camera_optical."""
-    if not mount.body:
-        return mount.parent_from_optical
-    return world_from_base(states[bodies.index(mount.body)]).compose(mount.parent_from_optical)
-
-
 def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
     """Return what the camera has before it; a camera never sees its own carrier, nor what is nowhere (NaN)."""
     half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
-    camera = camera_pose(spec.mount, spec.bodies, states)
+    camera, *smear = _camera_poses(spec, states, (0.0, -half_s, half_s))
+    rolling = None
+    if readout_s:
+        first, last = _camera_poses(spec, states, (-readout_s, readout_s))
+        rolling = first, last
     optical_from_world = camera.inverse()
-    smear = _camera_moved(spec, states, -half_s), _camera_moved(spec, states, half_s)
-    rolling = (_camera_moved(spec, states, -readout_s), _camera_moved(spec, states, readout_s)) if readout_s else None
     sights = []
     for board in spec.boards:
-        if board.body == spec.mount.body:
+        state = states[spec.bodies.index(board.body)]
+        if board.body == spec.mount.body or math.isnan(state[0]):
             continue
-        state, offset = states[spec.bodies.index(board.body)], np.array(board.position_m)
-        if math.isnan(state[0]):
-            continue
-        base = world_from_base(state)
+        base, offset = world_from_base(state), np.array(board.position_m)
         optical_from_base = optical_from_world.compose(base)
-        on_body = Pose(np.eye(3), offset)
+        place = base.apply(offset)
+        velocity = base.rotation @ _across(state[_RATES], offset) + state[_VELOCITY]
         begin, end = (
-            (_point_moved(state, base, offset, seconds) - at.translation) @ at.rotation
+            (place + seconds * velocity - at.translation) @ at.rotation
             for at, seconds in zip(smear, (-half_s, half_s), strict=True)
         )
         rows = None
         if rolling is not None:
             first, last = (
-                at.inverse().compose(moved(state, seconds).compose(on_body))
+                _shifted(at.inverse().compose(moved(base, state, seconds)), offset)
                 for at, seconds in zip(rolling, (-readout_s, readout_s), strict=True)
             )
             rows = first, last
-        sights.append(Sight(board, optical_from_base, optical_from_base.compose(on_body), begin, end, rows))
-    return CameraScene(camera, tuple(sorted(sights, key=lambda sight: -sight.depth_m)), smear, rolling)
+        sights.append(Sight(board, optical_from_base, _shifted(optical_from_base, offset), begin, end, rows))
+    farthest_first = tuple(sorted(sights, key=lambda sight: -sight.depth_m))
+    return CameraScene(camera, farthest_first, (smear[0], smear[1]), rolling)
 
 
-def _point_moved(state: Array, base: Pose, point: Array, seconds: float) -> Array:
-    """Return where a point of a body is a moment later [m; world]."""
-    turned = point + seconds * np.array(
-        [
-            state[10] * point[2] - state[11] * point[1],
-            state[11] * point[0] - state[9] * point[2],
-            state[9] * point[1] - state[10] * point[0],
-        ]
-    )
-    return np.asarray(base.rotation @ turned + base.translation + seconds * state[_VELOCITY])
+def _shifted(pose: Pose, offset: Array) -> Pose:
+    """Return a pose whose origin is at an offset of its own."""
+    return Pose(pose.rotation, pose.apply(offset))
 
 
-def _camera_moved(spec: RenderSpec, states: Array, seconds: float) -> Pose:
-    if not spec.mount.body:
-        return spec.mount.parent_from_optical
-    return moved(states[spec.bodies.index(spec.mount.body)], seconds).compose(spec.mount.parent_from_optical)
+def _across(rates: Array, point: Array) -> Array:
+    """Return the velocity of a point of a turning body [base]."""
+    (wx, wy, wz), (x, y, z) = rates.tolist(), point.tolist()
+    return np.array([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x])
+
+
+def _camera_poses(spec: RenderSpec, states: Array, moments_s: tuple[float, ...]) -> tuple[Pose, ...]:
+    """Return world_from_camera_optical at moments after the states' time [s]."""
+    mount = spec.mount
+    if not mount.body:
+        return (mount.parent_from_optical,) * len(moments_s)
+    state = states[spec.bodies.index(mount.body)]
+    base = world_from_base(state)
+    return tuple(moved(base, state, seconds).compose(mount.parent_from_optical) for seconds in moments_s)

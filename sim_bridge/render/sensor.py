@@ -34,7 +34,7 @@ class ImageSensor:
         self._down = np.clip(-noise, 0, 255).astype(np.uint8)
 
     def expose(self, picture: Image, random: np.random.Generator) -> Image:
-        """Return the picture as the sensor gives it."""
+        """Return the picture as the sensor gives it; the noise is laid over the given one in place."""
         if self._light is not None:
             picture = np.asarray(cv2.LUT(picture, self._light), dtype=np.uint8)
         if not self._active:
@@ -45,4 +45,4 @@ class ImageSensor:
         if self._gain is not None:
             gain = cv2.LUT(picture, self._gain)
             sides = [cv2.multiply(side, gain, scale=1.0 / (8.0 * _TILE_RMS)).astype(np.uint8) for side in sides]
-        return np.asarray(cv2.subtract(cv2.add(picture, sides[0]), sides[1]), dtype=np.uint8)
+        return np.asarray(cv2.subtract(cv2.add(picture, sides[0], picture), sides[1], picture), dtype=np.uint8)

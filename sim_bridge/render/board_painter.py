@@ -14,6 +14,7 @@ from sim_bridge.render.card import Card
 from sim_bridge.render.lens_table import PAD, LensTable
 
 Float32 = NDArray[np.float32]
+Pixel = tuple[float, float]
 
 _MIP_TEXELS = (64, 32, 16, 8, 4)
 _OVERSAMPLING = 2
@@ -61,11 +62,11 @@ class BoardPainter:
         rolling: where it is when the first and the last row of the picture are exposed.
         """
         poses = rolling or (optical_from_marker,)
-        rim = np.vstack([pose.apply(self._rim) for pose in poses])
+        rim = [point for pose in poses for point in pose.apply(self._rim).tolist()]
         faces_camera = float(optical_from_marker.rotation[:, 2] @ optical_from_marker.translation) < 0.0
-        if rim[:, 2].min() < _NEAREST_M or not faces_camera:
+        if min(depth for _, _, depth in rim) < _NEAREST_M or not faces_camera:
             return
-        rim_px = self._intrinsics.project(rim)
+        rim_px = [self._intrinsics.pixel(*point) for point in rim]
         window = self._window(rim_px)
         if window is None:
             return
@@ -76,21 +77,23 @@ class BoardPainter:
         patch = self._sample(x, y, poses, spacing, window[1])
         _blend(picture, window, _smeared(patch, flaws))
 
-    def _window(self, rim_px: Array) -> tuple[int, int, int, int] | None:
-        rim_px = rim_px[np.isfinite(rim_px).all(axis=1)]
-        if not len(rim_px):
+    def _window(self, rim_px: list[Pixel | None]) -> tuple[int, int, int, int] | None:
+        seen = [pixel for pixel in rim_px if pixel is not None]
+        if not seen:
             return None
-        low = np.floor(rim_px.min(axis=0)).astype(int) - _WINDOW_MARGIN_PX
-        high = np.ceil(rim_px.max(axis=0)).astype(int) + _WINDOW_MARGIN_PX + 1
-        left, top = max(0, int(low[0])), max(0, int(low[1]))
-        right, bottom = min(self._table.width, int(high[0])), min(self._table.height, int(high[1]))
+        across, down = zip(*seen, strict=True)
+        left, top = (max(0, math.floor(min(side)) - _WINDOW_MARGIN_PX) for side in (across, down))
+        right, bottom = (math.ceil(max(side)) + _WINDOW_MARGIN_PX + 1 for side in (across, down))
+        right, bottom = min(self._table.width, right), min(self._table.height, bottom)
         return (left, top, right, bottom) if right > left and bottom > top else None
 
-    def _spacing_px(self, rim_px: Array) -> float:
+    def _spacing_px(self, rim_px: list[Pixel | None]) -> float:
         """Return the side of a unit in the picture (geometric mean of its two directions), from the card's edges."""
-        along, across = rim_px[1] - rim_px[0], rim_px[3] - rim_px[2]
-        area = abs(float(along[0] * across[1] - along[1] * across[0]))
-        return max(0.5, math.sqrt(area / self._units)) if math.isfinite(area) else _SPACING_BEYOND_LENS_PX
+        west, east, south, north = rim_px[:4]
+        if west is None or east is None or south is None or north is None:
+            return _SPACING_BEYOND_LENS_PX
+        area = abs((east[0] - west[0]) * (north[1] - south[1]) - (east[1] - west[1]) * (north[0] - south[0]))
+        return max(0.5, math.sqrt(area / self._units))
 
     def _sample(self, x: Float32, y: Float32, poses: tuple[Pose, ...], spacing: float, top: int) -> Float32:
         """Return the window's grey times coverage, and coverage (h, w, 2), for the widened window.

@@ -1,5 +1,7 @@
 """One camera's picture: floor, bodies and boards from far to near, defocus, smear, sensor noise."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +59,8 @@ class Renderer:
         """Return by how much the floor in the middle of the picture moves during the exposure [px]."""
         axis = begin.rotation[:, 2]
         distance = begin.translation[2] / max(-axis[2], 0.1)
-        moved = self._spec.intrinsics.project(end.inverse().apply(begin.translation + distance * axis))
-        still = self._spec.intrinsics.project(np.array([0.0, 0.0, 1.0]))
-        return (float(moved[0] - still[0]), float(moved[1] - still[1])) if np.isfinite(moved).all() else (0.0, 0.0)
+        seen = (begin.translation + distance * axis - end.translation) @ end.rotation
+        return self._way((0.0, 0.0, 1.0), seen.tolist())
 
     def _blurred(self, picture: Image) -> Image:
         sigma = self._spec.scenario.blur_px
@@ -67,8 +68,10 @@ class Renderer:
 
     def _flaws(self, sight: Sight) -> Flaws:
         scenario = self._spec.scenario
-        begin, end = self._spec.intrinsics.project(np.stack((sight.begin_m, sight.end_m)))
-        smear = end - begin
-        if not np.isfinite(smear).all():
-            smear = np.zeros(2)
-        return Flaws(scenario.corner_noise_px, scenario.blur_px, (float(smear[0]), float(smear[1])))
+        smear = self._way(sight.begin_m.tolist(), sight.end_m.tolist())
+        return Flaws(scenario.corner_noise_px, scenario.blur_px, smear)
+
+    def _way(self, begin_m: Sequence[float], end_m: Sequence[float]) -> tuple[float, float]:
+        """Return the way in the picture from one point [optical] to another [px]; none where one is beyond the lens."""
+        begin, end = (self._spec.intrinsics.pixel(*point) for point in (begin_m, end_m))
+        return (0.0, 0.0) if begin is None or end is None else (end[0] - begin[0], end[1] - begin[1])

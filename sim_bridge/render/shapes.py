@@ -46,8 +46,9 @@ def draw_body(
         points = optical_from_base.apply(_RINGS[drum])
         if points[:, 2].min() < 0.1:
             continue
-        pixels = intrinsics.project(points)
-        if not np.isfinite(pixels).all() or np.abs(pixels).max() > 1e4:
+        seen = [intrinsics.pixel(*point) for point in points.tolist()]
+        pixels = np.array([pixel for pixel in seen if pixel is not None], dtype=np.float32)
+        if len(pixels) < len(seen) or np.abs(pixels).max() > 1e4:
             continue
-        hull = cv2.convexHull(pixels.astype(np.float32)).reshape(-1, 1, 2)
+        hull = cv2.convexHull(pixels).reshape(-1, 1, 2)
         cv2.fillConvexPoly(picture, np.rint(hull * (1 << _SHIFT)).astype(np.int32), drum.grey, cv2.LINE_AA, _SHIFT)

@@ -23,6 +23,8 @@ _NEAREST_M = 0.12
 _SPACING_BEYOND_LENS_PX = 30.0
 # Measured: cornerSubPix then sees the demanded rms (cubic interpolation overshoots, its window averages).
 _FIELD_GAIN = 1.03
+# A card has four layers, grey thrice and its coverage: OpenCV draws four of them in a third of the time of two.
+_COVERAGE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +112,10 @@ class BoardPainter:
         # Enlarging a smooth map by two gives the rays a quarter pixel to all four sides of each centre.
         size = (_OVERSAMPLING * x.shape[1], _OVERSAMPLING * x.shape[0])
         fine_u, fine_v = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (u, v))
-        fine = cv2.remap(texture, fine_u, fine_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(0, 0))
-        return cv2.resize(fine, (x.shape[1], x.shape[0]), interpolation=cv2.INTER_AREA).astype(np.float32)
+        # What lies beyond the card's border is 0 in every layer.
+        fine = cv2.remap(texture, fine_u, fine_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        layers = cv2.resize(fine, (x.shape[1], x.shape[0]), interpolation=cv2.INTER_AREA)
+        return layers[..., ::_COVERAGE].astype(np.float32, order="C")
 
     def _texels(self, x: Float32, y: Float32, pose: Pose, texel_from_unit: Array) -> tuple[Float32, Float32]:
         """Return where the rays of a window meet the card, in texels."""
@@ -123,7 +127,7 @@ class BoardPainter:
 
 
 def _with_coverage(picture: Image, texel_from_square: Array) -> tuple[Image, Array]:
-    return np.dstack((picture, np.full_like(picture, 255))), texel_from_square
+    return np.dstack((picture, picture, picture, np.full_like(picture, 255))), texel_from_square
 
 
 def _warped(
@@ -133,17 +137,11 @@ def _warped(
     rows, columns = x.shape
     nodes = (max(2, round(rows / spacing) + 1), max(2, round(columns / spacing) + 1))
     field = random.normal(0.0, rms_px * _FIELD_GAIN, (*nodes, 2)).astype(np.float32)
-    shift = cv2.resize(field, (columns, rows), interpolation=cv2.INTER_CUBIC)
-    across, down = shift[..., 0], shift[..., 1]
     row, column = rows // 2, columns // 2
-    slopes = [
-        (0.5 * float(a[row, column + 1] - a[row, column - 1]), 0.5 * float(a[row + 1, column] - a[row - 1, column]))
-        for a in (x, y)
-    ]
-    return (
-        x + np.float32(slopes[0][0]) * across + np.float32(slopes[0][1]) * down,
-        y + np.float32(slopes[1][0]) * across + np.float32(slopes[1][1]) * down,
-    )
+    slopes = [(a[row, column + 1] - a[row, column - 1], a[row + 1, column] - a[row - 1, column]) for a in (x, y)]
+    shifts = (field @ np.float32(0.5 * np.array(slope)) for slope in slopes)
+    across, down = (cv2.resize(shift, (columns, rows), interpolation=cv2.INTER_CUBIC) for shift in shifts)
+    return x + across, y + down
 
 
 def _smeared(patch: Float32, flaws: Flaws) -> Float32:

@@ -24,6 +24,17 @@ def test_unknown_tags_are_kept_and_skipped():
     assert packet.read(options.TIME) is None
 
 
+def test_packets_of_one_length_may_hold_different_options():
+    """What one of them was cut into says nothing of the next: sizes, tags, and where the checksum is."""
+    cuts = [((1, b"abcd"), (2, b"efghij")), ((1, b"abcdef"), (2, b"ghij")), ((1, b"abcd"), (3, b"efghij"))]
+    for options_in in (*cuts, *cuts):
+        datagram = navdata.encode(Navdata(0, 1, 0, options_in))
+        assert navdata.decode(datagram).options == options_in
+        early = datagram[:16] + b"\xff\xff" + datagram[18:]
+        assert reason(early) == "trailing_bytes"
+        assert reason(datagram[:18] + b"\x03" + datagram[19:]) == "option_size"
+
+
 def test_longer_options_of_newer_firmware_are_read_by_their_beginning():
     grown = options.PWM.encode(options.Pwm(motors=(1, 2, 3, 4)), 92) + b"more"
     pwm = Navdata(0, 1, 0, ((9, grown),)).read(options.PWM)

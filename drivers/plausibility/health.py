@@ -39,6 +39,8 @@ class HealthReport:
 
     def of(self, *sensors: Sensor) -> Health:
         """Return the worst health of some sensors."""
+        if not self.findings:  # as most reports are, and each packet asks several times
+            return Health.GOOD
         return max((one.health for one in self.findings if one.sensor in sensors), default=Health.GOOD)
 
     def reason(self, health: Health, sensors: frozenset[Sensor]) -> str:

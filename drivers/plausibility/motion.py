@@ -6,7 +6,7 @@ it may touch the floor: its velocity alone may stand then.
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.plausibility.clock_drift import ClockDrift
 from drivers.plausibility.clock_watch import ClockWatch
@@ -21,8 +21,7 @@ _Judged = tuple[Sensor, Health, str]
 _GAP_S = 0.3
 
 
-@dataclass(frozen=True, slots=True)
-class MotionSample:
+class MotionSample(NamedTuple):
     """Motion in one packet. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it has none.
 
     velocity_m_s: horizontal, as told, in axes of the vehicle's own choice; heading_rad: of the vehicle in these axes.
@@ -76,20 +75,22 @@ class MotionMonitor:
             if self._before is not None:
                 self.reset()
             return self.report
-        judged = [*self._judge_repeats(sample, state in UP), *self._judge_clock(sample), *self._judge_values(sample)]
+        judged = self._judge_repeats(sample, state in UP)
+        judged += self._judge_clock(sample)
+        judged += self._judge_values(sample)
         self._before = sample
         self.report = self._settle(sample.stamp_ns, judged)
         return self.report
 
     def _settle(self, now_ns: int, judged: list[_Judged]) -> HealthReport:
         """Hold each verdict for a while, the worse one first."""
+        if not judged and not self._held:
+            return ALL_GOOD
         hold_ns = round(self.limits.hold_s * 1e9)
         for sensor, health, reason in judged:
             held = self._held.get(sensor)
             if held is None or health >= held[1].health or now_ns - held[0] > hold_ns:
                 self._held[sensor] = (now_ns, Finding(sensor, health, reason))
-        if not self._held:
-            return ALL_GOOD
         self._held = {sensor: held for sensor, held in self._held.items() if now_ns - held[0] <= hold_ns}
         return HealthReport(tuple(sorted((one for _, one in self._held.values()), key=lambda one: -one.health)))
 
@@ -102,9 +103,11 @@ class MotionMonitor:
         attitude_s = self._attitude.update(stamp_ns, tilt)
         inertial_s = self._inertial.update(stamp_ns, sample.inertial) if sample.inertial else 0.0
         judged = self._judge_standstill(sample, flies)
-        judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, "its telemetry is frozen: all values repeat")
-        judged += _repeated(Sensor.ATTITUDE, attitude_s, limits.stuck_s, "its attitude is stuck")
-        judged += _repeated(Sensor.IMU, inertial_s, limits.stuck_s, "its IMU is stuck")
+        if frozen_s or attitude_s or inertial_s:
+            frozen = "its telemetry is frozen: all values repeat"
+            judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, frozen)
+            judged += _repeated(Sensor.ATTITUDE, attitude_s, limits.stuck_s, "its attitude is stuck")
+            judged += _repeated(Sensor.IMU, inertial_s, limits.stuck_s, "its IMU is stuck")
         return judged
 
     def _judge_standstill(self, sample: MotionSample, flies: bool) -> list[_Judged]:
@@ -115,8 +118,10 @@ class MotionMonitor:
             return judged
         for watch, velocity, tilt in zip(self._velocity, sample.velocity_m_s, sample.lean_rad, strict=True):
             held_s, change_m_s = watch.update(sample.stamp_ns, velocity, tilt)
-            needed_s = limits.stuck_s if change_m_s >= limits.stuck_m_s else limits.stuck_alone_s
-            judged += _repeated(Sensor.VELOCITY, held_s, needed_s, f"its velocity is stuck at {abs(velocity):.2f} m/s")
+            if held_s:
+                needed_s = limits.stuck_s if change_m_s >= limits.stuck_m_s else limits.stuck_alone_s
+                reason = f"its velocity is stuck at {abs(velocity):.2f} m/s"
+                judged += _repeated(Sensor.VELOCITY, held_s, needed_s, reason)
         return judged
 
     # -- its clock ----------------------------------------------------------------------------------------------------
@@ -136,24 +141,25 @@ class MotionMonitor:
     # -- values and steps ---------------------------------------------------------------------------------------------
 
     def _judge_values(self, sample: MotionSample) -> list[_Judged]:
-        limits, before = self.limits, self._before
+        limits, before, judged = self.limits, self._before, list[_Judged]()
         speed = math.hypot(*sample.velocity_m_s)
         tilt = max(abs(sample.roll_rad), abs(sample.pitch_rad))
-        judged = self._beyond(Sensor.VELOCITY, sample, speed > limits.speed_m_s, f"{speed:.1f} m/s")
-        judged += self._beyond(
-            Sensor.ATTITUDE, sample, tilt > limits.tilt_rad, f"a tilt of {math.degrees(tilt):.0f} deg"
-        )
+        if speed > limits.speed_m_s or tilt > limits.tilt_rad or self._beyond_ns:
+            degrees = f"a tilt of {math.degrees(tilt):.0f} deg"
+            judged += self._beyond(Sensor.VELOCITY, sample, speed > limits.speed_m_s, f"{speed:.1f} m/s")
+            judged += self._beyond(Sensor.ATTITUDE, sample, tilt > limits.tilt_rad, degrees)
         elapsed_s = math.inf if before is None else (sample.stamp_ns - before.stamp_ns) * 1e-9
         if before is None or elapsed_s > _GAP_S:
             return judged
         step = math.dist(sample.velocity_m_s, before.velocity_m_s)
         turned = max(abs(sample.roll_rad - before.roll_rad), abs(sample.pitch_rad - before.pitch_rad))
-        jumps = step > limits.jump_m_s + limits.acceleration_m_s2 * elapsed_s
-        judged += self._jumps(Sensor.VELOCITY, sample, jumps, f"its velocity jumps by {step:.1f} m/s")
-        jumps = turned > limits.jump_rad + limits.turn_rad_s * elapsed_s
-        return judged + self._jumps(
-            Sensor.ATTITUDE, sample, jumps, f"its attitude jumps by {math.degrees(turned):.0f} deg"
-        )
+        if step > limits.jump_m_s + limits.acceleration_m_s2 * elapsed_s:
+            judged.append(self._jumped(Sensor.VELOCITY, sample, f"its velocity jumps by {step:.1f} m/s"))
+        if turned > limits.jump_rad + limits.turn_rad_s * elapsed_s:
+            judged.append(
+                self._jumped(Sensor.ATTITUDE, sample, f"its attitude jumps by {math.degrees(turned):.0f} deg")
+            )
+        return judged
 
     def _beyond(self, sensor: Sensor, sample: MotionSample, beyond: bool, value: str) -> list[_Judged]:
         if not beyond:
@@ -163,14 +169,12 @@ class MotionMonitor:
         bad = sample.stamp_ns - since_ns >= self.limits.beyond_s * 1e9
         return [(sensor, Health.BAD if bad else Health.SUSPECT, f"it claims {value}, which it cannot do")]
 
-    def _jumps(self, sensor: Sensor, sample: MotionSample, jumps: bool, reason: str) -> list[_Judged]:
-        if not jumps:
-            return []
+    def _jumped(self, sensor: Sensor, sample: MotionSample, reason: str) -> _Judged:
         limits = self.limits
         times = self._jumped_ns.setdefault(sensor, deque(maxlen=limits.jumps))
         times.append(sample.stamp_ns)
         often = len(times) == limits.jumps and times[-1] - times[0] <= limits.jumps_within_s * 1e9
-        return [(sensor, Health.BAD if often else Health.SUSPECT, reason)]
+        return sensor, Health.BAD if often else Health.SUSPECT, reason
 
 
 def _repeated(sensor: Sensor, held_s: float, limit_s: float, reason: str) -> list[_Judged]:

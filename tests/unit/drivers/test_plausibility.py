@@ -2,7 +2,6 @@
 
 import math
 import random
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -65,47 +64,47 @@ def broken(fault, **options):
 
 
 def frozen(sample, began):
-    return replace(began, stamp_ns=sample.stamp_ns)
+    return began._replace(stamp_ns=sample.stamp_ns)
 
 
 def frozen_but_for_the_clock(sample, began):
-    return replace(began, stamp_ns=sample.stamp_ns, vehicle_ns=sample.vehicle_ns)
+    return began._replace(stamp_ns=sample.stamp_ns, vehicle_ns=sample.vehicle_ns)
 
 
 def stuck_at_zero(sample, _):
-    return replace(sample, velocity_m_s=(0.0, 0.0))
+    return sample._replace(velocity_m_s=(0.0, 0.0))
 
 
 def one_axis_stuck(sample, began):
-    return replace(sample, velocity_m_s=(0.5, sample.velocity_m_s[1]))
+    return sample._replace(velocity_m_s=(0.5, sample.velocity_m_s[1]))
 
 
 def attitude_stuck(sample, began):
-    return replace(sample, roll_rad=began.roll_rad, pitch_rad=began.pitch_rad)
+    return sample._replace(roll_rad=began.roll_rad, pitch_rad=began.pitch_rad)
 
 
 def imu_stuck(sample, began):
-    return replace(sample, inertial=began.inertial)
+    return sample._replace(inertial=began.inertial)
 
 
 def clock_stands(sample, began):
-    return replace(sample, vehicle_ns=began.vehicle_ns)
+    return sample._replace(vehicle_ns=began.vehicle_ns)
 
 
 def falls_behind(sample, began):
-    return replace(sample, vehicle_ns=began.vehicle_ns + (sample.vehicle_ns - began.vehicle_ns) // 3)
+    return sample._replace(vehicle_ns=began.vehicle_ns + (sample.vehicle_ns - began.vehicle_ns) // 3)
 
 
 def too_fast(sample, _):
-    return replace(sample, velocity_m_s=(9.0, sample.velocity_m_s[1]))
+    return sample._replace(velocity_m_s=(9.0, sample.velocity_m_s[1]))
 
 
 def too_steep(sample, _):
-    return replace(sample, roll_rad=math.radians(60) + sample.roll_rad)
+    return sample._replace(roll_rad=math.radians(60) + sample.roll_rad)
 
 
 def flickering(sample, _):
-    return replace(sample, velocity_m_s=(2.0 * (sample.stamp_ns // (100 * MS) % 2), sample.velocity_m_s[1]))
+    return sample._replace(velocity_m_s=(2.0 * (sample.stamp_ns // (100 * MS) % 2), sample.velocity_m_s[1]))
 
 
 @pytest.mark.parametrize("limits", [ARDRONE, MAVLINK], ids=["ardrone", "mavlink"])
@@ -140,14 +139,14 @@ def test_a_stuck_imu_is_no_reason_to_stop():
 
 def test_a_level_vehicle_may_be_slow_for_longer():
     """Without a tilt that would move it a standstill is likelier true."""
-    level = [replace(sample, pitch_rad=sample.pitch_rad * 0.02) for sample in broken(stuck_at_zero, tilt_deg=0.0)]
+    level = [sample._replace(pitch_rad=sample.pitch_rad * 0.02) for sample in broken(stuck_at_zero, tilt_deg=0.0)]
     first, _ = judge(level)
     assert first[Sensor.VELOCITY, Health.BAD] == pytest.approx(FAULT_S + ARDRONE.stuck_alone_s, abs=0.05)
 
 
 def test_one_jump_is_doubted_and_forgotten():
     def jump(sample, began):
-        return replace(sample, velocity_m_s=(sample.velocity_m_s[0] + 0.9, sample.velocity_m_s[1]))
+        return sample._replace(velocity_m_s=(sample.velocity_m_s[0] + 0.9, sample.velocity_m_s[1]))
 
     monitor, worst = MotionMonitor(ARDRONE), Health.GOOD
     for sample in broken(jump):
@@ -160,7 +159,7 @@ def test_an_ardrone_cannot_change_its_velocity_by_a_third_of_a_metre_per_second_
     """One jumped by 0.33 m/s as its ceiling camera went black, and drew the belief of the whole team along."""
 
     def jump(sample, _):
-        return replace(sample, velocity_m_s=(sample.velocity_m_s[0] + 0.33, sample.velocity_m_s[1]))
+        return sample._replace(velocity_m_s=(sample.velocity_m_s[0] + 0.33, sample.velocity_m_s[1]))
 
     first, said = judge(broken(jump, period_ms=period_ms), ARDRONE)
     assert FAULT_S <= first[Sensor.VELOCITY, Health.SUSPECT] <= FAULT_S + 2 * period_ms / 1000

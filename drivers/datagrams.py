@@ -7,9 +7,10 @@ import struct
 import threading
 
 from groundstation.bus.api import Bus
-from groundstation.bus.topics import RAW_RX, RAW_TX, Topic
+from groundstation.bus.topics import RAW_RX, RAW_TX
 
 _HEAD = struct.Struct("<qI")
+_Stamped = tuple[int, bytes]
 
 
 def pack(datagrams: list[tuple[int, bytes]]) -> bytes:
@@ -44,25 +45,25 @@ class DatagramLog:
         self._entity = entity
         self._enabled = enabled
         self._lock = threading.Lock()
-        self._waiting: dict[Topic, list[tuple[int, bytes]]] = {RAW_RX: [], RAW_TX: []}
+        self._received, self._sent = list[_Stamped](), list[_Stamped]()
 
     def received(self, stamp_ns: int, datagram: bytes) -> None:
         """Remember a datagram from the vehicle."""
         if self._enabled:
             with self._lock:
-                self._waiting[RAW_RX].append((stamp_ns, datagram))
+                self._received.append((stamp_ns, datagram))
 
     def sent(self, stamp_ns: int, datagram: bytes) -> None:
         """Remember a datagram to the vehicle."""
         if self._enabled:
             with self._lock:
-                self._waiting[RAW_TX].append((stamp_ns, datagram))
+                self._sent.append((stamp_ns, datagram))
 
     def flush(self) -> None:
         """Publish the collected datagrams, one message per direction, stamped as its first datagram."""
         with self._lock:
-            batches = [(topic, batch) for topic, batch in self._waiting.items() if batch]
-            for topic, _ in batches:
-                self._waiting[topic] = []
+            batches = ((RAW_RX, self._received), (RAW_TX, self._sent))
+            self._received, self._sent = [], []
         for topic, batch in batches:
-            self._bus.publish_bytes(topic, self._bus.header(self._entity, batch[0][0]), pack(batch))
+            if batch:
+                self._bus.publish_bytes(topic, self._bus.header(self._entity, batch[0][0]), pack(batch))

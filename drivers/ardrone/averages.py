@@ -1,11 +1,14 @@
 """Means of the samples between two turns of the sender: the reader adds, the sender drains."""
 
 import threading
+from collections import deque
 
 from drivers.ardrone.convert import NavdataMotion
 
 # In flight no measured velocity comes twice: one that has come so often is none.
 _REPEATED = 4
+# Nobody drains while the sender stands still.
+_MOST_WAITING = 50
 
 
 class MotionMean:
@@ -13,19 +16,19 @@ class MotionMean:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: list[NavdataMotion] = []
+        self._waiting: deque[NavdataMotion] = deque(maxlen=_MOST_WAITING)
         self._velocity = (0.0, 0.0, 0.0)
-        self._newest, self._standing = (0.0, 0.0), [1, 1]
+        self._newest, self._standing = (0.0, 0.0), (1, 1)
         self._force: tuple[float, float] | None = None
 
     def add(self, motion: NavdataMotion) -> None:
         """Take the motion of one packet."""
+        x, y, _ = motion.velocity_m_s
         with self._lock:
             self._waiting.append(motion)
-            for i, before in enumerate(self._newest):
-                self._standing[i] = self._standing[i] + 1 if motion.velocity_m_s[i] == before else 1
-            self._newest = motion.velocity_m_s[:2]
-            del self._waiting[:-50]  # nobody drains while the sender stands still
+            (before_x, before_y), (times_x, times_y) = self._newest, self._standing
+            self._standing = (times_x + 1 if x == before_x else 1, times_y + 1 if y == before_y else 1)
+            self._newest = (x, y)
 
     @property
     def repeats(self) -> bool:
@@ -35,7 +38,8 @@ class MotionMean:
     def drain(self) -> tuple[tuple[float, float, float], tuple[float, float] | None]:
         """Return (velocity, force forward and left or None) since the last call, or once more the last ones."""
         with self._lock:
-            waiting, self._waiting = self._waiting, []
+            waiting = list(self._waiting)
+            self._waiting.clear()
         if waiting:
             count = len(waiting)
             vx, vy, vz = (sum(motion.velocity_m_s[i] for motion in waiting) / count for i in range(3))

@@ -6,12 +6,12 @@ counter-clockwise.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, TIME, Demo, PhysMeasures
-from drivers.ardrone.wire.state import ControlState, StateBit, split_control_state
+from drivers.ardrone.wire.state import ControlState, StateBit
 from drivers.plausibility.motion import MotionSample
 from groundstation.bus.messages import FlightState, Vector3
 from groundstation.geometry.angles import difference, wrap
@@ -29,7 +29,9 @@ _MOST_DEG_S, _MOST_MG = 5_000.0, 50_000.0
 _JUMP_RAD = math.radians(8)
 _JUMP_RATE_RAD_S = math.radians(100)
 _GAP_S = 0.5
-_PHASES = {
+# Numbers of their own: asking an enum for a member costs as much as reading an option.
+_FLY, _EMERGENCY, _TAKING_OFF = int(StateBit.FLY), int(StateBit.EMERGENCY), int(ControlState.TRANS_TAKEOFF)
+_PHASES: dict[int, FlightState] = {
     ControlState.TRANS_TAKEOFF: FlightState.TAKING_OFF,
     ControlState.TRANS_LANDING: FlightState.LANDING,
     ControlState.HOVERING: FlightState.HOVERING,
@@ -40,8 +42,7 @@ _PHASES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class NavdataMotion:
+class NavdataMotion(NamedTuple):
     """The vehicle's motion by one packet, in our frames.
 
     velocity_m_s [base_stabilized], as reported (no scale applied); rates and specific force [base], None in demo mode.
@@ -84,18 +85,20 @@ def motion_from_navdata(packet: Navdata) -> NavdataMotion | None:
 
 
 def _require_sane(demo: Demo) -> None:
-    angles, speeds = demo[2:5], demo[6:9]
+    _, _, theta, phi, psi, altitude_mm, vx, vy, vz, _ = demo
     # Comparisons with a NaN are false, so one chained comparison refuses it together with what is too large.
-    sane = all(-_MOST_MDEG <= a <= _MOST_MDEG for a in angles) and all(-_MOST_MM_S <= v <= _MOST_MM_S for v in speeds)
-    if sane and demo.altitude_mm <= _MOST_MM:
+    turns = -_MOST_MDEG <= theta <= _MOST_MDEG and -_MOST_MDEG <= phi <= _MOST_MDEG and -_MOST_MDEG <= psi <= _MOST_MDEG
+    moves = -_MOST_MM_S <= vx <= _MOST_MM_S and -_MOST_MM_S <= vy <= _MOST_MM_S and -_MOST_MM_S <= vz <= _MOST_MM_S
+    if turns and moves and altitude_mm <= _MOST_MM:
         return
+    angles, speeds = (theta, phi, psi), (vx, vy, vz)
     finite = all(map(math.isfinite, angles + speeds))
-    raise WireError("implausible" if finite else "not_finite", f"DEMO {angles} {speeds} {demo.altitude_mm}")
+    raise WireError("implausible" if finite else "not_finite", f"DEMO {angles} {speeds} {altitude_mm}")
 
 
 def _height(state: int, demo: Demo) -> float | None:
     # WIRE: DEMO's altitude is 0 on the ground and until shortly after lift-off.
-    return demo.altitude_mm / 1000 if state & StateBit.FLY and demo.altitude_mm > 0 else None
+    return demo.altitude_mm / 1000 if state & _FLY and demo.altitude_mm > 0 else None
 
 
 def _imu_from_phys(phys: PhysMeasures) -> tuple[Vector3, Vector3]:
@@ -127,12 +130,12 @@ def flight_state_from_navdata(state: int, control_state: int | None) -> FlightSt
 
     WIRE: the two are not consistent within a packet. FLY with the phase LANDED is about to leave the ground.
     """
-    if state & StateBit.EMERGENCY:
+    if state & _EMERGENCY:
         return FlightState.EMERGENCY
-    phase = None if control_state is None else split_control_state(control_state)[0]
-    if state & StateBit.FLY:
+    phase = None if control_state is None else control_state >> 16
+    if state & _FLY:
         return FlightState.FLYING if phase is None else _PHASES.get(phase, FlightState.FLYING)
-    return FlightState.TAKING_OFF if phase is ControlState.TRANS_TAKEOFF else FlightState.LANDED
+    return FlightState.TAKING_OFF if phase == _TAKING_OFF else FlightState.LANDED
 
 
 class HeadingWatch:

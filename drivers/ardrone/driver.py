@@ -3,9 +3,8 @@
 import logging
 import threading
 from collections import Counter
-from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 from drivers.ardrone import convert, velocity_loop
 from drivers.ardrone.averages import MotionMean
@@ -55,8 +54,7 @@ LIMITS = PlausibilityLimits(clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class LatestNavdata:
+class LatestNavdata(NamedTuple):
     """The newest word of the drone; heard_ns 0: never; moved_ns: when it last reported motion; velocity as reported.
 
     obeyed: sequence number of the last PCMD that it says it obeyed, if it says so.
@@ -121,25 +119,29 @@ class ArDrone:
                 _log.exception("%s: a packet could not be used", self.name)
 
     def _hear(self, now_ns: int, packet: Navdata) -> None:
-        motion = convert.motion_from_navdata(packet)
-        heard, moved = self.telemetry, dict[str, Any]()
-        demo, references = packet.read(DEMO), packet.read(SPEED_REFERENCES)
-        if demo is not None and motion is not None:
-            moved = {
-                "moved_ns": now_ns,
-                "velocity_m_s": motion.velocity_m_s,
-                "obeyed": None if references is None else references.sequence,
-                "control_state": demo.control_state,
-                "battery": min(demo.battery_percent, 100) / 100,
-                "model": heard.model if heard.model is not Model.UNKNOWN else model_from_navdata(packet),
-            }
-        flight_state = convert.flight_state_from_navdata(packet.state, moved.get("control_state", heard.control_state))
-        self.telemetry = replace(heard, heard_ns=now_ns, state=packet.state, flight_state=flight_state, **moved)
-        if motion is not None:
-            sample = convert.sample_from_motion(now_ns, packet, motion)
-            report = self._plausibility.update(sample, flight_state)
-            self._motion.add(motion)
-            self._publisher.publish(now_ns, motion, report)
+        motion, demo = convert.motion_from_navdata(packet), packet.read(DEMO)
+        heard = self.telemetry
+        control_state = heard.control_state if demo is None else demo.control_state
+        flight_state = convert.flight_state_from_navdata(packet.state, control_state)
+        if demo is None or motion is None:
+            self.telemetry = heard._replace(heard_ns=now_ns, state=packet.state, flight_state=flight_state)
+            return
+        references = packet.read(SPEED_REFERENCES)
+        self.telemetry = LatestNavdata(
+            heard_ns=now_ns,
+            moved_ns=now_ns,
+            state=packet.state,
+            control_state=control_state,
+            flight_state=flight_state,
+            battery=min(demo.battery_percent, 100) / 100,
+            model=model_from_navdata(packet) if heard.model is Model.UNKNOWN else heard.model,
+            velocity_m_s=motion.velocity_m_s,
+            obeyed=None if references is None else references.sequence,
+        )
+        sample = convert.sample_from_motion(now_ns, packet, motion)
+        report = self._plausibility.update(sample, flight_state)
+        self._motion.add(motion)
+        self._publisher.publish(now_ns, motion, report)
 
     # -- sender loop --------------------------------------------------------------------------------------------------
 

@@ -1,7 +1,6 @@
 """The driver's velocity loop against the emulated drone, byte for byte and tick by tick, without sockets or clock."""
 
 import math
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -190,13 +189,13 @@ def test_healthy_flights_and_rest_on_the_floor_give_no_alarm(seed):
 
 
 def still(motion):
-    return replace(motion, velocity_m_s=(0.0, 0.0, motion.velocity_m_s[2]))
+    return motion._replace(velocity_m_s=(0.0, 0.0, motion.velocity_m_s[2]))
 
 
 def shaking(motion):
     """A stuck velocity with the noise of a sensor that lives."""
     stir = 0.03 * math.sin(1e6 * sum(motion.rates_rad_s))
-    return replace(motion, velocity_m_s=(stir, -stir, motion.velocity_m_s[2]))
+    return motion._replace(velocity_m_s=(stir, -stir, motion.velocity_m_s[2]))
 
 
 @pytest.mark.parametrize(("lie", "within_m"), [(still, 0.5), (shaking, 1.2)])

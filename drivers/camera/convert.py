@@ -1,6 +1,7 @@
 """Frames and messages: mounting and attitudes to `Gravity`, a sighting to a `RelativeObservation`."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,11 +17,15 @@ from groundstation.geometry.rotations import (
 )
 
 
+@lru_cache(maxsize=16)
 def parent_from_optical(mount: MountSettings) -> Array:
     """Return base_from_camera_optical (3, 3) on a robot, world_from_camera_optical in the world."""
     if mount.in_world:
-        return world_from_downward_optical(mount.rotation_deg)
-    return base_from_tilted_optical(math.radians(mount.tilt_down_deg), math.radians(mount.pan_deg))
+        rotation = world_from_downward_optical(mount.rotation_deg)
+    else:
+        rotation = base_from_tilted_optical(math.radians(mount.tilt_down_deg), math.radians(mount.pan_deg))
+    rotation.setflags(write=False)
+    return rotation
 
 
 def stabilized_from_optical(mount: MountSettings, roll_rad: float, pitch_rad: float) -> Array:

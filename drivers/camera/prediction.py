@@ -59,7 +59,8 @@ class Foresight:
     def __init__(
         self, mount: MountSettings, observer: str, markers: tuple[MarkerSettings, ...], intrinsics: CameraIntrinsics
     ) -> None:
-        self._mount, self._observer, self._markers, self._intrinsics = mount, observer, markers, intrinsics
+        self._mount, self._observer, self._intrinsics = mount, observer, intrinsics
+        self._markers = [(marker, marker.reach_m) for marker in markers]
         self._estimates: deque[Estimate] = deque(maxlen=_KEPT)
 
     def add(self, estimate: Estimate) -> None:
@@ -78,11 +79,11 @@ class Foresight:
         if camera is None:
             return {}
         found: Predictions = {}
-        for marker in self._markers:
+        for marker, reach_m in self._markers:
             entity = entities.get(marker.entity)
             place = _marker_place(entity, marker, seconds) if entity is not None else None
             if place is not None:
-                known, prediction = _seen(camera, *place, marker.reach_m, self._intrinsics)
+                known, prediction = _seen(camera, *place, reach_m, self._intrinsics)
                 if known:
                     found[marker.entity] = prediction
         return found
@@ -112,12 +113,12 @@ class _Camera:
 
     def covariance_of(self, point: Array) -> Array:
         """Return the covariance (3, 3) [m^2; world] of a world point relative to the camera, from the camera alone."""
-        x, y, z = point - self.pose.translation
-        by_tilt = np.array([[0.0, z], [-z, 0.0], [y, -x]])
-        by_yaw = np.array([-y, x, 0.0])
-        return np.asarray(
-            self.covariance + self.tilt_std_rad**2 * by_tilt @ by_tilt.T + self.yaw_variance * np.outer(by_yaw, by_yaw)
-        )
+        x, y, z = (point - self.pose.translation).tolist()
+        # Tilts displace it by (0, -z, y) and (z, 0, -x), a turn by (-y, x, 0).
+        tilt, yaw = self.tilt_std_rad**2, self.yaw_variance
+        xy, xz, yz = -yaw * x * y, -tilt * x * z, -tilt * y * z
+        xx, yy, zz = tilt * z * z + yaw * y * y, tilt * z * z + yaw * x * x, tilt * (x * x + y * y)
+        return np.asarray(self.covariance + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
 def _marker_place(entity: EntityEstimate, marker: MarkerSettings, seconds: float) -> tuple[Array, Array] | None:
@@ -153,14 +154,23 @@ def _seen(
     if point[2] < _LEAST_DEPTH_M + _SIGMAS * depth_std:
         return point[2] < -_SIGMAS * depth_std, None
     jacobian = intrinsics.project_jacobian(point)
-    std_px = math.sqrt(float(np.linalg.eigvalsh(jacobian @ relative @ jacobian.T)[-1]))
-    centre_px = intrinsics.project(point)
+    (a, b), (_, d) = (jacobian @ relative @ jacobian.T).tolist()
+    std_px = math.sqrt(0.5 * (a + d) + math.hypot(0.5 * (a - d), b))  # along the longer axis of its ellipse
     if std_px > _WIDEST_SHARE * intrinsics.width_px:
         return False, None
-    if not np.isfinite(centre_px).all():
+    pixel = intrinsics.pixel(*point.tolist())
+    if pixel is None:
         return True, None
-    # The marker lies level; how it is turned does not change its largest and least extent.
-    level = np.linalg.svd(jacobian @ rotation.T[:, :2], compute_uv=False) * reach_m
+    centre_px = np.array(pixel)
     if not intrinsics.contains(centre_px, -_SIGMAS * std_px):
         return True, None
-    return True, Prediction(centre_px, float(level[0]), float(level[1]) / _RADIUS_SQUARES, std_px)
+    # The marker lies level; how it is turned does not change its largest and least extent.
+    most, least = _singular_values(jacobian @ rotation[:2].T)
+    return True, Prediction(centre_px, most * reach_m, least * reach_m / _RADIUS_SQUARES, std_px)
+
+
+def _singular_values(matrix: Array) -> tuple[float, float]:
+    """Return the larger and the smaller singular value of a matrix (2, 2): a turn and a mirroring add up to it."""
+    (a, b), (c, d) = matrix.tolist()
+    turn, mirroring = 0.5 * math.hypot(a + d, b - c), 0.5 * math.hypot(a - d, b + c)
+    return turn + mirroring, abs(turn - mirroring)

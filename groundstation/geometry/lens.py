@@ -79,8 +79,9 @@ class CameraIntrinsics:
         with np.errstate(invalid="ignore"):
             inside = x * x + y * y <= self.max_radius**2
         x_d, y_d = _distort(x, y, self.distortion)
-        pixels = np.stack((self.fx_px * x_d + self.cx_px, self.fy_px * y_d + self.cy_px), axis=-1)
-        return np.where(inside[..., None], pixels, np.nan)
+        pixels = np.empty(normalised.shape)
+        pixels[..., 0], pixels[..., 1] = self.fx_px * x_d + self.cx_px, self.fy_px * y_d + self.cy_px
+        return pixels if inside.all() else np.where(inside[..., None], pixels, np.nan)
 
     def normalised_from_pixels(self, pixels: Array) -> Array:
         """Return undistorted normalised coordinates (..., 2) of pixels (..., 2), by Newton's method.
@@ -100,11 +101,13 @@ class CameraIntrinsics:
         points = np.asarray(points, dtype=np.float64)
         z = points[..., 2]
         x, y = points[..., 0] / z, points[..., 1] / z
-        lens = _distort_jacobian(x, y, self.distortion)
-        zero = np.zeros_like(z)
-        pinhole = np.stack((np.stack((1 / z, zero, -x / z), -1), np.stack((zero, 1 / z, -y / z), -1)), -2)
-        focal = np.array([[self.fx_px], [self.fy_px]])
-        return focal * np.asarray(lens @ pinhole)
+        xx, xy, yy = _distort_slopes(x, y, self.distortion)
+        # Times the pinhole's own: (1, 0, -x) / z and (0, 1, -y) / z.
+        by_x, by_y = self.fx_px / z, self.fy_px / z
+        jacobian = np.empty((*points.shape[:-1], 2, 3))
+        jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 0, 2] = by_x * xx, by_x * xy, -by_x * (xx * x + xy * y)
+        jacobian[..., 1, 0], jacobian[..., 1, 1], jacobian[..., 1, 2] = by_y * xy, by_y * yy, -by_y * (xy * x + yy * y)
+        return jacobian
 
     def contains(self, pixels: Array, margin_px: float = 0.0) -> NDArray[np.bool_]:
         """Return which pixels (..., 2) lie in the picture, at least `margin_px` from its border."""
@@ -137,14 +140,8 @@ def _distort(x: Scalars, y: Scalars, distortion: tuple[float, ...]) -> tuple[Sca
     )
 
 
-def _distort_jacobian(x: Array, y: Array, distortion: tuple[float, ...]) -> Array:
-    """Return d(distorted) / d(undistorted) (..., 2, 2)."""
-    xx, xy, yy = _distort_slopes(x, y, distortion)
-    return np.stack((np.stack((xx, xy), -1), np.stack((xy, yy), -1)), -2)
-
-
 def _distort_slopes(x: Array, y: Array, distortion: tuple[float, ...]) -> tuple[Array, Array, Array]:
-    """Return the elements xx, xy = yx, yy of that Jacobian."""
+    """Return d(distorted) / d(undistorted): its elements xx, xy = yx, yy."""
     k1, k2, p1, p2, k3 = distortion
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -167,9 +164,12 @@ def _undistort(x_d: Array, y_d: Array, distortion: tuple[float, ...]) -> tuple[A
         determinant = a * d - b * b
         determinant = np.where(np.abs(determinant) < 1e-6, 1e-6, determinant)
         step_x, step_y = (d * error_x - b * error_y) / determinant, (a * error_y - b * error_x) / determinant
-        # A bounded step keeps pixels outside the lens model from running away.
-        x, y = x - np.clip(step_x, -0.5, 0.5), y - np.clip(step_y, -0.5, 0.5)
-        if max(np.abs(step_x).max(initial=0.0), np.abs(step_y).max(initial=0.0)) < _NEWTON_TOLERANCE:
+        most_x, most_y = np.abs(step_x).max(initial=0.0), np.abs(step_y).max(initial=0.0)
+        if not (most_x <= 0.5 and most_y <= 0.5):
+            # A bounded step keeps pixels outside the lens model from running away.
+            step_x, step_y = np.clip(step_x, -0.5, 0.5), np.clip(step_y, -0.5, 0.5)
+        x, y = x - step_x, y - step_y
+        if max(most_x, most_y) < _NEWTON_TOLERANCE:
             break
     x_now, y_now = _distort(x, y, distortion)
     bad = np.hypot(x_now - x_d, y_now - y_d) > 1e-9

@@ -33,13 +33,20 @@ class BarReading:
 
 
 def read_bar(
-    picture: NDArray[np.uint8], find: Find, intrinsics: CameraIntrinsics, mirrored: bool = False
+    picture: NDArray[np.uint8],
+    find: Find,
+    intrinsics: CameraIntrinsics,
+    mirrored: bool = False,
+    rays: Array | None = None,
 ) -> BarReading | None:
     """Return the reading of a board's bar, or None when the bar is not fully in the picture.
 
+    rays: of the board's corners, normalised (n, 2), where the caller has them.
     mirrored: where the bar of a print that was mirrored lies; the squares alone look the same both ways.
     """
-    pixels = _bar_pixels(find.corners, intrinsics, _SAMPLES * (-1.0, 1.0) if mirrored else _SAMPLES)
+    if rays is None:
+        rays = intrinsics.normalised_from_pixels(find.corners)
+    pixels = _bar_pixels(rays, intrinsics, _SAMPLES * (-1.0, 1.0) if mirrored else _SAMPLES)
     if pixels is None or not intrinsics.contains(pixels, 1.0).all():
         return None
     grey = sample(picture, pixels).reshape(marker.CELLS, -1).mean(axis=1)
@@ -75,9 +82,8 @@ def _step(ratio: Array) -> Array:
     return np.array([0.5 + 0.5 * math.erf(value / math.sqrt(2.0)) for value in ratio.ravel()]).reshape(ratio.shape)
 
 
-def _bar_pixels(corners: Array, intrinsics: CameraIntrinsics, samples: Array) -> Array | None:
+def _bar_pixels(rays: Array, intrinsics: CameraIntrinsics, samples: Array) -> Array | None:
     """Return where the cells' samples are in the picture: a homography of undistorted corners, then the lens."""
-    rays = intrinsics.normalised_from_pixels(corners)
     if not np.isfinite(rays).all():
         return None
     h = homography(_GRID, rays)

@@ -14,7 +14,7 @@ from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Sighting
 from drivers.camera.tags import TagFinder
 from drivers.camera.tracks import Track
-from groundstation.arrays import Image
+from groundstation.arrays import Array, Image
 from groundstation.bus.notice import Notice
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.time_units import NS_PER_S
@@ -101,8 +101,9 @@ class Pipeline:
         if searching:
             self._schedule_search(stamp_ns, predictions)
         for track, find in finds:
-            self._identify(picture, track, find, stamp_ns)
-            sighting = self._measure(track, stamp_ns, gravity_of, drop_of)
+            rays = self._intrinsics.normalised_from_pixels(find.corners)
+            self._identify(picture, track, find, rays, stamp_ns)
+            sighting = self._measure(track, rays, stamp_ns, gravity_of, drop_of)
             if sighting is not None:
                 sightings.append(sighting)
         self._forget(stamp_ns, predictions)
@@ -209,26 +210,28 @@ class Pipeline:
         foreign = track.code is not None and track.code not in self._expected
         return foreign or track.is_lost(stamp_ns)
 
-    def _identify(self, picture: Image, track: Track, find: detect.Find, stamp_ns: int) -> None:
+    def _identify(self, picture: Image, track: Track, find: detect.Find, rays: Array, stamp_ns: int) -> None:
         least = self._settings.identity_margin
-        reading = markers.read_bar(picture, find, self._intrinsics)
+        reading = markers.read_bar(picture, find, self._intrinsics, rays=rays)
         track.identify(reading, stamp_ns, least)
         if track.code is not None or (reading is not None and reading.is_sure(least)):
             return
-        mirrored = markers.read_bar(picture, find, self._intrinsics, mirrored=True)
+        mirrored = markers.read_bar(picture, find, self._intrinsics, mirrored=True, rays=rays)
         marker = self._expected.get(mirrored.code) if mirrored is not None and mirrored.is_sure(least) else None
         if marker is not None and mirrored is not None:
             self.counts["mirrored"] += 1
             self._faults.mirrored(marker, mirrored)
 
-    def _measure(self, track: Track, stamp_ns: int, gravity_of: GravityOf, drop_of: DropOf) -> Sighting | None:
-        """Return the sighting of an identified, expected board, unless its corners fit no pose."""
+    def _measure(
+        self, track: Track, rays: Array, stamp_ns: int, gravity_of: GravityOf, drop_of: DropOf
+    ) -> Sighting | None:
+        """Return the sighting of an identified, expected board, unless its corners (and their rays) fit no pose."""
         expected = self._expected.get(track.code) if track.code is not None else None
         if expected is None:
             self.counts["unknown"] += 1
             return None
         points, settings = self._points[expected.entity], self._settings
-        poses = pose.planar_poses(track.corners, points, self._intrinsics)
+        poses = pose.planar_poses(track.corners, points, self._intrinsics, rays)
         if not poses:
             self.counts["no_pose"] += 1
             return None

@@ -9,7 +9,6 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.geometry.rotations import rotation_from_euler
 
 # How far the measured roll and pitch of both vehicles may be off together, and how far assumed levelness may.
 _GRAVITY_STD_RAD = math.radians(3.0)
@@ -57,9 +56,15 @@ class PoseChoice:
     residual_px: float
 
 
-def planar_poses(corners: Array, points: Array, intrinsics: CameraIntrinsics) -> list[PlanarPose]:
-    """Return the one or two poses of a flat board (points (n, 3) [m; marker]), refined on the distorted pixels."""
-    rays = intrinsics.normalised_from_pixels(corners)
+def planar_poses(
+    corners: Array, points: Array, intrinsics: CameraIntrinsics, rays: Array | None = None
+) -> list[PlanarPose]:
+    """Return the one or two poses of a flat board (points (n, 3) [m; marker]), refined on the distorted pixels.
+
+    rays: of the corners, normalised (n, 2), where the caller has them.
+    """
+    if rays is None:
+        rays = intrinsics.normalised_from_pixels(corners)
     if not np.isfinite(rays).all():
         return []
     count, turns, shifts, _ = cv2.solvePnPGeneric(
@@ -107,23 +112,24 @@ def choose(
     """
     freedom = 2 * len(points) - 6
     variance = min(pose.squared_error for pose in poses) / freedom + floor_px**2
-    ranked = sorted(poses, key=lambda pose: _cost(pose, variance, gravity))
-    best = relative_pose(ranked[0], points, intrinsics, gravity, floor_px)
-    residual = math.sqrt(ranked[0].squared_error / freedom)
-    if len(ranked) == 1:
+    ranked = sorted(((_cost(pose, variance, gravity), pose) for pose in poses), key=lambda pair: pair[0])
+    first_cost, first = ranked[0]
+    best = relative_pose(first, points, intrinsics, gravity, floor_px)
+    residual = math.sqrt(first.squared_error / freedom)
+    if len(ranked) == 1 or ranked[1][0] - first_cost >= ambiguity_cost:
         return PoseChoice(best, None, residual)
-    gap = _cost(ranked[1], variance, gravity) - _cost(ranked[0], variance, gravity)
-    if gap >= ambiguity_cost:
-        return PoseChoice(best, None, residual)
-    other = relative_pose(ranked[1], points, intrinsics, gravity, floor_px)
+    other = relative_pose(ranked[1][1], points, intrinsics, gravity, floor_px)
     return PoseChoice(best, other if _differ(best, other) else None, residual)
 
 
 def _cost(pose: PlanarPose, variance: float, gravity: Gravity) -> float:
-    marker = gravity.stabilized_from_optical @ pose.rotation
-    yaw = math.atan2(marker[1, 0], marker[0, 0])
-    upright = rotation_from_euler(gravity.subject_roll_rad, gravity.subject_pitch_rad, yaw)[:, 2]
-    angle = math.acos(float(np.clip(marker[:, 2] @ upright, -1.0, 1.0)))
+    (xx, _, xz), (yx, _, yz), (_, _, zz) = (gravity.stabilized_from_optical @ pose.rotation).tolist()
+    yaw, roll, pitch = math.atan2(yx, xx), gravity.subject_roll_rad, gravity.subject_pitch_rad
+    # The subject's z axis as its roll, its pitch and that yaw have it.
+    ahead, left, up = math.sin(pitch) * math.cos(roll), -math.sin(roll), math.cos(pitch) * math.cos(roll)
+    c, s = math.cos(yaw), math.sin(yaw)
+    cosine = xz * (c * ahead - s * left) + yz * (s * ahead + c * left) + zz * up
+    angle = math.acos(max(-1.0, min(1.0, cosine)))
     std = _GRAVITY_STD_RAD if gravity.known else _LEVEL_STD_RAD
     return pose.squared_error / variance + (angle / std) ** 2
 
@@ -142,8 +148,12 @@ def pose_covariance(pose: PlanarPose, points: Array, intrinsics: CameraIntrinsic
     turned = points @ pose.rotation.T
     by_point = intrinsics.project_jacobian(turned + pose.translation)
     # A left rotation error w moves a point by w x p, so d(pixel)/dw = -J [p]x.
-    by_turn = np.cross(turned[:, None, :], by_point)
-    jacobian = np.concatenate((by_turn, by_point), axis=2).reshape(-1, 6)
+    by_pose = np.empty((len(points), 2, 6))
+    x, y, z = turned.T[:, :, None]
+    by_x, by_y, by_z = by_point[..., 0], by_point[..., 1], by_point[..., 2]
+    by_pose[..., 0], by_pose[..., 1], by_pose[..., 2] = y * by_z - z * by_y, z * by_x - x * by_z, x * by_y - y * by_x
+    by_pose[..., 3:] = by_point
+    jacobian = by_pose.reshape(-1, 6)
     variance = pose.squared_error / (len(jacobian) - 6) + floor_px**2
     return np.asarray(variance * np.linalg.solve(jacobian.T @ jacobian, np.eye(6)))
 

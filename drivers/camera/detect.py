@@ -1,6 +1,8 @@
 """Finds one checkerboard in one window of a picture, and puts its twelve corners into the marker's own order."""
 
+import math
 from dataclasses import dataclass
+from statistics import median
 from typing import NamedTuple
 
 import cv2
@@ -42,7 +44,8 @@ _RIM_SIDES = tuple(
     np.array([outside for square in _CENTRES[~_BLACK] if (outside := _step_out(square, side)) is not None])
     for side in range(4)
 )
-_RIM, _RIM_ENDS = np.vstack(_RIM_SIDES), np.cumsum([len(side) for side in _RIM_SIDES])[:-1]
+_RIM, _RIM_COUNTS = np.vstack(_RIM_SIDES), np.array([len(side) for side in _RIM_SIDES])
+_RIM_STARTS = np.cumsum(_RIM_COUNTS) - _RIM_COUNTS
 _LEAST_RIM_WHITENESS = 0.35
 
 
@@ -70,14 +73,14 @@ class Find:
     @property
     def centre(self) -> Array:
         """Return the mean of the corners [px]."""
-        return np.asarray(self.corners.mean(axis=0))
+        return np.asarray(np.add.reduce(self.corners) / len(self.corners))
 
 
 def spacing_px(corners: Array) -> float:
     """Return the least distance of neighbouring corners [px]."""
     grid = corners.reshape(marker.CORNERS_Y, marker.CORNERS_X, 2)
-    along, across = np.diff(grid, axis=1), np.diff(grid, axis=0)
-    return float(np.sqrt(min((along**2).sum(axis=-1).min(), (across**2).sum(axis=-1).min())))
+    along, across = grid[:, 1:] - grid[:, :-1], grid[1:] - grid[:-1]
+    return math.sqrt(min((along * along).sum(axis=-1).min(), (across * across).sum(axis=-1).min()))
 
 
 def window_around(points: Array, margin_px: float, shape: tuple[int, ...]) -> Window | None:
@@ -90,7 +93,7 @@ def window_around(points: Array, margin_px: float, shape: tuple[int, ...]) -> Wi
 
 def enlargement(spacing: float) -> float:
     """Return by how much a picture is scaled for the board finder when squares are about `spacing` pixels wide."""
-    return float(np.clip(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT))
+    return min(max(_WANTED_PX_PER_SQUARE / max(spacing, 1.0), _LEAST_ENLARGEMENT), _MOST_ENLARGEMENT)
 
 
 def find_board(picture: Image, window: Window, spacing: float) -> Find | None:
@@ -115,9 +118,9 @@ def refined(picture: Image, corners: Array, columns: int = marker.CORNERS_X) -> 
     if window is None:
         return corners
     part = picture[window.top : window.bottom, window.left : window.right]
-    enlarged, ratio = resized(part, float(np.clip(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0, _MOST_ENLARGEMENT)))
+    enlarged, ratio = resized(part, min(max(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0), _MOST_ENLARGEMENT))
     most = _MOST_HALF_ENLARGED_PX if ratio[0] < 1.0 else _MOST_HALF_PX
-    half = int(np.clip(round(0.55 * reach / ratio[0]), 1, most))
+    half = min(max(round(0.55 * reach / ratio[0]), 1), most)
     start = ((corners - (window.left, window.top) + 0.5) / ratio - 0.5).astype(np.float32).reshape(-1, 1, 2)
     found = cv2.cornerSubPix(enlarged, start, (half, half), (-1, -1), _REFINE)
     fine = (np.asarray(found, np.float64).reshape(-1, 2) + 0.5) * ratio - 0.5 + (window.left, window.top)
@@ -160,7 +163,7 @@ def ordered(picture: Image, corners: Array) -> Find | None:
         # Turned by 180 degrees: one side of the board has black ends, the other white ones.
         corners, grey = corners[::-1], grey[::-1]
         pixels_from_plane = pixels_from_plane * (-1.0, -1.0, 1.0)
-    white, black = float(np.median(grey[~_BLACK])), float(np.median(grey[_BLACK]))
+    white, black = median(grey[~_BLACK].tolist()), median(grey[_BLACK].tolist())
     wrong = int(((grey < 0.5 * (white + black)) != _BLACK).sum())
     if white - black < _LEAST_CONTRAST or wrong > _MOST_WRONG_SQUARES:
         return None
@@ -174,8 +177,7 @@ def _has_white_rim(picture: Image, pixels_from_plane: Array, least: float) -> bo
     rim = _mapped(pixels_from_plane, _RIM)
     if rim.min() < 0.0 or rim[:, 0].max() > picture.shape[1] - 1 or rim[:, 1].max() > picture.shape[0] - 1:
         return False
-    sides = np.split(sample(picture, rim), _RIM_ENDS)
-    return min(float(side.mean()) for side in sides) >= least
+    return bool((np.add.reduceat(sample(picture, rim), _RIM_STARTS) / _RIM_COUNTS).min() >= least)
 
 
 def sample(picture: Image, points: Array) -> Array:
@@ -197,11 +199,11 @@ def _mapped(h: Array, points: Array) -> Array:
 
 def homography(plane: Array, image: Array) -> Array:
     """Return the (3, 3) homography that maps plane points (n, 2) to image points (n, 2), least squares with h22 = 1."""
-    x, y = plane[:, 0], plane[:, 1]
-    u, v = image[:, 0], image[:, 1]
-    one, nil = np.ones_like(x), np.zeros_like(x)
-    rows_u = np.column_stack((x, y, one, nil, nil, nil, -u * x, -u * y))
-    rows_v = np.column_stack((nil, nil, nil, x, y, one, -v * x, -v * y))
-    system = np.vstack((rows_u, rows_v))
-    solution = np.linalg.solve(system.T @ system, system.T @ np.concatenate((u, v)))
-    return np.append(solution, 1.0).reshape(3, 3)
+    n = len(plane)
+    system = np.zeros((2 * n, 8))  # rows (x, y, 1, 0, 0, 0, -u x, -u y), then (0, 0, 0, x, y, 1, -v x, -v y)
+    system[:n, :2] = system[n:, 3:5] = plane
+    system[:n, 2] = system[n:, 5] = 1.0
+    system[:n, 6:], system[n:, 6:] = -image[:, :1] * plane, -image[:, 1:] * plane
+    h = np.ones(9)
+    h[:8] = np.linalg.solve(system.T @ system, system.T @ image.T.ravel())
+    return h.reshape(3, 3)

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,6 @@ class SizeCheck:
         """Return by how much the marker seems farther than it is, or None while that agrees with its size."""
         if len(self._ratios) < _LEAST_SAMPLES or self._ratios[-1][0] - self._ratios[0][0] < _LEAST_SPAN_NS:
             return None
-        deviation = float(np.median([ratio for _, ratio, _ in self._ratios]))
-        std = float(np.mean([std for _, _, std in self._ratios]))
+        deviation = median(ratio for _, ratio, _ in self._ratios)
+        std = math.fsum(std for _, _, std in self._ratios) / len(self._ratios)
         return math.exp(deviation) if abs(deviation) > max(_LEAST_DEVIATION, _SIGMAS * std) else None

@@ -42,7 +42,7 @@ _FRESH_NS = 300_000_000
 # Long enough that the drone waits for RESUME.
 _DOUBTED_NS = 1_300_000_000
 _RATE_PERIOD_NS = 200_000_000
-_FAULTS = StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW
+_FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
 _NO_AR1_VIDEO = Notice(
     Severity.WARNING,
     "this is an AR.Drone 1.0: its video (UVLC and P264 over UDP 5555) is out of scope and is left alone",
@@ -169,8 +169,8 @@ class ArDrone:
         pinned, serial = self._settings.serial_number, self._session.identity.serial
         if pinned and serial != pinned:
             return f"it is another drone: its serial number is {serial or 'not known'}, the field says {pinned}"
-        faults = bit_names(heard.state & _FAULTS)
-        return f"the drone reports {', '.join(faults)}" if faults else ""
+        faults = heard.state & _FAULTS
+        return f"the drone reports {', '.join(bit_names(faults))}" if faults else ""
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send one datagram with the commands for the decision, and those of the session."""

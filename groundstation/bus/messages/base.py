@@ -25,6 +25,8 @@ def _is_finite(value: Any) -> bool:
     if kind is tuple and set(map(type, value)) == {float}:
         # Vectors and matrices are most of what is checked: no sum of them is finite if one of them is not.
         return math.isfinite(sum(value)) or all(map(math.isfinite, value))
+    if kind is float:
+        return math.isfinite(value)
     if kind is Header:
         return _is_whole(value.stamp_ns) and _is_whole(value.seq)
     if isinstance(value, float):
@@ -36,7 +38,7 @@ def _is_finite(value: Any) -> bool:
     if isinstance(value, tuple):
         return all(map(_is_finite, value))
     if isinstance(value, msgspec.Struct):
-        return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
+        return all(map(_is_finite, astuple(value)))
     if isinstance(value, dict):
         return all(map(_is_finite, value.values()))
     return True

@@ -57,10 +57,6 @@ class Window(NamedTuple):
     right: int
     bottom: int
 
-    def holds(self, point: Array) -> bool:
-        """Return whether a pixel lies inside."""
-        return bool(self.left <= point[0] < self.right and self.top <= point[1] < self.bottom)
-
 
 @dataclass(frozen=True, slots=True)
 class Find:

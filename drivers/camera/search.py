@@ -113,18 +113,24 @@ def saddle_points(picture: Image) -> Seeds:
 
 def clusters(seeds: Seeds, taken: list[Window]) -> list[Cluster]:
     """Return lattice-like clusters of saddle points, the likeliest board first."""
-    free = np.array([not any(window.holds(point) for window in taken) for point in seeds.points], dtype=bool)
+    free = np.ones(len(seeds.points), dtype=bool)
+    for left, top, right, bottom in taken:
+        x, y = seeds.points.T
+        free &= ~((left <= x) & (x < right) & (top <= y) & (y < bottom))
     points, strength, direction = seeds.points[free], seeds.strength[free], seeds.direction[free]
     if len(points) < _LEAST_CLUSTER:
         return []
-    distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    across, along = (points[:, None, axis] - points[None, :, axis] for axis in (0, 1))
+    distance = np.sqrt(across * across + along * along)
     ratio = strength[:, None] / strength[None]
     opposite = (direction @ direction.T < -0.6) & (ratio > 0.55) & (ratio < 1.8)
     reach = np.where(opposite, distance, np.inf).min(axis=1)
     similar = (reach[:, None] < 2.0 * reach[None]) & (reach[None] < 2.0 * reach[:, None])
     linked = opposite & similar & (distance < _REACH * np.minimum(reach[:, None], reach[None]))
     label = _components(linked)
-    found = [_rated(points[label == k], reach[label == k], linked[label == k]) for k in np.unique(label)]
+    names, counts = np.unique(label, return_counts=True)
+    members = [label == k for k in names[(counts >= _LEAST_CLUSTER) & (counts <= _MOST_CLUSTER)]]
+    found = [_rated(points[own], reach[own], linked[own]) for own in members]
     best = sorted((pair for pair in found if pair is not None), key=lambda pair: pair[0])
     return [cluster for _, cluster in best]
 
@@ -143,8 +149,6 @@ def _components(linked: NDArray[np.bool_]) -> NDArray[np.intp]:
 def _rated(points: Array, reach: Array, linked: NDArray[np.bool_]) -> tuple[float, Cluster] | None:
     """Return how unlike a board a cluster is, and the cluster; None when it cannot be one."""
     count = len(points)
-    if not _LEAST_CLUSTER <= count <= _MOST_CLUSTER:
-        return None
     spacing = float(np.median(reach))
     if np.ptp(points, axis=0).max() > 9.0 * spacing * 2.0:
         return None

@@ -271,6 +271,8 @@ def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -
         assert low <= places[:, :, axis].min() and places[:, :, axis].max() <= high
 
 
+@pytest.mark.slow
+@pytest.mark.study
 def test_a_target_that_jumps_away_is_found_again() -> None:
     """It took 17 to 60 s, by seed and processor; how soon it should be is judged by kidnap-2m and kidnap-3m."""
     resolved = lab()

@@ -14,34 +14,37 @@ PYTEST = $(BIN)/python -m pytest $(REPEAT)
 
 INTEROP := .interop
 STUDIES := .pytest_cache/studies
-COMPUTING := .pytest_cache/computing
-COVERAGE := .pytest_cache/coverage-waiting.json .pytest_cache/coverage-computing.json
+PARTS := waiting units others
+COVERAGE := $(PARTS:%=.pytest_cache/coverage-%.json)
 # Fast tests that wait for sockets, processes or time; all others compute. Each file has loopback addresses of its own.
 WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/contract/mavlink_links \
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test test-waiting test-computing raise-floors test-slow slow-flights slow-studies test-exhaustive fuzz test-firmware mutants wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-studies test-exhaustive fuzz test-firmware mutants wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)
 
 demo: $(STAMP)
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
-# Tests that wait (for sockets, processes, time) run in one pytest, those that compute beside them in another, printed at
-# the end. What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors raises them.
+# Tests that wait (for sockets, processes, time) run in one pytest, those that compute beside them in two others, printed
+# at their ends. What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors
+# raises them.
 test: $(STAMP)-test
-	$(MAKE) --jobs 2 --keep-going --output-sync=none test-waiting test-computing
+	$(MAKE) --jobs 3 --keep-going --output-sync=none $(PARTS:%=test-%)
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE)
 
 test-waiting: $(STAMP)-test
-	COVERAGE_DATA=$(word 1,$(COVERAGE)) $(PYTEST) -m "not slow" $(WAITING)
+	COVERAGE_DATA=.pytest_cache/coverage-waiting.json $(PYTEST) -m "not slow" $(WAITING)
 
-test-computing: $(STAMP)-test
-	@mkdir -p $(COMPUTING) && code=0; \
-	COVERAGE_DATA=$(word 2,$(COVERAGE)) .ci/background $(PYTEST) -m "not slow" -o cache_dir=$(COMPUTING) \
-		$(addprefix --ignore=,$(WAITING)) tests >$(COMPUTING)/log 2>&1 || code=$$?; \
-	cat $(COMPUTING)/log; exit $$code
+test-units: COMPUTED = tests/unit
+test-others: COMPUTED = --ignore=tests/unit tests
+test-units test-others: test-%: $(STAMP)-test
+	@mkdir -p .pytest_cache/$* && code=0; \
+	COVERAGE_DATA=.pytest_cache/coverage-$*.json .ci/background $(PYTEST) -m "not slow" -o cache_dir=.pytest_cache/$* \
+		$(addprefix --ignore=,$(WAITING)) $(COMPUTED) >.pytest_cache/$*/log 2>&1 || code=$$?; \
+	cat .pytest_cache/$*/log; exit $$code
 
 raise-floors: $(STAMP)-test
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise

@@ -70,7 +70,7 @@ test-exhaustive: $(STAMP)-test-slow
 test-firmware: $(STAMP)-test-slow
 	$(PYTEST) -m firmware --timeout 900 tests
 
-# Damaged inputs for every decoder: COUNT of each (test-slow: 100 000; field files 20 000). DECODER=navdata, at, pave, ... takes one.
+# Damaged inputs for every decoder: COUNT of each (test-slow: 30 000; field files 6000). DECODER=navdata, at, pave, ... takes one.
 fuzz: $(STAMP)-test
 	FUZZ_INPUTS=$(or $(COUNT),1000000) nice $(PYTEST) -m fuzz --timeout 7200 -k "many_damaged $(if $(DECODER),and $(DECODER))" tests/property
 

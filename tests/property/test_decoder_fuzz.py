@@ -8,7 +8,7 @@ import os
 import pytest
 from fuzzed_decoders import DECODERS, fuzz
 
-LONG = int(os.environ.get("FUZZ_INPUTS", "100000"))
+LONG = int(os.environ.get("FUZZ_INPUTS", "30000"))
 QUICK = 500
 _SLOW_TO_READ = {"field": 5}  # times slower than others
 

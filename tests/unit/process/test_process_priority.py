@@ -1,9 +1,14 @@
 """A loop with deadlines goes first where it may; what it starts does not."""
 
 import os
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
-from groundstation.process.priority import go_first
+import pytest
+
+from groundstation.process.priority import go_first, take_larger_share
 
 
 def policies() -> tuple[bool, int, int]:
@@ -35,3 +40,32 @@ def test_where_it_may_not_it_goes_on(monkeypatch) -> None:
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     assert go_first() is False
+
+
+def nice_of(*, own_session: bool) -> tuple[str, str, str]:
+    """What a process got by asking, its nice value, and that of its session."""
+    script = (
+        "import os; from groundstation.process.priority import take_larger_share as take;"
+        "print(take(), os.getpriority(os.PRIO_PROCESS, 0), open('/proc/self/autogroup').read().split()[-1])"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, start_new_session=own_session
+    )
+    allowed, own, session = ran.stdout.split()
+    return allowed, own, session
+
+
+@pytest.mark.skipif(not Path("/proc/self/autogroup").exists(), reason="this kernel has no autogroup")
+def test_a_larger_share_is_the_processs_and_of_a_session_only_if_it_is_its_own() -> None:
+    before = Path("/proc/self/autogroup").read_text().split()[-1]
+    allowed, own, session = nice_of(own_session=True)
+    assert (own, session) == (("-10", "-10") if allowed == "True" else ("0", "0"))
+    assert nice_of(own_session=False)[2] == before, "others are in that session"
+
+
+def test_where_it_may_not_have_more_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "setpriority", refuse)
+    assert take_larger_share() is False

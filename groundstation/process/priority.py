@@ -32,8 +32,9 @@ def go_first(rank: Rank = Rank.TICK) -> bool:
 def take_larger_share(nice: int = -10) -> bool:
     """Let this process, with all threads that it starts from now on, have more of the processor than ordinary ones.
 
-    For what all others wait for and that never computes for long: the router. Returns whether that is allowed. Linux
-    shares the processor out by session first (autogroup), and nice acts within one: a session of its own gets both.
+    For what others wait for and that never computes for long (docs/decisions/0137). Returns whether that is allowed.
+    Linux shares the processor out by session first (autogroup), and nice acts within one: a session of its own gets
+    both.
     """
     with suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, nice)

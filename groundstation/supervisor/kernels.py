@@ -7,7 +7,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import IO
 
 from groundstation.errors import GroundStationError
@@ -45,9 +44,9 @@ def compile_first(
             if process.returncode:
                 raise GroundStationError(f"kernels cannot be compiled: {_last_line(errors, process.returncode)}")
         finally:
-            with suppress(ProcessLookupError):
+            if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+                process.wait()
     return process.returncode == 0
 
 

@@ -1,6 +1,7 @@
 """Every message survives the wire, and nothing that contradicts its key does."""
 
 import math
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -158,6 +159,14 @@ def test_whole_numbers_beyond_64_bits_are_refused(number: int) -> None:
         messages.VehicleStatus(
             header=HEADER, flight_state=messages.FlightState.LANDED, mode="", rejected={"replayed": 2**64}
         )
+
+
+@pytest.mark.parametrize("number", [2**63, -(2**63) - 1])
+def test_a_whole_number_beyond_64_bits_is_found_among_many(number: int) -> None:
+    map_of = partial(messages.SearchMap, header=HEADER, first_m=(0.0, 0.0), cell_m=0.25, columns=3)
+    assert map_of(chances=(0, 255, 7)).chances == (0, 255, 7)
+    with pytest.raises(ValueError, match="chances is not finite"):
+        map_of(chances=(0, number, 7))
 
 
 def test_a_number_that_is_not_finite_is_found_inside_nested_parts() -> None:

@@ -22,9 +22,13 @@ def _is_finite(value: Any) -> bool:
     kind = type(value)
     if kind in _ALWAYS:
         return True
-    if kind is tuple and set(map(type, value)) == {float}:
-        # Vectors and matrices are most of what is checked: no sum of them is finite if one of them is not.
-        return math.isfinite(sum(value)) or all(map(math.isfinite, value))
+    if kind is tuple and value:
+        # Vectors, matrices and maps are most of what is checked.
+        kinds = set(map(type, value))
+        if kinds == {float}:  # no sum of them is finite if one of them is not
+            return math.isfinite(sum(value)) or all(map(math.isfinite, value))
+        if kinds == {int}:
+            return _is_whole(min(value)) and _is_whole(max(value))
     if kind is float:
         return math.isfinite(value)
     if kind is Header:

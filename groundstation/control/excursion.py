@@ -41,7 +41,7 @@ class Excursions:
         if view is None:
             return np.full(len(places), math.inf)
         left_s = self.left_s(name, belief)
-        way_m = np.array([way_back_m(x, y, view) for x, y in places.tolist()])
+        way_m = way_back_m(places, view)
         back_s = left_s - way_m / p.return_speed_m_s - p.return_margin_s
         return np.where(way_m > 0.0, back_s, math.inf)
 

@@ -41,7 +41,7 @@ def is_lost(
     view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
     if view is None or unseen_s <= parameters.return_soonest_s:
         return spread > parameters.return_std_m
-    way_m = way_back_m(float(mean[0]), float(mean[1]), view)
+    way_m = float(way_back_m(mean[:2], view))
     return left_s < way_m / parameters.return_speed_m_s + parameters.return_margin_s
 
 

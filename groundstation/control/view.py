@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+
+from groundstation.arrays import Array
 from groundstation.control.parameters import ControlParameters
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
@@ -35,8 +38,9 @@ def velocity_error_m_s(belief: JointBelief, name: str) -> float:
     return math.sqrt(max((float(belief.mean_of(name)[i] ** 2 + variances[i]) for i in entries), default=0.0))
 
 
-def way_back_m(x: float, y: float, view: Rectangle) -> float:
-    """Return how far it is from a point towards the middle of a view until the point is inside; 0 inside."""
-    (x0, x1), (y0, y1), (cx, cy) = view.x_m, view.y_m, view.center
-    outside = max(2.0 * abs(x - cx) / max(x1 - x0, _POINT_M), 2.0 * abs(y - cy) / max(y1 - y0, _POINT_M))
-    return math.dist((x, y), view.center) * (1.0 - 1.0 / max(outside, 1.0))
+def way_back_m(places: Array, view: Rectangle) -> Array:
+    """Return how far it is from places (..., 2) towards the middle of a view until they are inside; 0 inside."""
+    apart = np.asarray(places) - view.center
+    half_sides = np.maximum(np.ptp((view.x_m, view.y_m), axis=1), _POINT_M) / 2.0
+    outside = np.maximum((np.abs(apart) / half_sides).max(axis=-1), 1.0)
+    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]) * (1.0 - 1.0 / outside))

@@ -140,8 +140,7 @@ class FigureSuspicion:
         for place, (who, part) in enumerate(self._keys):
             if part == "tilt":
                 self._surveyed[place] = _LEVELLED_RAD if who in levelled else _SURVEYED[part]
-        nothing = self._evidence(())[0]
-        charges = sorted(self._charges(nothing), key=lambda charge: -charge.lead)
+        charges = sorted(self._charges(self._held_to_surveys()), key=lambda charge: -charge.lead)
         best = charges[0]
         wanted = bool(self.charges)
         if best.lead > _SURE and abs(best.size) > _WORTH_TELLING[best.suspect.part]:
@@ -153,12 +152,21 @@ class FigureSuspicion:
         self.charges = named if self._held >= _PATIENCE else ()
         return self.charges
 
-    def _charges(self, nothing: float) -> Iterator[Charge]:
+    def _held_to_surveys(self) -> "_Fit":
+        posterior, determinant = _covariance(self._information + np.diag(1.0 / self._surveyed**2))
+        return _Fit(posterior, determinant - 2.0 * float(np.sum(np.log(self._surveyed))))
+
+    def _charges(self, nothing: "_Fit") -> Iterator[Charge]:
+        before = nothing.evidence(self._pull)
         for suspect, places in self._suspects().items():
-            evidence, sizes, stds = self._evidence(places)
+            fit = nothing
+            for place in places:
+                fit = fit.freed(place, float(self._surveyed[place]), _WRONG[self._keys[place][1]])
+            sizes = fit.posterior @ self._pull
             most = places[int(np.argmax(np.abs(sizes[list(places)])))]
             size = float(np.hypot(*sizes[list(places)])) if suspect.part == TILTED else float(sizes[most])
-            yield Charge(suspect, size, float(stds[most]), evidence - nothing)
+            std = math.sqrt(fit.posterior[most, most])
+            yield Charge(suspect, size, std, fit.evidence(self._pull) - before)
 
     def _suspects(self) -> Mapping[Suspect, tuple[int, ...]]:
         found: dict[Suspect, tuple[int, ...]] = {
@@ -174,14 +182,25 @@ class FigureSuspicion:
                 found[Suspect("", part)] = places
         return found
 
-    def _evidence(self, places: tuple[int, ...]) -> tuple[float, Vector, Vector]:
-        sigma = self._surveyed.copy()
-        for place in places:
-            sigma[place] = _WRONG[self._keys[place][1]]
-        posterior, spread = _covariance(self._information + np.diag(1.0 / sigma**2))
-        sizes = posterior @ self._pull
-        spread -= 2.0 * float(np.sum(np.log(sigma)))
-        return 0.5 * (float(self._pull @ sizes) + spread), sizes, np.sqrt(np.diag(posterior))
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Covariance of all figures, and the logarithm of its determinant less that of what was known before."""
+
+    posterior: Matrix
+    spread: float
+
+    def evidence(self, pull: Vector) -> float:
+        """Return the logarithm of how well the loops are explained; only differences tell anything."""
+        return 0.5 * (float(pull @ self.posterior @ pull) + self.spread)
+
+    def freed(self, place: int, surveyed: float, wrong: float) -> "_Fit":
+        """Return the fit in which one figure may be wrong, by the formula of Sherman and Morrison."""
+        column = self.posterior[:, place]
+        less = 1.0 / wrong**2 - 1.0 / surveyed**2
+        scale = 1.0 + less * float(column[place])
+        posterior = self.posterior - less / scale * np.outer(column, column)
+        return _Fit(posterior, self.spread - math.log(scale) - 2.0 * math.log(wrong / surveyed))
 
 
 def _covariance(information: Matrix) -> tuple[Matrix, float]:

@@ -167,3 +167,30 @@ def test_an_imu_makes_a_smaller_tilt_suspect() -> None:
             suspicion.take(gap)
         told.append([bool(suspicion.judge(levelled)) for _ in range(3)][-1])
     assert told == [False, True]
+
+
+def test_two_figures_freed_in_turn_are_judged_as_if_both_had_been_free_from_the_start() -> None:
+    keys = (("drone_1", "pan"), ("drone_2", "pan"), ("", "print"))
+    rng = np.random.default_rng(4)
+    suspicion = FigureSuspicion(keys, {})
+    error = np.array([0.05, 0.04, 0.0])
+    for n, slope in enumerate(np.repeat(3.0 * rng.normal(size=(12, 3)), 5, axis=0)):
+        suspicion.take(Gap("loop", n / 5.0, np.array([-slope @ error]), slope[None], 0.02, 0.012))
+    for _ in range(3):
+        charges = suspicion.judge()
+    both = next(one for one in charges if one.suspect == Suspect("", "pan"))
+
+    information, pull = suspicion._information, suspicion._pull
+    surveyed = np.array([math.radians(0.5)] * 2 + [0.003])
+    free = np.array([math.radians(5.0)] * 2 + [0.003])
+
+    def evidence(sigma: np.ndarray) -> float:
+        posterior = np.linalg.inv(information + np.diag(sigma**-2.0))
+        return 0.5 * float(pull @ posterior @ pull + np.linalg.slogdet(posterior)[1] - 2.0 * np.log(sigma).sum())
+
+    posterior = np.linalg.inv(information + np.diag(free**-2.0))
+    sizes = posterior @ pull
+    most = int(np.argmax(np.abs(sizes[:2])))
+    assert both.size == pytest.approx(sizes[most], rel=1e-6)
+    assert both.std == pytest.approx(math.sqrt(posterior[most, most]), rel=1e-6)
+    assert both.lead == pytest.approx(evidence(free) - evidence(surveyed), rel=1e-6)

@@ -15,7 +15,10 @@ _SETTINGS = {"pan": "pan_left_deg", "tilt": "tilt_down_deg"}
 
 
 class FigureWatch:
-    """Fed with the sightings that the tracker accepted, stamped by `clock`; `notices` about once a second."""
+    """Fed with the sightings that the tracker accepted, stamped by `clock`; `notices` about once a second.
+
+    `close_loops` any number of times between them spreads the work.
+    """
 
     def __init__(self, field: ResolvedField, clock: str) -> None:
         self._field, self._clock = field, clock
@@ -29,10 +32,14 @@ class FigureWatch:
         if sighting.header.clock == self._clock:
             self._loops.see(sighting, lean)
 
-    def notices(self, now_ns: int) -> list[Notice]:
-        """Return a new finding, or the end of one. `cause` is the finding that stands, in a few words, or ""."""
+    def close_loops(self, now_ns: int) -> None:
+        """Weigh the loops that have closed since."""
         for gap in self._loops.gaps(now_ns / NS_PER_S):
             self._suspicion.take(gap)
+
+    def notices(self, now_ns: int) -> list[Notice]:
+        """Return a new finding, or the end of one. `cause` is the finding that stands, in a few words, or ""."""
+        self.close_loops(now_ns)
         charges = self._suspicion.judge(self._loops.levelled)
         suspects = tuple(sorted((one.suspect for one in charges), key=lambda s: (s.who, s.part)))
         before, self._told = self._told, suspects

@@ -27,6 +27,9 @@ from groundstation.runtime.rejoin_watch import RejoinWatch
 from groundstation.tracker import PlanRequest, Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
+_LOOPS_HZ = 5
+# What is not due at each tick: in which of its ticks it is. All in one made that tick late, once a second.
+_PLAN_PHASE, _BELIEF_PHASE, _MAP_PHASE, _LOOPS_PHASE, _FIGURES_PHASE, _WATCH_PHASE = 0, 1, 2, 3, 14, 24
 _PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
 EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
 
@@ -109,6 +112,7 @@ class Tracking:
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
         self._map_every = max(1, round(self.rate_hz / SEARCH_MAP.rate_hz))
+        self._loops_every = max(1, round(self.rate_hz / _LOOPS_HZ))
         self._worker = feed.worker_of(self.tracker.planner)
         self._tick = feed.first_tick
         self._known_refusals: Counter[str] = Counter()
@@ -129,14 +133,14 @@ class Tracking:
         adopted = self._worker.poll()
         if adopted is not None and adopted.plan is not None:
             tracker.adopt(adopted.plan)
-        if self._tick % self._plan_every == 0 and self._worker.idle:
+        if self._is_due(self._plan_every, _PLAN_PHASE) and self._worker.idle:
             self._worker.submit(self._tick, tracker.request())
         limited = tracker.setpoints(now_ns)
         announcer.setpoints(tracker, limited, now_ns)
         announcer.estimate(tracker, now_ns)
-        if self._tick % self._belief_every == 0:
+        if self._is_due(self._belief_every, _BELIEF_PHASE):
             announcer.belief(tracker, self._picture_age.lateness(), now_ns)
-        if self._tick % self._map_every == 0:
+        if self._is_due(self._map_every, _MAP_PHASE):
             announcer.search_maps(tracker, now_ns)
         if adopted is not None and adopted.plan is not None:
             announcer.plan(adopted.plan, limited, "HOLD" if tracker.holding else adopted.plan.mode)
@@ -154,14 +158,20 @@ class Tracking:
         """Stop planning."""
         self._worker.close()
 
+    def _is_due(self, every: int, phase: int) -> bool:
+        return self._tick % every == phase % every
+
     def _watch(self, now_ns: int) -> None:
         tracker = self.tracker
         self.notices += tracker.take_notices()
         for name in self._unseen.step(now_ns, tracker.unlocalised_s()):
             text = "flies, and nobody knows well enough where it is: its driver lands it"
             self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
-        if self._tick % self.rate_hz == 0:
+        if self._is_due(self._loops_every, _LOOPS_PHASE):
+            self._figures.close_loops(now_ns)
+        if self._is_due(self.rate_hz, _FIGURES_PHASE):
             self.notices += self._figures.notices(now_ns)
+        if self._is_due(self.rate_hz, _WATCH_PHASE):
             self.notices += self._contradictions.notices(now_ns, self._figures.cause) + self._picture_age.notices()
             self._report_refusals()
 

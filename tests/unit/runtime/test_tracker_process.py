@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import Counter
 from typing import Any
 
 import msgspec
@@ -42,6 +43,7 @@ from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.replay.difference import first_difference
 from groundstation.replay.rerun import Rerun
 from groundstation.replay.tick_log import Tick
+from groundstation.runtime import tracker_loop
 from groundstation.runtime.health import Deadlines, UnseenWatch
 from groundstation.runtime.tracker_loop import TrackerSection, Tracking
 from groundstation.runtime.warm_up import warm_up
@@ -241,3 +243,23 @@ def test_nothing_compiles_after_the_warm_up(lab: Lab, lab_field: ResolvedField) 
     with event.install_recorder("numba:compile") as recorder:
         lab.run(30, pause_s=0.002)
     assert recorder.buffer == []
+
+
+def test_no_tick_does_more_than_two_things_that_are_not_due_at_each(lab_field: ResolvedField) -> None:
+    tracking = Tracking(MemoryBus(MemoryExchange(), "lab", "tracker"), TrackerSection(lab_field))
+    phases = {
+        "plan": (tracking._plan_every, tracker_loop._PLAN_PHASE),
+        "belief": (tracking._belief_every, tracker_loop._BELIEF_PHASE),
+        "map": (tracking._map_every, tracker_loop._MAP_PHASE),
+        "loops": (tracking._loops_every, tracker_loop._LOOPS_PHASE),
+        "figures": (tracking.rate_hz, tracker_loop._FIGURES_PHASE),
+        "watch": (tracking.rate_hz, tracker_loop._WATCH_PHASE),
+    }
+    done: Counter[str] = Counter()
+    for tick in range(tracking.rate_hz):
+        tracking._tick = tick
+        due = [name for name, (every, phase) in phases.items() if tracking._is_due(every, phase)]
+        assert len(due) <= 2, (tick, due)
+        done.update(due)
+    tracking.close()
+    assert done == {"plan": 10, "belief": 5, "map": 2, "loops": 5, "figures": 1, "watch": 1}

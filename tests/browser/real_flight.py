@@ -16,6 +16,7 @@ from serve_fake import field_json
 
 from groundstation.supervisor import runtime_file
 
+FEW_PICTURES = Path(__file__).parents[1] / "fixtures" / "few_pictures.yaml"
 NETWORK = "127.0.0.2"
 """Where the run's console also serves invited devices."""
 
@@ -43,7 +44,7 @@ def kernels() -> None:
 def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
-    arguments += ["--set", f"console.listen={NETWORK}"]
+    arguments += ["--set", f"console.listen={NETWORK}", "--scenario", str(FEW_PICTURES)]
     process = subprocess.Popen([sys.executable, "-m", "groundstation.cli.main", *arguments], stdout=subprocess.DEVNULL)
     try:
         yield eventually(lambda: next(iter(runtime_file.live_records()), None), 60.0, "a run")

@@ -20,6 +20,7 @@ from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 
 COMMAND = (sys.executable, "-m", "groundstation.cli.main")
+FEW_PICTURES = Path(__file__).parents[1] / "fixtures" / "few_pictures.yaml"
 
 
 class SitlRun:
@@ -31,8 +32,9 @@ class SitlRun:
         self.folder = folder
         self.output = folder / "output.txt"
         report = () if "--report" in arguments else ("--report", str(folder))
+        scenario = () if "--scenario" in arguments else ("--scenario", str(FEW_PICTURES))
         screen = ("--headless",) if terminal is None else ()
-        command = [*program, *arguments, *screen, *report]
+        command = [*program, *arguments, *screen, *report, *scenario]
         with self.output.open("wb") as sink:
             self.process = subprocess.Popen(
                 # With a terminal, `setsid --ctty` makes it the run's own: closing it hangs up.

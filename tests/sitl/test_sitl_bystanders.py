@@ -86,7 +86,7 @@ def test_full_disk_stops_the_recording_but_neither_flight_nor_restarts(sitl: Sta
     assert any("recorder" in event and ("No space" in event or "MB left" in event) for event in run.events())
     camera = run.pid("drone_1_camera")
     os.kill(camera, signal.SIGKILL)
-    run.until(lambda: run.restarted("drone_1_camera", camera), 15, "camera back")
+    run.until(lambda: run.restarted("drone_1_camera", camera), 45, "camera back")
     for drone in run.record.drones:
         assert set(run.modes_since(drone, since)) == {"TRACK"}
     run.process.send_signal(signal.SIGTERM)

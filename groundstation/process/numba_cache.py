@@ -8,10 +8,13 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
+
+from groundstation.errors import GroundStationError
 
 FLIGHT = (".", "estimation", "estimation/models", "geometry", "planning", "sensing")
 """Packages whose kernels fly."""
@@ -49,6 +52,17 @@ def activate(packages: Iterable[str] = FLIGHT) -> Path:
             _forget_old(folder.parent)
             _begin_with(folder.parent / f"numba-{sources_hash(FLIGHT)}", folder)
     return folder
+
+
+def require_writable(folder: Path) -> None:
+    """Raise GroundStationError where nothing can be kept: each start would compile for minutes, and say nothing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        remedy = "let NUMBA_CACHE_DIR name a folder that can be written"
+        raise GroundStationError(f"compiled kernels cannot be kept in {folder} ({error.strerror}): {remedy}") from error
 
 
 def is_complete(folder: Path) -> bool:

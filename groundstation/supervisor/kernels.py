@@ -31,8 +31,10 @@ def compile_first(
 ) -> bool:
     """Run a command that compiles all kernels, and tell how it goes; return whether it ended before `stopped` did.
 
-    Raises GroundStationError when it fails or takes longer than `limit_s`; nothing of it is left running.
+    Raises GroundStationError when it fails, takes longer than `limit_s`, or could not keep what it compiles; nothing of
+    it is left running.
     """
+    numba_cache.require_writable(numba_cache.place())
     say("  compiling kernels: once per version, a minute or two")
     with tempfile.TemporaryFile() as errors:
         # A session of its own: it compiles in two processes, and both end with it.

@@ -29,6 +29,15 @@ def test_a_failure_is_told_by_its_last_line() -> None:
         kernels.compile_first(lambda _: None, lambda: False, _command("raise RuntimeError('no space')"))
 
 
+def test_what_could_not_be_kept_is_not_compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "kernels"))
+    said: list[str] = []
+    with pytest.raises(GroundStationError, match=r"file/kernels \(Not a directory\): let NUMBA_CACHE_DIR name"):
+        kernels.compile_first(said.append, lambda: False, _command("pass"))
+    assert said == []
+
+
 @pytest.mark.parametrize("late", [True, False])
 def test_what_is_late_or_unwanted_ends_with_its_children(tmp_path: Path, late: bool) -> None:
     mark = tmp_path / "child"

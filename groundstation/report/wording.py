@@ -18,7 +18,7 @@ _TITLES = {
     "tracker_missed_percent": ("tracker's deadlines missed", "%"),
     "tracker_rate_hz": ("tracker's rate", "Hz"),
     "mean_cpu_cores": ("processor used", "cores"),
-    "sim_overrun_percent": ("simulator's ticks too late", "%"),
+    "sim_overrun_percent": ("simulator's ticks or pictures late", "%"),
     "topology_seconds.flat": ("time in a flat topology", "s"),
     "topology_seconds.string": ("time in a string topology", "s"),
     "topology_switches": ("switches of topology", ""),

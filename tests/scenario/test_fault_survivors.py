@@ -44,7 +44,8 @@ def order() -> dict[str, Any]:
     path = find_field("lab")
     field = load_field(path, ("recording.raw_datagrams=false",))
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
-    scenario = json.loads(json.dumps(load_scenario(find_scenario("realistic", path))))
+    # With any other rate of pictures the seeds stand for other flights.
+    scenario = json.loads(json.dumps(load_scenario(find_scenario("realistic", path), ["cameras.fps=15"])))
     builtins = msgspec.to_builtins(resolved_field(field))
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
 

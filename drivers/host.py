@@ -25,7 +25,7 @@ from groundstation.bus.messages import (
     VelocitySetpoint,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
-from groundstation.process.priority import lead
+from groundstation.process.priority import go_first
 from groundstation.process.refusals import Refusals
 from groundstation.time_units import NS_PER_S
 
@@ -272,7 +272,7 @@ def fly_one(
 ) -> int:
     """Fly one vehicle until a stop is requested, then close its link; see `run_hosts`."""
     try:
-        lead()
+        go_first()
         return run_hosts(child, [VehicleHost(child, vehicle, limits)], rate_hz, before)
     finally:
         vehicle.close()

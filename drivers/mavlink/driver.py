@@ -19,7 +19,7 @@ from drivers.vehicle_settings import read_section
 from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import DriverError
-from groundstation.process.priority import lead
+from groundstation.process.priority import go_first
 
 # Of what is due by the clock: poses, questions, status. Orders do not wait for a turn.
 RATE_HZ = 100.0
@@ -131,7 +131,7 @@ def run(child: HostProcess) -> int:
     share_interpreter(settings)
     fleet = Fleet(child, settings)
     try:
-        lead()
+        go_first()
         return run_hosts(child, hosts_of(child, fleet, settings), RATE_HZ, fleet.turn)
     finally:
         fleet.close()

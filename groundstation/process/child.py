@@ -18,6 +18,7 @@ from groundstation.errors import GroundStationError, without_passwords
 from groundstation.process import log
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.parent import ParentWatch
+from groundstation.process.priority import take_larger_share
 from groundstation.process.signals import StopSignal
 
 _STATUS_PERIOD_NS = 1_000_000_000
@@ -32,7 +33,7 @@ class ChildSpec:
     name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none),
     with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did); identity:
     what it shows the router, or the router shows others (None: nobody asks); clock: id of the run's clock where that is
-    another host's ("": this host's own).
+    another host's ("": this host's own); nice: below 0 for a larger share of the processor (docs/decisions/0137).
     """
 
     name: str
@@ -45,6 +46,7 @@ class ChildSpec:
     parent_pid: int = 0
     identity: Identity | None = None
     clock: str = ""
+    nice: int = 0
 
 
 class Child:
@@ -72,6 +74,8 @@ class Child:
         with suppress(PermissionError):  # already the leader of a group
             os.setsid()  # keeps the terminal's Ctrl-C and hang-up away from what has to land first
         log.configure(self.name)
+        if self.spec.nice:
+            take_larger_share(self.spec.nice)  # before its bus threads begin, and before it imports much
         self._parent = ParentWatch(self.spec.parent_pid)
         self._stop = StopSignal(self._parent)
         self._stop.install()

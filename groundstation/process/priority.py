@@ -43,9 +43,3 @@ def take_larger_share(nice: int = -10) -> bool:
                 Path("/proc/self/autogroup").write_text(str(nice))
         return True
     return False
-
-
-def lead() -> None:
-    """Do both, for a process that others wait for in all it does: its bus threads bring what its loop acts on."""
-    take_larger_share()
-    go_first()

@@ -10,7 +10,7 @@ from groundstation.bus.messages import Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.bus.zenoh_bus import ZenohBus, open_router
 from groundstation.process.child import Child
-from groundstation.process.priority import go_first, take_larger_share
+from groundstation.process.priority import go_first
 from groundstation.runtime.router_refusals import RouterRefusals
 
 _TURN_NS = 50_000_000
@@ -33,7 +33,6 @@ class RouterSection(msgspec.Struct, frozen=True):
 def run(child: Child) -> int:
     """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
     section = msgspec.json.decode(child.section, type=RouterSection)
-    take_larger_share()  # one session of fourteen: with no more than its share it let set-points wait for 0.7 s
     refusals = RouterRefusals()
     session = open_router(
         section.endpoint, child.spec.identity, section.access, section.also, trace=section.name_refusals

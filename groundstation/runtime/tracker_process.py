@@ -16,7 +16,7 @@ from groundstation.bus import clock
 from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache
 from groundstation.process.child import Child
-from groundstation.process.priority import go_first, take_larger_share
+from groundstation.process.priority import go_first
 from groundstation.runtime.compile_kernels import compile_kernels
 from groundstation.runtime.health import Deadlines
 from groundstation.time_units import NS_PER_S
@@ -29,7 +29,6 @@ _SWITCH_INTERVAL_S = 0.001  # how long the planner's thread may keep the interpr
 
 def run(child: Child) -> int:
     """Run the tracker until it is stopped or its supervisor is gone; returns the exit code."""
-    take_larger_share()  # a bus thread that holds the interpreter and has no processor keeps a tick waiting
     cache = numba_cache.activate()
     if numba_cache.is_complete(cache):
         child.starting("loading kernels")

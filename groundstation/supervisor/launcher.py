@@ -60,6 +60,7 @@ class Launcher:
                 parent_pid=os.getpid(),
                 identity=self._identity(spec),
                 clock=self._run.clock if spec.on_bus else "",
+                nice=spec.nice,
             )
         )
         if spec.command:

@@ -56,7 +56,8 @@ class ProcessSpec:
     silence_limit_s: heartbeat older than this starts its fail-safe datagrams; hang_limit_s: it is killed (both after
     READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it.
     on_terminal: it writes to the operator's terminal. entities: the vehicles or the camera that a device speaks of.
-    kernels: it computes with compiled kernels, which are made before anything starts.
+    kernels: it computes with compiled kernels, which are made before anything starts. nice: its share of the processor,
+    beside that of others (docs/decisions/0137).
     """
 
     name: str
@@ -79,6 +80,7 @@ class ProcessSpec:
     keep_open: tuple[int, ...] = ()
     entities: tuple[str, ...] = ()
     kernels: bool = False
+    nice: int = 0
 
     @property
     def is_router(self) -> bool:

@@ -7,6 +7,9 @@ import sys
 
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder
 
+# Shares of a processor that is full (docs/decisions/0137): recorder, console and terminal have what is left.
+_WAITED_FOR, _NEEDED = -10, -5
+
 GUARDIAN = ProcessSpec(
     name="guardian",
     role="guardian",
@@ -22,6 +25,7 @@ ROUTER = ProcessSpec(
     restart_delay_s=0.5,
     # Under a flood it forwards, and beats late; without it drones hover and land by themselves.
     hang_limit_s=2.0,
+    nice=_WAITED_FOR,  # with an ordinary share it let set-points wait for 0.7 s
     stop_order=StopOrder.CONNECTS,
     on_bus=False,
 )
@@ -41,6 +45,7 @@ TRACKER = ProcessSpec(
     kernels=True,
     start_limit_s=180.0,  # one that had to be started again compiles what somebody deleted meanwhile
     hang_limit_s=0.5,  # as long as a drone flies on without setpoints
+    nice=_WAITED_FOR,  # a bus thread that holds the interpreter and has no processor keeps a tick waiting
     stop_order=StopOrder.DECIDES,
 )
 RECORDER = ProcessSpec(
@@ -56,6 +61,7 @@ DRONE = ProcessSpec(  # name and entry are those of the drone
     name="",
     role="driver",
     required=False,  # the others can fly without it
+    nice=_WAITED_FOR,  # the bus thread that brings its set-points: without them it lands what it flies
     stop_order=StopOrder.DRIVES,
     stop_limit_s=12.0,  # it lands before it ends
 )
@@ -64,6 +70,7 @@ CAMERA = ProcessSpec(  # name and entry are those of the camera
     role="camera",
     required=False,
     hang_limit_s=2.0,  # a decoder may stop for longer than a drone may be left alone
+    nice=_NEEDED,  # drones that no picture places land; but it can use all that there is
     stop_order=StopOrder.DRIVES,
 )
 LIAISON = ProcessSpec(  # name is that of the other host

@@ -63,17 +63,6 @@ def test_a_larger_share_is_the_processs_and_of_a_session_only_if_it_is_its_own()
     assert nice_of(own_session=False)[2] == before, "others are in that session"
 
 
-@pytest.mark.skipif(not Path("/proc/self/autogroup").exists(), reason="this kernel has no autogroup")
-def test_who_leads_has_both() -> None:
-    script = (
-        "import os; from groundstation.process.priority import go_first, lead; lead();"
-        "print(os.sched_getscheduler(0) & 7, os.getpriority(os.PRIO_PROCESS, 0), go_first())"
-    )
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    policy, nice, allowed = ran.stdout.split()
-    assert (int(policy), int(nice)) == ((os.SCHED_RR, -10) if allowed == "True" else (os.SCHED_OTHER, 0))
-
-
 def test_where_it_may_not_have_more_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")

@@ -23,3 +23,9 @@ def test_each_role_has_one_row_that_is_killed_only_after_its_silence_was_noticed
     assert len({row.role for row in ROWS}) == len(ROWS)
     for row in ROWS:
         assert row.silence_limit_s <= row.hang_limit_s < row.start_limit_s, row.role
+
+
+def test_what_a_flight_waits_for_has_more_of_a_full_processor_than_what_nobody_does() -> None:
+    shares = {row.role: row.nice for row in ROWS}
+    assert shares["router"] == shares["tracker"] == shares["driver"] < shares["camera"] < shares["recorder"]
+    assert shares["recorder"] == shares["console"] == shares["monitor"] == 0

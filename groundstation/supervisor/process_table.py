@@ -7,7 +7,7 @@ import sys
 
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder
 
-# Shares of a processor that is full (docs/decisions/0137): recorder, console and terminal have what is left.
+# Shares of a processor that is full (docs/decisions/0137): recorder and terminal have what is left.
 _WAITED_FOR, _NEEDED = -10, -5
 
 GUARDIAN = ProcessSpec(
@@ -85,6 +85,7 @@ CONSOLE = ProcessSpec(
     role="console",
     entry="groundstation.console.process:run",
     required=False,
+    nice=_NEEDED,  # a stop that is clicked goes through it
     silence_limit_s=5.0,
     hang_limit_s=5.0,
     stop_order=StopOrder.DRIVES,

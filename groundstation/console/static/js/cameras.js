@@ -32,22 +32,34 @@ function feed(name) {
   const canvas = el("canvas", { width: 320, height: 180, role: "img", "aria-label": `Picture of ${name}` });
   const age = el("span", { class: "num" }), veil = el("span", { class: "pill veil", data: { level: "wait" } }, "no picture yet");
   const root = el("figure", { class: "camera", data: { camera: name, testid: `camera-${name}` } }, el("figcaption", {}, el("span", {}, name), age), el("div", { class: "picture" }, canvas, veil));
-  feeds.set(name, { root, canvas, age, veil, bitmap: null, stamp: null });
+  feeds.set(name, { root, canvas, age, veil, bitmap: null, stamp: null, newest: null, decoding: false });
   return root;
 }
 
 export function startCameras() {
   document.addEventListener("visibilitychange", choose);
-  on("picture", async (head, blob) => {
+  on("picture", (head, blob) => {
     const target = feeds.get(head.camera);
     if (!target) return;
-    let bitmap = null;
-    try { bitmap = await createImageBitmap(blob); } catch { return; }
+    target.newest = [head, blob];
+    if (!target.decoding) decode(head.camera, target);
+  });
+}
+
+// One picture of a camera at a time, and then the newest: a slow device would otherwise fall behind for ever.
+async function decode(name, target) {
+  target.decoding = true;
+  while (target.newest) {
+    const [head, blob] = target.newest;
+    target.newest = null;
+    const bitmap = await createImageBitmap(blob).catch(() => null);
+    if (!bitmap) continue;
     target.bitmap?.close();
     Object.assign(target, { bitmap, stamp: head.stamp_ms });
     pictures.frames += 1;
-    draw(head.camera, target);
-  });
+    draw(name, target);
+  }
+  target.decoding = false;
 }
 
 // Detections of a picture may come after it.

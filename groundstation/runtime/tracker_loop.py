@@ -28,8 +28,9 @@ from groundstation.tracker import PlanRequest, Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
 _LOOPS_HZ = 5
-# What is not due at each tick: in which of its ticks it is. All in one made that tick late, once a second.
-_PLAN_PHASE, _BELIEF_PHASE, _MAP_PHASE, _LOOPS_PHASE, _FIGURES_PHASE, _WATCH_PHASE = 0, 1, 2, 3, 14, 24
+# What is not due at each tick: in which of its ticks it is. All in one made that tick late, once a second; beliefs stay
+# where recordings made earlier have them.
+_PLAN_PHASE, _BELIEF_PHASE, _MAP_PHASE, _LOOPS_PHASE, _FIGURES_PHASE, _WATCH_PHASE = 0, 0, 2, 3, 14, 24
 _PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
 EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
 

@@ -23,7 +23,8 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 
-pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(600)]
+# A flight and a browser that draws in software are more than two slow cores have.
+pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(600)]
 
 _FLY, _LAND = 290718208, 290717696
 _REF = re.compile(rb"AT\*REF=\d+,(\d+)")
@@ -101,7 +102,6 @@ def _hold_by_tablet(open_page: Any) -> None:
     tablet.page.context.close()  # two pages that are drawn in software take what a flight beside them needs
 
 
-@pytest.mark.exhaustive
 def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
     live: runtime_file.RuntimeRecord, served: str, record_property: Callable[[str, object], None]
 ) -> None:

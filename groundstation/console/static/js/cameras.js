@@ -49,17 +49,20 @@ export function startCameras() {
 // One picture of a camera at a time, and then the newest: a slow device would otherwise fall behind for ever.
 async function decode(name, target) {
   target.decoding = true;
-  while (target.newest) {
-    const [head, blob] = target.newest;
-    target.newest = null;
-    const bitmap = await createImageBitmap(blob).catch(() => null);
-    if (!bitmap) continue;
-    target.bitmap?.close();
-    Object.assign(target, { bitmap, stamp: head.stamp_ms });
-    pictures.frames += 1;
-    draw(name, target);
+  try {
+    while (target.newest) {
+      const [head, blob] = target.newest;
+      target.newest = null;
+      const bitmap = await createImageBitmap(blob).catch(() => null);
+      if (!bitmap) continue;
+      target.bitmap?.close();
+      Object.assign(target, { bitmap, stamp: head.stamp_ms });
+      pictures.frames += 1;
+      draw(name, target);
+    }
+  } finally { // a picture that cannot be drawn must not be the camera's last
+    target.decoding = false;
   }
-  target.decoding = false;
 }
 
 // Detections of a picture may come after it.

@@ -21,6 +21,8 @@ _MOVED_SIGMAS = 3.0
 _LATE_MS, _LATE_SIGMAS = 20.0, 3.0
 # A plan counts on a link for so long at least, and sees what is younger than this.
 _PLANNED_S, _SEEN_S, _SEEN_PERCENT = 5.0, 0.5, 50.0
+# A plan lists all that its topology permits; it counts on what would tell a place to 0.1 m [1/m^2].
+_COUNTED_ON = 100.0
 _PLAN_LASTS_S = 1.0
 _TRACKER = "tracker"
 
@@ -147,6 +149,8 @@ def _links(data: RunData) -> list[LinkForecast]:
     for plan, until in zip(plans, until_s, strict=True):
         lasts_s = min(until - plan.time_s, _PLAN_LASTS_S)
         for edge in plan.message.edges:
+            if edge.information < _COUNTED_ON:
+                continue
             times = looked_at.get((edge.observer, edge.subject), np.empty(0))
             planned[edge.observer, edge.subject].append((lasts_s, _saw(times, plan.time_s)))
     return [_link(*edge, found) for edge, found in sorted(planned.items())]

@@ -53,9 +53,9 @@ def belief(moved_m: float = 0.0, turned_rad: float = 0.0, late_ms: float = 0.0) 
     return m.Belief(header=header(), mean=mean, covariance_upper=(), layout=layout, lateness=lateness)
 
 
-def planned(observer: str, subject: str) -> list[TimedMessage[m.Plan]]:
+def planned(observer: str, subject: str, information: float = 2000.0) -> list[TimedMessage[m.Plan]]:
     solver = m.SolverReport("ok", 1, 0.001, 1, 1)
-    edges = (m.Edge(observer, subject, 100.0),)
+    edges = (m.Edge(observer, subject, information),)
     return [
         TimedMessage(
             0.5 * i,
@@ -103,6 +103,12 @@ def test_a_doubt_names_its_cause_and_remedy(series: dict[str, object], words: tu
     for word in words:
         assert word in doubt
     assert "<li>" in trust_section(trust)
+
+
+def test_a_link_of_which_a_plan_expected_next_to_nothing_need_not_see() -> None:
+    """A topology permits a camera to see whom it has outside of its picture."""
+    trust = trust_of(run_with(plans=planned("ceiling", "drone_2", information=6.0)))
+    assert trust.links == [] and trust.doubts == []
 
 
 def test_what_the_tracker_suspected_in_flight_is_told_once() -> None:

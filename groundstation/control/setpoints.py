@@ -14,7 +14,7 @@ from groundstation.control.regaining import regaining
 from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.search_spacing import apart
 from groundstation.control.stand import Stand
-from groundstation.control.view import view_of
+from groundstation.control.view import spread_m, view_of
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
@@ -23,6 +23,8 @@ from groundstation.sensing.models import SensorSuite
 
 _NO_DRIFT = np.zeros(3)
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
+# Deviations of a robot's place by which others make room for it: two keep it away from them, one is to spare.
+_ROOM_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +95,14 @@ def setpoints_from_plan(
         phases[scout] = FlightMode.SEARCH
     searching = sight.search([name for name in robots if phases[name] is FlightMode.SEARCH], missing)
     stands = _stands(phases, belief, robots, parameters, sensors, searching, sight.missed_s)
+    coming = [name for name in robots if phases[name] is FlightMode.RETURN]
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
         if phase is FlightMode.UNKNOWN:
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, belief, parameters, sensors, sight)
+            vx, vy = _giving_way(name, (vx, vy), coming, belief, parameters)
             wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
         else:
             drift = sight.drifts_m_s.get(name, _NO_DRIFT) if phase is FlightMode.RETURN else _NO_DRIFT
@@ -126,6 +130,27 @@ def _regained(
         return vx, vy, rate
     (vx, vy), rate = found[0].tolist(), found[1]
     return vx, vy, rate
+
+
+def _giving_way(
+    name: str, velocity: tuple[float, float], coming: Sequence[str], belief: JointBelief, parameters: ControlParameters
+) -> tuple[float, float]:
+    """Return the velocity [base_stabilized] of a robot that makes room for those that fly back.
+
+    Where they are is doubtful, so the limit of separation holds them off from afar: one that hovers in the middle of
+    the view would keep them out of it.
+    """
+    mean, wanted = belief.mean_of(name), np.array(velocity)
+    for other in coming:
+        away = mean[:2] - belief.mean_of(other)[:2]
+        distance = max(float(np.linalg.norm(away)), 1e-6)
+        lacking_m = parameters.column_m + _ROOM_SIGMAS * spread_m(belief, other) - distance
+        if lacking_m <= 0.0:
+            continue
+        off = stabilized_from_world(np.append(away / distance, 0.0), float(mean[3]))[:2]
+        least = min(parameters.search_speed_m_s, _STAND_GAIN * lacking_m)
+        wanted = wanted + max(0.0, least - float(off @ wanted)) * off
+    return float(wanted[0]), float(wanted[1])
 
 
 def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight) -> bool:

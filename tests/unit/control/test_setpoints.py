@@ -154,6 +154,24 @@ def test_a_lost_robot_flies_back_towards_the_middle_of_the_view() -> None:
     assert out["drone_2"].phase is FlightMode.TRACK  # as uncertain, but in view: the camera will see it
 
 
+@pytest.mark.parametrize(("unseen_s", "gives_way"), [(20.0, True), (0.1, False)])
+def test_who_tracks_makes_room_for_one_that_comes_back_with_a_doubtful_place(unseen_s: float, gives_way: bool) -> None:
+    yaw = 1.0
+    at = belief((1.6, 0.3, 1.5, 0.0), (0.0, 0.0, 1.5, yaw), robot_std=0.3)
+    out = setpoints_from_plan(plan((1.5, 1.5)), at, NAMES, CONTROL, SENSORS, Sight(0.1, {"drone_1": unseen_s}))
+    assert out["drone_1"].phase is (FlightMode.RETURN if gives_way else FlightMode.TRACK)
+    assert out["drone_2"].phase is FlightMode.TRACK
+    vx, vy, _ = out["drone_2"].velocity_m_s
+    away = -np.array([1.6, 0.3]) / math.hypot(1.6, 0.3)
+    speed = away @ (math.cos(yaw) * vx - math.sin(yaw) * vy, math.sin(yaw) * vx + math.cos(yaw) * vy)
+    lacking_m = CONTROL.column_m + 3.0 * 0.3 - math.hypot(1.6, 0.3)
+    assert lacking_m > 0.2
+    if gives_way:
+        assert speed == pytest.approx(lacking_m)
+    else:
+        assert (vx, vy) == (0.0, 0.1)
+
+
 def test_the_way_back_is_flown_against_the_drift_that_was_measured() -> None:
     at = belief((3.0, 0.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0), robot_std=0.4)
 

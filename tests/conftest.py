@@ -22,10 +22,11 @@ STUDIES = {"property", "replay", "statistics"}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow tests of folders that only compute."""
+    """Mark the slow tests of folders that only compute; put those last that need the machine to themselves."""
     for item in items:
         if item.get_closest_marker("slow") and STUDIES & set(item.path.relative_to(ROOT).parts):
             item.add_marker("study")
+    items.sort(key=lambda item: item.get_closest_marker("last") is not None)
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

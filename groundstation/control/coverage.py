@@ -1,4 +1,4 @@
-"""Stands from which a team sees most of where a lost target may be, soonest."""
+"""Sweeps from which a team sees most of where a lost target may be, soonest: robots turn while they fly somewhere."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,15 +11,20 @@ from groundstation.arrays import Array, BoolArray, IntVector
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.estimation.room_map import RoomGrid
-from groundstation.geometry.angles import difference
 from groundstation.sensing.footprint import HEADINGS, Footprint, seen_from
 
 _ANY_ORDER = 3  # of so many robots any may choose first
+_STEP_RAD = math.tau / HEADINGS
+# Views of a sweep that count: the next 300 degrees, about 6.5 s.
+_VIEWS = 10
+_DIRECTIONS = (1, -1)
+# How far ahead of a robot the heading is that it turns to: too far to slow down for.
+_LEAD_RAD = 0.5 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """The stands that are considered: their cells, and their places (n, 2) [m; world]."""
+    """The stands that are considered, a rectangle by rows: their cells, and their places (n, 2) [m; world]."""
 
     rows: IntVector
     columns: IntVector
@@ -41,16 +46,28 @@ def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
 
 
 @dataclass(frozen=True, slots=True)
+class Sweep:
+    """What one robot does: the stand of the lattice that it flies to, and which way it turns (1: left, -1: right)."""
+
+    stand: int
+    direction: int
+
+
+@dataclass(frozen=True, slots=True)
 class Outlook:
-    """The chosen viewpoints, with the chance to see the target there, and the time of arrival [s].
+    """The chosen sweeps, with the stands that bring them about, and the chance to see the target within `after_s`.
 
     value: sum of the chances, each the less worth the later.
     """
 
     stands: Mapping[str, Stand]
+    sweeps: Mapping[str, Sweep]
     chance: float
     after_s: float
     value: float = 0.0
+
+
+NO_OUTLOOK = Outlook({}, {}, 0.0, math.inf)
 
 
 def choose_stands(
@@ -59,15 +76,17 @@ def choose_stands(
     footprints: Mapping[str, Footprint],
     poses: Mapping[str, Array],
     allowed_s: Mapping[str, Array],
-    held: Mapping[str, Stand],
+    held: Mapping[str, Sweep],
     parameters: SearchParameters,
 ) -> Outlook:
-    """Return a viewpoint for each robot that has a footprint: in turn, the best chance at the earliest time.
+    """Return a sweep for each robot that has a footprint: in turn, that with the best chances at the earliest times.
 
     poses: x, y, z, yaw; allowed_s: by stand, within how long a robot may be there (negative: not at all); held: the
-    stands so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
+    sweeps so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
     Of few robots, whoever had better choose first does; the first in the order of `footprints` if that is the same.
     """
+    if not len(lattice.places):
+        return NO_OUTLOOK
     searchers = {
         name: _searcher(footprint, lattice, poses[name], allowed_s[name], held.get(name), parameters)
         for name, footprint in footprints.items()
@@ -81,12 +100,21 @@ def choose_stands(
 
 @dataclass(frozen=True, slots=True)
 class _Searcher:
-    """One robot that may look: how long it needs to each stand and heading [s], where it may be, where it looks now."""
+    """One robot that may look: from which stands it will, at which headings, and where it may be.
+
+    at (n, _VIEWS): stand nearest to where it is at each view of the sweep to a stand; heading: its own, as a number.
+    """
 
     footprint: Footprint
-    way_s: Array
+    yaw_rad: float
+    at: IntVector
+    heading: int
     free: BoolArray
-    kept: tuple[int, int] | None
+    kept: Sweep | None
+
+    def headings(self, direction: int) -> IntVector:
+        """Return the heading of each view."""
+        return (self.heading + direction * np.arange(1, _VIEWS + 1, dtype=np.int64)) % HEADINGS
 
 
 def _searcher(
@@ -94,61 +122,68 @@ def _searcher(
     lattice: Lattice,
     pose: Array,
     allowed_s: Array,
-    held: Stand | None,
+    held: Sweep | None,
     parameters: SearchParameters,
 ) -> _Searcher:
-    way_s = _way_s(pose, lattice.places, parameters)
-    free = way_s.min(axis=1) <= allowed_s
-    return _Searcher(footprint, way_s, free, None if held is None else _nearest(held, lattice))
+    ways = lattice.places - pose[:2]
+    flight_s = np.hypot(*ways.T) / parameters.speed_m_s
+    free = flight_s + parameters.look_s <= allowed_s
+    share = np.minimum(1.0, _times_s(parameters) / np.maximum(flight_s, 1e-9)[:, None])
+    at = _nearest(pose[:2] + share[:, :, None] * ways[:, None, :], lattice)
+    yaw_rad = float(pose[3])
+    return _Searcher(footprint, yaw_rad, at, round(yaw_rad / _STEP_RAD), free, held)
 
 
 def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], parameters: SearchParameters) -> Outlook:
     """Return what robots that choose in this order choose; left: of the chances, changed."""
     stands: dict[str, Stand] = {}
-    missed, soonest, total = 1.0, math.inf, 0.0
+    sweeps: dict[str, Sweep] = {}
+    missed, total = 1.0, 0.0
+    times_s = _times_s(parameters)
+    worth = np.exp(-times_s / parameters.patience_s)
     for name, searcher in searchers.items():
-        footprint, way_s, free = searcher.footprint, searcher.way_s, searcher.free.copy()
-        cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
-        seen = seen_from(left, lattice.rows, lattice.columns, *cells)
-        value = seen * np.exp(-way_s / parameters.patience_s)
+        footprint, free = searcher.footprint, searcher.free.copy()
         for other in stands.values():
             free &= np.hypot(*(lattice.places - (other.x, other.y)).T) >= parameters.apart_m
         if not free.any():
             continue
-        value = np.where(free[:, None], value, -1.0)
+        cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
+        seen = footprint.fresh * seen_from(left, lattice.rows, lattice.columns, *cells)
+        views = np.stack([seen[searcher.at, searcher.headings(way)] for way in _DIRECTIONS], axis=1)
+        value = np.where(free[:, None], views @ worth, -1.0)
         if searcher.kept is not None:
-            value[searcher.kept] *= parameters.keep_gain
-        stand, heading = divmod(int(np.argmax(value)), HEADINGS)
+            value[searcher.kept.stand, _DIRECTIONS.index(searcher.kept.direction)] *= parameters.keep_gain
+        stand, way = divmod(int(np.argmax(value)), len(_DIRECTIONS))
+        sweep = sweeps[name] = Sweep(stand, _DIRECTIONS[way])
         x, y = lattice.places[stand].tolist()
-        stands[name] = Stand(x, y, math.tau * heading / HEADINGS)
-        missed *= 1.0 - float(seen[stand, heading])
-        soonest = min(soonest, float(way_s[stand, heading]))
-        total += float(value[stand, heading])
-        _take(left, lattice, footprint, stand, heading)
-    return Outlook(stands, 1.0 - missed, soonest if stands else math.inf, total)
+        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * _LEAD_RAD)
+        missed *= 1.0 - min(1.0, float(views[stand, way].sum()))
+        total += float(value[stand, way])
+        for view, heading in zip(searcher.at[stand], searcher.headings(sweep.direction), strict=True):
+            _take(left, lattice, footprint, int(view), int(heading))
+    return Outlook(stands, sweeps, 1.0 - missed, float(times_s[-1]), total) if stands else NO_OUTLOOK
 
 
-def _way_s(pose: Array, places: Array, parameters: SearchParameters) -> Array:
-    """Return how long a robot needs to each stand and heading (n, HEADINGS) [s]."""
-    flight = np.hypot(*(places - pose[:2]).T) / parameters.speed_m_s
-    turn = [abs(difference(math.tau * k / HEADINGS, float(pose[3]))) for k in range(HEADINGS)]
-    slower: Array = np.maximum(flight[:, None], np.array(turn)[None, :] / parameters.yaw_rate_rad_s)
-    return slower + parameters.look_s
+def _times_s(parameters: SearchParameters) -> Array:
+    """Return when the views of a sweep are seen [s]."""
+    return np.arange(1.0, _VIEWS + 1) * (_STEP_RAD / parameters.yaw_rate_rad_s)
 
 
-def _nearest(stand: Stand, lattice: Lattice) -> tuple[int, int]:
-    row = int(np.argmin(np.hypot(*(lattice.places - (stand.x, stand.y)).T)))
-    return row, round(stand.yaw / math.tau * HEADINGS) % HEADINGS
+def _nearest(places: Array, lattice: Lattice) -> IntVector:
+    """Return the stand nearest to each place (..., 2)."""
+    xs, ys = np.unique(lattice.places[:, 0]), np.unique(lattice.places[:, 1])
+    column = np.abs(places[..., :1] - xs).argmin(axis=-1)
+    row = np.abs(places[..., 1:] - ys).argmin(axis=-1)
+    return np.asarray(row * len(xs) + column, dtype=np.int64)
 
 
 def _take(left: Array, lattice: Lattice, footprint: Footprint, stand: int, heading: int) -> None:
-    """Mark the view of a robot's viewpoint as seen, for the robots that choose after it."""
+    """Mark one view of a robot's sweep as seen, for the robots that choose after it."""
     part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
     rows = lattice.rows[stand] + footprint.rows[part]
     columns = lattice.columns[stand] + footprint.columns[part]
     inside = (rows >= 0) & (rows < left.shape[0]) & (columns >= 0) & (columns < left.shape[1])
-    # A stand is looked from more than once: three pictures.
-    left[rows[inside], columns[inside]] *= (1.0 - footprint.chances[part][inside]) ** 3
+    left[rows[inside], columns[inside]] *= 1.0 - footprint.chances[part][inside]
 
 
 def robots_in_order(robots: Sequence[str], chances: Array, poses: Mapping[str, Array], grid: RoomGrid) -> list[str]:

@@ -8,6 +8,8 @@ from groundstation.planning.parameters import MotionLimits, limits_from_field
 
 Interval = tuple[float, float]
 _USUAL_LIMITS = MotionLimits()
+# Of whoever searches: as fast as pictures stay sharp and follow each other densely enough.
+SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +46,8 @@ class ControlParameters:
     sound_error_m_s: float = 0.12
     seen_std_m: float = 0.05
     regain_after_s: float = 0.35
-    search_speed_m_s: float = 0.5
-    search_yaw_rate_rad_s: float = 0.8
+    search_speed_m_s: float = SEARCH_SPEED_M_S
+    search_yaw_rate_rad_s: float = SEARCH_YAW_RATE_RAD_S
     hint_std_m: float = 1.5
     max_plan_age_s: float = 1.0
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from groundstation.control.parameters import SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
@@ -19,14 +20,13 @@ class SearchParameters:
     """How a target that is not seen is searched for.
 
     room_m: size along x and y; ranges_m: how far each robot's pictures are searched with success, farther than plans
-    count on; observers: robots and world-fixed cameras that may see targets; height_m: of the search;
-    begin_after_s: unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is
-    where it was predicted below which the search begins, though `lost_after_s` is not over; speed_m_s, yaw_rate_rad_s:
-    as fast as pictures stay sharp and follow each other densely enough; patience_s: what is seen so much later counts
-    1/e; keep_gain: another stand must promise so much more; drift_m_s: how fast a robot's place becomes uncertain out
-    of sight; starts_ahead_m: how far before the team a target is expected that was never seen; target_speed_m_s,
-    target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so
-    long a search that excluded so much of the room a person is asked.
+    count on; observers: robots and world-fixed cameras that may see targets; height_m: of the search; begin_after_s:
+    unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is where it was
+    predicted below which the search begins, though `lost_after_s` is not over; patience_s: what is seen so much later
+    counts 1/e; keep_gain: another stand must promise so much more; drift_m_s: how fast a robot's place becomes
+    uncertain out of sight; starts_ahead_m: how far before the team a target is expected that was never seen;
+    target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so long a
+    search that excluded so much of the room a person is asked.
     """
 
     room_m: tuple[float, float]
@@ -39,8 +39,8 @@ class SearchParameters:
     fence_inset_m: float = 0.3
     begin_after_s: float = 0.6
     given_up_below: float = 0.3
-    speed_m_s: float = 0.5
-    yaw_rate_rad_s: float = 0.8
+    speed_m_s: float = SEARCH_SPEED_M_S
+    yaw_rate_rad_s: float = SEARCH_YAW_RATE_RAD_S
     look_s: float = 0.4
     patience_s: float = 10.0
     keep_gain: float = 1.3

@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import SearchedPicture
-from groundstation.control.coverage import Outlook, choose_stands, lattice_of, robots_in_order
+from groundstation.control.coverage import NO_OUTLOOK, Outlook, choose_stands, lattice_of, robots_in_order
 from groundstation.control.excursion import Excursions
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
@@ -85,7 +85,7 @@ class Search:
         self._history: deque[JointBelief] = deque(maxlen=_HISTORY)
         self._moved_ns = 0
         self._shown_ns: dict[str, int] = {}
-        self._outlook = Outlook({}, 0.0, np.inf)
+        self._outlook = NO_OUTLOOK
         self._planned: tuple[int, tuple[str, ...], tuple[str, ...]] = (0, (), ())
 
     def take(self, picture: SearchedPicture) -> None:
@@ -133,13 +133,13 @@ class Search:
     def _choose(self, robots: Sequence[str], targets: Sequence[str], belief: JointBelief) -> Outlook:
         rooms = [room for name in targets if (room := self.targets[name].room) is not None]
         if not rooms or not robots:
-            return Outlook({}, 0.0, np.inf)
+            return NO_OUTLOOK
         chances: Array = np.sum([room.in_view for room in rooms], axis=0) / len(rooms)
         poses = {name: belief.mean_of(name)[:4] for name in robots}
         order = robots_in_order(robots, chances, poses, self.grid)
         footprints = {name: self._footprints[name] for name in order}
         allowed_s = {name: self._excursions.allowed_s(name, belief, self._lattice.places) for name in robots}
-        held = self._outlook.stands
+        held = self._outlook.sweeps
         return choose_stands(chances, self._lattice, footprints, poses, allowed_s, held, self.parameters)
 
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:

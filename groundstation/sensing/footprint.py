@@ -19,13 +19,15 @@ _LEAST = 0.05  # a chance below it is not counted
 class Footprint:
     """The cells that a robot's camera sees from the centre of a cell, for each heading: row, column, chance.
 
-    first (HEADINGS + 1): where the cells of a heading begin.
+    first (HEADINGS + 1): where the cells of a heading begin; fresh: share of a view that the one beside it does not
+    show, on average over a full turn.
     """
 
     rows: IntVector
     columns: IntVector
     chances: Vector
     first: IntVector
+    fresh: float
 
 
 def footprint_of(
@@ -44,12 +46,10 @@ def footprint_of(
         columns.append(at[1] - half)
         chances.append(seen[at])
         first.append(first[-1] + len(at[0]))
-    return Footprint(
-        np.concatenate(rows).astype(np.int64),
-        np.concatenate(columns).astype(np.int64),
-        np.concatenate(chances),
-        np.array(first, dtype=np.int64),
-    )
+    all_rows, all_columns = np.concatenate(rows).astype(np.int64), np.concatenate(columns).astype(np.int64)
+    different = len(np.unique(np.array([all_rows, all_columns]), axis=1).T)
+    fresh = different / max(1, len(all_rows))
+    return Footprint(all_rows, all_columns, np.concatenate(chances), np.array(first, dtype=np.int64), fresh)
 
 
 @kernel()

@@ -83,11 +83,28 @@ def fly(
     return limit_s, nearest, search
 
 
-@pytest.mark.parametrize("place", [(2.8, 1.8), (-3.5, -2.5)])
-def test_a_target_at_rest_is_found_wherever_it_stands_and_stands_are_apart(place: tuple[float, float]) -> None:
-    found_s, nearest, _ = fly(place)
-    assert found_s < 45.0
-    assert nearest >= SEARCH.apart_m - 1e-9
+def test_a_target_at_rest_is_found_wherever_it_stands_and_stands_are_apart() -> None:
+    """Though its marker is found less far away than the search believes; chance decides which place takes long."""
+    places = ((2.8, 1.8), (-3.5, -2.5), (3.5, -2.5), (-3.6, 0.0), (0.0, 2.6), (2.0, -1.0))
+    flights = [fly(place, limit_s=90.0) for place in places]
+    found_s = [one[0] for one in flights]
+    assert max(found_s) < 75.0
+    assert sum(found_s) / len(found_s) < 27.0  # turning on arrival only: 32 s
+    assert min(one[1] for one in flights) >= SEARCH.apart_m - 1e-9
+
+
+def test_a_searcher_turns_all_the_time_towards_what_it_has_not_seen() -> None:
+    search, lattice = new_search(), lattice_of(RoomGrid.over(*SEARCH.room_m), SEARCH)
+    chances = np.zeros(search.grid.shape)
+    chances[int(np.argmin(np.abs(search.grid.ys - 1.5))), int(np.argmin(np.abs(search.grid.xs)))] = 1.0
+    view = footprint_of(SENSORS.onboard["drone_1"], search.grid.cell_m, 1.6, 0.4, SENSORS.softness)
+    poses, anywhen = {"drone_1": np.array([0.0, 0.0, 1.6, 0.0])}, {"drone_1": np.full(len(lattice.places), math.inf)}
+    outlook = choose_stands(chances, lattice, {"drone_1": view}, poses, anywhen, {}, SEARCH)
+    assert outlook.sweeps["drone_1"].direction == 1
+    assert outlook.stands["drone_1"].yaw > 1.0
+    assert outlook.chance > 0.5
+    again = choose_stands(chances, lattice, {"drone_1": view}, poses, anywhen, outlook.sweeps, SEARCH)
+    assert again.sweeps == outlook.sweeps
 
 
 def test_pictures_are_searched_as_far_as_a_full_search_finds_markers() -> None:
@@ -139,7 +156,7 @@ def test_each_searches_on_its_own_side_whoever_is_nearer_to_the_middle() -> None
 
 def test_a_target_that_is_nowhere_is_said_to_be_lost_when_the_room_was_searched() -> None:
     soon = replace(SEARCH, lost_after_s=5.0, lost_excluded=0.2)
-    before = fly((30.0, 0.0), 4.0, soon)[2].targets["turtlebot"]
+    before = fly((30.0, 0.0), 3.0, soon)[2].targets["turtlebot"]
     after = fly((30.0, 0.0), 14.0, soon)[2].targets["turtlebot"]
     assert (before.mode, after.mode) == (SearchMode.SEARCH, SearchMode.LOST)
     assert after.excluded > 0.2 > before.excluded > 0.01

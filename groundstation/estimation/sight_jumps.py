@@ -21,7 +21,7 @@ from groundstation.time_units import NS_PER_S
 _BEFORE, _AFTER, _SIDE_S, _GAP_S = 3, 4, 0.6, 0.4
 # What is told: displacements from so far on [m], and more by the speed [m/s] at which a robot may be wrong about its
 # velocity in the gap. One robot alone may be as wrong as a robot can; not two in the same manner.
-_LEAST_M, _ALONE_M_S, _TOGETHER_M_S = 0.06, 1.2, 0.3
+_LEAST_M, ALONE_M_S, _TOGETHER_M_S = 0.06, 1.2, 0.3
 # On each side of a jump sights stay within this share of it; of a robot that drifts off they do not.
 _STEADY = 0.3
 _PATH = 120  # moments
@@ -113,7 +113,7 @@ class SightJumps:
                 Displacement(name, *shift) for name, others in sights.items() if (shift := _across(others, began_s))
             ]
             gap_s = began_s - rows[_BEFORE - 1].at_s
-            together_m, alone_m = (_LEAST_M + gap_s * speed for speed in (_TOGETHER_M_S, _ALONE_M_S))
+            together_m, alone_m = (_LEAST_M + gap_s * speed for speed in (_TOGETHER_M_S, ALONE_M_S))
             # Who stays where he was beside one that jumps speaks for the camera: it hardly turned about his very sight.
             together = len(displaced) > 1 and min(one.size_m for one in displaced) > together_m
             if together or (len(displaced) == 1 and jump > alone_m):

@@ -1,12 +1,14 @@
 """Fixed cameras that contradict robots which agree among each other. Pure.
 
 A robot that nobody saw for a while may be lost, and is believed to be where the camera sees it. Two that see each
-other, or one target, where they should be, cannot be lost in the same manner: then the camera is.
+other, or one target, where they should be, cannot be lost in the same manner: then the camera is. Nor can one that the
+camera saw where it should be a moment ago be lost by more than it can fly in that moment.
 """
 
 import math
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -15,14 +17,40 @@ from groundstation.arrays import Vector
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.event_log import FAR, HASTY
 from groundstation.estimation.measurement import Correction
+from groundstation.estimation.sight_jumps import ALONE_M_S
 from groundstation.geometry.camera_turn import CameraTurn, Displacement, camera_turn
 
 # A contradiction counts for so long, so many at least over so long, all by the same amount but for a share of it.
 _COUNTS_S, _LEAST, _LASTS_S, _STEADY = 1.5, 4, 0.3, 0.3
-_TIED_S, _AGREES_S = 1.0, 1.0
+_TIED_S = 1.0
 _LEAST_M = 0.15
+_MOMENT_S = 0.4
 
 Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Contradiction:
+    """Of a robot's place by a camera: since when, for how long [s] they had not agreed then; times and residuals."""
+
+    since_s: float
+    after_s: float
+    rows: deque[tuple[float, Vector]] = field(default_factory=lambda: deque(maxlen=15))
+
+    def lasting(self, now_s: float) -> Vector | None:
+        """Return by how much [m; camera_optical], if lastingly and by one and the same amount."""
+        kept = [(at_s, gap) for at_s, gap in self.rows if now_s - at_s <= _COUNTS_S]
+        if len(kept) < _LEAST or kept[-1][0] - kept[0][0] < _LASTS_S:
+            return None
+        gaps = [gap for _, gap in kept]
+        middle = np.median(gaps, axis=0)
+        size = math.hypot(*middle)
+        steady = max(math.hypot(*(a - b)) for a, b in combinations(gaps, 2)) < 2.0 * _STEADY * size
+        return middle if steady and size > _LEAST_M else None
+
+    def is_jump(self, gap: Vector) -> bool:
+        """Return whether a robot would have had to fly faster than one can."""
+        return self.after_s <= _MOMENT_S and math.hypot(*gap) > _LEAST_M + self.after_s * ALONE_M_S
 
 
 class TiedContradictions:
@@ -30,7 +58,7 @@ class TiedContradictions:
 
     def __init__(self, cameras: Collection[str], robots: Collection[str]) -> None:
         self._cameras, self._robots = frozenset(cameras), frozenset(robots)
-        self._far: dict[Pair, deque[tuple[float, Vector]]] = {}
+        self._far: dict[Pair, _Contradiction] = {}
         self._agreed_s: dict[Pair, float] = {}
 
     def take(self, corrections: Iterable[Correction], now_s: float) -> None:
@@ -41,24 +69,27 @@ class TiedContradictions:
                 self._agreed_s[pair] = now_s
                 self._far.pop(pair, None)
             elif c.observer in self._cameras and c.subject in self._robots and c.reason in (FAR, HASTY):
-                self._far.setdefault(pair, deque(maxlen=15)).append((now_s, np.array(c.residual[:3])))
+                if pair not in self._far:
+                    self._far[pair] = _Contradiction(now_s, now_s - self._agreed(pair))
+                self._far[pair].rows.append((now_s, np.array(c.residual[:3])))
 
     def turns(self, now_s: float, seen: Mapping[Pair, Vector]) -> Iterator[CameraTurn]:
         """Yield the cameras that were turned. seen: where each fixed camera saw each robot last [m; camera_optical]."""
         for camera in sorted({camera for camera, _ in self._far}):
             turn = self._turn(camera, now_s, seen)
             if turn is not None:
-                self._far = {pair: rows for pair, rows in self._far.items() if pair[0] != camera}
+                self._far = {pair: far for pair, far in self._far.items() if pair[0] != camera}
                 yield turn
 
     def _turn(self, camera: str, now_s: float, seen: Mapping[Pair, Vector]) -> CameraTurn | None:
-        off = {
-            pair[1]: gap
-            for pair, rows in self._far.items()
-            if pair[0] == camera and pair in seen and (gap := _lasting(rows, now_s)) is not None
-        }
-        agrees = any(self._lately((camera, robot), now_s, _AGREES_S) for robot in self._robots)
-        if not off or agrees or not self._is_witnessed(off, now_s):
+        far = {robot: one for (by, robot), one in self._far.items() if by == camera and (by, robot) in seen}
+        off = {robot: gap for robot, one in far.items() if (gap := one.lasting(now_s)) is not None}
+        if not off:
+            return None
+        since_s = min(far[robot].since_s for robot in off)
+        agrees = any(self._agreed((camera, robot)) >= since_s for robot in self._robots)
+        jumps = any(far[robot].is_jump(gap) for robot, gap in off.items())
+        if agrees or not (jumps or self._is_witnessed(off, now_s)):
             return None
         return camera_turn(camera, [Displacement(n, seen[camera, n] - gap, seen[camera, n]) for n, gap in off.items()])
 
@@ -71,22 +102,10 @@ class TiedContradictions:
     def _are_tied(self, one: str, other: str, now_s: float) -> bool:
         """Return whether one robot lately saw the other, or both one target, where they should be."""
         seen_by = [
-            {whom for who, whom in self._agreed_s if who == name and self._lately((who, whom), now_s, _TIED_S)}
+            {whom for who, whom in self._agreed_s if who == name and now_s - self._agreed((who, whom)) <= _TIED_S}
             for name in (one, other)
         ]
         return other in seen_by[0] or one in seen_by[1] or bool((seen_by[0] & seen_by[1]) - self._robots)
 
-    def _lately(self, pair: Pair, now_s: float, within_s: float) -> bool:
-        return now_s - self._agreed_s.get(pair, float("-inf")) <= within_s
-
-
-def _lasting(rows: Iterable[tuple[float, Vector]], now_s: float) -> Vector | None:
-    """Return by how much a robot is contradicted [m; camera_optical], if lastingly and by one and the same amount."""
-    kept = [(at_s, gap) for at_s, gap in rows if now_s - at_s <= _COUNTS_S]
-    if len(kept) < _LEAST or kept[-1][0] - kept[0][0] < _LASTS_S:
-        return None
-    gaps = [gap for _, gap in kept]
-    middle = np.median(gaps, axis=0)
-    size = math.hypot(*middle)
-    steady = max(math.hypot(*(a - b)) for a, b in combinations(gaps, 2)) < 2.0 * _STEADY * size
-    return middle if steady and size > _LEAST_M else None
+    def _agreed(self, pair: Pair) -> float:
+        return self._agreed_s.get(pair, float("-inf"))

@@ -29,7 +29,7 @@ def tracked(tmp_path_factory: pytest.TempPathFactory, lab_field: ResolvedField) 
     from sim_bridge.study.runner import StudyOptions
 
     folder = tmp_path_factory.mktemp("flight")
-    FlownStudy(lab_field, folder, StudyOptions(seed=3, duration_s=90.0)).fly()
+    FlownStudy(lab_field, folder, StudyOptions(seed=4, duration_s=90.0)).fly()
     return folder
 
 

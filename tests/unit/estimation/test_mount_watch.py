@@ -173,3 +173,21 @@ def test_who_agree_among_each_other_are_not_both_lost(
             watch.see(sighting(name, now_s - 0.1, np.array(place)))
         told += watch.advance(round(now_s * 1e9), {}, (far("drone_2"), *beside), DRONES)
     assert [notice.entity for notice in told] == culprits
+
+
+@pytest.mark.parametrize(
+    ("pause_s", "gap_m", "culprits"),
+    [(0.15, 0.4, ["ceiling"]), (0.15, 0.25, []), (0.35, 0.5, []), (0.5, 2.0, [])],
+    ids=["jumped", "may have flown", "may have flown for longer", "nobody looked"],
+)
+def test_one_that_was_just_where_it_should_be_is_not_lost_by_more_than_it_can_fly(
+    lab_field: ResolvedField, pause_s: float, gap_m: float, culprits: list[str]
+) -> None:
+    watch, told = mount_watch(lab_field), list[Notice]()
+    for picture in range(8):
+        now_s = 10.0 + picture / 15.0
+        watch.see(sighting("drone_2", now_s - 0.1, np.array((0.9, -0.4, 2.5))))
+        if not picture:
+            told += watch.advance(round((now_s - pause_s) * 1e9), {}, (agreed("ceiling", "drone_2"),), DRONES)
+        told += watch.advance(round(now_s * 1e9), {}, (far("drone_2", (0.0, -gap_m, 0.0)),), DRONES)
+    assert [notice.entity for notice in told] == culprits

@@ -11,6 +11,7 @@ import msgspec
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.process.log import DiscreetFormatter
 from groundstation.report import run_facts
+from groundstation.supervisor import kernels
 from groundstation.supervisor.runtime_file import start_time
 from groundstation.time_units import NS_PER_S
 
@@ -47,8 +48,8 @@ def _free_bytes(path: Path) -> int:
 
 def write_facts(run_dir: Path, facts: run_facts.RunFacts) -> None:
     """Write how the run was asked for, and when this process was started: the operator waits from then on."""
-    command_ns = time.time_ns() - _age_ns()
-    run_facts.write(run_dir, msgspec.structs.replace(facts, command_unix_ns=command_ns))
+    command_ns, lacked = time.time_ns() - _age_ns(), not kernels.are_compiled()
+    run_facts.write(run_dir, msgspec.structs.replace(facts, command_unix_ns=command_ns, kernels_lacked=lacked))
 
 
 def _age_ns() -> int:

@@ -11,7 +11,7 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     """How a run was asked for.
 
     mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
-    tracking asked for; warm_cache: whether compiled kernels were there at the start, if known; real: what of a
+    tracking asked for; kernels_lacked: whether they had to be compiled first, once per version; real: what of a
     simulated run was not emulated.
     """
 
@@ -21,7 +21,7 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     seed: int | None = None
     command_unix_ns: int = 0
     tracking_s: float | None = None
-    warm_cache: bool | None = None
+    kernels_lacked: bool = False
     real: tuple[str, ...] = ()
 
 

@@ -39,6 +39,8 @@ def test_a_normal_end_is_calm_and_leaves_nothing_to_stop(stage: Any) -> None:
     assert page.page.locator(".banner").count() == 1  # no NO CONNECTION, no TRACKER SILENT, no alarm
     assert page.there("link").inner_text() == "run ended"
     assert all(stop.is_disabled() and "the run has ended" in stop.get_attribute("title") for stop in stops(page))
+    page.page.wait_for_timeout(3000)  # nobody beats any more, and nobody needs to
+    assert page.there("recording").inner_text() == "ended"
     page.page.keyboard.press("l")
     assert "the run has ended" in page.there("orders").inner_text()
     page.shot("run_ended")

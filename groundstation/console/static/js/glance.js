@@ -69,10 +69,17 @@ export function batteryLevel(name, value) {
 
 export const oldestS = () => Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));
 
+// Nobody is heard of once the run is over: then what counts is how long the recorder was silent before the others were.
+function recorderSilentS(recorder) {
+  if (!runOver()) return ageS(recorder.at);
+  return (Math.max(...Object.values(store.s.processes).map((one) => one.at)) - recorder.at) / 1000;
+}
+
 export function recording() {
   const recorder = store.s.processes?.recorder;
   if (!recorder) return ["none", "warn"];
-  if (ageS(recorder.at) > RECORDING_SILENT_S) return ["STOPPED", "bad"];
+  if (recorderSilentS(recorder) > RECORDING_SILENT_S) return ["STOPPED", "bad"];
+  if (runOver()) return ["ended", "calm"];
   return recorder.state === "READY" ? ["on", "good"] : [recorder.state.toLowerCase(), "warn"];
 }
 

@@ -27,6 +27,7 @@ _SHOWN = "a path looks like '-2,0 2,0 2,1': places x,y [m; world]"
 )
 @click.argument("field")
 @click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; may be given often.")
+@click.option("--target", metavar="NAME", help="The target, if the field has several; without it the first.")
 @click.option("--path", "drawn", metavar="'X,Y X,Y ..'", help="The target's path: corners [m; world].")
 @click.option("--scenario", metavar="S", help="The target's path is that of a scenario (a name or a path).")
 @click.option(
@@ -34,8 +35,9 @@ _SHOWN = "a path looks like '-2,0 2,0 2,1': places x,y [m; world]"
 )
 @click.option("--json", "as_json", is_flag=True, help="Print all figures as JSON.")
 def forecast(
-    field: str, options: tuple[str, ...], drawn: str | None, scenario: str | None, output: Path | None, as_json: bool
-) -> None:
+    field: str, options: tuple[str, ...], target: str | None, drawn: str | None, scenario: str | None,
+    output: Path | None, as_json: bool,
+) -> None:  # fmt: skip
     """Say before a flight how well the target will be known: over the floor, on its path, and when something fails.
 
     Figures are deviations of the target's place in the floor plan by the filter that flies, at the best stand that the
@@ -52,12 +54,13 @@ def forecast(
         raise click.UsageError(f"--output {output}: must end in .svg, .png, .pdf or .html")
     path = find_field(field)
     settings = load_field(path, options)
-    paths = _paths(settings, path, drawn, scenario)
+    target = _target(settings, target)
+    paths = _paths(settings, path, target, drawn, scenario)
     numba_cache.activate()
     from groundstation.forecast.forecast import forecast as forecast_of
 
     began = time.process_time()
-    found = forecast_of(resolved_field(settings), paths[next(iter(settings.tracked))], progress)
+    found = forecast_of(resolved_field(settings), paths[target], progress, target)
     spent_s = time.process_time() - began
     if as_json:
         from groundstation.forecast.plain import plain
@@ -71,8 +74,15 @@ def forecast(
         _write(found, settings, paths, output)
 
 
-def _paths(settings: "Field", path: Path, drawn: str | None, scenario: str | None) -> "Paths":
-    """Return each target's path; the first is the one that is forecast."""
+def _target(settings: "Field", named: str | None) -> str:
+    names = list(settings.tracked)
+    if named is not None and named not in names:
+        raise SettingsError([f"--target: the field has no target {named!r}; it has {', '.join(names)}"])
+    return named or names[0]
+
+
+def _paths(settings: "Field", path: Path, target: str, drawn: str | None, scenario: str | None) -> "Paths":
+    """Return each target's path, as far as it is known."""
     from groundstation.settings import drawing
     from groundstation.settings.files import find_scenario
     from groundstation.settings.scenario import load_scenario
@@ -80,12 +90,12 @@ def _paths(settings: "Field", path: Path, drawn: str | None, scenario: str | Non
     names = list(settings.tracked)
     paths: Paths = {name: [] for name in names}
     if drawn:
-        paths[names[0]] = _places(drawn)
+        paths[target] = _places(drawn)
     elif scenario:
         paths = drawing.paths_of(load_scenario(find_scenario(scenario, path)), names)
-        if not paths[names[0]]:
+        if not paths[target]:
             click.echo(
-                f"{scenario}: no fixed path of {names[0]}: the floor alone is forecast; --path names one", err=True
+                f"{scenario}: no fixed path of {target}: the floor alone is forecast; --path names one", err=True
             )
     where = "--path" if drawn else str(scenario)
     if beyond := drawing.beyond_walls(settings, paths):

@@ -33,13 +33,15 @@ class Forecast:
 
 
 def forecast(
-    field: ResolvedField, path: Sequence[Place] = (), told: Callable[[int, int], None] = lambda done, total: None
-) -> Forecast:
-    """Return the forecast of a field for a target on a path (points in order; none: anywhere on the floor).
+    field: ResolvedField, path: Sequence[Place] = (), told: Callable[[int, int], None] = lambda done, total: None,
+    target: str = "",
+) -> Forecast:  # fmt: skip
+    """Return the forecast of a field for one target on a path (points in order; none: anywhere on the floor).
 
-    told: called with the places done, and about how many there are. Raises EstimatorFault for what is not finite.
+    told: called with the places done, and about how many there are; target: "" for the first. Raises EstimatorFault for
+    what is not finite.
     """
-    team, points = team_of(field), spaced(path, _PATH_PLACES)
+    team, points = team_of(field, target), spaced(path, _PATH_PLACES)
     total, done = _CELLS + len(points) + len(teams_without_one(team)) * _CELLS // 4, 0
 
     def one_more() -> None:

@@ -12,10 +12,11 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """Who flies with which cameras, and whom it tracks."""
+    """Who flies with which cameras, and whom all of them track; others: the field's other targets."""
 
     robots: tuple[str, ...]
     target: str
+    others: tuple[str, ...]
     sensors: SensorSuite
     planner: PlannerParameters
 
@@ -31,7 +32,8 @@ class Team:
         return replace(left, robots=tuple(one for one in self.robots if one != name))
 
 
-def team_of(field: ResolvedField) -> Team:
-    """Return the whole team of a field, with the first of its targets."""
-    target = next(iter(field.tracked))
-    return Team(tuple(field.drones), target, sensors_from_field(field), parameters_from_field(field))
+def team_of(field: ResolvedField, target: str = "") -> Team:
+    """Return the whole team of a field, with one of its targets ("": the first)."""
+    target = target or next(iter(field.tracked))
+    others = tuple(name for name in field.tracked if name != target)
+    return Team(tuple(field.drones), target, others, sensors_from_field(field), parameters_from_field(field))

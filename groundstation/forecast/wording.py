@@ -40,7 +40,9 @@ def _accuracy(forecast: Forecast) -> Section:
     if forecast.path:
         rows.insert(0, ("along the path", *_cells(spread_of(forecast.path))))
     title = f"Where {forecast.team.target} will be known to, with the best stand of {_count(forecast.team.robots)}"
-    return Section(title, ("", "median", "worst", "not seen"), tuple(rows))
+    others = ", ".join(forecast.team.others)
+    notes = (f"as if {others} were not there: --target forecasts others",) if others else ()
+    return Section(title, ("", "median", "worst", "not seen"), tuple(rows), notes)
 
 
 def _cells(spread: Spread) -> tuple[str, str, str]:

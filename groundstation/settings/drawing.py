@@ -88,7 +88,7 @@ def _hatch(axes: "Axes", x: tuple[float, float], y: tuple[float, float], label: 
 
 
 def paths_of(scenario: Mapping[str, Any], targets: Iterable[str]) -> Paths:
-    """Return points of each target's path in a scenario [m; world]: a figure eight, or none for a target that waits."""
+    """Return points of each target's path in a scenario [m; world]: none for one that waits or wanders."""
     own, common = scenario.get("targets", {}), scenario.get("target", {})
     return {name: _points(own.get(name, common).get("path", {})) for name in targets}
 
@@ -108,6 +108,9 @@ def beyond_walls(field: Field, paths: Paths) -> list[str]:
 
 
 def _points(path: Mapping[str, Any]) -> list[tuple[float, float]]:
+    if path.get("shape") == "waypoints":
+        points = [(float(x), float(y)) for x, y in path["points_m"]]
+        return [*points, points[0]] if path.get("after_last", "first") == "first" else points
     if path.get("shape") != "figure_eight":
         return []
     phases = [math.tau * n / 200 for n in range(201)]

@@ -46,6 +46,16 @@ def test_json_has_all_figures_and_pictures_are_drawn(tmp_path: Path, capsys: pyt
     assert picture.read_text(encoding="utf-8").count("<path") > 20
 
 
+def test_each_of_several_targets_is_forecast_by_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    order = ["forecast", "two-targets", "--scenario", "parting-targets"]
+    assert cli.run(order) == ExitCode.OK
+    assert "as if turtlebot_2 were not there: --target forecasts others" in capsys.readouterr().out
+    assert cli.run([*order, "--target", "turtlebot_2", "--json"]) == ExitCode.OK
+    found = json.loads(capsys.readouterr().out)
+    assert found["target"] == "turtlebot_2" and "turtlebot_2" in found["failures"]["ceiling"]["unlocalised"]
+    assert found["path"]["places"][0]["place_m"] == [0.0, -0.3], "it goes along its own path"
+
+
 @pytest.mark.parametrize(
     ("given", "answer"),
     [
@@ -54,6 +64,7 @@ def test_json_has_all_figures_and_pictures_are_drawn(tmp_path: Path, capsys: pyt
         (["--path", " "], "--path: names no place"),
         (["--path", "0,0 9,0"], "--path: the path of turtlebot leaves the room: up to x 9.0, y 0.0 m"),
         (["--path", "0,0", "--scenario", "realistic"], "--path and --scenario both name a path: give one of them"),
+        (["--target", "bot"], "--target: the field has no target 'bot'; it has turtlebot"),
         (["-o", "map.txt"], "--output map.txt: must end in .svg, .png, .pdf or .html"),
     ],
 )

@@ -227,4 +227,7 @@ def test_the_drawing_is_to_scale(field: Field) -> None:
     paths = paths_of({"target": eight, "targets": {"b": {"path": {"shape": "none"}}}}, ("a", "b"))
     assert max(paths["a"]) == pytest.approx((3, 0))
     assert paths["b"] == []
+    along = {"shape": "waypoints", "points_m": [[0, 0], [1, 0]]}
+    for after_last, points in (("back", [(0, 0), (1, 0)]), ("first", [(0, 0), (1, 0), (0, 0)])):
+        assert paths_of({"target": {"path": along | {"after_last": after_last}}}, ("a",)) == {"a": points}
     assert paths_of({}, ("a",)) == {"a": []}

@@ -81,10 +81,12 @@ class Start:
                 supervisor.terminal.say(f"  waiting for {note}")
 
     def _late(self, process: ManagedProcess) -> None:
+        events = self._supervisor.events
         if process.spec.required:
             self._supervisor.fail(process, f"is not ready {process.spec.start_limit_s:.0f} s after the start")
+        elif process.is_up:
+            events.state(process)
         else:
-            events = self._supervisor.events
             events.event(Severity.WARNING, process, "is not ready; going on without it", "see its log")
 
     def _raise_failure(self) -> None:

@@ -10,7 +10,8 @@ _SAME_NOTE_PERIOD_S = 10.0
 class Waiting:
     """Processes that are not up yet.
 
-    limit_s: how long each may take from `began_s` on (None: its own start limit, over all of its restarts).
+    limit_s: how long each may take from `began_s` on (None: its own start limit, over all of its restarts). Within it
+    they are waited for until they are READY: a device may answer a moment after its driver has begun.
     """
 
     def __init__(self, processes: list[ManagedProcess], began_s: float, limit_s: float | None = None) -> None:
@@ -23,7 +24,7 @@ class Waiting:
     def take_up(self) -> list[ManagedProcess]:
         """Return those that have come up, and were so at the last call too: who dies of its first work is not up."""
         before = self._seen_up
-        self._seen_up = [(process, process.life) for process in self.processes if process.is_up]
+        self._seen_up = [(process, process.life) for process in self.processes if self._is_up(process)]
         return self._take([process for process, life in self._seen_up if (process, life) in before])
 
     def take_late(self, now_s: float) -> list[ManagedProcess]:
@@ -38,6 +39,9 @@ class Waiting:
             return ""
         self._noted, self._noted_s = note, now_s
         return note
+
+    def _is_up(self, process: ManagedProcess) -> bool:
+        return process.is_up and (self._limit_s is None or process.state is SlotState.READY)
 
     def _take(self, processes: list[ManagedProcess]) -> list[ManagedProcess]:
         self.processes = [process for process in self.processes if process not in processes]

@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from dummy_table import spec, start, until
@@ -12,12 +13,14 @@ from dummy_table import spec, start, until
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
+from groundstation.process.heartbeat import SlotState
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.process_spec import ProcessSpec, StopOrder
 from groundstation.supervisor.start import Interrupted
 from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
+from groundstation.supervisor.waiting import Waiting
 
 
 def test_starts_router_first_and_stops_in_order(make: Callable[..., Supervisor]) -> None:
@@ -36,6 +39,17 @@ def test_starts_router_first_and_stops_in_order(make: Callable[..., Supervisor])
     supervisor.step = step  # type: ignore[method-assign]
     supervisor.stop()
     assert ended == ["drone_1", "recorder", "router"]
+
+
+def test_its_loop_goes_first_while_it_watches_and_nothing_that_it_started(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("drone_1", "obedient", nice=-5), spec("recorder", "obedient"))
+    start(supervisor)
+    allowed = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR
+    pids = [process.pid for process in supervisor.processes[1:]]
+    assert [os.sched_getscheduler(pid) for pid in pids] == [os.SCHED_OTHER] * 2
+    assert [os.getpriority(os.PRIO_PROCESS, pid) for pid in pids] == ([-5, 0] if allowed else [5, 10])
+    supervisor.close()
+    assert (os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == (os.SCHED_OTHER, 0)
 
 
 def test_crash_of_a_required_process_at_start_names_its_log(make: Callable[..., Supervisor]) -> None:
@@ -62,6 +76,21 @@ def test_late_start_is_waited_for_and_a_recovery_told(make: Callable[..., Superv
     supervisor = make(spec("ceiling", "obedient", section='{"slow_s": 0.7, "hoarse_s": 0.4}'))
     start(supervisor)
     until(supervisor, lambda: "ceiling      ready  fine" in (tmp_path / "terminal").read_text())
+
+
+@pytest.mark.parametrize(("limit_s", "up"), [(5.0, []), (None, ["ceiling"])], ids=["optional", "required"])
+def test_a_device_that_may_still_answer_is_waited_for(limit_s: float | None, up: list[str]) -> None:
+    row = SimpleNamespace(name="ceiling", start_limit_s=60.0)
+    ceiling = SimpleNamespace(spec=row, is_up=True, life=1, state=SlotState.DEGRADED)
+
+    def taken() -> list[str]:
+        waiting.take_up()  # who dies of its first work is not up: only the second look counts
+        return [process.spec.name for process in waiting.take_up()]
+
+    waiting = Waiting([ceiling], 0.0, limit_s)  # type: ignore[list-item]
+    assert (taken(), bool(waiting.take_late(4.9))) == (up, False)
+    ceiling.state = SlotState.READY
+    assert up + taken() == ["ceiling"]
 
 
 def test_signal_while_starting_interrupts(make: Callable[..., Supervisor]) -> None:

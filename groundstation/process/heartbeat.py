@@ -147,7 +147,7 @@ class HeartbeatBlock:
         return max(0, now_ns - self._words[slot * _WORDS_PER_SLOT + _STAMP])
 
     def close(self, *, remove: bool = False) -> None:
-        """Unmap, and remove the file if it is the creator who leaves; idempotent."""
+        """Unmap, and remove the file if nobody needs it any more; idempotent."""
         self._words.release()
         self._map.close()
         if remove:

@@ -132,5 +132,5 @@ def run(child: Child) -> int:
             break
         child.sleep_until(now_ns + _PERIOD_NS)
     guardian.close()
-    block.close()
+    block.close(remove=not child.supervisor_alive)  # the last to leave
     return 0

@@ -177,6 +177,7 @@ def test_hovers_and_lands_a_drone_without_supervisor_and_driver(
         run.process.kill()
     run.until_gone("guardian")
 
+    assert not Path(f"/dev/shm/skein-lab-{run.process.pid}").exists()
 
 def test_is_silent_while_the_driver_lives(run: SupervisedRun, drone: FakeDrone) -> None:
     run.process.kill()

@@ -70,6 +70,10 @@ class HostProcess(Protocol):
     def supervisor_fresh(self) -> bool:
         """False while the supervisor is frozen."""
 
+    @property
+    def spoken_for_ns(self) -> int:
+        """For how long others have told the vehicle to hover in this driver's place [ns], 0: nobody does."""
+
     def beat(self) -> None:
         """Say that the main loop turns."""
 

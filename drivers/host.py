@@ -56,7 +56,7 @@ class VehicleHost:
 
     def __init__(self, child: HostProcess, vehicle: Vehicle, limits: WatchdogLimits) -> None:
         self.vehicle = vehicle
-        self.watchdog = Watchdog(limits, clock.clock_id(), child.bus.run)
+        self.watchdog = Watchdog(limits, clock.clock_id(), child.bus.run, child.spoken_for_ns)
         self._child = child
         self._bus = child.bus
         self._setpoints = self._bus.subscribe([SETPOINT], entity=vehicle.name, newest=True)

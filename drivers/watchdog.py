@@ -34,11 +34,13 @@ class Watchdog:
     """Authority over one vehicle. Feed it with `accept_*`, then call `step` at the sender's rate.
 
     mode, reason: see `WatchdogDecision`; failsafe: condition of the row by which it is in that mode, "" without. The
-    vehicle's and upstream's last words are remembered between steps.
+    vehicle's and upstream's last words are remembered between steps. braked_ns: for how long others have told the
+    vehicle to hover as this driver starts.
     """
 
-    def __init__(self, limits: WatchdogLimits, clock: str, run: str = "") -> None:
+    def __init__(self, limits: WatchdogLimits, clock: str, run: str = "", braked_ns: int = 0) -> None:
         self.limits = limits
+        self._brake_ns = max(0, int(limits.brake_s * NS_PER_S) - braked_ns)
         self.table = failsafes(limits)
         self._acting = tuple(row for row in self.table if row.reaction is not Reaction.REFUSE)
         self.mode = DriverMode.CONNECTING
@@ -162,7 +164,7 @@ class Watchdog:
         self._entered_ns = now_ns
         self.mode, self.reason, self.failsafe = mode, reason, failsafe
         self._paused_ns = None
-        self._brake_until_ns = now_ns + int(self.limits.brake_s * NS_PER_S) if brake else 0
+        self._brake_until_ns = now_ns + self._brake_ns if brake else 0
         self._acks.enter(mode)
         return ""
 

@@ -35,7 +35,7 @@ class _Host:
     """The process around the driver, reduced to what the driver asks of it."""
 
     name, section = "mavlink", "{}"
-    stop_requested, supervisor_alive, supervisor_fresh = False, True, True
+    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
 
     def __init__(self, bus: Bus) -> None:
         self.bus: Bus = bus

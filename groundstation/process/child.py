@@ -33,7 +33,8 @@ class ChildSpec:
     name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none),
     with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did); identity:
     what it shows the router, or the router shows others (None: nobody asks); clock: id of the run's clock where that is
-    another host's ("": this host's own); nice: below 0 for a larger share of the processor (docs/decisions/0137).
+    another host's ("": this host's own); nice: below 0 for a larger share of the processor (docs/decisions/0137);
+    spoken_since_ns: since when others have spoken in its place (0: nobody does).
     """
 
     name: str
@@ -47,6 +48,7 @@ class ChildSpec:
     identity: Identity | None = None
     clock: str = ""
     nice: int = 0
+    spoken_since_ns: int = 0
 
 
 class Child:
@@ -134,6 +136,12 @@ class Child:
         if self._block is None:
             return True
         return self._block.age_ns(SUPERVISOR_SLOT, time.monotonic_ns()) < _SUPERVISOR_STALE_NS
+    @property
+    def spoken_for_ns(self) -> int:
+        """For how long others have been speaking in this process's place [ns], 0: nobody does."""
+        since_ns = self.spec.spoken_since_ns
+        return time.monotonic_ns() - since_ns if since_ns else 0
+
 
     def wake(self) -> None:
         """End a sleep early, the one under way or the next; from any thread."""

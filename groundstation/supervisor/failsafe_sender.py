@@ -1,6 +1,7 @@
 """Sends to a drone whose driver is dead or hangs: hover, and later land, in the drone's own protocol."""
 
 import logging
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ class _Speech:
     words: FailsafeDatagrams
     since_ns: int
     addresses: Sequence[Address]
+    began_ns: int
 
 
 class FailsafeSender:
@@ -61,13 +63,18 @@ class FailsafeSender:
         if why:
             _log.error("nobody can speak for %s: %s", name, why)
         addresses = heard_at() if words.called else ((words.address, words.port),)
-        self._speaking[name] = _Speech(words, since_ns, addresses)
+        self._speaking[name] = _Speech(words, since_ns, addresses, time.monotonic_ns())
         self._next_ns = 0
         return True
 
     def end(self, name: str) -> bool:
         """Leave the word to the driver again; returns whether that is news."""
         return self._speaking.pop(name, None) is not None
+
+    def began_ns(self, name: str) -> int:
+        """Return since when it has been speaking for a driver [ns], 0: it does not, or nothing carries its words."""
+        speech = self._speaking.get(name)
+        return speech.began_ns if speech is not None and name in self._voices else 0
 
     def send_due(self, now_ns: int) -> None:
         """Send due datagrams; a lost link is no error, they are repeated anyway."""

@@ -43,8 +43,11 @@ class Launcher:
         except OSError as error:
             raise GroundStationError(f"cannot write to the run folder {self._run_dir}: {error.strerror}") from error
 
-    def launch(self, spec: ProcessSpec, slot: int, life: int) -> subprocess.Popen[bytes]:
-        """Start a process; `life` counts its starts and raises the epoch of a numbered one."""
+    def launch(self, spec: ProcessSpec, slot: int, life: int, spoken_since_ns: int = 0) -> subprocess.Popen[bytes]:
+        """Start a process; `life` counts its starts and raises the epoch of a numbered one.
+
+        spoken_since_ns: since when its drone has been told to hover by others, 0: nobody does.
+        """
         section = json.loads(spec.section)
         if spec.numbered:
             section["epoch"] = section.get("epoch", 0) + life
@@ -61,6 +64,7 @@ class Launcher:
                 identity=self._identity(spec),
                 clock=self._run.clock if spec.on_bus else "",
                 nice=spec.nice,
+                spoken_since_ns=spoken_since_ns,
             )
         )
         if spec.command:

@@ -109,7 +109,8 @@ class Supervisor:
     def launch(self, process: ManagedProcess) -> None:
         """Start a process; one that cannot be executed is tried again, or is the failure of a run that needs it."""
         try:
-            handle = self._launcher.launch(process.spec, process.slot, process.life)
+            spoken_since_ns = self._last_words.began_ns(process.spec.name)
+            handle = self._launcher.launch(process.spec, process.slot, process.life, spoken_since_ns)
             process.adopt(handle, time.monotonic_ns())
         except OSError as error:
             why = f"cannot be started: {error.strerror}" + (f": {error.filename}" if error.filename else "")

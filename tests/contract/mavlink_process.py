@@ -7,6 +7,7 @@ class FakeProcess:
     def __init__(self, bus):
         self.name, self.bus, self.section = bus.source, bus, "{}"
         self.stop_requested, self.supervisor_alive, self.supervisor_fresh = False, True, True
+        self.spoken_for_ns = 0
         self.events = []
 
     @property

@@ -29,7 +29,7 @@ def drive(address: str) -> None:
 
     class Process:
         name, section = "drone_1", f'{{"name": "drone_1", "address": "{address}"}}'
-        stop_requested, supervisor_alive, supervisor_fresh = False, True, True
+        stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
         bus: Bus = MemoryBus(MemoryExchange(), "lab", "drone_1")
 
         def beat(self): ...

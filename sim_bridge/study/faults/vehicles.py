@@ -41,6 +41,7 @@ class HostedProcess:
         self.bus: Bus = bus
         self.stop_requested = False
         self.supervisor_alive = self.supervisor_fresh = True
+        self.spoken_for_ns = 0
         self._said = said
 
     def beat(self) -> None:

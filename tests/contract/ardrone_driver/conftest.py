@@ -40,6 +40,7 @@ class Process:
         self.name, self.section = bus.source, section
         self.bus: Bus = bus
         self.stop_requested, self.supervisor_alive, self.supervisor_fresh = False, True, True
+        self.spoken_for_ns = 0
         self.events: list[tuple[Severity, str, str]] = []
         self.states: list[str] = []
         self.beats = 0

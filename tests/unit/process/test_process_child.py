@@ -165,6 +165,13 @@ def test_supervisor_is_fresh_only_while_it_beats(block: HeartbeatBlock) -> None:
     assert Child(ChildSpec("x", "test", "", "lab")).supervisor_fresh, "without a supervisor nobody is missed"
 
 
+def test_a_successor_knows_for_how_long_others_spoke_for_it() -> None:
+    assert Child(ChildSpec("x", "test", "", "lab")).spoken_for_ns == 0
+    since_ns = time.monotonic_ns() - 1550 * MS
+    child = Child(ChildSpec("x", "test", "", "lab", spoken_since_ns=since_ns))
+    assert child.spoken_for_ns == pytest.approx(1550 * MS, abs=200 * MS)
+
+
 def test_process_package_imports_nothing_heavy() -> None:
     script = (
         "import sys, groundstation.process.entry, groundstation.bus.zenoh_bus;"

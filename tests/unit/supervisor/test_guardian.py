@@ -19,6 +19,7 @@ import msgspec
 import pytest
 from dummy_table import spec, until
 
+from groundstation.supervisor.failsafe_sender import FailsafeSender
 from groundstation.supervisor.guard_order import GuardOrder, guarded
 from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.supervisor.process_spec import FailsafeDatagrams, ProcessSpec
@@ -176,8 +177,8 @@ def test_hovers_and_lands_a_drone_without_supervisor_and_driver(
         assert run.alive("guardian"), "the supervisor may wake up"
         run.process.kill()
     run.until_gone("guardian")
-
     assert not Path(f"/dev/shm/skein-lab-{run.process.pid}").exists()
+
 
 def test_is_silent_while_the_driver_lives(run: SupervisedRun, drone: FakeDrone) -> None:
     run.process.kill()
@@ -238,6 +239,23 @@ def test_who_cannot_be_killed_is_left_behind(
     assert not driver.running
     os.kill(driver.pid, signal.SIGKILL)
     os.waitpid(driver.pid, 0)
+
+
+@pytest.mark.parametrize("carried", [True, False])
+def test_only_words_that_are_carried_count_as_spoken(monkeypatch: pytest.MonkeyPatch, carried: bool) -> None:
+    def refused(*_: object) -> None:
+        raise OSError("no such device")
+
+    if not carried:
+        monkeypatch.setattr("groundstation.supervisor.failsafe_sender.open_voice", refused)
+    sender = FailsafeSender()
+    words = FailsafeDatagrams("127.0.0.1", 5556, b"hover", b"land", 20.0)
+    assert sender.began_ns("drone_1") == 0
+    sender.begin("drone_1", words, 1)
+    assert (sender.began_ns("drone_1") > 0) is carried
+    sender.end("drone_1")
+    assert sender.began_ns("drone_1") == 0
+    sender.close()
 
 
 def test_a_stop_waits_for_the_guardian_as_long_as_hover_and_landing_take() -> None:

@@ -73,7 +73,7 @@ class FakeSource:
 
 
 class FakeChild:
-    stop_requested, supervisor_alive, supervisor_fresh = False, True, True
+    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
 
     def __init__(self, bus, section="{}"):
         self.bus, self.name, self.section = bus, "drone_1_camera", section

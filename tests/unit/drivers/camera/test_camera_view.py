@@ -1,5 +1,6 @@
 """`groundstation camera view`: lines and pictures of what is found, and a stream for a browser."""
 
+import json
 import socket
 import threading
 import urllib.request
@@ -7,7 +8,6 @@ import urllib.request
 import cv2
 import numpy as np
 import pytest
-import yaml
 
 from drivers.camera.calibration.stream import PictureServer
 from drivers.camera.multipart import MultipartParser
@@ -37,7 +37,7 @@ def files(tmp_path):
     (tmp_path / "in").mkdir()
     for number in range(3):
         cv2.imwrite(str(tmp_path / "in" / f"p{number}.png"), picture())
-    (tmp_path / "lens.yaml").write_text(yaml.safe_dump(CALIBRATION))
+    (tmp_path / "lens.yaml").write_text(json.dumps(CALIBRATION))
     return tmp_path
 
 
@@ -60,7 +60,7 @@ def test_without_a_calibration_nothing_is_said_of_distances(files, capsys):
 
 
 def test_bad_input_is_named(files, capsys):
-    (files / "lens.yaml").write_text(yaml.safe_dump(CALIBRATION | {"width_px": 1280}))
+    (files / "lens.yaml").write_text(json.dumps(CALIBRATION | {"width_px": 1280}))
     assert run(["camera", "view", str(files / "in"), "--calibration", str(files / "lens.yaml")]) == 2
     assert "640x360, the calibration" in capsys.readouterr().err
     (files / "lens.yaml").write_text("model: plumb_bob\nfx_pixels: 3\n")

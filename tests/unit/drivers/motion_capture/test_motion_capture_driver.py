@@ -30,7 +30,7 @@ PLACES = {"drone_1": (0.5, 0.2, 1.5), "drone_2": (-0.9, 0.1, 1.4)}
 
 
 class FakeChild:
-    stop_requested, supervisor_alive, supervisor_fresh = False, True, True
+    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
 
     def __init__(self, bus: MemoryBus, section: str) -> None:
         self.bus, self.name, self.section = bus, "mocap", section

@@ -2,7 +2,8 @@
 
 import pytest
 
-from drivers.watchdog_types import Action, DriverMode, Upstream
+from drivers.watchdog import Watchdog
+from drivers.watchdog_types import Action, DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AckStage, FlightState, Lease, Verb
 
 MS = 1_000_000
@@ -44,6 +45,15 @@ def test_a_restarted_driver_brakes_and_lands_what_flies(new_bench, state):
     bench.run(0.5)
     assert bench.order(Verb.TRACK).stage is AckStage.REFUSED
     assert bench.run(0.7)[-1] is Action.LAND
+
+
+@pytest.mark.parametrize(("braked_s", "lands_s"), [(0.4, 0.6), (1.0, 0.0), (2.5, 0.0)])
+def test_a_restarted_driver_lands_the_sooner_the_longer_others_braked(braked_s, lands_s):
+    dog = Watchdog(WatchdogLimits(), "clock", braked_ns=round(braked_s * S))
+    steps = [n * 33 * MS for n in range(1, 40)]
+    view = VehicleView(FlightState.FLYING, True, 0.9, "")
+    landing = [at for at in steps if dog.step(at, view, Upstream()).action is Action.LAND]
+    assert lands_s <= (landing[0] - steps[0]) / S < lands_s + 0.07
 
 
 def test_before_the_vehicle_was_heard_nothing_is_decided(new_bench):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 EXTRAS = ("test", "test-slow", "check", "docs")
-OLDEST_PYTHON = "3.11.5"  # soupsieve, of the docs, needs it
+OLDEST_PYTHON = "3.11"
 _PIN = re.compile(r"^\S+==\S+.*(?:\n    --hash=.*)*\n", re.M)
 
 

@@ -1,6 +1,8 @@
 """What is installed: each part pinned and in the bill of materials, and no file whose hash is not known."""
 
+import ast
 import hashlib
+import importlib.metadata
 import importlib.util
 import re
 import shlex
@@ -72,6 +74,25 @@ def test_each_pin_has_the_hashes_of_its_files(path: Path) -> None:
 def test_the_lists_are_the_pins() -> None:
     assert {path.stem for path in LISTS} == {"run", "test", "test-slow", "check", "docs"}
     assert set().union(*map(hashes_of, LISTS)) == pins(), "make hashes"
+
+
+def test_what_tests_import_is_installed_by_make_test() -> None:
+    """What a test module imports as it is collected; with one import missing, no test beside it runs."""
+    local = {path.stem for folder in ("tests", "docs", ".ci") for path in (ROOT / folder).rglob("*")}
+    own = {path.name for path in ROOT.iterdir()} | local | sys.stdlib_module_names
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")]
+    bodies = [ast.parse(text).body for text in texts if "importorskip" not in text]
+    imports = {name.split(".")[0] for body in bodies for node in body for name in imported(node)}
+    distributions = importlib.metadata.packages_distributions()
+    needed = {re.sub(r"[-_.]+", "-", distributions[name][0]).lower() for name in imports - own}
+    lists = [ROOT / "requirements" / f"{name}.txt" for name in ("run", "test")]
+    assert needed - {pin.split("==")[0] for path in lists for pin in hashes_of(path)} == set()
+
+
+def imported(node: ast.stmt) -> list[str]:
+    if isinstance(node, ast.ImportFrom):
+        return [node.module or ""]
+    return [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
 
 
 def test_each_part_that_runs_is_installed_by_its_hash(tool: ModuleType) -> None:

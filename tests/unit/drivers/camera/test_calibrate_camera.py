@@ -5,8 +5,8 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-import yaml
 from click.testing import CliRunner
+from ruamel.yaml import YAML
 
 from drivers.camera.calibration.coverage import TILTS, coverage_of
 from drivers.camera.calibration.pattern import pattern_of
@@ -72,7 +72,7 @@ def calibrated(tmp_path, capsys):
         file = tmp_path / "out" / "lens.yaml"
         code = run(["calibrate", "camera", str(source), "--output", str(file), *options])
         said = capsys.readouterr()
-        return code, said.out + said.err, yaml.safe_load(file.read_text()) if file.exists() else None
+        return code, said.out + said.err, YAML(typ="safe").load(file.read_text()) if file.exists() else None
 
     return call
 

@@ -17,7 +17,7 @@ from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import WORLD_FROM_DOWNWARD_OPTICAL, base_from_tilted_optical
 from groundstation.geometry.tag import SquareTag
-from groundstation.process.priority import take_larger_share
+from groundstation.process.priority import take_share
 from groundstation.vehicles import kind_named
 from sim_bridge.fault_kinds import FaultKind, exchanged
 from sim_bridge.mounting import generator_of_eye, mounted
@@ -145,7 +145,7 @@ def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
 def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:
     # Linux shares the processor out by session first (autogroup): drawing must not use up what the bridge's loop gets.
     os.setsid()
-    take_larger_share(-15)  # it stands for a camera, which waits for nothing on this machine
+    take_share(-15)  # it stands for a camera, which waits for nothing on this machine
     from sim_bridge.render.process import run
 
     raise SystemExit(run(spec, modes, tally))

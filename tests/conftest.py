@@ -1,7 +1,7 @@
 """Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded evidence."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -12,7 +12,7 @@ from measurement import Measurement
 MEASUREMENT = Measurement()
 
 from groundstation.field.resolved import ResolvedField
-from groundstation.process import numba_cache
+from groundstation.process import child, numba_cache
 
 numba_cache.activate(numba_cache.EVERYTHING)
 
@@ -37,6 +37,14 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     skipped = len(reporter.stats.get("skipped", ())) if reporter else 0
     MEASUREMENT.finish(skipped, repeated=bool(session.config.getoption("lf", False)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_share() -> Iterator[None]:
+    """Children that run inside pytest leave its share of the processor as it is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(child, "take_share", lambda _nice: False)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from groundstation.errors import GroundStationError, without_passwords
 from groundstation.process import log
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.parent import ParentWatch
-from groundstation.process.priority import take_larger_share
+from groundstation.process.priority import take_share
 from groundstation.process.signals import StopSignal
 
 _STATUS_PERIOD_NS = 1_000_000_000
@@ -76,8 +76,7 @@ class Child:
         with suppress(PermissionError):  # already the leader of a group
             os.setsid()  # keeps the terminal's Ctrl-C and hang-up away from what has to land first
         log.configure(self.name)
-        if self.spec.nice:
-            take_larger_share(self.spec.nice)  # before its bus threads begin, and before it imports much
+        take_share(self.spec.nice)  # not its parent's; before its bus threads begin, and before it imports much
         self._parent = ParentWatch(self.spec.parent_pid)
         self._stop = StopSignal(self._parent)
         self._stop.install()
@@ -136,12 +135,12 @@ class Child:
         if self._block is None:
             return True
         return self._block.age_ns(SUPERVISOR_SLOT, time.monotonic_ns()) < _SUPERVISOR_STALE_NS
+
     @property
     def spoken_for_ns(self) -> int:
         """For how long others have been speaking in this process's place [ns], 0: nobody does."""
         since_ns = self.spec.spoken_since_ns
         return time.monotonic_ns() - since_ns if since_ns else 0
-
 
     def wake(self) -> None:
         """End a sleep early, the one under way or the next; from any thread."""

@@ -1,9 +1,14 @@
 """Loops with deadlines go first, and what all wait for gets a larger share, where the system lets them."""
 
 import os
+import time
 from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
+
+LARGEST = -10  # of what flies; what only emulates can have more (docs/decisions/0137)
+_AUTOGROUP = Path("/proc/self/autogroup")
+_TURNS, _TURN_S = 40, 0.05  # the kernel lets ordinary users change one session each 0.1 s, all of them together
 
 
 class Rank(IntEnum):
@@ -29,17 +34,45 @@ def go_first(rank: Rank = Rank.TICK) -> bool:
     return False
 
 
-def take_larger_share(nice: int = -10) -> bool:
-    """Let this process, with all threads that it starts from now on, have more of the processor than ordinary ones.
+def take_share(nice: int = LARGEST) -> bool:
+    """Give this thread and all that it starts from now on a share of the processor: a larger one for nice below 0.
 
-    For what others wait for and that never computes for long (docs/decisions/0137). Returns whether that is allowed.
+    A large one is for what others wait for and that never computes for long (docs/decisions/0137). Returns whether it
+    is allowed. Where not, all that is not LARGEST takes less instead, so that the proportions hold.
     Linux shares the processor out by session first (autogroup), and nice acts within one: a session of its own gets
     both.
     """
+    own_session = os.getsid(0) == os.getpid()
     with suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, nice)
-        if os.getsid(0) == os.getpid():
-            with suppress(FileNotFoundError):  # a kernel without it
-                Path("/proc/self/autogroup").write_text(str(nice))
-        return True
+        if _may_have_more():
+            _set(nice, own_session)
+            return True
+        if own_session and nice > LARGEST:
+            _set(nice - LARGEST, own_session)
     return False
+
+
+def _may_have_more() -> bool:
+    """Ask for the largest share, which is had from then on if there is the right to it."""
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, LARGEST)
+    except PermissionError:
+        return False
+    return True
+
+
+def _set(nice: int, own_session: bool) -> None:
+    with suppress(PermissionError):  # it was started with less than this
+        os.setpriority(os.PRIO_PROCESS, 0, nice)
+    for _ in range(_TURNS if own_session and _AUTOGROUP.exists() else 0):
+        with suppress(BlockingIOError):
+            _AUTOGROUP.write_text(str(nice))
+            break
+        time.sleep(_TURN_S)
+
+
+def go_back() -> None:
+    """Undo both for the calling thread."""
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        take_share(0)

@@ -59,7 +59,8 @@ def _verdict(report: RunReport) -> Text:
     if report.passed:
         return Text("PASSED", style="bold green")
     if not report.valid:
-        return Text("INVALID: the simulator did not keep real time; close other programs and repeat", style="bold red")
+        remedy = "close other programs, see what `groundstation doctor` says of this computer, and repeat"
+        return Text(f"INVALID: the simulator did not keep real time; {remedy}", style="bold red")
     failed = [criterion for criterion in report.criteria if not criterion.ok]
     return Text(f"FAILED: {'; '.join(missed(one) for one in failed)}", style="bold red")
 

@@ -5,15 +5,17 @@ A run completes the rows with its sections and addresses (`groundstation/flight/
 
 import sys
 
+from groundstation.process.priority import LARGEST
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder
 
 # Shares of a processor that is full (docs/decisions/0137): recorder and terminal have what is left.
-_WAITED_FOR, _NEEDED = -10, -5
+_WAITED_FOR, _NEEDED = LARGEST, -5
 
 GUARDIAN = ProcessSpec(
     name="guardian",
     role="guardian",
     entry="groundstation.supervisor.guardian:run",
+    nice=_WAITED_FOR,
     stop_order=StopOrder.GUARDS,
     on_bus=False,  # it needs nobody
 )
@@ -35,6 +37,7 @@ SIM_BRIDGE = ProcessSpec(
     command=(sys.executable, "-m", "sim_bridge", "--spec", "{spec}"),  # never imported by what flies
     restart=Restart.ENDS_RUN,  # a new one would put the drones back on their pads
     hang_limit_s=5.0,
+    nice=_WAITED_FOR,  # it answers for the drones
     stop_order=StopOrder.EMULATES,  # drivers land on it first
 )
 TRACKER = ProcessSpec(
@@ -78,6 +81,7 @@ LIAISON = ProcessSpec(  # name is that of the other host
     role="liaison",
     entry="groundstation.runtime.liaison:run",
     required=False,  # the devices of this host can do without
+    nice=_WAITED_FOR,  # set-points go through it
     stop_limit_s=30.0,  # the drones there land before it ends
 )
 CONSOLE = ProcessSpec(

@@ -16,6 +16,7 @@ from groundstation.bus.topics import PROCESS_STATUS
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.process import ports
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
+from groundstation.process.priority import go_back, go_first, take_share
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.events import ProcessEvents
 from groundstation.supervisor.failsafe_sender import FailsafeSender
@@ -96,11 +97,13 @@ class Supervisor:
         certify(self._identities, self.run.site, ports.host_of(self.run.endpoint), self.run.listen, names)
 
     def connect(self) -> None:
-        """Join the bus; its router is up."""
+        """Join the bus, whose router is up, and go first from now on: drones hover that hear nothing of this loop."""
         run = self.run
+        take_share()  # for the threads of its bus
         self.bus = self.events.bus = open_bus(run.endpoint, run.site, run.source, identity=self._identity())
         self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
         self._publisher = StatusPublisher(self.bus)
+        go_first()
 
     def _identity(self) -> Identity | None:
         own = Identity(str(self._identities), SOURCE, self.run.name) if self._identities else None
@@ -311,3 +314,4 @@ class Supervisor:
             shutil.rmtree(self._identities, ignore_errors=True)
         self._launcher.close()
         self._block.path.unlink(missing_ok=True)
+        go_back()

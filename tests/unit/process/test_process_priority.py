@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.process.priority import go_first, take_larger_share
+from groundstation.process.priority import LARGEST, go_first, take_share
+
+
+def inherited() -> int:
+    """What a process that is started now begins with."""
+    return os.getpriority(os.PRIO_PROCESS, 0)
 
 
 def policies() -> tuple[bool, int, int]:
@@ -42,11 +47,13 @@ def test_where_it_may_not_it_goes_on(monkeypatch) -> None:
     assert go_first() is False
 
 
-def nice_of(*, own_session: bool) -> tuple[str, str, str]:
+def nice_of(nice: int = LARGEST, *, own_session: bool, refused: bool = False) -> tuple[str, str, str]:
     """What a process got by asking, its nice value, and that of its session."""
     script = (
-        "import os; from groundstation.process.priority import take_larger_share as take;"
-        "print(take(), os.getpriority(os.PRIO_PROCESS, 0), open('/proc/self/autogroup').read().split()[-1])"
+        "import os; from groundstation.process import priority;"
+        + refused * "priority._may_have_more = lambda: False;"
+        + f"print(priority.take_share({nice}), os.getpriority(os.PRIO_PROCESS, 0),"
+        " open('/proc/self/autogroup').read().split()[-1])"
     )
     ran = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, start_new_session=own_session
@@ -59,8 +66,19 @@ def nice_of(*, own_session: bool) -> tuple[str, str, str]:
 def test_a_larger_share_is_the_processs_and_of_a_session_only_if_it_is_its_own() -> None:
     before = Path("/proc/self/autogroup").read_text().split()[-1]
     allowed, own, session = nice_of(own_session=True)
-    assert (own, session) == (("-10", "-10") if allowed == "True" else ("0", "0"))
+    assert (own, session) == (("-10", "-10") if allowed == "True" else (str(inherited()), "0"))
     assert nice_of(own_session=False)[2] == before, "others are in that session"
+
+
+@pytest.mark.skipif(not Path("/proc/self/autogroup").exists(), reason="this kernel has no autogroup")
+@pytest.mark.parametrize(("nice", "less"), [(0, "10"), (-5, "5"), (LARGEST, "0"), (-15, "0")])
+def test_where_nobody_may_have_more_the_others_have_less(nice: int, less: str) -> None:
+    allowed, own, session = nice_of(nice, own_session=True, refused=True)
+    assert (allowed, session) == ("False", less)
+    assert int(own) in (int(less), max(inherited(), int(less))), "nobody gets back what he was started without"
+    assert nice_of(nice, own_session=False, refused=True)[:2] == ("False", str(inherited())), (
+        "others are in that session"
+    )
 
 
 def test_where_it_may_not_have_more_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,4 +86,4 @@ def test_where_it_may_not_have_more_it_goes_on(monkeypatch: pytest.MonkeyPatch) 
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(os, "setpriority", refuse)
-    assert take_larger_share() is False
+    assert take_share() is False

@@ -111,7 +111,7 @@ def fly_all(
 
 def demo_command(seed: int, duration_s: float | None, folder: Path) -> list[str]:
     """Return the command line of one demo."""
-    command = [sys.executable, "-m", "groundstation.cli.main", "demo", "--headless", "--seed", str(seed)]
+    command = [sys.executable, "-m", "groundstation", "demo", "--headless", "--seed", str(seed)]
     if duration_s is not None:
         command += ["--duration", f"{duration_s:g}"]
     return [*command, "--report", str(folder)]

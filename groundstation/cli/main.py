@@ -152,7 +152,7 @@ def _tell(error: BaseException) -> None:
 
 
 def main() -> None:
-    """Entry point of the `groundstation` script."""
+    """Carry out the command of this process, and end it."""
     try:
         code = run()
     except Exception:  # noqa: BLE001  the outermost loop: a bug must not look like a failed run (exit code 1)
@@ -161,7 +161,3 @@ def main() -> None:
         traceback.print_exc()
         code = ExitCode.BUG
     sys.exit(int(code))
-
-
-if __name__ == "__main__":
-    main()

@@ -21,15 +21,16 @@ class Rank(IntEnum):
     TICK = 2
 
 
-def go_first(rank: Rank = Rank.TICK) -> bool:
-    """Put the calling thread, not those it starts, ahead of ordinary ones; returns whether that is allowed.
+def go_first(rank: Rank = Rank.TICK, *, heirs: bool = False) -> bool:
+    """Put the calling thread, and with `heirs` all that it starts, ahead of ordinary ones; returns whether it may.
 
     For loops that work a small share of each period and then sleep: senders, tracker, simulator.
     It needs CAP_SYS_NICE or `ulimit -r`; without it the thread runs like all others. The kernel keeps 5 % of each core
     for ordinary threads.
     """
     with suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(rank))
+        policy = os.SCHED_RR if heirs else os.SCHED_RR | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(rank))
         return True
     return False
 

@@ -25,7 +25,7 @@ def resolved_field(name: str, overrides: list[str]) -> ResolvedField:
 
     Nothing else here reads YAML.
     """
-    command = [sys.executable, "-m", "groundstation.cli.main", "config", "show", name, "--resolved", "--json"]
+    command = [sys.executable, "-m", "groundstation", "config", "show", name, "--resolved", "--json"]
     for override in overrides:
         command += ["--set", override]
     result = subprocess.run(command, capture_output=True, text=True, check=False)

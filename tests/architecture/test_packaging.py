@@ -80,7 +80,7 @@ def test_distribution() -> None:
         "drivers",
         "sim_bridge",
     ]
-    assert settings["project"]["scripts"]["groundstation"] == "groundstation.cli.main:main"
+    assert settings["project"]["scripts"]["groundstation"] == "groundstation.__main__:main"
     assert "Typing :: Typed" in settings["project"]["classifiers"]
 
 

@@ -45,7 +45,7 @@ def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
     arguments += ["--set", f"console.listen={NETWORK}", "--scenario", str(FEW_PICTURES)]
-    process = subprocess.Popen([sys.executable, "-m", "groundstation.cli.main", *arguments], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([sys.executable, "-m", "groundstation", *arguments], stdout=subprocess.DEVNULL)
     try:
         yield eventually(lambda: next(iter(runtime_file.live_records()), None), 60.0, "a run")
     finally:
@@ -58,7 +58,7 @@ def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
 @pytest.fixture
 def served(live: runtime_file.RuntimeRecord, free_port: int) -> Iterator[str]:
-    command = [sys.executable, "-m", "groundstation.cli.main", "console", "--port", str(free_port)]
+    command = [sys.executable, "-m", "groundstation", "console", "--port", str(free_port)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=dict(os.environ))
     url = f"http://127.0.0.1:{free_port}/"
     try:

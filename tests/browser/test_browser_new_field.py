@@ -24,7 +24,7 @@ class Form(NamedTuple):
 
 @pytest.fixture
 def form(browser: Any, tmp_path: Path) -> Iterator[Form]:
-    command = [sys.executable, "-m", "groundstation.cli.main", "new", str(tmp_path / "hall"), "--page"]
+    command = [sys.executable, "-m", "groundstation", "new", str(tmp_path / "hall"), "--page"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ, PYTHONUNBUFFERED="1"))
     assert process.stdout is not None
     context = browser.new_context(viewport={"width": 1440, "height": 900})

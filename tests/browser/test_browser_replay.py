@@ -30,7 +30,7 @@ def recorded(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator
 def replay(browser: Any, recorded: Recorded, free_port: int) -> Iterator[Callable[..., Seen]]:
     """Start the command and open its page; once more: another page of the same replay."""
     contexts: list[Any] = []
-    command = [sys.executable, "-m", "groundstation.cli.main", "replay", str(recorded.folder), "--port", str(free_port)]
+    command = [sys.executable, "-m", "groundstation", "replay", str(recorded.folder), "--port", str(free_port)]
     process = subprocess.Popen([*command, "--paused"], stdout=subprocess.DEVNULL)
     yield lambda: open_seen(browser, contexts, f"http://127.0.0.1:{free_port}/")
     for context in contexts:
@@ -169,7 +169,7 @@ def test_the_fastest_replay_loses_nothing(replay: Callable[..., Seen], recorded:
 
 
 def test_an_operator_leaves_it_with_ctrl_c(recorded: Recorded, free_port: int) -> None:
-    command = [sys.executable, "-m", "groundstation.cli.main", "replay", str(recorded.folder), "--until-end"]
+    command = [sys.executable, "-m", "groundstation", "replay", str(recorded.folder), "--until-end"]
     options = ["--port", str(free_port), "--speed", "20"]
     done = subprocess.run([*command, *options], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

@@ -85,7 +85,7 @@ def test_land_all_reaches_the_emulated_drones(live: runtime_file.RuntimeRecord, 
 
 def _hold_by_tablet(open_page: Any) -> None:
     """A tablet that was invited to stop comes in over TLS, touches HOLD, and may do nothing more."""
-    command = [sys.executable, "-m", "groundstation.cli.main", "console", "--invite", "stop"]
+    command = [sys.executable, "-m", "groundstation", "console", "--invite", "stop"]
     said = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout
     invitation = next(line for line in said.splitlines() if line.startswith("https://"))
     assert invitation.startswith(f"https://{NETWORK}:")

@@ -44,7 +44,7 @@ SAMPLE = ("flow-bias", "kidnap-2m", "occluder", "two-targets", "unkind")
 )
 def test_scenarios_end_as_their_files_expect(tmp_path: Path, names: tuple[str, ...], least: int) -> None:
     """One seed each: found in time, held, nobody lands."""
-    command = [sys.executable, "-m", "groundstation.cli.main", "experiment", "scenarios", *names]
+    command = [sys.executable, "-m", "groundstation", "experiment", "scenarios", *names]
     flown = subprocess.run(
         [*command, "--scheduler", "none", "-o", str(tmp_path)], capture_output=True, text=True, check=False
     )

@@ -19,7 +19,7 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 
-COMMAND = (sys.executable, "-m", "groundstation.cli.main")
+COMMAND = (sys.executable, "-m", "groundstation")
 FEW_PICTURES = Path(__file__).parents[1] / "fixtures" / "few_pictures.yaml"
 
 

@@ -25,7 +25,7 @@ from groundstation.supervisor.joining import join
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
 
-COMMAND = [sys.executable, "-m", "groundstation.cli.main"]
+COMMAND = [sys.executable, "-m", "groundstation"]
 SECRET = "s3cr3t-w0rd"
 
 

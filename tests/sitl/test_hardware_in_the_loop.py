@@ -35,7 +35,7 @@ from firmware import VARIABLES, Firmware, binary_of  # noqa: E402
 pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.firmware, pytest.mark.timeout(400)]
 SYSTEM = 8
 STAND_IN = "127.95.1.2"
-GROUND = (sys.executable, "-m", "groundstation.cli.main")
+GROUND = (sys.executable, "-m", "groundstation")
 
 
 def field(folder: Path, mavlink: str, address: str = "127.0.0.1", **sources: str) -> Path:

@@ -24,7 +24,7 @@ def processor_times() -> tuple[int, int]:
 
 def flown(folder):
     """Fly the team; returns (report, run directory, what was printed)."""
-    command = [sys.executable, "-m", "groundstation.cli.main", "sitl", str(FIELD), "--duration", str(FLOWN_S)]
+    command = [sys.executable, "-m", "groundstation", "sitl", str(FIELD), "--duration", str(FLOWN_S)]
     # Five cameras, fourteen processes: no more pictures than the vehicles can do with, fewer for eyes, half the plans.
     scenario = folder / "four_pictures.yaml"
     scenario.write_text("schema_version: 1\ncameras: {fps: 4}\n")
@@ -68,7 +68,7 @@ def test_mixed_team_tracks_and_lands(tmp_path):
 def judge_tlogs(run):
     """What both sides said is in the logs, in order, and any program reads it: the MAVSDK link leaves nothing out."""
     exported = subprocess.run(
-        [sys.executable, "-m", "groundstation.cli.main", "export", "--tlog", str(run)],
+        [sys.executable, "-m", "groundstation", "export", "--tlog", str(run)],
         capture_output=True,
         text=True,
         timeout=120,

@@ -19,7 +19,7 @@ FAULTS = pytest.mark.slow
 
 
 def cli(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "groundstation.cli.main", *arguments]
+    command = [sys.executable, "-m", "groundstation", *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 

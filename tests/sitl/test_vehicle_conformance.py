@@ -30,6 +30,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(300)]
     ],
 )
 def test_our_kinds_keep_the_contract(kind, options, flights):
-    command = [sys.executable, "-m", "groundstation.cli.main", "vehicle", "check", kind, "--only", flights, *options]
+    command = [sys.executable, "-m", "groundstation", "vehicle", "check", kind, "--only", flights, *options]
     result = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
     assert result.returncode == 0, result.stdout + result.stderr

@@ -29,7 +29,7 @@ def puffin(tmp_path):
 
 
 def checked(env, only, *settings):
-    command = [sys.executable, "-m", "groundstation.cli.main", "vehicle", "check", "puffin", "--only", only, *settings]
+    command = [sys.executable, "-m", "groundstation", "vehicle", "check", "puffin", "--only", only, *settings]
     return subprocess.run(command, env=env, capture_output=True, text=True, timeout=400, check=False)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import pytest
 
+from groundstation import __main__ as program
 from groundstation.cli import main as cli
 from groundstation.cli.exits import ExitCode, UnreachableError, exit_code_of
 from groundstation.cli.verbs import VERBS, CommandRow, all_verbs
@@ -156,10 +157,21 @@ def test_mixed_installations_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 def test_start_up_imports_nothing_heavy() -> None:
     """`land` must be quick: click and the table are all that is loaded before its module is."""
-    code = "import sys, groundstation.cli.main; print(*sys.modules)"
+    code = "import sys, groundstation.__main__, groundstation.cli.main; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True).stdout
     heavy = {"numpy", "pydantic", "ruamel.yaml", "zenoh", "msgspec", "rich", "scipy", "numba", "cv2", "matplotlib"}
     assert not heavy & set(loaded.split())
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_what_stops_goes_first_and_with_it_its_bus(monkeypatch: pytest.MonkeyPatch, verb: str) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(program, "go_first", lambda *, heirs: done.append(f"first {heirs}"))
+    monkeypatch.setattr(cli, "main", lambda: done.append("carried out"))
+    monkeypatch.setattr(sys, "argv", ["groundstation", verb])
+    program.main()
+    lasts = verb == "deadman"  # and drones hold when it is late
+    assert done == (["first True"] if VERBS[verb].family == "Stop" and not lasts else []) + ["carried out"]
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

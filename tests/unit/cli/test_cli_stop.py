@@ -84,7 +84,7 @@ def announce(endpoint: str, site: str = "lab", processes: tuple[ProcessRecord, .
 
 
 def cli(*arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "groundstation.cli.main", *arguments]
+    command = [sys.executable, "-m", "groundstation", *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, input=given, check=False)
 
 

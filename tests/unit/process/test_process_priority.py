@@ -16,12 +16,12 @@ def inherited() -> int:
     return os.getpriority(os.PRIO_PROCESS, 0)
 
 
-def policies() -> tuple[bool, int, int]:
+def policies(*, heirs: bool) -> tuple[bool, int, int]:
     """What a thread got by asking, its own policy, and that of a thread it started."""
     found: list[tuple[bool, int, int]] = []
 
     def ask() -> None:
-        allowed, started = go_first(), []
+        allowed, started = go_first(heirs=heirs), []
         child = threading.Thread(target=lambda: started.append(os.sched_getscheduler(0)))
         child.start()
         child.join()
@@ -33,10 +33,11 @@ def policies() -> tuple[bool, int, int]:
     return found[0]
 
 
-def test_only_the_thread_that_asks_goes_first() -> None:
-    allowed, own, started = policies()
+@pytest.mark.parametrize("heirs", [False, True])
+def test_only_the_thread_that_asks_goes_first_unless_it_asks_for_its_heirs(heirs: bool) -> None:
+    allowed, own, started = policies(heirs=heirs)
     assert own == (os.SCHED_RR if allowed else os.SCHED_OTHER)
-    assert started == os.SCHED_OTHER
+    assert started == (own if heirs else os.SCHED_OTHER)
 
 
 def test_where_it_may_not_it_goes_on(monkeypatch) -> None:

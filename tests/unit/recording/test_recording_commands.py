@@ -225,7 +225,7 @@ def test_a_full_disk_is_named_and_nothing_is_left_behind(command: tuple[str, ...
         resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 
     result = subprocess.run(
-        [sys.executable, "-m", "groundstation.cli.main", "recording", command[0], str(whole), *command[1:]],
+        [sys.executable, "-m", "groundstation", "recording", command[0], str(whole), *command[1:]],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": str(REPOSITORY), "PYTHONDONTWRITEBYTECODE": "1"},
         preexec_fn=little_room,

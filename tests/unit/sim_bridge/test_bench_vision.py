@@ -96,7 +96,7 @@ def test_too_few_pictures_are_refused():
 @pytest.mark.exhaustive
 @pytest.mark.timeout(400)
 def test_the_command_judges(tmp_path):
-    command = [sys.executable, "-m", "groundstation.cli.main", "bench", "vision", "--pictures", "8", "--json"]
+    command = [sys.executable, "-m", "groundstation", "bench", "vision", "--pictures", "8", "--json"]
     result = subprocess.run(
         [*command, "--output", str(tmp_path)], capture_output=True, text=True, timeout=380, check=False
     )

@@ -145,7 +145,7 @@ def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
 def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:
     # Linux shares the processor out by session first (autogroup): drawing must not use up what the bridge's loop gets.
     os.setsid()
-    take_share(-15)  # it stands for a camera, which waits for nothing on this machine
+    take_share(-10)  # it stands for a camera, which waits for nothing on this machine
     from sim_bridge.render.process import run
 
     raise SystemExit(run(spec, modes, tally))

@@ -6,7 +6,7 @@ from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
 
-LARGEST = -10  # of what flies; what only emulates can have more (docs/decisions/0137)
+LARGEST = -5  # of what flies; what only emulates can have more (docs/decisions/0137)
 _AUTOGROUP = Path("/proc/self/autogroup")
 _TURNS, _TURN_S = 40, 0.05  # the kernel lets ordinary users change one session each 0.1 s, all of them together
 
@@ -24,7 +24,7 @@ class Rank(IntEnum):
 def go_first(rank: Rank = Rank.TICK, *, heirs: bool = False) -> bool:
     """Put the calling thread, and with `heirs` all that it starts, ahead of ordinary ones; returns whether it may.
 
-    For loops that work a small share of each period and then sleep: senders, tracker, simulator.
+    For loops that work a small share of each period and then sleep, senders, tracker, simulator; and for stops.
     It needs CAP_SYS_NICE or `ulimit -r`; without it the thread runs like all others. The kernel keeps 5 % of each core
     for ordinary threads.
     """

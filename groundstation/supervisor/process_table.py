@@ -8,8 +8,8 @@ import sys
 from groundstation.process.priority import LARGEST
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder
 
-# Shares of a processor that is full (docs/decisions/0137): recorder and terminal have what is left.
-_WAITED_FOR, _NEEDED = LARGEST, -5
+# Shares of a processor that is full, each a third of the one before (docs/decisions/0137).
+_WAITED_FOR, _NEEDED, _LAST = LARGEST, LARGEST + 5, LARGEST + 10
 
 GUARDIAN = ProcessSpec(
     name="guardian",
@@ -55,6 +55,7 @@ RECORDER = ProcessSpec(
     name="recorder",
     role="recorder",
     entry="groundstation.runtime.recorder:run",
+    nice=_NEEDED,  # one that waits for 5 s is started again, and a full machine is when a recording is asked for
     silence_limit_s=5.0,
     hang_limit_s=5.0,  # nobody flies by it, and a slow disk is no fault of its own
     stop_order=StopOrder.RECORDS,
@@ -98,6 +99,7 @@ MONITOR = ProcessSpec(
     name="monitor",
     role="monitor",
     entry="groundstation.runtime.monitor:run",
+    nice=_LAST,
     silence_limit_s=5.0,
     hang_limit_s=5.0,
     stop_order=StopOrder.DECIDES,  # the terminal is the operator's again before the shut-down writes on it

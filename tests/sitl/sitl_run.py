@@ -59,7 +59,7 @@ class SitlRun:
         while time.monotonic() < deadline:
             for record in runtime_file.live_records():
                 if record.supervisor.pid == self.process.pid:
-                    self._bus = join(record, "view", Role.VIEW)
+                    self._bus = join(record, "view", Role.VIEW, timeout_s=10.0)
                     topics = (VEHICLE_STATUS, PROCESS_STATUS, EVENT, TRUTH, SETPOINT)
                     self._inbox = self._bus.subscribe(topics, capacity=100_000)
                     return record

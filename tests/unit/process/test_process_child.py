@@ -82,12 +82,12 @@ def test_a_child_takes_the_share_that_its_row_gives_it() -> None:
     script = (
         "import os; from groundstation.process.child import Child, ChildSpec;"
         "from groundstation.process.priority import take_share;"
-        "child = Child(ChildSpec('x', 'test', '', 'lab', nice=-5)).__enter__();"
-        "print(os.getpriority(os.PRIO_PROCESS, 0), take_share(-5))"
+        "child = Child(ChildSpec('x', 'test', '', 'lab', nice=-2)).__enter__();"
+        "print(os.getpriority(os.PRIO_PROCESS, 0), take_share(-2))"
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     nice, allowed = ran.stdout.split()
-    assert int(nice) == (-5 if allowed == "True" else max(5, os.getpriority(os.PRIO_PROCESS, 0)))
+    assert int(nice) == (-2 if allowed == "True" else max(3, os.getpriority(os.PRIO_PROCESS, 0)))
 
 
 def test_attaching_to_a_block_that_is_gone_fails(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_its_loop_goes_first_while_it_watches_and_nothing_that_it_started(make: 
     allowed = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR
     pids = [process.pid for process in supervisor.processes[1:]]
     assert [os.sched_getscheduler(pid) for pid in pids] == [os.SCHED_OTHER] * 2
-    assert [os.getpriority(os.PRIO_PROCESS, pid) for pid in pids] == ([-5, 0] if allowed else [5, 10])
+    assert [os.getpriority(os.PRIO_PROCESS, pid) for pid in pids] == ([-5, 0] if allowed else [0, 5])
     supervisor.close()
     assert (os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == (os.SCHED_OTHER, 0)
 

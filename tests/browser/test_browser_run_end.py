@@ -41,6 +41,10 @@ def test_a_normal_end_is_calm_and_leaves_nothing_to_stop(stage: Any) -> None:
     assert all(stop.is_disabled() and "the run has ended" in stop.get_attribute("title") for stop in stops(page))
     page.page.wait_for_timeout(3000)  # nobody beats any more, and nobody needs to
     assert page.there("recording").inner_text() == "ended"
+    assert page.there("worst-age").inner_text() == "–"
+    assert {pill.get_attribute("data-level") for pill in page.page.locator("#processes .pill:not(.plain)").all()} == {
+        "wait"
+    }
     page.page.keyboard.press("l")
     assert "the run has ended" in page.there("orders").inner_text()
     page.shot("run_ended")

@@ -23,7 +23,7 @@ export function showBar() {
   const least = Math.min(...droneNames().map(minutesLeft).filter((minutes) => minutes !== null));
   text(byId("battery-lasts"), Number.isFinite(least) ? `worst, ${least < 1 ? "< 1" : Math.floor(least)} min` : "worst battery");
   const oldest = oldestS();
-  show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
+  show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
   text(byId("verdict"), replaying() ? "" : verdict());
   showStages(stage());

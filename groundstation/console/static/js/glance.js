@@ -67,7 +67,8 @@ export function batteryLevel(name, value) {
   return value < limit + 0.05 ? "bad" : value < limit + 0.15 ? "warn" : "good";
 }
 
-export const oldestS = () => Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));
+// NaN once the run is over: nothing gets older any more.
+export const oldestS = () => runOver() ? NaN : Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));
 
 // Nobody is heard of once the run is over: then what counts is how long the recorder was silent before the others were.
 function recorderSilentS(recorder) {

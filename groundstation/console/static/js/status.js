@@ -85,13 +85,14 @@ export function showEvents() {
 export function showProcesses() {
   const processes = Object.entries(store.s.processes ?? {}).sort(([a], [b]) => a.localeCompare(b));
   const total = processes.reduce((sum, [, status]) => sum + (ageS(status.at) < 3 ? status.cpu : 0), 0);
-  const host = byId("processes"), key = JSON.stringify(processes.map(([name, { cpu, state, late, at }]) => [name, cpu, state, late, ageS(at) > 3]));
+  const host = byId("processes"), over = runOver();
+  const key = JSON.stringify([over, processes.map(([name, { cpu, state, late, at }]) => [name, cpu, state, late, ageS(at) > 3])]);
   if (host.dataset.key === key) return;
   host.dataset.key = key;
   host.replaceChildren(...processes.map(([name, status]) => {
     const silent = ageS(status.at) > 3 && status.state !== "STOPPING";
-    const level = silent ? "bad" : status.state === "DEGRADED" ? "warn" : status.state === "READY" ? "good" : "wait";
+    const level = over ? "wait" : silent ? "bad" : status.state === "DEGRADED" ? "warn" : status.state === "READY" ? "good" : "wait";
     const late = status.late > 0.01 ? ` · ${(100 * status.late).toFixed(0)} % late` : "";
-    return el("span", { class: "pill num", title: status.detail, data: { level } }, `${name} ${silent ? "silent" : `${(100 * status.cpu).toFixed(0)} %${late}`}`);
+    return el("span", { class: "pill num", title: status.detail, data: { level } }, `${name} ${over ? "ended" : silent ? "silent" : `${(100 * status.cpu).toFixed(0)} %${late}`}`);
   }), el("span", { class: "pill plain num" }, `together ${total.toFixed(2)} cores`));
 }

@@ -4,8 +4,8 @@ import sys
 
 from groundstation.process.priority import go_first
 
-# An ordinary process of a shell gets a thirtieth of a full machine (docs/decisions/0137). A dead man's switch stays one:
-# drones hold when it is late, and it lasts.
+# An ordinary process of a shell gets a thirtieth of a full machine (docs/decisions/0137). A dead man's switch stays
+# one: drones hold when it is late, and it lasts.
 STOPS = ("hold", "land", "cut-motors")
 
 

@@ -1,4 +1,4 @@
-"""The start of a run: guardian and router, then everything else at once, and the wait until it is up."""
+"""The start of a run: guardian and router, then what it cannot do without, then the devices."""
 
 import time
 
@@ -24,7 +24,9 @@ class Start:
         self._supervisor = supervisor
 
     def run(self) -> None:
-        """Compile kernels where they lack, start guardian and router, then everything else; returns when it can begin.
+        """Compile kernels where they lack, start one rank after the other; returns when the run can begin.
+
+        Devices come last: emulated ones answer once the simulator is up, and would be told of as silent before.
 
         Raises GroundStationError when a required process cannot be started, fails or is late, Interrupted when the
         operator stops it.
@@ -37,10 +39,14 @@ class Start:
         self._wait_for(first)
         supervisor.connect()
         others = [p for p in supervisor.processes if p not in first and not p.spec.on_terminal]
-        self._launch_all(others)
+        required = [p for p in others if p.spec.required]
+        self._launch_all(required)
         supervisor.write_runtime_file()
-        self._wait_for([p for p in others if p.spec.required])
-        self._wait_for([p for p in others if not p.spec.required], limit_s=_OPTIONAL_GRACE_S)
+        self._wait_for(required)
+        optional = [p for p in others if not p.spec.required]
+        self._launch_all(optional)
+        supervisor.write_runtime_file()
+        self._wait_for(optional, _OPTIONAL_GRACE_S)
 
     def show_screen(self) -> None:
         """Hand the terminal to the process that draws on it, if the table has one; once."""
@@ -62,10 +68,10 @@ class Start:
             self._supervisor.launch(process)
             self._raise_failure()
 
-    def _wait_for(self, processes: list[ManagedProcess], limit_s: float | None = None) -> None:
-        """Wait until all are up, for each as long as its start may take, or `limit_s`; go on without optional ones."""
+    def _wait_for(self, processes: list[ManagedProcess], grace_s: float | None = None) -> None:
+        """Wait until all are up, or their time is over; go on without those that have a grace only."""
         supervisor = self._supervisor
-        waiting = Waiting(processes, time.monotonic(), limit_s)
+        waiting = Waiting(processes, time.monotonic(), grace_s)
         while waiting.processes:
             supervisor.step()
             now_s = time.monotonic()

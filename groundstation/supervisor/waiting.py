@@ -5,19 +5,22 @@ from groundstation.supervisor.managed_process import ManagedProcess
 
 _NOTE_PERIOD_S = 2.0
 _SAME_NOTE_PERIOD_S = 10.0
+_TO_BEGIN = 3.0
 
 
 class Waiting:
     """Processes that are not up yet.
 
-    limit_s: how long each may take from `began_s` on (None: its own start limit, over all of its restarts). Within it
-    they are waited for until they are READY: a device may answer a moment after its driver has begun.
+    Each may take as long as its own start limit from `began_s` on, over all of its restarts. grace_s: the start can do
+    without them, and waits for so long, from when each has come up or failed for the first time, until it is READY: a
+    device may answer a moment after its driver has begun. One that does not begin at all has three times as long.
     """
 
-    def __init__(self, processes: list[ManagedProcess], began_s: float, limit_s: float | None = None) -> None:
+    def __init__(self, processes: list[ManagedProcess], began_s: float, grace_s: float | None = None) -> None:
         self.processes = list(processes)
         self._began_s = self._noted_s = began_s
-        self._limit_s = limit_s
+        self._grace_s = grace_s
+        self._begun_s: dict[str, float] = {}
         self._noted = ""
         self._seen_up: list[tuple[ManagedProcess, int]] = []
 
@@ -29,8 +32,7 @@ class Waiting:
 
     def take_late(self, now_s: float) -> list[ManagedProcess]:
         """Return those whose time is up; nobody waits for them any longer."""
-        elapsed_s = now_s - self._began_s
-        return self._take([p for p in self.processes if elapsed_s > (self._limit_s or p.spec.start_limit_s)])
+        return self._take([process for process in self.processes if self._is_late(process, now_s)])
 
     def note(self, now_s: float) -> str:
         """Return whom the start waits for when the operator should read it (again), else nothing."""
@@ -41,7 +43,14 @@ class Waiting:
         return note
 
     def _is_up(self, process: ManagedProcess) -> bool:
-        return process.is_up and (self._limit_s is None or process.state is SlotState.READY)
+        return process.is_up and (self._grace_s is None or process.state is SlotState.READY)
+
+    def _is_late(self, process: ManagedProcess, now_s: float) -> bool:
+        if self._grace_s is None:
+            return now_s - self._began_s > process.spec.start_limit_s
+        if process.is_up or process.life:
+            return now_s - self._begun_s.setdefault(process.spec.name, now_s) > self._grace_s
+        return now_s - self._began_s > _TO_BEGIN * self._grace_s
 
     def _take(self, processes: list[ManagedProcess]) -> list[ManagedProcess]:
         self.processes = [process for process in self.processes if process not in processes]

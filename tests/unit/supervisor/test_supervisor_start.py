@@ -58,6 +58,15 @@ def test_crash_of_a_required_process_at_start_names_its_log(make: Callable[..., 
         start(supervisor)
 
 
+def test_devices_begin_once_what_emulates_them_answers(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(
+        spec("drone_1", "obedient", required=False), spec("sim_bridge", "obedient", section='{"slow_s": 0.7}')
+    )
+    start(supervisor)
+    driver, sim_bridge = supervisor.processes[1:]
+    assert driver.started_ns - sim_bridge.started_ns > 700_000_000
+
+
 def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -78,8 +87,8 @@ def test_late_start_is_waited_for_and_a_recovery_told(make: Callable[..., Superv
     until(supervisor, lambda: "ceiling      ready  fine" in (tmp_path / "terminal").read_text())
 
 
-@pytest.mark.parametrize(("limit_s", "up"), [(5.0, []), (None, ["ceiling"])], ids=["optional", "required"])
-def test_a_device_that_may_still_answer_is_waited_for(limit_s: float | None, up: list[str]) -> None:
+@pytest.mark.parametrize(("grace_s", "up"), [(5.0, []), (None, ["ceiling"])], ids=["optional", "required"])
+def test_a_device_that_may_still_answer_is_waited_for(grace_s: float | None, up: list[str]) -> None:
     row = SimpleNamespace(name="ceiling", start_limit_s=60.0)
     ceiling = SimpleNamespace(spec=row, is_up=True, life=1, state=SlotState.DEGRADED)
 
@@ -87,8 +96,8 @@ def test_a_device_that_may_still_answer_is_waited_for(limit_s: float | None, up:
         waiting.take_up()  # who dies of its first work is not up: only the second look counts
         return [process.spec.name for process in waiting.take_up()]
 
-    waiting = Waiting([ceiling], 0.0, limit_s)  # type: ignore[list-item]
-    assert (taken(), bool(waiting.take_late(4.9))) == (up, False)
+    waiting = Waiting([ceiling], 0.0, grace_s)  # type: ignore[list-item]
+    assert (taken(), waiting.take_late(10.0), waiting.take_late(14.9)) == (up, [], [])
     ceiling.state = SlotState.READY
     assert up + taken() == ["ceiling"]
 

@@ -25,7 +25,9 @@ from groundstation.supervisor.runtime_file import RuntimeRecord
 
 _PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
 _PATIENCE_DEFAULT_S = 5.0
-_CONNECT_S = 0.5
+# A router that died is back by then; drones hover without one. One that lives may be busy, and a signal is the last
+# resort: drivers that get it land and exit, whatever was asked.
+_CONNECT_S = 2.0
 
 
 def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:

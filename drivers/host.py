@@ -32,9 +32,8 @@ from groundstation.time_units import NS_PER_S
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS = 200_000_000
 _FLUSH_PERIOD_NS = 100_000_000
-_FLOOD_NS = 10_000_000
-_UNANSWERED_NS = 5_000_000_000
-_UNCONFIGURED_NS = 15_000_000_000
+_FLOOD_NS, _NEVER_NS = 10_000_000, 1 << 62
+_UNANSWERED_NS, _UNCONFIGURED_NS = 5_000_000_000, 15_000_000_000
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
@@ -85,9 +84,10 @@ class VehicleHost:
         """Have a function called, on the network's thread, whenever a setpoint arrives."""
         self._setpoints.on_arrival = wake
 
-    def is_due(self, now_ns: int) -> bool:
-        """Whether a setpoint or command cannot wait for the next turn; a flood of commands waits a little."""
-        return self._setpoints.waiting or (self._commands.waiting and now_ns - self._turned_ns >= _FLOOD_NS)
+    def due_ns(self) -> int:
+        """Return when a setpoint or command asks for a turn; a flood of commands waits a little."""
+        asked_ns = self._turned_ns + _FLOOD_NS if self._commands.waiting else _NEVER_NS
+        return 0 if self._setpoints.waiting else asked_ns
 
     def turn(self, now_ns: int) -> WatchdogDecision:
         """Run one cycle: orders, decision, command to the vehicle, reports."""
@@ -314,7 +314,7 @@ def run_hosts(
 
 def sleep_serving(child: HostProcess, hosts: Sequence[VehicleHost], deadline_ns: int) -> None:
     """Sleep until the next turn; a host whose orders call `child.wake` turns at once when one arrives."""
-    while child.sleep_until(deadline_ns) and clock.now_ns() < deadline_ns:
+    while child.sleep_until(min(deadline_ns, *(host.due_ns() for host in hosts))) and clock.now_ns() < deadline_ns:
         for host in hosts:
-            if host.is_due(now_ns := clock.now_ns()):
+            if host.due_ns() <= (now_ns := clock.now_ns()):
                 host.turn(now_ns)

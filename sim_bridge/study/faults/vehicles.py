@@ -130,5 +130,5 @@ class Drivers:
             if due:
                 fleet.turn(now_ns)
             for host in hosts:
-                if due or host.is_due(now_ns):
+                if due or host.due_ns() <= now_ns:
                     self.decisions[host.vehicle.name] = host.turn(now_ns)

@@ -1,4 +1,7 @@
-"""Which orders count: those for this run that are not too old; to start, those of the holder of a live lease."""
+"""Which orders count: those for this run that are not too old; to start, those of the holder of a live lease.
+
+A start that was given before the last stop never counts: repetitions of it may come after that stop.
+"""
 
 from dataclasses import dataclass
 
@@ -26,6 +29,8 @@ class LeaseBook:
     source: str = ""
     expires_ns: int = 0
     stamp_ns: int = -1
+    stopped_ns: int = -1
+    stopped_by: str = ""
 
     def accept(self, now_ns: int, lease: Lease) -> str:
         """Take a lease message; returns "" or why it is ignored (other_clock, future, held, old)."""
@@ -55,7 +60,13 @@ class LeaseBook:
             return "no live operator lease"
         if (command.issuer, command.header.source) != (self.holder, self.source):
             return f"the operator lease is held by {self.holder}"
-        return ""
+        return f"{self.stopped_by} came after it" if command.header.stamp_ns < self.stopped_ns else ""
+
+    def hear_stop(self, now_ns: int, stop: Command) -> None:
+        """Remember a stop that counts; one from another clock is as old as its arrival."""
+        given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == self.clock else now_ns
+        if given_ns > self.stopped_ns:
+            self.stopped_ns, self.stopped_by = given_ns, f"{stop.verb} by {stop.issuer}"
 
     def _staleness(self, now_ns: int, stop: Command) -> str:
         age_ns = now_ns - stop.header.stamp_ns

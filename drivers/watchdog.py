@@ -79,8 +79,10 @@ class Watchdog:
         before = self._acks.answered(command)
         if before is not None:
             return received, before
-        refusal = self.lease.refusal(now_ns, command) or self._obey(now_ns, command)
-        return received, self._acks.answer(command, refusal)
+        refusal = self.lease.refusal(now_ns, command)
+        if command.verb.stops and not refusal:
+            self.lease.hear_stop(now_ns, command)
+        return received, self._acks.answer(command, refusal or self._obey(now_ns, command))
 
     def _obey(self, now_ns: int, command: Command) -> str:
         match command.verb:

@@ -21,6 +21,7 @@ from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
+from groundstation.runtime.requests import Requests, overtakes
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
 from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.time_units import NS_PER_S
@@ -68,6 +69,7 @@ class Operator:
         self.mistake: Mistake | None = None
         self.tracking_since_ns = 0
         self._inbox = bus.subscribe([COMMAND, COMMAND_ACK])
+        self._requests = Requests(bus, drones)
         self._dialogues: list[_Dialogue] = []
         self._sequence: TakeOff | None = None
         self._sequence_request: Command | None = None
@@ -114,18 +116,23 @@ class Operator:
 
     def land(self, now_ns: int) -> None:
         """Land everybody; whatever else was going on ends."""
-        self._abandon()
         if self.phase is not TeamPhase.LANDING:
             self.phase = TeamPhase.LANDING
-            self._give(Verb.LAND, (), now_ns)
+            self._end_starts(self._give(Verb.LAND, (), now_ns).command, now_ns)
 
     def landed(self, now_ns: int) -> bool:
         """Whether no drone is in the air, as far as they say."""
         return not self.team.airborne(now_ns)
 
-    def _abandon(self) -> None:
+    def _end_starts(self, stop: Command, now_ns: int) -> None:
+        """Give up what was to begin, for a stop of the whole team, and tell who asked for it."""
+        self._requests.hear_stop(now_ns, stop)
+        starts = [dialogue for dialogue in self._dialogues if not dialogue.book.command.verb.stops]
+        for request in (self._sequence_request, *(dialogue.request for dialogue in starts)):
+            if request is not None:
+                self._requests.answer(request, AckStage.REFUSED, overtakes(stop))
         self._sequence, self._sequence_request = None, None
-        self._dialogues = [d for d in self._dialogues if d.book.command.verb.stops]
+        self._dialogues = [dialogue for dialogue in self._dialogues if dialogue not in starts]
 
     def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AwaitedAnswers:
         self._count += 1
@@ -187,14 +194,16 @@ class Operator:
         elif self._is_void(command, now_ns):
             return  # no driver obeys it, and it is theirs to say so
         elif command.verb.stops and not self._is_partial(command):
+            self._end_starts(command, now_ns)
             if self.phase is not TeamPhase.LANDING:
-                self._abandon()
                 self.phase = TeamPhase.HELD if command.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{command.verb} by {command.issuer}")
-        elif command.verb.stops and self._sequence is not None:
-            for name in command.scope:
-                self._sequence.drop(name, f"{command.verb} by {command.issuer}", now_ns)
-            self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")
+        elif command.verb.stops:
+            self._requests.hear_stop(now_ns, command)
+            if self._sequence is not None:
+                for name in command.scope:
+                    self._sequence.drop(name, f"{command.verb} by {command.issuer}", now_ns)
+                self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")
 
     def _is_void(self, stop: Command, now_ns: int) -> bool:
         old = stop.header.clock == clock.clock_id() and now_ns - stop.header.stamp_ns > STOP_LIVES_NS
@@ -206,23 +215,17 @@ class Operator:
     # --- requests of other shells --------------------------------------------------------------------------------
 
     def _serve(self, request: Command, now_ns: int) -> None:
+        if self._requests.repeated(request):
+            return
+        self._requests.answer(request, AckStage.RECEIVED)
         names = tuple(name for name in request.scope if name != OPERATOR)
-        strangers = [name for name in names if name not in self.team.members]
-        if any(d.request is not None and d.request.id == request.id for d in self._dialogues) or (
-            self._sequence_request is not None and self._sequence_request.id == request.id
-        ):
-            return  # a repetition
-        self._answer(request, AckStage.RECEIVED)
-        if request.run != self._bus.run:
-            self._answer(request, AckStage.REFUSED, f"given for another run ({request.run})")
-        elif strangers:
-            self._answer(request, AckStage.REFUSED, f"there is no drone {', '.join(strangers)}")
-        elif self._sequence is not None:
-            self._answer(request, AckStage.REFUSED, f"{self._sequence.current} is taking off")
-        elif request.verb is Verb.TAKEOFF and (why := self._why_not(request, names, now_ns)):
-            self._answer(request, AckStage.REFUSED, why)
-        else:
-            self._answer(request, AckStage.ACCEPTED)
+        why = self._requests.refusal(now_ns, request)
+        if not why and self._sequence is not None:
+            why = f"{self._sequence.current} is taking off"
+        if not why and request.verb is Verb.TAKEOFF:
+            why = self._why_not(request, names, now_ns)
+        self._requests.answer(request, AckStage.REFUSED if why else AckStage.ACCEPTED, why)
+        if not why:
             self._obey(request, names, now_ns)
 
     def _why_not(self, request: Command, names: tuple[str, ...], now_ns: int) -> str:
@@ -240,11 +243,6 @@ class Operator:
                 self._give(verb, names, now_ns, request)
                 if verb is Verb.RESUME:
                     self.phase = TeamPhase.TRACKING
-
-    def _answer(self, request: Command, stage: AckStage, reason: str = "") -> None:
-        header = self._bus.header(OPERATOR)
-        ack = CommandAck(header=header, command_id=request.id, verb=request.verb, stage=stage, reason=reason)
-        self._bus.publish(COMMAND_ACK, ack)
 
     # --- what is under way ---------------------------------------------------------------------------------------
 
@@ -268,12 +266,12 @@ class Operator:
         if dialogue.request is None:
             return
         if book.confirmed:
-            self._answer(dialogue.request, AckStage.EFFECTIVE)
+            self._requests.answer(dialogue.request, AckStage.EFFECTIVE)
         else:
             failed = [
                 f"{n}: {p.text(final=True)}" for n, p in book.progress.items() if p.stage is not AckStage.EFFECTIVE
             ]
-            self._answer(dialogue.request, AckStage.REFUSED, "; ".join(failed) or "no drone is up")
+            self._requests.answer(dialogue.request, AckStage.REFUSED, "; ".join(failed) or "no drone is up")
 
     def _go_on(self, sequence: TakeOff, now_ns: int) -> None:
         progress = self._take_off_book.progress.get(sequence.current) if self._take_off_book else None
@@ -311,6 +309,6 @@ class Operator:
         self.mistake = sequence.mistake
         if request is not None:
             missing = "; ".join(f"{name}: {reason}" for name, reason in sequence.left_out.items())
-            self._answer(request, AckStage.REFUSED if missing else AckStage.EFFECTIVE, missing)
+            self._requests.answer(request, AckStage.REFUSED if missing else AckStage.EFFECTIVE, missing)
         if self._then_track and sequence.up and sequence.mistake is None:
             self.track(now_ns, tuple(sequence.up))

@@ -286,7 +286,7 @@ def test_another_shell_may_ask_for_take_off(scene: Scene) -> None:
     other = MemoryBus(scene.exchange, "lab", "cli_1")
     acks = other.subscribe([COMMAND_ACK], entity="operator")
     request = Command(
-        header=other.header("operator"), id="r1", verb=Verb.TAKEOFF, scope=("operator",), issuer="cli_1", expires_ns=1
+        header=other.header("operator"), id="r1", verb=Verb.TAKEOFF, scope=("operator",), issuer="cli_1", expires_ns=0
     )
     scene.pass_(0.2)
     other.publish(COMMAND, request)
@@ -295,7 +295,7 @@ def test_another_shell_may_ask_for_take_off(scene: Scene) -> None:
     assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]
     phases = [scene.operator.phase]
     other.publish(COMMAND, Command(header=other.header("operator"), id="r2", verb=Verb.TRACK, scope=("operator",),
-                                   issuer="cli_1", expires_ns=1))  # fmt: skip
+                                   issuer="cli_1", expires_ns=0))  # fmt: skip
     scene.pass_(2.0)
     stages = [r.message.stage for r in acks.drain() if isinstance(r.message, CommandAck)]
     assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]

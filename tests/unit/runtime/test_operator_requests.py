@@ -35,11 +35,17 @@ class Desk:
         self.now_ns += round(seconds * S)
         self.operator.step(self.now_ns)
 
-    def ask(self, verb, *scope, identity="r"):
-        header = self.shell.header("team")
-        request = Command(header=header, id=identity, verb=verb, scope=scope, issuer="cli_1")
-        self.shell.publish(COMMAND, request)
+    def command(self, verb, *scope, identity="r", age_s=0.0, lives_s=0.0):
+        header = self.shell.header("team", self.now_ns - round(age_s * S))
+        expires_ns = header.stamp_ns + round(lives_s * S) if lives_s else 0
+        return Command(header=header, id=identity, verb=verb, scope=scope, issuer="cli_1", expires_ns=expires_ns)
+
+    def send(self, command):
+        self.shell.publish(COMMAND, command)
         self.turn()
+
+    def ask(self, verb, *scope, identity="r"):
+        self.send(self.command(verb, *scope, identity=identity))
 
     def confirm(self, *stages, refused=()):
         """Let every drone answer the newest order of the operator."""
@@ -106,7 +112,7 @@ def test_strangers_and_repetitions_order_nothing():
     for _ in range(2):
         desk.ask(Verb.RESUME, OPERATOR, "drone_1", identity="same")
     assert len({order.id for order in desk.orders()}) == 1
-    assert [stage for stage, _ in desk.stages()] == [AckStage.RECEIVED, AckStage.ACCEPTED]
+    assert [stage for stage, _ in desk.stages()] == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.ACCEPTED]
 
 
 def test_nothing_else_is_begun_during_a_take_off_and_its_request_is_not_begun_twice():
@@ -114,9 +120,41 @@ def test_nothing_else_is_begun_during_a_take_off_and_its_request_is_not_begun_tw
     for _ in range(2):
         desk.ask(Verb.TAKEOFF, OPERATOR, "drone_1", identity="t")
     desk.ask(Verb.RESUME, OPERATOR, "drone_1", identity="r")
-    assert [stage for stage, _ in desk.stages()] == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.RECEIVED,
-                                                     AckStage.REFUSED]  # fmt: skip
+    begun = [AckStage.RECEIVED, AckStage.ACCEPTED]
+    assert [stage for stage, _ in desk.stages()] == [*begun, AckStage.ACCEPTED, AckStage.RECEIVED, AckStage.REFUSED]
     assert {order.verb for order in desk.orders()} == {Verb.TAKEOFF}
+
+
+@pytest.mark.parametrize("scope", [(), ("drone_1",), ("drone_1", "drone_2")], ids=["all", "one", "all by name"])
+@pytest.mark.parametrize("stop", [Verb.HOLD, Verb.LAND])
+@pytest.mark.parametrize("start", [Verb.TAKEOFF, Verb.TRACK, Verb.RESUME])
+def test_a_start_that_is_repeated_after_a_stop_is_not_begun_again(start, stop, scope):
+    desk = Desk(drone_1=UP, drone_2=UP)
+    request = desk.command(start, OPERATOR, identity="start", age_s=3)
+    desk.send(request)
+    desk.send(desk.command(stop, *scope, identity="stop", age_s=2))
+    desk.stages()
+    begun = [order for order in desk.orders() if order.verb is start]
+    desk.send(request)
+    assert [order for order in desk.orders() if order.verb is start and order.id not in {o.id for o in begun}] == []
+    if scope != ("drone_1",):
+        assert desk.stages() == [(AckStage.REFUSED, f"{stop} by cli_1 came after it")]
+
+
+@pytest.mark.parametrize("scope", [(), ("drone_1",)], ids=["all", "one"])
+def test_a_start_that_arrives_after_a_later_stop_is_refused_and_a_new_one_is_not(scope):
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.send(desk.command(Verb.HOLD, *scope, identity="stop", age_s=2))
+    desk.send(desk.command(Verb.TRACK, OPERATOR, identity="late", age_s=3))
+    assert desk.stages()[-1] == (AckStage.REFUSED, "HOLD by cli_1 came after it")
+    desk.send(desk.command(Verb.TRACK, OPERATOR, identity="new", age_s=1))
+    assert desk.stages()[-1] == (AckStage.ACCEPTED, "")
+
+
+def test_a_request_that_lay_somewhere_for_too_long_is_refused():
+    desk = Desk(drone_1=UP)
+    desk.send(desk.command(Verb.TRACK, OPERATOR, age_s=7, lives_s=5))
+    assert desk.stages()[-1] == (AckStage.REFUSED, "given 7 s ago")
 
 
 @pytest.mark.parametrize(("verb", "limit_s"), [(Verb.LAND, 20.0), (Verb.RESUME, 6.0)])

@@ -91,3 +91,18 @@ def test_a_watchdog_without_a_run_asks_for_none(new_bench):
     bench = new_bench().fly()
     answer = bench.watchdog.accept_command(bench.now, command(bench, Verb.LAND, "any"))[-1]
     assert answer.stage is AckStage.ACCEPTED
+
+
+@pytest.mark.parametrize(("clock", "age_s"), [("clock", 1.0), ("clock", -9.0), ("another host's", 40.0)])
+@pytest.mark.parametrize("start", [Verb.TRACK, Verb.RESUME])
+def test_a_start_that_was_given_before_a_stop_is_refused_and_a_new_one_is_not(new_bench, start, clock, age_s):
+    bench = new_bench().fly()
+    given = bench.now
+    held = command(bench, Verb.HOLD, issuer="anybody", age_s=age_s, clock=clock)
+    assert bench.watchdog.accept_command(bench.now, held)[-1].stage is AckStage.ACCEPTED
+    bench.run(0.2)
+    overtaken = bench.watchdog.accept_command(bench.now, command(bench, start, age_s=(bench.now - given) / S + 1.5))[-1]
+    assert (overtaken.stage, overtaken.reason) == (AckStage.REFUSED, "HOLD by anybody came after it")
+    assert bench.watchdog.mode == "HOLD"
+    new = bench.watchdog.accept_command(bench.now, command(bench, start))[-1]
+    assert new.stage is AckStage.ACCEPTED

@@ -1,0 +1,77 @@
+"""Requests of other shells: each is obeyed once, answered as often as it is repeated, and never after a later stop."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from groundstation.bus import clock
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck
+from groundstation.bus.topics import COMMAND_ACK
+from groundstation.time_units import NS_PER_S
+
+_REMEMBERED = 256
+
+
+@dataclass(frozen=True, slots=True)
+class _Stop:
+    given_ns: int
+    words: str
+
+
+class Requests:
+    """Remembers the last answer to each request, and the last stop of each drone."""
+
+    def __init__(self, bus: Bus, drones: Collection[str]) -> None:
+        self._bus = bus
+        self._drones = drones
+        self._answers: dict[str, tuple[AckStage, str]] = {}
+        self._stops: dict[str, _Stop] = {}
+
+    def repeated(self, request: Command) -> bool:
+        """Whether a request was answered before; then it is answered so again."""
+        known = self._answers.get(request.id)
+        if known is not None:
+            self._publish(request, *known)
+        return known is not None
+
+    def answer(self, request: Command, stage: AckStage, reason: str = "") -> None:
+        """Answer a request."""
+        if len(self._answers) >= _REMEMBERED:
+            del self._answers[next(iter(self._answers))]
+        self._answers[request.id] = stage, reason
+        self._publish(request, stage, reason)
+
+    def _publish(self, request: Command, stage: AckStage, reason: str) -> None:
+        header = self._bus.header(OPERATOR)
+        ack = CommandAck(header=header, command_id=request.id, verb=request.verb, stage=stage, reason=reason)
+        self._bus.publish(COMMAND_ACK, ack)
+
+    def hear_stop(self, now_ns: int, stop: Command) -> None:
+        """Remember a stop of the drones that it names, or of all; one from another clock is as old as its arrival."""
+        given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == clock.clock_id() else now_ns
+        for name in stop.scope or self._drones:
+            if name not in self._stops or self._stops[name].given_ns < given_ns:
+                self._stops[name] = _Stop(given_ns, overtakes(stop))
+
+    def refusal(self, now_ns: int, request: Command) -> str:
+        """Return why a request does not count, or "".
+
+        Whoever misses an answer repeats a request for as long as a minute. It must not undo a stop that came meanwhile.
+        """
+        names = [name for name in request.scope if name != OPERATOR]
+        strangers = [name for name in names if name not in self._drones]
+        if request.run != self._bus.run:
+            return f"given for another run ({request.run})"
+        if strangers:
+            return f"there is no drone {', '.join(strangers)}"
+        if request.verb.stops or request.header.clock != clock.clock_id():
+            return ""
+        if 0 < request.expires_ns <= now_ns:
+            return f"given {(now_ns - request.header.stamp_ns) / NS_PER_S:.0f} s ago"
+        later = [self._stops[name] for name in names or self._drones if name in self._stops]
+        return next((stop.words for stop in later if stop.given_ns > request.header.stamp_ns), "")
+
+
+def overtakes(stop: Command) -> str:
+    """Return why a start that was given before a stop is not carried out."""
+    return f"{stop.verb} by {stop.issuer} came after it"

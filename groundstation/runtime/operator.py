@@ -118,15 +118,16 @@ class Operator:
         """Land everybody; whatever else was going on ends."""
         if self.phase is not TeamPhase.LANDING:
             self.phase = TeamPhase.LANDING
-            self._end_starts(self._give(Verb.LAND, (), now_ns).command, now_ns)
+            stop = self._give(Verb.LAND, (), now_ns).command
+            self._requests.hear_stop(now_ns, stop)
+            self._end_starts(stop)
 
     def landed(self, now_ns: int) -> bool:
         """Whether no drone is in the air, as far as they say."""
         return not self.team.airborne(now_ns)
 
-    def _end_starts(self, stop: Command, now_ns: int) -> None:
+    def _end_starts(self, stop: Command) -> None:
         """Give up what was to begin, for a stop of the whole team, and tell who asked for it."""
-        self._requests.hear_stop(now_ns, stop)
         starts = [dialogue for dialogue in self._dialogues if not dialogue.book.command.verb.stops]
         for request in (self._sequence_request, *(dialogue.request for dialogue in starts)):
             if request is not None:
@@ -193,17 +194,19 @@ class Operator:
             self._serve(command, now_ns)
         elif self._is_void(command, now_ns):
             return  # no driver obeys it, and it is theirs to say so
-        elif command.verb.stops and not self._is_partial(command):
-            self._end_starts(command, now_ns)
+        elif command.verb.stops and self._requests.hear_stop(now_ns, command):
+            self._hear_stop(command, now_ns)
+
+    def _hear_stop(self, stop: Command, now_ns: int) -> None:
+        if not self._is_partial(stop):
+            self._end_starts(stop)
             if self.phase is not TeamPhase.LANDING:
-                self.phase = TeamPhase.HELD if command.verb is Verb.HOLD else TeamPhase.LANDING
-                self._say(f"{command.verb} by {command.issuer}")
-        elif command.verb.stops:
-            self._requests.hear_stop(now_ns, command)
-            if self._sequence is not None:
-                for name in command.scope:
-                    self._sequence.drop(name, f"{command.verb} by {command.issuer}", now_ns)
-                self._say(f"{command.verb} {', '.join(command.scope)} by {command.issuer}")
+                self.phase = TeamPhase.HELD if stop.verb is Verb.HOLD else TeamPhase.LANDING
+                self._say(f"{stop.verb} by {stop.issuer}")
+        elif self._sequence is not None:
+            for name in stop.scope:
+                self._sequence.drop(name, f"{stop.verb} by {stop.issuer}", now_ns)
+            self._say(f"{stop.verb} {', '.join(stop.scope)} by {stop.issuer}")
 
     def _is_void(self, stop: Command, now_ns: int) -> bool:
         old = stop.header.clock == clock.clock_id() and now_ns - stop.header.stamp_ns > STOP_LIVES_NS

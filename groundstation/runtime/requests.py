@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -19,13 +20,14 @@ class _Stop:
 
 
 class Requests:
-    """Remembers the last answer to each request, and the last stop of each drone."""
+    """Remembers the last answer to each request, which stops were heard, and the last one of each drone."""
 
     def __init__(self, bus: Bus, drones: Collection[str]) -> None:
         self._bus = bus
         self._drones = drones
         self._answers: dict[str, tuple[AckStage, str]] = {}
         self._stops: dict[str, _Stop] = {}
+        self._heard: dict[str, None] = {}
 
     def repeated(self, request: Command) -> bool:
         """Whether a request was answered before; then it is answered so again."""
@@ -36,8 +38,7 @@ class Requests:
 
     def answer(self, request: Command, stage: AckStage, reason: str = "") -> None:
         """Answer a request."""
-        if len(self._answers) >= _REMEMBERED:
-            del self._answers[next(iter(self._answers))]
+        _make_room(self._answers)
         self._answers[request.id] = stage, reason
         self._publish(request, stage, reason)
 
@@ -46,12 +47,20 @@ class Requests:
         ack = CommandAck(header=header, command_id=request.id, verb=request.verb, stage=stage, reason=reason)
         self._bus.publish(COMMAND_ACK, ack)
 
-    def hear_stop(self, now_ns: int, stop: Command) -> None:
-        """Remember a stop of the drones that it names, or of all; one from another clock is as old as its arrival."""
+    def hear_stop(self, now_ns: int, stop: Command) -> bool:
+        """Remember a stop of the drones that it names, or of all; returns whether it is none that is repeated.
+
+        One from another clock is as old as its arrival.
+        """
+        if stop.id in self._heard:
+            return False
+        _make_room(self._heard)
+        self._heard[stop.id] = None
         given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == clock.clock_id() else now_ns
         for name in stop.scope or self._drones:
             if name not in self._stops or self._stops[name].given_ns < given_ns:
                 self._stops[name] = _Stop(given_ns, overtakes(stop))
+        return True
 
     def refusal(self, now_ns: int, request: Command) -> str:
         """Return why a request does not count, or "".
@@ -70,6 +79,11 @@ class Requests:
             return f"given {(now_ns - request.header.stamp_ns) / NS_PER_S:.0f} s ago"
         later = [self._stops[name] for name in names or self._drones if name in self._stops]
         return next((stop.words for stop in later if stop.given_ns > request.header.stamp_ns), "")
+
+
+def _make_room(memory: dict[str, Any]) -> None:
+    if len(memory) >= _REMEMBERED:
+        del memory[next(iter(memory))]
 
 
 def overtakes(stop: Command) -> str:

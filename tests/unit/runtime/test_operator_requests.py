@@ -1,6 +1,7 @@
 """What other shells ask of the operator, and whom his orders go to; each order to the drones it names alone."""
 
 import pytest
+from msgspec import structs
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -139,6 +140,21 @@ def test_a_start_that_is_repeated_after_a_stop_is_not_begun_again(start, stop, s
     assert [order for order in desk.orders() if order.verb is start and order.id not in {o.id for o in begun}] == []
     if scope != ("drone_1",):
         assert desk.stages() == [(AckStage.REFUSED, f"{stop} by cli_1 came after it")]
+
+
+@pytest.mark.parametrize("clock_id", ["", "another host's"])
+def test_a_stop_that_is_repeated_ends_no_start_that_came_after_it(clock_id):
+    desk = Desk(drone_1=UP, drone_2=UP)
+    stop = desk.command(Verb.HOLD, identity="stop", age_s=2)
+    if clock_id:
+        stop = structs.replace(stop, header=structs.replace(stop.header, clock=clock_id))
+    desk.send(stop)
+    desk.send(desk.command(Verb.TRACK, OPERATOR, identity="start", age_s=-0.2 if clock_id else 1))
+    desk.send(stop)
+    assert desk.operator.phase is TeamPhase.TRACKING
+    assert sum("HOLD by" in line for line in desk.said) == 1
+    desk.confirm(*DONE)
+    assert desk.stages()[-1] == (AckStage.EFFECTIVE, "")
 
 
 @pytest.mark.parametrize("scope", [(), ("drone_1",)], ids=["all", "one"])

@@ -39,7 +39,11 @@ def test_an_order_that_nobody_answers_is_red_until_it_is(stage: Any) -> None:
     line = page.there("order").first
     assert line.get_attribute("data-state") == "sent"
     assert "NOT CONFIRMED" in line.inner_text() and "drone_2 no answer" in line.inner_text().replace("\n", " ")
+    alarm = page.there("banner-unheard")
+    assert "LAND NOT CONFIRMED: no answer from drone_2" in alarm.inner_text()
     page.shot("not_confirmed")
+    stage.flight.deaf = set()
+    alarm.wait_for(state="detached", timeout=5000)
 
 
 def test_one_drone_alone(stage: Any) -> None:

@@ -99,7 +99,9 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     known = "No alarms. 2 of 2 fly, the places of 2 of 2 are known. "
     page.wait(lambda s: verdict.inner_text() == f"{known}The target is seen.")
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "HOLD"}
-    page.wait(lambda s: verdict.inner_text().endswith("They hover because of an order or a failsafe: RESUME goes on."))
+    page.wait(
+        lambda s: verdict.inner_text().endswith("They hover because of an order or a failsafe: RESUME lets them go on.")
+    )
     stage.flight.modes["drone_2"] = "LANDED"
     page.wait(lambda s: "1 of 2 flies" in verdict.inner_text())
     page.shot("verdict")

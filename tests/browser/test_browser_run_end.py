@@ -78,5 +78,6 @@ def test_a_console_that_dies_is_no_end_of_the_run(stage: Any) -> None:
     stage.console.wait(10)
     page.there("banner-link").wait_for(timeout=20_000)
     assert "NO CONNECTION" in page.there("banner-link").inner_text()
+    assert "no connection" in page.there("hold").inner_text()
     assert "groundstation land" in page.there("banner-link").inner_text()
     assert all(stop.is_enabled() for stop in stops(page))

@@ -2,11 +2,10 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { refusalOf } from "./glance.js";
+import { refusalOf, STOPS } from "./glance.js";
 import { me, on, send } from "./link.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
-const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
 const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000, STOP_LIVES_MS = 5000;
 const OVER = "the run has ended: nothing is left to command";
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
@@ -98,6 +97,10 @@ export function showControls() {
     node.dataset.title ??= node.title;
     node.disabled = replay || runOver() || !mayGive("LAND");
     node.title = runOver() ? OVER : !mayGive("LAND") ? roleText() : node.dataset.title;
+  }
+  for (const node of document.querySelectorAll(".stops small")) {
+    node.dataset.caption ??= node.textContent;
+    text(node, store.connected || runOver() ? node.dataset.caption : "no connection");
   }
   for (const node of document.querySelectorAll(".count")) text(node, names.length ? `${names.length}` : "");
   const free = !session.operator, mine = session.operator === me.client, mayStart = mayGive("TAKEOFF");

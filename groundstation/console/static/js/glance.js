@@ -93,3 +93,13 @@ export function refusalOf(verb, names = droneNames()) {
   if (verb === "HOLD" || all.some((mode) => mode === "HOVER" || mode === "HOLD")) return "";
   return all.includes("TRACK") ? "the team tracks already" : "no drone hovers or holds";
 }
+
+export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
+const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
+
+// The newest stop, if a drone has not answered it: an alarm, wherever it was given.
+export function unheardStop() {
+  const order = runOver() ? null : (store.s.orders ?? []).find(({ verb }) => STOPS.has(verb));
+  const silent = (order?.rows ?? []).filter(({ stage }) => !stage).map(({ name }) => name), age = ageS(order?.given_ms);
+  return silent.length && age > UNHEARD_S && age < FORGOTTEN_S ? { verb: order.verb.replace("_", " "), names: silent.join(", ") } : null;
+}

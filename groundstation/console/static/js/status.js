@@ -2,6 +2,7 @@
 
 import { showMore } from "./bar.js";
 import { byId, el, seconds, text } from "./dom.js";
+import { unheardStop } from "./glance.js";
 import { drawn } from "./map.js";
 import { ageS, estimateAge, replaying, runOver, silentS, store } from "./store.js";
 
@@ -22,6 +23,8 @@ export function showBanners() {
   else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
   else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land after 3 s."]);
+  const stop = store.connected ? unheardStop() : null;
+  if (stop) banners.push(["unheard", "grave", `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, "Press again. What flies on: groundstation land in a shell, or its own remote control."]);
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);
   for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, 4) : []) {
     if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave ? "grave" : "mild", alarm.text, ""]);

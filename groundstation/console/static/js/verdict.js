@@ -8,13 +8,19 @@ const FRESH_S = 1;
 const NEXT = {
   "TAKING OFF": "Each is seen from outside before the next one rises.",
   HOVER: "They hover and wait: TRACK begins the task.",
-  HOLD: "They hover because of an order or a failsafe: RESUME goes on.",
   SEARCH: "Nobody sees the target: they look for it.",
   LANDING: "Those that land stay down until a new TAKE OFF.",
   CUT: "Motors were cut.",
 };
 
+// Why they hover, in the words of the first driver that says it.
+function held() {
+  const status = droneNames().map((name) => store.s.vehicles?.[name]).find((one) => one?.mode === "HOLD" && one.detail);
+  return `They hover${status ? ` (${status.detail})` : " because of an order or a failsafe"}: RESUME lets them go on.`;
+}
+
 function next(mode) {
+  if (mode === "HOLD") return held();
   if (mode === "TRACK") return targetAgeS() <= FRESH_S ? "The target is seen." : "Nobody sees the target just now.";
   return NEXT[mode] ?? "";
 }

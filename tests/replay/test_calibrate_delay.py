@@ -29,12 +29,12 @@ def tracked(tmp_path_factory: pytest.TempPathFactory, lab_field: ResolvedField) 
     from sim_bridge.study.runner import StudyOptions
 
     folder = tmp_path_factory.mktemp("flight")
-    FlownStudy(lab_field, folder, StudyOptions(seed=4, duration_s=90.0)).fly()
+    FlownStudy(lab_field, folder, StudyOptions(seed=4, duration_s=150.0)).fly()
     return folder
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
+@pytest.mark.timeout(1200)
 def test_the_delays_of_cameras_are_found_and_a_wrong_setting_shows(tracked: Path, tmp_path: Path) -> None:
     def later(record: RawRecord) -> bytes:
         if record.key.topic.name != "observation":
@@ -47,7 +47,8 @@ def test_the_delays_of_cameras_are_found_and_a_wrong_setting_shows(tracked: Path
     told = measured(rewritten(tracked, tmp_path / "wrong", later))
     for name, error_ms in (("ceiling", SHIFT_MS), ("drone_1 camera", SHIFT_MS), ("drone_2 camera", 0.0)):
         one = told[name]
-        # A minute and a half tells a delay to 10 ms (one deviation); for the ceiling seeds came out 4 to 20 ms late.
+        # Two minutes and a half tell a delay to 9 ms (one deviation); a minute and a half does not on every processor,
+        # whose last digits make another flight.
         assert one["sure"] and one["std_ms"] < 15.0, one
         assert abs(one["measured_ms"] - 120.0 - error_ms) < 2.5 * one["std_ms"], one
         assert abs(one["measured_ms"] - one["now_ms"]) > 20.0 or not error_ms, one

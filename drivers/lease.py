@@ -6,6 +6,7 @@ A start that was given before the last stop never counts: repetitions of it may 
 from dataclasses import dataclass
 
 from groundstation.bus.messages import STOP_LIVES_NS, Command, Lease, Verb
+from groundstation.bus.stop_mark import StopMark
 from groundstation.time_units import NS_PER_S
 
 # Orders that begin or go on with a motion; all others stop, and anyone may stop.
@@ -29,8 +30,7 @@ class LeaseBook:
     source: str = ""
     expires_ns: int = 0
     stamp_ns: int = -1
-    stopped_ns: int = -1
-    stopped_by: str = ""
+    last_stop: StopMark | None = None
 
     def accept(self, now_ns: int, lease: Lease) -> str:
         """Take a lease message; returns "" or why it is ignored (other_clock, future, held, old)."""
@@ -60,13 +60,13 @@ class LeaseBook:
             return "no live operator lease"
         if (command.issuer, command.header.source) != (self.holder, self.source):
             return f"the operator lease is held by {self.holder}"
-        return f"{self.stopped_by} came after it" if command.header.stamp_ns < self.stopped_ns else ""
+        return self.last_stop.words if self.last_stop is not None and self.last_stop.overtakes(command) else ""
 
     def hear_stop(self, now_ns: int, stop: Command) -> None:
-        """Remember a stop that counts; one from another clock is as old as its arrival."""
-        given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == self.clock else now_ns
-        if given_ns > self.stopped_ns:
-            self.stopped_ns, self.stopped_by = given_ns, f"{stop.verb} by {stop.issuer}"
+        """Remember a stop that counts."""
+        mark = StopMark.of(stop, now_ns, self.clock)
+        if self.last_stop is None or self.last_stop.given_ns < mark.given_ns:
+            self.last_stop = mark
 
     def _staleness(self, now_ns: int, stop: Command) -> str:
         age_ns = now_ns - stop.header.stamp_ns

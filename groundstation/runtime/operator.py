@@ -16,12 +16,13 @@ from groundstation.bus.messages import (
     Severity,
     Verb,
 )
+from groundstation.bus.stop_mark import StopMark
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
-from groundstation.runtime.requests import Requests, overtakes
+from groundstation.runtime.requests import Requests
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
 from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.time_units import NS_PER_S
@@ -120,18 +121,19 @@ class Operator:
             self.phase = TeamPhase.LANDING
             stop = self._give(Verb.LAND, (), now_ns).command
             self._requests.hear_stop(now_ns, stop)
-            self._end_starts(stop)
+            self._end_starts(stop, now_ns)
 
     def landed(self, now_ns: int) -> bool:
         """Whether no drone is in the air, as far as they say."""
         return not self.team.airborne(now_ns)
 
-    def _end_starts(self, stop: Command) -> None:
+    def _end_starts(self, stop: Command, now_ns: int) -> None:
         """Give up what was to begin, for a stop of the whole team, and tell who asked for it."""
+        why = StopMark.of(stop, now_ns, clock.clock_id()).words
         starts = [dialogue for dialogue in self._dialogues if not dialogue.book.command.verb.stops]
         for request in (self._sequence_request, *(dialogue.request for dialogue in starts)):
             if request is not None:
-                self._requests.answer(request, AckStage.REFUSED, overtakes(stop))
+                self._requests.answer(request, AckStage.REFUSED, why)
         self._sequence, self._sequence_request = None, None
         self._dialogues = [dialogue for dialogue in self._dialogues if dialogue not in starts]
 
@@ -199,7 +201,7 @@ class Operator:
 
     def _hear_stop(self, stop: Command, now_ns: int) -> None:
         if not self._is_partial(stop):
-            self._end_starts(stop)
+            self._end_starts(stop, now_ns)
             if self.phase is not TeamPhase.LANDING:
                 self.phase = TeamPhase.HELD if stop.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{stop.verb} by {stop.issuer}")

@@ -1,22 +1,16 @@
 """Requests of other shells: each is obeyed once, answered as often as it is repeated, and never after a later stop."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Any
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck
+from groundstation.bus.stop_mark import StopMark
 from groundstation.bus.topics import COMMAND_ACK
 from groundstation.time_units import NS_PER_S
 
 _REMEMBERED = 256
-
-
-@dataclass(frozen=True, slots=True)
-class _Stop:
-    given_ns: int
-    words: str
 
 
 class Requests:
@@ -26,7 +20,7 @@ class Requests:
         self._bus = bus
         self._drones = drones
         self._answers: dict[str, tuple[AckStage, str]] = {}
-        self._stops: dict[str, _Stop] = {}
+        self._stops: dict[str, StopMark] = {}
         self._heard: dict[str, None] = {}
 
     def repeated(self, request: Command) -> bool:
@@ -48,18 +42,15 @@ class Requests:
         self._bus.publish(COMMAND_ACK, ack)
 
     def hear_stop(self, now_ns: int, stop: Command) -> bool:
-        """Remember a stop of the drones that it names, or of all; returns whether it is none that is repeated.
-
-        One from another clock is as old as its arrival.
-        """
+        """Remember a stop of the drones that it names, or of all; returns whether it is none that is repeated."""
         if stop.id in self._heard:
             return False
         _make_room(self._heard)
         self._heard[stop.id] = None
-        given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == clock.clock_id() else now_ns
+        mark = StopMark.of(stop, now_ns, clock.clock_id())
         for name in stop.scope or self._drones:
-            if name not in self._stops or self._stops[name].given_ns < given_ns:
-                self._stops[name] = _Stop(given_ns, overtakes(stop))
+            if name not in self._stops or self._stops[name].given_ns < mark.given_ns:
+                self._stops[name] = mark
         return True
 
     def refusal(self, now_ns: int, request: Command) -> str:
@@ -78,14 +69,9 @@ class Requests:
         if 0 < request.expires_ns <= now_ns:
             return f"given {(now_ns - request.header.stamp_ns) / NS_PER_S:.0f} s ago"
         later = [self._stops[name] for name in names or self._drones if name in self._stops]
-        return next((stop.words for stop in later if stop.given_ns > request.header.stamp_ns), "")
+        return next((stop.words for stop in later if stop.overtakes(request)), "")
 
 
 def _make_room(memory: dict[str, Any]) -> None:
     if len(memory) >= _REMEMBERED:
         del memory[next(iter(memory))]
-
-
-def overtakes(stop: Command) -> str:
-    """Return why a start that was given before a stop is not carried out."""
-    return f"{stop.verb} by {stop.issuer} came after it"

@@ -1,0 +1,23 @@
+"""A stop, remembered for the starts that were given before it and come, or are repeated, after it."""
+
+from dataclasses import dataclass
+
+from groundstation.bus.messages import Command
+
+
+@dataclass(frozen=True, slots=True)
+class StopMark:
+    """When a stop was given [ns; boot clock], and why a start from before it is not carried out."""
+
+    given_ns: int
+    words: str
+
+    @classmethod
+    def of(cls, stop: Command, now_ns: int, clock: str) -> "StopMark":
+        """Return the mark of a stop that was heard now; one from another clock than ours is as old as its arrival."""
+        given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == clock else now_ns
+        return cls(given_ns, f"{stop.verb} by {stop.issuer} came after it")
+
+    def overtakes(self, start: Command) -> bool:
+        """Whether a start of our clock was given before it."""
+        return start.header.stamp_ns < self.given_ns

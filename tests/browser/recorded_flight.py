@@ -9,10 +9,12 @@ from typing import Any
 
 import msgspec
 from fake_flight import FakeFlight
+from mcap.opcode import Opcode
 from serve_fake import field_json
 
 from groundstation.bus import messages as m
 from groundstation.process.child import ChildSpec
+from groundstation.recording.chunks import frames
 
 
 @dataclass(frozen=True)
@@ -38,14 +40,16 @@ def start_recorder(endpoint: str, folder: Path) -> "subprocess.Popen[bytes]":
 
 
 def _until_it_records(path: Path) -> None:
-    """Wait until the file has grown by what was heard: a recording that began with the gust would always show it."""
+    """Wait for a second chunk: a recording whose first messages come with the gust would show it from its start."""
     deadline = time.monotonic() + 30
-    sizes: set[int] = set()
-    while len(sizes) < 3:
+    while not (path.exists() and _chunks(path) >= 2):
         assert time.monotonic() < deadline, "the recorder does not start"
-        time.sleep(0.05)
-        if path.exists():
-            sizes.add(path.stat().st_size)
+        time.sleep(0.1)
+
+
+def _chunks(path: Path) -> int:
+    with path.open("rb") as stream:
+        return sum(opcode == Opcode.CHUNK for opcode, _body in frames(stream, []))
 
 
 def record(flight: FakeFlight, page: Any, folder: Path, seconds: float) -> Recorded:

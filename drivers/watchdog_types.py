@@ -55,7 +55,7 @@ class WatchdogLimits:
     hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and
     noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
     it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it is told: from 1 m/s
-    it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. lost_hover_s, lost_land_s: without a position from
+    it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. wrong_land_s: likewise while its sensors are wrong. lost_hover_s, lost_land_s: without a position from
     the cameras, for vehicles that need one. pad_m: where it takes off [x, y; world], if known; min_separation_m: how
     far from there everybody in the air must be.
     """
@@ -76,6 +76,7 @@ class WatchdogLimits:
     fast_resume_s: float = 0.5
     fast_land_s: float = 1.6
     stray_land_s: float = 1.6
+    wrong_land_s: float = 1.6
     lost_hover_s: float = 0.5
     lost_land_s: float = 2.0
     pad_m: tuple[float, float] | None = None

@@ -92,7 +92,7 @@ class ControlErrorMonitor:
     def judge(
         self, now_ns: int, view: VehicleView, told: WatchdogDecision | None, seen_m_s: tuple[float, float] | None
     ) -> VehicleView:
-        """Return the view with its speed, and whether it strays from its last command.
+        """Return the view with its speed, whether cameras see that, and whether it strays from its last command.
 
         seen_m_s: velocity forward and left as cameras see it, None if they do not.
         """
@@ -113,7 +113,7 @@ class ControlErrorMonitor:
         strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
-        return replace(view, speed_m_s=max(speeds), stray=strays)
+        return replace(view, speed_m_s=max(speeds), stray=strays, seen=seen_m_s is not None)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,

@@ -73,8 +73,8 @@ def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
         holding[Condition.STATE_UNKNOWN] = ""
     if state not in STANDING:
         holding[Condition.NOT_STANDING] = str(state)
-    if vehicle.unsound:
-        holding[Condition.SENSORS_WRONG] = vehicle.silence
+    if vehicle.unsound and not vehicle.seen:
+        holding[Condition.BLIND] = vehicle.silence
     if not vehicle.fresh:
         holding[Condition.TELEMETRY_SILENT] = vehicle.silence
         return

@@ -37,7 +37,7 @@ class Condition(StrEnum):
     STOP_REQUESTED = auto()
     SUPERVISOR_DEAD = auto()
     SUPERVISOR_SILENT = auto()
-    SENSORS_WRONG = auto()
+    BLIND = auto()
     TELEMETRY_SILENT = auto()
     STATE_UNKNOWN = auto()
     NOT_STANDING = auto()
@@ -120,8 +120,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.STOP_REQUESTED, land, "the driver was ordered to stop"),
         Failsafe(Condition.SUPERVISOR_DEAD, land, "the supervisor is dead", limits.brake_s),
         Failsafe(Condition.SUPERVISOR_SILENT, land, "the supervisor does not answer", noticed_s, patience, SLOWLY),
-        # Its own hover may rest on what is wrong: drivers/plausibility says which, VehicleView.plausible makes it silence.
-        Failsafe(Condition.SENSORS_WRONG, land, "{why}", limits.wrong_land_s, "", SLOWLY),
+        # Its own hover may rest on what is wrong, and cameras do not show how to brake it.
+        Failsafe(Condition.BLIND, land, "{why}, and no camera sees it", limits.blind_land_s, "", SLOWLY, modes=FREE),
+        # Frozen and stuck sensors as well: drivers/plausibility says which, VehicleView.plausible makes them silence.
         Failsafe(Condition.TELEMETRY_SILENT, land, "{why}", noticed_s, patience, SLOWLY),
         Failsafe(Condition.STATE_UNKNOWN, land, "the vehicle does not say what it does", noticed_s, patience, SLOWLY),
         Failsafe(Condition.BATTERY_LOW, land, "battery below its limit", limits.battery_hold_s,

@@ -50,14 +50,15 @@ ALOFT = FREE | {DriverMode.TAKING_OFF}
 class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
-    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
-    of the tracker, whatever broke on the way from it; gap_s: likewise a pause of our own loop; brake_s:
-    hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and
-    noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
-    it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it is told: from 1 m/s
-    it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. wrong_land_s: likewise while its sensors are wrong. lost_hover_s, lost_land_s: without a position from
-    the cameras, for vehicles that need one. pad_m: where it takes off [x, y; world], if known; min_separation_m: how
-    far from there everybody in the air must be.
+    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s:
+    likewise of the tracker, whatever broke on the way from it; gap_s: likewise a pause of our own loop; brake_s:
+    hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts
+    and noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for
+    fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it
+    is told: from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while
+    its sensors are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for
+    vehicles that need one. pad_m: where it takes off [x, y; world], if known; min_separation_m: how far from there
+    everybody in the air must be.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
@@ -76,7 +77,7 @@ class WatchdogLimits:
     fast_resume_s: float = 0.5
     fast_land_s: float = 1.6
     stray_land_s: float = 1.6
-    wrong_land_s: float = 1.6
+    blind_land_s: float = 1.6
     lost_hover_s: float = 0.5
     lost_land_s: float = 2.0
     pad_m: tuple[float, float] | None = None
@@ -92,12 +93,13 @@ class WatchdogLimits:
 class VehicleView:
     """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or "".
 
-    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before. unsound: why
-    what it says of its motion cannot be true, or ""; its telemetry then counts as silent. velocity_m_s: true (scaled)
-    one that it reports, None if it reports none. speed_m_s, stray: what the host makes of that: horizontal speed, and
-    how the vehicle strays from what it is told, or ""; unseen_s: for how long it may not have been where it is
-    believed, as the tracker says; near: who in the air is too near to its pad, or "". lost_s: for how long it had no
-    position that it needs. clears: an order of its own ends its emergency, and starts no motor.
+    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before. unsound:
+    why what it says of its motion cannot be true, or ""; its telemetry then counts as silent. velocity_m_s: true
+    (scaled) one that it reports, None if it reports none. speed_m_s, stray: what the host makes of that: horizontal
+    speed, and how the vehicle strays from what it is told, or ""; seen: whether cameras show how fast it is;
+    unseen_s: for how long it may not have been where it is believed, as the tracker says; near: who in the air is
+    too near to its pad, or "". lost_s: for how long it had no position that it needs. clears: an order of its own
+    ends its emergency, and starts no motor.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -109,6 +111,7 @@ class VehicleView:
     velocity_m_s: Vector3 | None = None
     speed_m_s: float = 0.0
     stray: str = ""
+    seen: bool = False
     unseen_s: float = 0.0
     near: str = ""
     lost_s: float = 0.0

@@ -231,11 +231,12 @@ class ArDrone:
         return asked
 
     def _is_blind(self) -> bool:
-        """Return whether the drone sees nothing of its motion; one that wind pushes holds its place better itself."""
-        report = self._plausibility.report
-        wrong = report.of(Sensor.VELOCITY) is Health.BAD and self._motion.repeats
-        others = report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.ATTITUDE, Sensor.IMU)
-        return wrong and others is not Health.BAD and self.telemetry.flight_state in UP
+        """Return whether the drone sees nothing of its motion; one that wind pushes holds its place better itself.
+
+        Before the velocity is BAD, too: the firmware's hover would end the loop, and with it the last correct speed.
+        """
+        others = self._plausibility.report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.ATTITUDE, Sensor.IMU)
+        return self._motion.repeats and others is not Health.BAD and self.telemetry.flight_state in UP
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals of the link."""

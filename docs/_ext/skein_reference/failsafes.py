@@ -20,7 +20,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.STOP_REQUESTED: "SIGTERM to the driver",
     Condition.SUPERVISOR_DEAD: "the supervisor's process is gone",
     Condition.SUPERVISOR_SILENT: "no heartbeat of the supervisor for 0.3 s",
-    Condition.SENSORS_WRONG: "a BAD sensor, the IMU excepted",
+    Condition.BLIND: "a BAD sensor, the IMU excepted, while cameras do not show how fast it is",
     Condition.TELEMETRY_SILENT: "no telemetry for 0.3 s, or a BAD sensor",
     Condition.STATE_UNKNOWN: "its state is UNKNOWN or LOST",
     Condition.NOT_STANDING: "its state is neither LANDED nor EMERGENCY",

@@ -26,6 +26,7 @@ class Bench:
         self.not_ready = self.unsound = self.stray = ""
         self.speed = self.unseen_s = self.lost_s = 0.0
         self.unseen = self.lost = False
+        self.seen = True
         self.near, self.clears = "", clears
         self.upstream = Upstream()
         self.epoch = 1
@@ -54,7 +55,7 @@ class Bench:
     def view(self):
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = replace(view, unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near)
-        return replace(seen, speed_m_s=self.speed, stray=self.stray, clears=self.clears).plausible
+        return replace(seen, speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):
         """Let the watchdog know what the vehicle says, as its host does before it hands over orders."""

@@ -45,7 +45,7 @@ def partly(wrong_s, period_s, hover_s, land_s, *conditions, **values):
 
 
 LOST = Condition.TELEMETRY_SILENT
-WRONG = (LOST, Condition.SENSORS_WRONG)
+BLIND = (LOST, Condition.BLIND)
 TRACKER = (Condition.TRACKER_SILENT, Condition.TRACKER_PAUSED, Condition.NOT_RESUMED, Condition.SETPOINTS_PATCHY)
 DEVIATIONS = {
     "told to stop": always(0.1, 0.1, Condition.STOP_REQUESTED, upstream=Upstream(stop_requested=True)),
@@ -53,8 +53,9 @@ DEVIATIONS = {
     "supervisor frozen": always(0.1, 2.9, Condition.SUPERVISOR_SILENT, upstream=Upstream(supervisor_fresh=False)),
     "telemetry gone": always(0.1, 2.9, LOST, fresh=False),
     "telemetry for 0.3 s of each second": partly(0.7, 1.0, 3.0, 6.5, LOST, fresh=False),
-    "velocity stuck": always(0.1, 1.8, *WRONG, unsound="its velocity is stuck at 0.00 m/s"),
-    "velocity stuck now and then": partly(0.8, 1.0, 3.0, 3.0, *WRONG, unsound="its velocity is stuck at 0.00 m/s"),
+    "velocity stuck": always(0.1, 2.9, LOST, unsound="its velocity is stuck at 0.00 m/s"),
+    "velocity stuck now and then": partly(0.8, 1.0, 3.0, 6.5, LOST, unsound="its velocity is stuck at 0.00 m/s"),
+    "velocity stuck, no camera": always(0.1, 1.8, *BLIND, unsound="its velocity is stuck at 0.00 m/s", seen=False),
     "state UNKNOWN": always(0.5, 2.9, Condition.STATE_UNKNOWN, state=FlightState.UNKNOWN),
     "state LOST": always(0.5, 2.9, Condition.STATE_UNKNOWN, state=FlightState.LOST),
     "an emergency": always(0.1, 0.1, Condition.EMERGENCY, state=FlightState.EMERGENCY),

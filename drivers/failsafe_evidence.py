@@ -1,8 +1,9 @@
 """Evidence for the conditions of the table of failsafes: which hold now, for how long they have, and why. Pure."""
 
+import math
 from dataclasses import dataclass
 
-from drivers.failsafe_table import Condition, Failsafe
+from drivers.failsafe_table import Condition, Failsafe, Reaction
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import AIRBORNE, STANDING, DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import FlightState
@@ -12,6 +13,8 @@ from groundstation.time_units import NS_PER_S
 _STREAM_S = 0.15
 # What a condition is credited with when it is met anew, however long nobody looked.
 _FIRST_S = 0.05
+# What is told of a reaction to come: its condition has lasted for so long, and it is so near.
+_LASTING_S, _NEAR_S = 0.3, 3.0
 NAMELESS = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 
 
@@ -134,6 +137,7 @@ class Evidence:
     """Keeps the duration of conditions; ended ones are forgotten by the rules of the table."""
 
     def __init__(self, table: tuple[Failsafe, ...]) -> None:
+        self._table = table
         self._forgets = {row.condition: row.forgets for row in table if row.forgets is not None}
         self.holding: dict[Condition, str] = {}
         self.charged_s: dict[Condition, float] = {}
@@ -158,6 +162,17 @@ class Evidence:
     def lasted_s(self, condition: Condition) -> float | None:
         """Return for how long a condition has lasted [s], or None if it does not hold."""
         return self.charged_s.get(condition, 0.0) if condition in self.holding else None
+
+    def soonest_s(self, mode: DriverMode, reaction: Reaction) -> float | None:
+        """Return the time until the first row with a reaction acts if nothing changes [s]; None: none is near."""
+        waits = [
+            row.after_s - lasted_s
+            for row in self._table
+            if row.reaction is reaction and mode in row.modes
+            and (lasted_s := self.lasted_s(row.condition) or 0.0) >= _LASTING_S
+        ]  # fmt: skip
+        soonest_s = max(0.0, min(waits, default=math.inf))
+        return soonest_s if soonest_s <= _NEAR_S else None
 
     def forget(self, *conditions: Condition) -> None:
         """Begin anew with some conditions, or with all."""

@@ -47,7 +47,6 @@ _INTRUSIONS = {
     "setpoint_epoch_leap": "setpoints of an epoch far ahead",
     "lease_held": "operator leases of another sender",
 }
-_LOUD = {DriverMode.CUT: Severity.ERROR, DriverMode.LANDING: Severity.WARNING}
 
 
 class VehicleHost:
@@ -104,8 +103,7 @@ class VehicleHost:
             if isinstance(received.message, VelocitySetpoint):
                 self._count("setpoint", self.watchdog.accept_setpoint(now_ns, received.message))
         decision = self.watchdog.step(now_ns, view, self._upstream())
-        decision = replace(decision, seen_m_s=self._seen.velocity(now_ns))
-        self._told = decision
+        self._told = decision = replace(decision, seen_m_s=self._seen.velocity(now_ns))
         self.vehicle.apply(now_ns, decision)
         self._report(now_ns, view, decision)
         return decision
@@ -161,7 +159,8 @@ class VehicleHost:
             link_quality=health.link_quality,
             rate_hz=health.rate_hz,
             rejected=health.rejected | self._ignored | self._refused(),
-            detail=health.detail or self.watchdog.reason,
+            detail=health.detail or self.watchdog.explanation,
+            lands_in_s=self.watchdog.lands_in_s,
             clock_drift_ppm=None if health.clock is None else health.clock.drift_ppm,
             telemetry_late_ms=None if health.clock is None else health.clock.late_ms,
         )
@@ -226,7 +225,8 @@ class VehicleHost:
             # The status of a changed mode must not wait: the tracker learns from it who is airborne.
             self._next_status_ns = 0
         self._announced = (decision.mode, decision.reason)
-        severity = _LOUD.get(decision.mode, Severity.INFO)
+        cut, sinks = decision.mode is DriverMode.CUT, decision.mode is DriverMode.LANDING and self.watchdog.failsafe
+        severity = Severity.ERROR if cut else Severity.WARNING if sinks else Severity.INFO
         self._event(severity, f"{self.vehicle.name} {decision.mode}: {decision.reason}")
 
     def _announce_silence(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:

@@ -58,6 +58,7 @@ class Watchdog:
         self._brake_until_ns = 0
         self._clearing = False
         self._paused_ns: int | None = None
+        self._braked_by: Failsafe | None = None
 
     # -- inputs -------------------------------------------------------------------------------------------------------
 
@@ -170,6 +171,18 @@ class Watchdog:
         self._acks.enter(mode)
         return ""
 
+    # -- outlook ------------------------------------------------------------------------------------------------------
+
+    @property
+    def explanation(self) -> str:
+        """Return why the vehicle does what it does now, in words."""
+        return self.reason if self._braked_by is None else f"hovers: {self._text_of(self._braked_by)}"
+
+    @property
+    def lands_in_s(self) -> float | None:
+        """Return when the table lands the vehicle if nothing changes [s]; None while no such condition lasts."""
+        return self.evidence.soonest_s(self.mode, Reaction.LAND)
+
     # -- step ---------------------------------------------------------------------------------------------------------
 
     def step(self, now_ns: int, vehicle: VehicleView, upstream: Upstream) -> WatchdogDecision:
@@ -179,8 +192,8 @@ class Watchdog:
         self._last_step_ns = now_ns
         self._follow_vehicle(now_ns)
         self.evidence.step(self._situation(now_ns, gap_s), self.limits)
-        braked = self._heed_table(now_ns)
-        setpoint = self.gate.obeyed(now_ns) if self.mode is DriverMode.TRACK and not braked else None
+        self._braked_by = self._heed_table(now_ns)
+        setpoint = self.gate.obeyed(now_ns) if self.mode is DriverMode.TRACK and self._braked_by is None else None
         acks = self._acks.effective(self.mode, self.vehicle, setpoint is not None)
         if setpoint is None:
             return WatchdogDecision(self.mode, self._action(now_ns), reason=self.reason, acks=acks)
@@ -218,17 +231,20 @@ class Watchdog:
         elif state in UP and self.mode is DriverMode.TAKING_OFF:
             self._enter(now_ns, DriverMode.HOVER, "airborne, waiting for TRACK")
 
-    def _heed_table(self, now_ns: int) -> bool:
-        """React by the first row of the table that applies; returns whether it hovers for now, in its mode."""
+    def _heed_table(self, now_ns: int) -> Failsafe | None:
+        """React by the first row of the table that applies; returns it if it only brakes for now, in the same mode."""
         evidence = self.evidence
         for row in self._acting:
             if row.condition not in evidence.holding or not row.applies(self.mode, evidence.lasted_s(row.condition)):
                 continue
             if row.latch is Latch.NONE:
-                return True
-            self._react(now_ns, row, row.text.format(why=evidence.holding[row.condition]))
-            return False
-        return False
+                return row
+            self._react(now_ns, row, self._text_of(row))
+            return None
+        return None
+
+    def _text_of(self, row: Failsafe) -> str:
+        return row.text.format(why=self.evidence.holding.get(row.condition, ""))
 
     def _react(self, now_ns: int, row: Failsafe, reason: str) -> None:
         if row.reaction is Reaction.CUT:

@@ -47,6 +47,8 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     """Datagrams, setpoints and commands that were dropped, by reason."""
     detail: str = ""
     """What the operator should know, in words."""
+    lands_in_s: float | None = None
+    """Time until a failsafe lands it if nothing changes [s]; none: none is near."""
     clock_drift_ppm: float | None = None
     """How much faster the vehicle's clock goes than ours [1e-6]; none: not known (yet)."""
     telemetry_late_ms: float | None = None

@@ -11,6 +11,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Volume, WorldCamera
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
+from groundstation.vehicles import kind_named
 
 Json = dict[str, Any]
 
@@ -41,7 +42,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
         "site": site,
         "truth": truth,
         "room": {"size_m": [8.0, 6.0, 4.5], "fence": None},
-        "drones": [{"name": name, "battery_min": 0.15} for name in drones],
+        "drones": [{"name": name, "battery_min": 0.15, "flight_time_s": None} for name in drones],
         "cameras": [],
         "volumes": [],
         "targets": [],
@@ -63,6 +64,7 @@ def _drone(name: str, drone: FieldDrone) -> Json:
     return {
         "name": name,
         "battery_min": drone.limits.battery_min,
+        "flight_time_s": kind_named(drone.kind).flight_time_s,
         "max_speed_m_s": drone.limits.max_speed_m_s,
         "pad_m": drone.pad_m,
         "pad_yaw_rad": float(np.radians(drone.pad_yaw_deg)),

@@ -15,6 +15,7 @@ from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
 TARGET = "turtlebot"
+_WHY = {"TRACK": "tracking for operator", "HOLD": "held by operator", "LANDING": "landing for operator"}
 _LEVEL = {m.Verb.HOLD: "HOLD", m.Verb.LAND: "LANDED", m.Verb.CUT_MOTORS: "CUT", m.Verb.TRACK: "TRACK"}
 
 
@@ -40,6 +41,8 @@ class FakeFlight(threading.Thread):
         self.battery: dict[str, float | None] = {"drone_1": 0.82, "drone_2": 0.34}
         self.link: dict[str, float | None] = {}
         self.rate_hz: dict[str, float] = {}
+        self.detail: dict[str, str] = {}
+        self.lands_in_s: dict[str, float] = {}
         self.deaf: set[str] = set()
         self.frozen = False
         self.distance_m = 1.3  # of the drones from the target
@@ -246,6 +249,8 @@ class FakeFlight(threading.Thread):
                 battery=self.battery.get(name),
                 link_quality=self.link.get(name, 0.93),
                 rate_hz=self.rate_hz.get(name, 198.0 + math.sin(s)),
+                detail=self.detail.get(name, _WHY.get(mode, "")),
+                lands_in_s=self.lands_in_s.get(name),
             )
             bus.publish(t.VEHICLE_STATUS, status)
 

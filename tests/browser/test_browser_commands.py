@@ -18,7 +18,7 @@ def test_land_all_is_one_click_and_is_shown_confirmed(stage: Any) -> None:
     (command,) = stage.flight.commands
     assert (command.verb, command.scope, command.expires_ns) == ("LAND", (), 0)
     line = page.there("order").first
-    assert "confirmed" in line.inner_text() and "drone_1 ✓ effective" in line.inner_text().replace("\n", " ")
+    assert "confirmed" in line.inner_text() and "drone_1 ✓ done" in line.inner_text().replace("\n", " ")
     page.wait(lambda s: page.there("drone_1-mode").inner_text() == "landed")
     page.shot("landed")
 

@@ -59,8 +59,9 @@ def test_nothing_is_cut_off(stage: Any, size: tuple[int, int]) -> None:
     assert page.page.evaluate(CUT_OFF) == []
     assert page.page.evaluate(OUTSIDE) == []
     assert page.page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
-    stage.flight.battery["drone_2"] = None
+    stage.flight.battery = {"drone_1": 0.9, "drone_2": None}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "unknown drone_2")
+    assert page.there("battery-lasts").inner_text() == "others ≥ 90 %"
     assert page.page.evaluate(CUT_OFF) == []
     page.shot(f"layout_{size[0]}")
 
@@ -71,12 +72,12 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page = stage.open()
     stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
-    assert page.there("battery-lasts").inner_text() == "worst battery"
+    assert page.there("battery-lasts").inner_text() == "worst, ~5 min"
     page.page.wait_for_timeout(31_000)
     stage.flight.battery["drone_2"] = 0.5
     page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst, 1 min")
     stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery")
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst, ~4 min")
 
 
 def test_the_bar_says_what_the_team_does(stage: Any) -> None:
@@ -99,14 +100,32 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     known = "No alarms. 2 of 2 fly, the places of 2 of 2 are known. "
     page.wait(lambda s: verdict.inner_text() == f"{known}The target is seen.")
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "HOLD"}
-    page.wait(
-        lambda s: verdict.inner_text().endswith("They hover because of an order or a failsafe: RESUME lets them go on.")
-    )
+    page.wait(lambda s: verdict.inner_text().endswith("They hover (held by operator): RESUME lets them go on."))
     stage.flight.modes["drone_2"] = "LANDED"
     page.wait(lambda s: "1 of 2 flies" in verdict.inner_text())
     page.shot("verdict")
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: verdict.inner_text().startswith("No alarms. Nobody flies."))
+
+
+def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
+    page = stage.open()
+    duty = page.there("drone_1-duty")
+    page.wait(lambda s: duty.inner_text().startswith("Watches turtlebot"))
+    assert "its place comes from ceiling" in duty.inner_text()
+    assert "limited by the fence" in page.there("drone_2-duty").inner_text()
+    stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"
+    stage.flight.lands_in_s["drone_1"] = 1.8
+    page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle. Lands in 2 s if nothing changes.")
+    assert "drone_1 LANDS IN 2 s" in page.there("banner-landing").inner_text()
+    stage.flight.detail.clear()
+    stage.flight.lands_in_s.clear()
+    stage.flight.modes["drone_1"] = "HOLD"
+    page.wait(lambda s: duty.inner_text() == "Held by operator.")
+    assert page.there("hold").inner_text().startswith("HOLD 2")
+    stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
+    page.wait(lambda s: page.there("hold").inner_text().startswith("HOLD\n"))
+    assert page.there("take-off").inner_text().startswith("TAKE OFF 2")
 
 
 def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:

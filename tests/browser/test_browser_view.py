@@ -227,7 +227,7 @@ def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:
         page.there(f"camera-{camera}").scroll_into_view_if_needed()
         page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden")
     assert page.there("land-all").inner_text().startswith("LAND ALL 3")
-    assert page.there("drone_3-battery").inner_text() == "?"  # not told is not empty
+    assert page.there("drone_3-battery").inner_text() == "unknown"
     page.shot("mixed_team")
     page.there("drone_3-land").click()
     page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")

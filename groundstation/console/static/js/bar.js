@@ -1,7 +1,7 @@
 // The bar on top: the team at a glance, how far the run is, and what it would accept.
 
 import { byId, el, seconds, text } from "./dom.js";
-import { minutesLeft, oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
+import { minutesWords, oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
 import { ageS, droneNames, replaying, store } from "./store.js";
 import { verdict } from "./verdict.js";
 
@@ -20,13 +20,19 @@ export function showBar() {
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();
   show("worst-battery", !battery ? "–" : battery.value === null ? `unknown ${battery.name}` : `${(100 * battery.value).toFixed(0)} % ${battery.name}`, battery?.level);
-  const least = Math.min(...droneNames().map(minutesLeft).filter((minutes) => minutes !== null));
-  text(byId("battery-lasts"), Number.isFinite(least) ? `worst, ${least < 1 ? "< 1" : Math.floor(least)} min` : "worst battery");
+  text(byId("battery-lasts"), batteryLabel(battery));
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
   text(byId("verdict"), replaying() ? "" : verdict());
   showStages(stage());
+}
+
+// What stands under the worst battery: for how long it lasts, or the least of those that are known.
+function batteryLabel(battery) {
+  if (battery?.value === null && battery.least) return `others ≥ ${(100 * battery.least[1]).toFixed(0)} %`;
+  const lasts = minutesWords(...droneNames());
+  return lasts ? `worst, ${lasts}` : "worst battery";
 }
 
 function showStages(now) {

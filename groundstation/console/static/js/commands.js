@@ -2,7 +2,7 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { refusalOf, STOPS } from "./glance.js";
+import { aloft, modes, refusalOf, STOPS } from "./glance.js";
 import { me, on, send } from "./link.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
@@ -12,7 +12,7 @@ const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
 const STATES = {
   unsent: "NOT SENT", dropped: "NOT SENT", sent: "NOT CONFIRMED", heard: "acknowledged", confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
 };
-const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ effective" };
+const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ done" };
 // Orders that the server has not shown yet, so that nothing is silently lost on the way there.
 let own = [], count = 0;
 
@@ -91,6 +91,15 @@ function holdToPress(button, fire) {
   button.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
+// How many are in the air for those that stop, how many stand for the one that starts; nothing where nobody is heard.
+function showCounts(names) {
+  const known = modes(names).length, up = aloft();
+  for (const node of document.querySelectorAll(".count")) {
+    const count = node.closest("#takeoff") ? known - up : up;
+    text(node, known && count ? `${count}` : "");
+  }
+}
+
 export function showControls() {
   const names = droneNames(), session = store.s.session ?? {}, replay = replaying();
   for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land], [data-hold]")) {
@@ -102,7 +111,7 @@ export function showControls() {
     node.dataset.caption ??= node.textContent;
     text(node, store.connected || runOver() ? node.dataset.caption : "no connection");
   }
-  for (const node of document.querySelectorAll(".count")) text(node, names.length ? `${names.length}` : "");
+  showCounts(names);
   const free = !session.operator, mine = session.operator === me.client, mayStart = mayGive("TAKEOFF");
   text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayStart ? roleText() : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
   byId("takeover").hidden = replay || !me.trusted || !mayStart || free || mine;

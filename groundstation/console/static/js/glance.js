@@ -38,28 +38,47 @@ export function stage() {
 // When each drone that is aloft was first heard aloft, and its battery then.
 const tookOff = new Map();
 
-// Minutes until a battery is at the level that lands its drone, at the mean drain of this flight; null: not known yet.
-export function minutesLeft(name) {
-  const status = store.s.vehicles?.[name];
-  if (!status || status.battery === null || !ALOFT.has(status.mode)) { tookOff.delete(name); return null; }
+function takenOff(name, status) {
+  if (!ALOFT.has(status.mode)) { tookOff.delete(name); return null; }
   const first = tookOff.get(name);
-  if (!first || status.at < first.at || status.battery > first.battery) { tookOff.set(name, { at: status.at, battery: status.battery }); return null; }
-  const minutes = (status.at - first.at) / 60_000, spent = first.battery - status.battery;
-  if (minutes < LEAST_MIN || spent < LEAST_DRAIN) return null;
-  return Math.max(0, (status.battery - leastBattery(name)) * minutes / spent);
+  if (first && status.at >= first.at && status.battery <= first.battery) return first;
+  tookOff.set(name, { at: status.at, battery: status.battery });
+  return null;
 }
 
-// The least battery, and whose it is; null where a drone does not say.
+// Minutes until a battery is at the level that lands its drone: [minutes, whether by the mean drain of this flight or by
+// what its kind usually does]; null: nobody knows.
+export function minutesLeft(name) {
+  const status = store.s.vehicles?.[name], usual = sceneOf(name)?.flight_time_s;
+  if (!status || status.battery === null) return null;
+  const left = Math.max(0, status.battery - leastBattery(name)), first = takenOff(name, status);
+  const minutes = first ? (status.at - first.at) / 60_000 : 0, spent = first ? first.battery - status.battery : 0;
+  if (minutes >= LEAST_MIN && spent >= LEAST_DRAIN) return [(left * minutes) / spent, true];
+  return usual ? [(left * usual) / 60, false] : null;
+}
+
+// "6 min" as measured, "~6 min" by what its kind usually does, "" where nobody knows.
+export function minutesWords(...names) {
+  const known = names.map(minutesLeft).filter(Boolean);
+  if (!known.length) return "";
+  const [minutes, measured] = known.reduce((least, one) => (one[0] < least[0] ? one : least));
+  return minutes < 1 ? "< 1 min" : `${measured ? "" : "~"}${Math.floor(minutes)} min`;
+}
+
+// The least battery, and whose it is; an unknown one is worse than any unless that is to be charged. least: of those
+// that are known. null where a drone was not heard yet.
 export function worstBattery() {
-  const known = droneNames().map((name) => [name, store.s.vehicles?.[name]?.battery]);
-  if (!known.length || known.some(([, value]) => value === undefined)) return null;
-  const unknown = known.find(([, value]) => value === null);
-  if (unknown) return { name: unknown[0], value: null, level: "warn" };
-  const [name, value] = known.reduce((least, one) => (one[1] < least[1] ? one : least));
-  return { name, value, level: batteryLevel(name, value) };
+  const all = droneNames().map((name) => [name, store.s.vehicles?.[name]?.battery]);
+  if (!all.length || all.some(([, value]) => value === undefined)) return null;
+  const known = all.filter(([, value]) => value !== null), unknown = all.find(([, value]) => value === null);
+  const least = known.length ? known.reduce((worst, one) => (one[1] < worst[1] ? one : worst)) : null;
+  const level = least ? batteryLevel(...least) : "good";
+  if (unknown && level !== "bad") return { name: unknown[0], value: null, level: "warn", least };
+  return { name: least[0], value: least[1], level, least };
 }
 
-const leastBattery = (name) => store.scene.drones.find((drone) => drone.name === name)?.battery_min ?? 0.15;
+const sceneOf = (name) => store.scene.drones.find((drone) => drone.name === name);
+const leastBattery = (name) => sceneOf(name)?.battery_min ?? 0.15;
 
 // Thresholds of the bar and of the cards: docs/explanation/console.md#thresholds.
 export function batteryLevel(name, value) {

@@ -15,7 +15,7 @@ import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";
 import { ghostPoint, startSteering } from "./steer.js";
 import { droneNames, entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
-import { buildTeam, paint, showTeam } from "./team.js";
+import { buildTeam, paint, showTeam, startTeam } from "./team.js";
 import { View } from "./view.js";
 
 const SLOW_MS = 200;
@@ -153,6 +153,7 @@ window.__console = {
 };
 
 startOrders();
+startTeam();
 startCameras();
 startSteering(byId("map"), view);
 connect();

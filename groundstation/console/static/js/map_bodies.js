@@ -3,6 +3,7 @@
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
+import { limitsOf } from "./duty.js";
 import { FIGURE, NAME, around, keepClear, note } from "./labels.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
@@ -156,7 +157,7 @@ export function drawVelocities(g, view, stale) {
     drawArrow(g, from, tip(setpoint.velocity), 3, ink().text);
     if (!control?.limited_by.length) continue;
     const places = around(from[0], from[1], bodyRadius(view) + 6, 11).slice(1);
-    note(g, FIGURE, name, `cut by ${control.limited_by.join(", ")}`, places, ink().fence, 11, 700);
+    note(g, FIGURE, name, `limited by ${limitsOf(control)}`, places, ink().fence, 11, 700);
   }
 }
 

@@ -1,6 +1,7 @@
 // The chosen sensing topology beside its alternatives, as small graphs with their costs.
 
 import { byId, el, seconds, svg, text } from "./dom.js";
+import { limitsOf } from "./duty.js";
 import { colourOf, ink } from "./palette.js";
 import { ageS, store } from "./store.js";
 
@@ -79,7 +80,7 @@ function cuts(plan) {
   const lines = limited.map((control) => {
     const speed = (v) => Math.hypot(v[0], v[1]).toFixed(2);
     const how = control.wanted ? `${speed(control.wanted)} → ${speed(control.velocity)} m/s` : `now ${speed(control.velocity)} m/s`;
-    return el("div", {}, el("strong", {}, control.robot), ` cut by ${control.limited_by.join(", ")}: ${how}`);
+    return el("div", {}, el("strong", {}, control.robot), ` limited by ${limitsOf(control)}: ${how}`);
   });
-  return el("div", { class: "cuts num", data: { testid: "cuts" } }, ...(lines.length ? lines : [el("span", { class: "dim" }, "Safety cuts nothing now.")]));
+  return el("div", { class: "cuts num", data: { testid: "cuts" } }, ...(lines.length ? lines : [el("span", { class: "dim" }, "Safety limits nobody now.")]));
 }

@@ -3,7 +3,8 @@
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
-import { batteryLevel } from "./glance.js";
+import { dutyOf, landingOf } from "./duty.js";
+import { batteryLevel, minutesWords } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
 
@@ -11,28 +12,33 @@ const STALE_S = 1;
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const cards = new Map();
 
+export function startTeam() {
+  const button = byId("figures");
+  button.onclick = () => button.setAttribute("aria-pressed", `${byId("team").classList.toggle("all")}`);
+}
+
 export function buildTeam() {
   cards.clear();
   const { drones, targets } = store.scene;
-  const nodes = drones.map((drone) => card(drone.name, ["battery", "rate", "link", "heard", "position", "ellipse", "seen", "speed", "by"], true));
+  const nodes = drones.map((drone) => card(drone.name, ["battery", "link", "heard", "seen", "rate", "speed", "by", "position", "ellipse"], true));
   for (const target of targets) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
   byId("team").replaceChildren(...nodes);
 }
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
 const BELIEF = ["position", "ellipse", "speed"];
-// What stays on a screen that is read from 3 m.
-const CHIEF = new Set(["battery", "seen"]);
+// What stays on a screen that is read from 3 m, and on a low one.
+const CHIEF = new Set(["battery", "seen"]), FIRST = { drone: new Set(["battery", "link", "heard", "seen"]), target: new Set(["seen", "speed", "by"]) };
 const WIDE = new Set(["position", "ellipse", "by"]);
 
 function card(name, fields, drone) {
   const values = Object.fromEntries(fields.map((field) => [field, el("dd", { data: { testid: `${name}-${field}` } })]));
   const mode = el("span", { class: "pill", data: { testid: `${name}-mode` } });
   const chip = svg("svg", { viewBox: "0 0 18 18", class: "chip", "aria-hidden": "true" });
-  const detail = el("p", { class: "detail", hidden: true });
-  const root = el("article", { class: "unit", "aria-label": name, data: { testid: `card-${name}` } },
-    el("div", { class: "head" }, chip, el("strong", {}, name), mode),
-    el("dl", {}, ...fields.map((field) => el("div", { class: `${WIDE.has(field) ? "wide" : ""}${CHIEF.has(field) ? " chief" : ""}` }, el("dt", {}, TITLES[field]), values[field]))), detail, drone ? actions(name) : null);
+  const detail = el("p", { class: "detail", data: { testid: `${name}-duty` } });
+  const root = el("article", { class: drone ? "unit" : "unit target", "aria-label": name, data: { testid: `card-${name}` } },
+    el("div", { class: "head" }, chip, el("strong", {}, name), mode), detail,
+    el("dl", {}, ...fields.map((field) => el("div", { class: [WIDE.has(field) && "wide", CHIEF.has(field) && "chief", FIRST[drone ? "drone" : "target"].has(field) && "first"].filter(Boolean).join(" ") }, el("dt", {}, TITLES[field]), values[field]))), drone ? actions(name) : null);
   cards.set(name, { root, values, mode, chip, detail, drone });
   paint(name);
   return root;
@@ -77,8 +83,14 @@ function showVehicle(name, { root, values, mode, detail }) {
   text(values.rate, `${status.rate_hz.toFixed(0)} Hz`);
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
   showLink(values.link, status.link);
-  detail.hidden = !status.detail;
-  text(detail, status.detail);
+  showDuty(detail, name, silent);
+}
+
+// A vehicle that is not heard does nobody knows what: only its landing is certain.
+function showDuty(node, name, silent) {
+  const landing = landingOf(name), words = silent ? "Nothing is heard of it: its own failsafes count." : `${dutyOf(name)} ${landing}`.trim();
+  text(node, words);
+  node.classList.toggle("low", Boolean(landing) || Boolean(silent));
 }
 
 // What share of the packets or of the signal arrives, as the driver says it.
@@ -90,7 +102,8 @@ function showLink(node, share) {
 }
 
 function showBattery(node, name, value) {
-  if (value === null || value === undefined) return text(node, "?");
+  text(node.previousElementSibling, ["battery", minutesWords(name)].filter(Boolean).join(", "));
+  if (value === null || value === undefined) { delete node.dataset.words; return text(node, "unknown"); }
   const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
   const words = `${(100 * value).toFixed(0)} %${level === "empty" ? (standing ? " charge!" : " land!") : level === "low" ? " low" : ""}`;
   if (node.dataset.words === words) return;
@@ -111,8 +124,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     const [search, words] = store.s.estimate?.searches?.[name] ?? [];
     text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : "tracked"));
     mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
-    detail.hidden = !words;
-    text(detail, words ?? "");
+    text(detail, words ?? (body && !lost ? `${age < 1 ? "Seen" : "Not seen just now"}: the team tracks it.` : ""));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   text(values.seen, body ? `${seconds(age)} ago` : "not yet");

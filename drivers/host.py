@@ -191,7 +191,7 @@ class VehicleHost:
 
     def _announce_refusal(self, now_ns: int, command: Command) -> None:
         """Report a command without the right to give it; once a second, and once for each."""
-        reason = self.watchdog.lease.refusal(now_ns, command)
+        reason = "" if self.watchdog.has_answered(command) else self.watchdog.lease.refusal(now_ns, command)
         if not reason or command.id == self._refused_id or OPERATOR in command.scope:
             return
         self._count("command", "unauthorised")

@@ -85,6 +85,10 @@ class Watchdog:
             self.lease.hear_stop(now_ns, command)
         return received, self._acks.answer(command, refusal or self._obey(now_ns, command))
 
+    def has_answered(self, command: Command) -> bool:
+        """Return whether this is the repetition of a command that was obeyed or refused before."""
+        return self._acks.answered(command) is not None
+
     def _obey(self, now_ns: int, command: Command) -> str:
         match command.verb:
             case Verb.CUT_MOTORS:

@@ -11,8 +11,8 @@ from drivers.ardrone.driver import ArDrone, run
 from drivers.host import VehicleHost, run_hosts
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import Severity, Verb
-from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, RAW_RX, RAW_TX, VEHICLE_STATUS
+from groundstation.bus.messages import Command, Severity, Verb
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, IMU, ODOMETRY, RAW_RX, RAW_TX, VEHICLE_STATUS
 from groundstation.errors import SettingsError
 
 S = 1_000_000_000
@@ -289,3 +289,17 @@ def test_an_order_without_the_right_to_give_it_is_an_event(rig):
     assert any(
         "TAKEOFF of cli_1 refused: the operator lease is held by op" in text for _, text, _ in rig.process.events
     )
+
+
+def test_an_obeyed_order_that_is_repeated_past_its_time_is_no_event(rig):
+    rig.connect()
+    sent_ns = time.monotonic_ns()
+    header = rig.other.header("team", sent_ns)
+    order = Command(header=header, id="t", verb=Verb.TAKEOFF, scope=(), issuer="op", expires_ns=sent_ns + S // 2)
+    rig.other.publish(COMMAND, order)
+    rig.turn()
+    assert rig.host.watchdog.mode == "TAKING_OFF"
+    rig.until(lambda: time.monotonic_ns() > order.expires_ns)
+    rig.other.publish(COMMAND, order)
+    rig.turn()
+    assert not any("refused" in text for _, text, _ in rig.process.events), rig.process.events

@@ -67,7 +67,7 @@ class Intake:
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
         self._attitudes = AttitudeIntake(joint.parameters.inertial)
         self.ranges = RangeIntake(joint, joint.parameters.ranging)
-        self._joins_early = joint.parameters.joins_early
+        self._joins_early, self._tells_steps = joint.parameters.joins_early, joint.parameters.tells_steps
         self._standing: dict[str, tuple[int, bool]] = {}
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
@@ -126,7 +126,7 @@ class Intake:
             return Verdict.IMPLAUSIBLE
         values = (message.velocity_m_s, *attitude, message.height_m)
         entity = message.header.entity
-        frozen = self._odometry_watch.is_frozen(entity, values, stamp_ns)
+        frozen = self._odometry_watch.is_frozen(entity, values, stamp_ns) and entity not in self._tells_steps
         # A vehicle that tells whole numbers repeats them as long as it stands.
         if frozen and not self._standing.get(entity, (0, False))[1]:
             return Verdict.FROZEN

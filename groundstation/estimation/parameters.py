@@ -58,11 +58,11 @@ class EstimatorParameters:
     """Entities and sensors by name, and the settings of the filter.
 
     step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
-    wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row
-    over at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where
-    they publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to
-    take off. world_cameras: sensors that hang in the room, and can be bumped. ranging: by
-    system, who has a transponder.
+    wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row over
+    at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where they
+    publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to take
+    off. tells_steps: robots whose odometry may repeat itself in flight. world_cameras: sensors that hang in the room,
+    and can be bumped. ranging: by system, who has a transponder.
     """
 
     entities: Mapping[str, MotionModel]
@@ -75,6 +75,7 @@ class EstimatorParameters:
     divergence_s: float = 0.6
     inertial: Mapping[str, float] = field(default_factory=dict)
     joins_early: frozenset[str] = frozenset()
+    tells_steps: frozenset[str] = frozenset()
     world_cameras: frozenset[str] = frozenset()
     ranging: Mapping[str, Mapping[str, RangedRobot]] = field(default_factory=dict)
 
@@ -105,6 +106,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
             n: d.odometry.velocity_scale for n, d in drones.items() if not kind_named(d.kind).habits.tells_attitude
         },
         joins_early=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.flies_on_estimate),
+        tells_steps=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.tells_steps),
         world_cameras=frozenset(resolved.cameras),
         ranging={name: _ranged(system, drones) for name, system in resolved.ranging.items()},
     )

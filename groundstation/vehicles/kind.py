@@ -33,7 +33,8 @@ class ErrorHabits:
     """How long a kind's errors last [s], and the error of its climb rate [m/s; of its highest: share].
 
     tells_attitude: its own attitude is better than what we could make of its IMU. flies_on_estimate: it is told where
-    it is, so that the tracker has to know it before it lifts off.
+    it is, so that the tracker has to know it before it lifts off. tells_steps: its velocities and angles come in steps
+    so coarse that they repeat while it hovers; a frozen one is its driver's to find.
     """
 
     velocity_s: float
@@ -44,6 +45,7 @@ class ErrorHabits:
     reports_climb: bool
     tells_attitude: bool
     flies_on_estimate: bool = False
+    tells_steps: bool = False
 
 
 @dataclass(frozen=True, slots=True)

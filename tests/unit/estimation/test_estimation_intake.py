@@ -181,6 +181,17 @@ def test_a_standing_vehicle_may_repeat_itself() -> None:
     assert desk.take(desk.odometry(-1 * MS, yaw_rad=0.5)) is Verdict.FROZEN
 
 
+@pytest.mark.parametrize("steps", [False, True])
+def test_a_vehicle_that_tells_coarse_steps_may_repeat_itself_in_flight(steps: bool) -> None:
+    desk = Desk()
+    joint = FixedLagFilter(replace(desk.filter.parameters, tells_steps=frozenset(["drone"] if steps else [])))
+    intake = Intake(joint, {"ceiling"}, "here")
+    still = [
+        intake.take("o", desk.odometry((500 - 10 * k) * MS, yaw_rad=0.5), NOW - (500 - 10 * k) * MS) for k in range(60)
+    ]
+    assert (Verdict.FROZEN in still) is not steps
+
+
 def test_a_sensor_that_repeats_itself_is_frozen_and_thaws() -> None:
     desk = Desk()
     ages = [(500 - 10 * k) * MS for k in range(50)]

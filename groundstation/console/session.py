@@ -182,10 +182,10 @@ class Sessions:
 
     def _take_over(self, viewer: PageConnection) -> None:
         replaced = self.operator_lock.take(viewer.client, viewer.name)
-        text = f"{viewer.name} has taken over from {replaced}: it alone starts now, stops work from here as before"
+        text = f"{viewer.name} has taken over from {replaced}: TAKE OFF, TRACK, RESUME are its own. Any page may stop"
         for other in self.viewers.values():
             if replaced and other is not viewer:
-                other.say(encoded("notice", text=text, grave=True, ref=""))
+                other.say(encoded("notice", text=text, grave=False, ref=""))
 
     def _steer(self, viewer: PageConnection, message: Drive | Place | FollowPath) -> None:
         if not self._targets:

@@ -72,12 +72,12 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page = stage.open()
     stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
-    assert page.there("battery-lasts").inner_text() == "worst, ~5 min"
+    assert page.there("battery-lasts").inner_text() == "~5 min left"
     page.page.wait_for_timeout(31_000)
     stage.flight.battery["drone_2"] = 0.5
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst, 1 min")
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "1 min left")
     stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst, ~4 min")
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "~4 min left")
 
 
 def test_the_bar_says_what_the_team_does(stage: Any) -> None:
@@ -87,7 +87,7 @@ def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     assert page.there("recording").inner_text() == "on"
     assert page.there("air-time").inner_text().startswith("0:")
     stage.flight.modes["drone_1"] = "LANDING"
-    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
+    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING 1/2")
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("team-mode").inner_text() == "ON GROUND")
     stage.flight.battery["drone_1"] = None
@@ -97,12 +97,16 @@ def test_the_bar_says_what_the_team_does(stage: Any) -> None:
 def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -> None:
     page = stage.open()
     verdict = page.there("verdict")
+    stage.flight.battery["drone_2"] = 0.6
     known = "No alarms. 2 of 2 fly, the places of 2 of 2 are known. "
     page.wait(lambda s: verdict.inner_text() == f"{known}The target is seen.")
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "HOLD"}
     page.wait(lambda s: verdict.inner_text().endswith("They hover (held by operator): RESUME lets them go on."))
     stage.flight.modes["drone_2"] = "LANDED"
     page.wait(lambda s: "1 of 2 flies" in verdict.inner_text())
+    stage.flight.battery["drone_2"] = 0.28
+    page.wait(lambda s: verdict.inner_text().startswith("No alarms, but the battery of drone_2 is low."))
+    stage.flight.battery["drone_2"] = 0.6
     page.shot("verdict")
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: verdict.inner_text().startswith("No alarms. Nobody flies."))
@@ -118,6 +122,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     stage.flight.lands_in_s["drone_1"] = 1.8
     page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle. Lands in 2 s if nothing changes.")
     assert "drone_1 LANDS IN 2 s" in page.there("banner-landing").inner_text()
+    assert page.there("drone_1-mode").inner_text() == "hover"
     stage.flight.detail.clear()
     stage.flight.lands_in_s.clear()
     stage.flight.modes["drone_1"] = "HOLD"

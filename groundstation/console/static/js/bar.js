@@ -31,8 +31,7 @@ export function showBar() {
 // What stands under the worst battery: for how long it lasts, or the least of those that are known.
 function batteryLabel(battery) {
   if (battery?.value === null && battery.least) return `others ≥ ${(100 * battery.least[1]).toFixed(0)} %`;
-  const lasts = minutesWords(...droneNames());
-  return lasts ? `worst, ${lasts}` : "worst battery";
+  return minutesWords(...droneNames()) || "worst battery";
 }
 
 function showStages(now) {

@@ -113,7 +113,7 @@ export function showControls() {
   }
   showCounts(names);
   const free = !session.operator, mine = session.operator === me.client, mayStart = mayGive("TAKEOFF");
-  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayStart ? roleText() : free ? "no operator" : mine ? "you are the operator" : `operator: ${session.operator_name || "another page"}`);
+  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayStart ? roleText() : free ? "starts: any page" : mine ? "starts: this page" : `starts: ${session.operator_name || "another page"}`);
   byId("takeover").hidden = replay || !me.trusted || !mayStart || free || mine;
   const able = !replay && !runOver() && me.trusted && mayStart && store.connected && (free || mine) && Boolean(session.lease);
   const why = replay ? "a replay: nothing here can be commanded" : runOver() ? OVER : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !mayStart ? roleText() : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";

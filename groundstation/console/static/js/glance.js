@@ -9,22 +9,29 @@ const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
 export const STAGES = ["pre-flight", "take-off", "track", "land", "over"];
 
 const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filter(Boolean);
+// Its mode; HOVER as well while a failsafe keeps it from following the plan in TRACK.
+export const modeOf = (status) => status?.mode === "TRACK" && status.detail.startsWith("hovers") ? "HOVER" : status?.mode;
 export const modes = (names = droneNames()) => names.map((name) => store.s.vehicles?.[name]?.mode).filter(Boolean);
 export const aloft = () => modes().filter((mode) => ALOFT.has(mode)).length;
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
 // The most careful thing that any drone does is what the team does; [words, level].
 export function teamMode() {
-  const all = modes(), lost = statuses().filter((status) => ageS(status.at) > HEARD_S).length;
+  const all = statuses().map(modeOf), lost = statuses().filter((status) => ageS(status.at) > HEARD_S).length;
   if (runOver()) return ["RUN OVER", "calm"];
   if (lost) return [`${lost} NOT HEARD`, "bad"];
   if (all.includes("CUT")) return ["CUT", "bad"];
-  if (all.includes("LANDING")) return ["LANDING", "warn"];
-  if (all.includes("TAKING_OFF")) return ["TAKING OFF", "warn"];
+  for (const mode of ["LANDING", "TAKING_OFF"]) if (all.includes(mode)) return [`${mode.replace("_", " ")}${share(all, mode)}`, "warn"];
   if (all.includes("HOLD")) return ["HOLD", "warn"];
   if (all.includes("TRACK")) return targetAgeS() > (store.scene?.lost_after_s ?? 3) ? ["SEARCH", "warn"] : ["TRACK", "good"];
   if (all.includes("HOVER")) return ["HOVER", "warn"];
   return all.length ? ["ON GROUND", "calm"] : ["–", "calm"];
+}
+
+// " 1/2" where not all of them do it.
+function share(all, mode) {
+  const count = all.filter((one) => one === mode).length;
+  return count < all.length ? ` ${count}/${all.length}` : "";
 }
 
 export function stage() {
@@ -57,12 +64,12 @@ export function minutesLeft(name) {
   return usual ? [(left * usual) / 60, false] : null;
 }
 
-// "6 min" as measured, "~6 min" by what its kind usually does, "" where nobody knows.
+// "6 min left" as measured, "~6 min left" by what its kind usually does, "" where nobody knows.
 export function minutesWords(...names) {
   const known = names.map(minutesLeft).filter(Boolean);
   if (!known.length) return "";
   const [minutes, measured] = known.reduce((least, one) => (one[0] < least[0] ? one : least));
-  return minutes < 1 ? "< 1 min" : `${measured ? "" : "~"}${Math.floor(minutes)} min`;
+  return minutes < 1 ? "< 1 min left" : `${measured ? "" : "~"}${Math.floor(minutes)} min left`;
 }
 
 // The least battery, and whose it is; an unknown one is worse than any unless that is to be charged. least: of those

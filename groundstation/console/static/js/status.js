@@ -22,11 +22,11 @@ export function showBanners() {
   if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", ended.text[0].toUpperCase() + ended.text.slice(1), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
   else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
-  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land after 3 s."]);
+  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land 3 s after its last word."]);
   const stop = store.connected ? unheardStop() : null;
   if (stop) banners.push(["unheard", "grave", `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, "Press again. What flies on: groundstation land in a shell, or its own remote control."]);
   for (const [name, status] of store.connected && !ended ? Object.entries(store.s.vehicles ?? {}) : []) {
-    if (status.lands_in_s !== null && ageS(status.at) < OLD_S) banners.push(["landing", "grave", `${name} LANDS IN ${status.lands_in_s.toFixed(0)} s`, `${status.detail}. Nothing else has to be done; once its cause is over, RESUME lets it go on.`]);
+    if (status.lands_in_s !== null && ageS(status.at) < OLD_S) banners.push(["landing", "grave", `${name} LANDS IN ${status.lands_in_s.toFixed(0)} s`, `${status.detail}. It lands by itself unless this ends.`]);
   }
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);
   for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, 4) : []) {

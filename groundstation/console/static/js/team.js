@@ -4,7 +4,7 @@ import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
 import { dutyOf, landingOf } from "./duty.js";
-import { batteryLevel, minutesWords } from "./glance.js";
+import { aloft, batteryLevel, minutesWords, modeOf } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
 
@@ -73,8 +73,8 @@ function showVehicle(name, { root, values, mode, detail }) {
   const status = store.s.vehicles?.[name], age = ageS(status?.at), stale = age > STALE_S || !store.connected;
   const silent = status && age > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
-  text(mode, silent ? "silent" : status ? status.mode.replace("_", " ").toLowerCase() : "no word yet");
-  mode.dataset.level = silent ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : LEVELS[status.mode] ?? "wait";
+  text(mode, silent ? "silent" : status ? modeOf(status).replace("_", " ").toLowerCase() : "no word yet");
+  mode.dataset.level = silent ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : (modeOf(status) === status.mode ? LEVELS[status.mode] : "warn") ?? "wait";
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
@@ -102,7 +102,7 @@ function showLink(node, share) {
 }
 
 function showBattery(node, name, value) {
-  text(node.previousElementSibling, ["battery", minutesWords(name)].filter(Boolean).join(", "));
+  text(node.previousElementSibling, minutesWords(name) || "battery");
   if (value === null || value === undefined) { delete node.dataset.words; return text(node, "unknown"); }
   const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
   const words = `${(100 * value).toFixed(0)} %${level === "empty" ? (standing ? " charge!" : " land!") : level === "low" ? " low" : ""}`;
@@ -115,6 +115,11 @@ function showBattery(node, name, value) {
   node.replaceChildren(el("span", { class: "battery" }, fill), words);
 }
 
+function beliefWords(body, age, lost) {
+  if (!body || lost) return "";
+  return age > 1 ? `Not seen for ${seconds(age)}: expected where it is drawn.` : aloft() ? "Seen: the team tracks it." : "Seen.";
+}
+
 function showBelief(name, { root, values, mode, detail, drone }) {
   const body = entity(name), age = body ? estimateAge() + body.age_s : Infinity;
   const old = estimateAge() > STALE_S;
@@ -124,7 +129,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     const [search, words] = store.s.estimate?.searches?.[name] ?? [];
     text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : "tracked"));
     mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
-    text(detail, words ?? (body && !lost ? `${age < 1 ? "Seen" : "Not seen just now"}: the team tracks it.` : ""));
+    text(detail, words ?? beliefWords(body, age, lost));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   text(values.seen, body ? `${seconds(age)} ago` : "not yet");

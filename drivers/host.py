@@ -160,6 +160,7 @@ class VehicleHost:
             rate_hz=health.rate_hz,
             rejected=health.rejected | self._ignored | self._refused(),
             detail=health.detail or self.watchdog.explanation,
+            braked=self.watchdog.braked,
             lands_in_s=self.watchdog.lands_in_s,
             clock_drift_ppm=None if health.clock is None else health.clock.drift_ppm,
             telemetry_late_ms=None if health.clock is None else health.clock.late_ms,
@@ -169,8 +170,7 @@ class VehicleHost:
             self._event(Severity.WARNING, f"{self.vehicle.name} refused {refused}")
 
     def _upstream(self) -> Upstream:
-        child = self._child
-        return Upstream(child.supervisor_alive, child.supervisor_fresh, child.stop_requested)
+        return Upstream(self._child.supervisor_alive, self._child.supervisor_fresh, self._child.stop_requested)
 
     def _count(self, what: str, reason: str) -> None:
         if reason:

@@ -178,6 +178,11 @@ class Watchdog:
     # -- outlook ------------------------------------------------------------------------------------------------------
 
     @property
+    def braked(self) -> bool:
+        """Return whether a row of the table keeps it hovering in TRACK for now."""
+        return self._braked_by is not None
+
+    @property
     def explanation(self) -> str:
         """Return why the vehicle does what it does now, in words."""
         return self.reason if self._braked_by is None else f"hovers: {self._text_of(self._braked_by)}"

@@ -185,6 +185,7 @@ def _vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
         "link": status.link_quality,
         "rate_hz": round(status.rate_hz, 1),
         "detail": status.detail,
+        "braked": status.braked,
         "lands_in_s": None if status.lands_in_s is None else round(status.lands_in_s, 1),
         "rejected": sum(status.rejected.values()),
     }

@@ -43,6 +43,7 @@ class FakeFlight(threading.Thread):
         self.rate_hz: dict[str, float] = {}
         self.detail: dict[str, str] = {}
         self.lands_in_s: dict[str, float] = {}
+        self.braked: set[str] = set()
         self.deaf: set[str] = set()
         self.frozen = False
         self.distance_m = 1.3  # of the drones from the target
@@ -250,6 +251,7 @@ class FakeFlight(threading.Thread):
                 link_quality=self.link.get(name, 0.93),
                 rate_hz=self.rate_hz.get(name, 198.0 + math.sin(s)),
                 detail=self.detail.get(name, _WHY.get(mode, "")),
+                braked=name in self.braked,
                 lands_in_s=self.lands_in_s.get(name),
             )
             bus.publish(t.VEHICLE_STATUS, status)

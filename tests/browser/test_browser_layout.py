@@ -120,11 +120,13 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     assert "limited by the fence" in page.there("drone_2-duty").inner_text()
     stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"
     stage.flight.lands_in_s["drone_1"] = 1.8
+    stage.flight.braked.add("drone_1")
     page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle. Lands in 2 s if nothing changes.")
     assert "drone_1 LANDS IN 2 s" in page.there("banner-landing").inner_text()
     assert page.there("drone_1-mode").inner_text() == "hover"
     stage.flight.detail.clear()
     stage.flight.lands_in_s.clear()
+    stage.flight.braked.clear()
     stage.flight.modes["drone_1"] = "HOLD"
     page.wait(lambda s: duty.inner_text() == "Held by operator.")
     assert page.there("hold").inner_text().startswith("HOLD 2")

@@ -47,6 +47,8 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     """Datagrams, setpoints and commands that were dropped, by reason."""
     detail: str = ""
     """What the operator should know, in words."""
+    braked: bool = False
+    """In TRACK: a failsafe keeps it hovering for now; it follows setpoints again once that is over."""
     lands_in_s: float | None = None
     """Time until a failsafe lands it if nothing changes [s]; none: none is near."""
     clock_drift_ppm: float | None = None

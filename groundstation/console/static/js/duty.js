@@ -34,8 +34,8 @@ function tracked(name, plan) {
 export function dutyOf(name) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
-  const planned = status.mode === "TRACK" && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
-  return planned && !status.detail.startsWith("hovers") ? tracked(name, plan) : sentence(status.detail);
+  const planned = status.mode === "TRACK" && !status.braked && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
+  return planned ? tracked(name, plan) : sentence(status.detail);
 }
 
 // When a failsafe will land it, if nothing changes; "" if none is near.

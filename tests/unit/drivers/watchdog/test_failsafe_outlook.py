@@ -10,7 +10,7 @@ def test_a_healthy_flight_expects_no_landing(new_bench):
     bench = new_bench().fly()
     bench.run(2.0)
     assert bench.watchdog.lands_in_s is None
-    assert bench.watchdog.explanation == "tracking for op"
+    assert bench.watchdog.explanation == "tracking for op" and not bench.watchdog.braked
 
 
 def test_a_usual_take_off_expects_no_landing(new_bench):
@@ -52,6 +52,7 @@ def test_a_landing_is_no_longer_announced_once_its_condition_is_over(new_bench):
     bench.tracker_speaks = False
     bench.run(0.45)
     assert bench.watchdog.lands_in_s is not None
+    assert bench.watchdog.braked and bench.watchdog.mode is DriverMode.TRACK
     bench.tracker_speaks = True
     bench.run(0.3)
-    assert bench.watchdog.lands_in_s is None
+    assert bench.watchdog.lands_in_s is None and not bench.watchdog.braked

@@ -5,7 +5,7 @@ from groundstation.supervisor.managed_process import ManagedProcess
 
 _NOTE_PERIOD_S = 2.0
 _SAME_NOTE_PERIOD_S = 10.0
-_TO_BEGIN = 3.0
+_TO_BEGIN = 8.0
 
 
 class Waiting:
@@ -13,7 +13,8 @@ class Waiting:
 
     Each may take as long as its own start limit from `began_s` on, over all of its restarts. grace_s: the start can do
     without them, and waits for so long, from when each has come up or failed for the first time, until it is READY: a
-    device may answer a moment after its driver has begun. One that does not begin at all has three times as long.
+    device may answer a moment after its driver has begun. One that does not begin at all has eight times as long: on a
+    full machine the imports of a second run take 10 s and more.
     """
 
     def __init__(self, processes: list[ManagedProcess], began_s: float, grace_s: float | None = None) -> None:

@@ -15,7 +15,8 @@ function show(id, words, level) {
 }
 
 export function showBar() {
-  show("team-mode", ...teamMode());
+  const [mode, level, share = ""] = teamMode();
+  show("team-mode", `${mode}${share}`, level);
   const since = store.s.flight?.airborne_since_ms, airborne = since ? ageS(since) : null;
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();

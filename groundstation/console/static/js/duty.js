@@ -14,7 +14,11 @@ const LIMITS = {
   unknown: "an unknown place",
 };
 
-export const limitsOf = (control) => control.limited_by.map((limit) => LIMITS[limit] ?? limit).join(" and ");
+// What limits a drone that follows its plan; "" if nothing does.
+export function limitsOf(control) {
+  const follows = store.s.vehicles?.[control?.robot]?.mode === "TRACK";
+  return follows ? control.limited_by.map((limit) => LIMITS[limit] ?? limit).join(" and ") : "";
+}
 
 const joined = (names) => names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${names.at(-1)}` : names[0];
 const sentence = (words) => words ? `${words[0].toUpperCase()}${words.slice(1)}${/[.!?]$/.test(words) ? "" : "."}` : "";
@@ -24,10 +28,10 @@ function tracked(name, plan) {
   const watched = relied.filter(([observer]) => observer === name).map(([, subject]) => subject);
   const watchers = relied.filter(([, subject]) => subject === name).map(([observer]) => observer);
   const sought = Object.keys(store.s.estimate?.searches ?? {});
-  const control = plan.controls.find(({ robot }) => robot === name);
+  const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const does = watched.length ? `watches ${joined(watched)}` : sought.length ? `looks for ${joined(sought)}` : "moves to where it will see more";
   const known = watchers.length ? `its place comes from ${joined(watchers)}` : "nobody sees it now";
-  return sentence([does, known, control?.limited_by.length ? `limited by ${limitsOf(control)}` : ""].filter(Boolean).join("; "));
+  return sentence([does, known, limits && `limited by ${limits}`].filter(Boolean).join("; "));
 }
 
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.
@@ -38,8 +42,8 @@ export function dutyOf(name) {
   return planned ? tracked(name, plan) : sentence(status.detail);
 }
 
-// When a failsafe will land it, if nothing changes; "" if none is near.
-export function landingOf(name) {
-  const left = store.s.vehicles?.[name]?.lands_in_s;
-  return left === null || left === undefined ? "" : `Lands in ${left.toFixed(0)} s if nothing changes.`;
+// In how many seconds a failsafe will land it, if nothing changes; "" if none is near.
+export function landsIn(name) {
+  const left = store.s.vehicles?.[name]?.lands_in_s ?? null;
+  return left === null ? "" : `${left.toFixed(0)} s`;
 }

@@ -15,13 +15,14 @@ export const modes = (names = droneNames()) => names.map((name) => store.s.vehic
 export const aloft = () => modes().filter((mode) => ALOFT.has(mode)).length;
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
-// The most careful thing that any drone does is what the team does; [words, level].
+// The most careful thing that any drone does is what the team does; [words, level, how many of them].
 export function teamMode() {
   const all = statuses().map(modeOf), lost = statuses().filter((status) => ageS(status.at) > HEARD_S).length;
   if (runOver()) return ["RUN OVER", "calm"];
   if (lost) return [`${lost} NOT HEARD`, "bad"];
   if (all.includes("CUT")) return ["CUT", "bad"];
-  for (const mode of ["LANDING", "TAKING_OFF"]) if (all.includes(mode)) return [`${mode.replace("_", " ")}${share(all, mode)}`, "warn"];
+  if (all.includes("LANDING")) return ["LANDING", "warn", share(all, "LANDING")];
+  if (all.includes("TAKING_OFF")) return ["TAKING OFF", "warn", share(all, "TAKING_OFF")];
   if (all.includes("HOLD")) return ["HOLD", "warn"];
   if (all.includes("TRACK")) return targetAgeS() > (store.scene?.lost_after_s ?? 3) ? ["SEARCH", "warn"] : ["TRACK", "good"];
   if (all.includes("HOVER")) return ["HOVER", "warn"];

@@ -155,9 +155,10 @@ export function drawVelocities(g, view, stale) {
     const tip = (v) => { const [dx, dy] = bodyToWorld(v, body.mean[3]); return view.point(body.mean[0] + dx * ARROW_S, body.mean[1] + dy * ARROW_S); };
     if (control?.wanted && control.limited_by.length) drawArrow(g, from, tip(control.wanted), 1.2, colourOf(name), 0, true);
     drawArrow(g, from, tip(setpoint.velocity), 3, ink().text);
-    if (!control?.limited_by.length || store.s.vehicles?.[name]?.mode !== "TRACK") continue;
+    const limits = limitsOf(control);
+    if (!limits) continue;
     const places = around(from[0], from[1], bodyRadius(view) + 6, 11).slice(1);
-    note(g, FIGURE, name, `limited by ${limitsOf(control)}`, places, ink().fence, 11, 700);
+    note(g, FIGURE, name, `limited by ${limits}`, places, ink().fence, 11, 700);
   }
 }
 

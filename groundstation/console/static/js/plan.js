@@ -76,7 +76,7 @@ export function showTimeline() {
 }
 
 function cuts(plan) {
-  const limited = plan.controls.filter(({ robot, limited_by }) => limited_by.length && store.s.vehicles?.[robot]?.mode === "TRACK");
+  const limited = plan.controls.filter(limitsOf);
   const lines = limited.map((control) => {
     const speed = (v) => Math.hypot(v[0], v[1]).toFixed(2);
     const how = control.wanted ? `${speed(control.wanted)} → ${speed(control.velocity)} m/s` : `now ${speed(control.velocity)} m/s`;

@@ -2,6 +2,7 @@
 
 import { showMore } from "./bar.js";
 import { byId, el, seconds, text } from "./dom.js";
+import { landsIn } from "./duty.js";
 import { unheardStop } from "./glance.js";
 import { drawn } from "./map.js";
 import { ageS, estimateAge, replaying, runOver, silentS, store } from "./store.js";
@@ -26,7 +27,8 @@ export function showBanners() {
   const stop = store.connected ? unheardStop() : null;
   if (stop) banners.push(["unheard", "grave", `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, "Press again. What flies on: groundstation land in a shell, or its own remote control."]);
   for (const [name, status] of store.connected && !ended ? Object.entries(store.s.vehicles ?? {}) : []) {
-    if (status.lands_in_s !== null && ageS(status.at) < OLD_S) banners.push(["landing", "grave", `${name} LANDS IN ${status.lands_in_s.toFixed(0)} s`, `${status.detail}. It lands by itself unless this ends.`]);
+    const left = landsIn(name);
+    if (left && ageS(status.at) < OLD_S) banners.push(["landing", "grave", `${name} LANDS IN ${left}`, `${status.detail}. It lands by itself unless this ends.`]);
   }
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);
   for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, 4) : []) {

@@ -3,7 +3,7 @@
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
-import { dutyOf, landingOf } from "./duty.js";
+import { dutyOf, landsIn } from "./duty.js";
 import { aloft, batteryLevel, minutesWords, modeOf } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
@@ -88,9 +88,9 @@ function showVehicle(name, { root, values, mode, detail }) {
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.
 function showDuty(node, name, silent) {
-  const landing = landingOf(name), words = silent ? "Nothing is heard of it: its own failsafes count." : `${dutyOf(name)} ${landing}`.trim();
-  text(node, words);
-  node.classList.toggle("low", Boolean(landing) || Boolean(silent));
+  const left = landsIn(name), landing = left && ` Lands in ${left} if nothing changes.`;
+  text(node, silent ? "Nothing is heard of it: its own failsafes count." : `${dutyOf(name)}${landing}`);
+  node.classList.toggle("low", Boolean(left || silent));
 }
 
 // What share of the packets or of the signal arrives, as the driver says it.
@@ -103,7 +103,7 @@ function showLink(node, share) {
 
 function showBattery(node, name, value) {
   text(node.previousElementSibling, minutesWords(name) || "battery");
-  if (value === null || value === undefined) { delete node.dataset.words; return text(node, "unknown"); }
+  if (value === null || value === undefined) { delete node.dataset.words; node.className = ""; return text(node, "unknown"); }
   const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
   const words = `${(100 * value).toFixed(0)} %${level === "empty" ? (standing ? " charge!" : " land!") : level === "low" ? " low" : ""}`;
   if (node.dataset.words === words) return;

@@ -38,7 +38,7 @@ function concern() {
 }
 
 export function verdict() {
-  const all = droneNames().length, up = aloft(), mode = teamMode()[0].split(/ \d/)[0];
+  const all = droneNames().length, up = aloft(), [mode] = teamMode();
   if (!all || !modes().length) return "No alarms. Nothing is heard of the drones yet.";
   if (stage() === "over") return "The run is over: nothing flies.";
   if (!up) return `${concern()} Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;

@@ -9,21 +9,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from drivers.tello.wire.text import (
-    COMMAND_PORT,
-    EMERGENCY,
-    LAND,
-    OK,
-    SDK,
-    STATE_PORT,
-    STOP,
-    STREAM_OFF,
-    STREAM_ON,
-    TAKE_OFF,
-    State,
-    parse_rc,
-    state_text,
-)  # fmt: skip
+from drivers.tello.wire.text import COMMAND_PORT, EMERGENCY, LAND, OK, SDK, STATE_PORT, STREAM_ON, TAKE_OFF, State
+from sim_bridge.devices.tello_text import STOP, STREAM_OFF, parse_rc, state_text
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.listening import open_udp
 from sim_bridge.own_video import OwnVideo

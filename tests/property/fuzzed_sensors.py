@@ -4,7 +4,8 @@ from damage import Random, damaged_bytes
 
 from drivers.motion_capture.wire import natnet
 from drivers.ranging.wire.ranges import Round, encode
-from drivers.tello.wire.text import State, state_text
+from drivers.tello.wire.text import State
+from sim_bridge.devices.tello_text import state_text
 
 RANGES = encode(Round("tag_1", {"north": 3.25, "south": 4.5, "east": 0.75}, 4.0))
 TELLO = state_text(State(1, -2, 30, (1, 2, -3), 80, 75, 87, 12, (1.0, -2.0, -998.0)))

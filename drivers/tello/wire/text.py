@@ -9,8 +9,8 @@ from dataclasses import dataclass
 COMMAND_PORT = 8889
 STATE_PORT = 8890
 VIDEO_PORT = 11111
-SDK, TAKE_OFF, LAND, EMERGENCY, STOP = b"command", b"takeoff", b"land", b"emergency", b"stop"
-STREAM_ON, STREAM_OFF = b"streamon", b"streamoff"
+SDK, TAKE_OFF, LAND, EMERGENCY = b"command", b"takeoff", b"land", b"emergency"
+STREAM_ON = b"streamon"
 OK = b"ok"
 _LARGEST = 1024
 
@@ -72,30 +72,7 @@ def parse_state(data: bytes) -> State:
     return State(*angles, velocity, whole["tof"], whole["h"], whole["bat"], whole["time"], (x, y, z))
 
 
-def state_text(state: State) -> bytes:
-    """Return a state as the vehicle sends it."""
-    vx, vy, vz = state.velocity
-    ax, ay, az = state.acceleration
-    return (
-        f"pitch:{state.pitch};roll:{state.roll};yaw:{state.yaw};vgx:{vx};vgy:{vy};vgz:{vz};templ:60;temph:62;"
-        f"tof:{state.tof};h:{state.height};bat:{state.battery};baro:0.00;time:{state.time};"
-        f"agx:{ax:.2f};agy:{ay:.2f};agz:{az:.2f};\r\n"
-    ).encode("ascii")
-
-
 def rc(right: int, forward: int, up: int, clockwise: int) -> bytes:
     """Return stick positions, each cut to -100..100."""
     sticks = (max(-100, min(100, value)) for value in (right, forward, up, clockwise))
     return b"rc " + b" ".join(b"%d" % value for value in sticks)
-
-
-def parse_rc(data: bytes) -> tuple[int, int, int, int] | None:
-    """Return the stick positions of a command, None for another one."""
-    words = data.split()
-    if len(words) != 5 or words[0] != b"rc":
-        return None
-    try:
-        a, b, c, d = (int(word) for word in words[1:])
-    except ValueError:
-        return None
-    return (a, b, c, d) if max(abs(a), abs(b), abs(c), abs(d)) <= 100 else None

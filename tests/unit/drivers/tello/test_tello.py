@@ -11,13 +11,14 @@ import pytest
 
 from drivers.tello.driver import Heard, Tello, velocity_from_state
 from drivers.tello.settings import TelloDriverSettings
-from drivers.tello.wire.text import COMMAND_PORT, STATE_PORT, State, WireError, parse_rc, parse_state, rc, state_text
+from drivers.tello.wire.text import COMMAND_PORT, STATE_PORT, State, WireError, parse_state, rc
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import FlightState
 from groundstation.vehicles import kind_named
 from sim_bridge.conformance.subject import subject_of
 from sim_bridge.devices.tello import TelloBody, TelloEmulator
+from sim_bridge.devices.tello_text import parse_rc, state_text
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.site import SiteDrone
 from sim_bridge.world.noise import generator_of

@@ -1,14 +1,10 @@
 """The Tello driver: reader thread, what a decision means to the vehicle, and the process entry `run`."""
 
 import math
-import select
-import socket
-import threading
-from collections import Counter
-from contextlib import suppress
 from dataclasses import dataclass
 
-from drivers.base import HostProcess, LinkHealth
+from drivers.base import HostProcess
+from drivers.datagram_link import DatagramLink, DatagramVehicle
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
 from drivers.plausibility.health import Health, Sensor
@@ -17,10 +13,8 @@ from drivers.plausibility.motion import MotionMonitor, MotionSample
 from drivers.tello.settings import TelloDriverSettings
 from drivers.tello.wire import text
 from drivers.vehicle_settings import read_section
-from drivers.vehicle_socket import open_udp
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
-from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Odometry, Vector3
 from groundstation.bus.topics import ODOMETRY
@@ -66,59 +60,38 @@ def velocity_from_state(state: text.State) -> Vector3:
     return c * north + s * east, s * north - c * east, -down
 
 
-class Tello:
+class Tello(DatagramVehicle):
     """One Tello behind its two ports; `drivers.base.Vehicle`."""
 
     def __init__(self, settings: TelloDriverSettings, bus: Bus) -> None:
         self.name, self.address = settings.name, with_zone(settings.address, settings.interface)
         self.heard = Heard()
         self._settings, self._bus = settings, bus
-        self._log = DatagramLog(bus, settings.name, settings.raw_datagrams)
-        self._commands = self._open(0)
-        self._states = self._open(text.STATE_PORT)
         self._ready = False
         self._asked = Action.WAIT
         self._sent_ns: dict[bytes, int] = {}
-        self._rejected: Counter[str] = Counter()
-        self._rate_hz = 0.0
         self._plausibility = MotionMonitor(LIMITS)
-        self._closing = threading.Event()
-        self._reader = threading.Thread(target=self._read, name="tello", daemon=True)
-        self._reader.start()
-
-    def _open(self, port: int) -> socket.socket:
-        # Connected, so that only this vehicle is heard: several share the state's port, and each socket gets its own.
-        own = self._settings
-        udp = open_udp((own.tello.local_address, port), own.interface, (own.address, text.COMMAND_PORT))
-        udp.setblocking(False)
-        return udp
+        here = settings.tello.local_address
+        self._link = DatagramLink(
+            DatagramLog(bus, settings.name, settings.raw_datagrams),
+            (settings.address, text.COMMAND_PORT),
+            {(here, 0): self._hear_answer, (here, text.STATE_PORT): self._hear_state},
+            settings.interface,
+        )
 
     # -- reader thread ------------------------------------------------------------------------------------------------
 
-    def _read(self) -> None:
-        while not self._closing.is_set():
-            readable, _, _ = select.select([self._commands, self._states], [], [], 0.1)
-            for udp in readable:
-                with suppress(OSError):  # nobody listens there yet
-                    data = udp.recv(2048)
-                    self._log.received(clock.now_ns(), data)
-                    self._take(clock.now_ns(), data, udp is self._states)
+    def _hear_answer(self, now_ns: int, data: bytes) -> bool:
+        self._ready = self._ready or data.strip().lower() == text.OK
+        return False
 
-    def _take(self, now_ns: int, data: bytes, is_state: bool) -> None:
-        if not is_state:
-            self._ready = self._ready or data.strip().lower() == text.OK
-            return
-        try:
-            state = text.parse_state(data)
-        except text.WireError as error:
-            self._rejected[error.reason] += 1
-            return
-        before, velocity = self.heard, velocity_from_state(state)
+    def _hear_state(self, now_ns: int, data: bytes) -> bool:
+        state, before = text.parse_state(data), self.heard
+        velocity = velocity_from_state(state)
         ran = before.state is not None and state.time > before.state.time
-        if before.heard_ns:
-            self._rate_hz += 0.1 * (1e9 / max(1, now_ns - before.heard_ns) - self._rate_hz)
         self.heard = Heard(now_ns, now_ns if ran else before.motors_ns, state, velocity)
         self._publish(now_ns, state, velocity)
+        return True
 
     def _publish(self, now_ns: int, state: text.State, velocity: Vector3) -> None:
         roll, pitch, yaw = math.radians(state.roll), -math.radians(state.pitch), -math.radians(state.yaw)
@@ -174,9 +147,9 @@ class Tello:
             case Action.TAKE_OFF if not flies:
                 self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)
             case Action.FLY if flies:
-                self._send(now_ns, self._sticks(decision))
+                self._link.send(now_ns, self._sticks(decision))
             case Action.HOVER | Action.TAKE_OFF if flies:
-                self._send(now_ns, text.rc(0, 0, 0, 0))
+                self._link.send(now_ns, text.rc(0, 0, 0, 0))
             case _:
                 self._repeat(now_ns, text.SDK)
         if not self._ready:
@@ -196,29 +169,7 @@ class Tello:
     def _repeat(self, now_ns: int, word: bytes) -> None:
         if now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]:
             self._sent_ns[word] = now_ns
-            self._send(now_ns, word)
-
-    def _send(self, now_ns: int, data: bytes) -> None:
-        with suppress(OSError):  # a full buffer or an absent vehicle loses packets, as radio does
-            self._commands.send(data)
-            self._log.sent(now_ns, data)
-
-    def health(self, now_ns: int) -> LinkHealth:
-        """Return rate and refusals of the link."""
-        silent = now_ns - self.heard.heard_ns > _FRESH_NS
-        return LinkHealth(None, 0.0 if silent else self._rate_hz, dict(self._rejected))
-
-    def flush(self) -> None:
-        """Publish the raw datagrams that wait."""
-        self._log.flush()
-
-    def close(self) -> None:
-        """Stop the reader and close the sockets."""
-        self._closing.set()
-        self._reader.join(timeout=1.0)
-        self._commands.close()
-        self._states.close()
-        self._log.flush()
+            self._link.send(now_ns, word)
 
 
 def run(child: HostProcess) -> int:

@@ -1,88 +1,14 @@
-"""A Tello's own video (`tello://ADDRESS`): H.264 that comes to UDP port 11111 once the driver has asked for it."""
+"""A Tello's own video (`tello://ADDRESS`), which comes once the driver has asked for it."""
 
-import socket
-import struct
-import time
-from collections import Counter
-
-from drivers.camera.sources.frames import Unit
-from drivers.camera.sources.h264 import H264Decoder
-from drivers.camera.sources.reader_thread import Drain, PictureDecoder
+from drivers.camera.sources.datagrams import DatagramReader
 from drivers.tello.wire.text import VIDEO_PORT
-from drivers.tello.wire.video import Assembly
-from groundstation.adapters import bind_to_adapter
-from groundstation.bus import clock
-from groundstation.errors import DriverError
 
-_SILENT_S, _LOOK_S = 2.0, 0.25
-_LARGEST = 2048
-_IP_PKTINFO = 8  # struct in_pktinfo: adapter, our address, the address that the datagram was sent to
-_PACKET_INFO = struct.Struct("=i4s4s")
+# WIRE (docs/reference/tello.md 4): a picture fills datagrams of this size; a shorter one is its last.
+WHOLE_BYTES = 1460
 
 
-class TelloReader:
-    """Listens to the video of one Tello; several share the port, each with the first of its own datagrams as peer."""
+class TelloReader(DatagramReader):
+    """The pictures of one Tello."""
 
     def __init__(self, address: tuple[str, int], interface: str = "") -> None:
-        self._host, self._interface = address[0], interface
-        self.name = f"{self._host} (UDP {VIDEO_PORT})"
-        self.rejected: Counter[str] = Counter()
-        self.decoder: PictureDecoder | None = H264Decoder(self.rejected)
-
-    def interrupt(self) -> None:
-        """Make `read` return: it looks again four times a second."""
-
-    def read(self, drain: Drain) -> None:
-        """Hand over pictures until the drain closes."""
-        own = self._find(drain)
-        if own is None:
-            return
-        with own as udp:
-            drain.opened()
-            assembly, heard_s = Assembly(), time.monotonic()
-            while not drain.closing:
-                try:
-                    unit = assembly.feed(udp.recv(_LARGEST))
-                except TimeoutError:
-                    _none_since(heard_s)
-                    continue
-                heard_s = time.monotonic()
-                if unit:
-                    now_ns = clock.now_ns()
-                    drain.keep([Unit(unit.data, now_ns, now_ns, unit.starts)])
-                self.rejected["bytes"] += assembly.skipped
-                assembly.skipped = 0
-
-    def _find(self, drain: Drain) -> socket.socket | None:
-        """Return a socket that hears this vehicle only, once it sends; the kernel then gives the others what is theirs.
-
-        Which port it sends from is not documented, and to which of our addresses, only a datagram tells.
-        """
-        with self._bound(("", VIDEO_PORT)) as udp:
-            udp.setsockopt(socket.IPPROTO_IP, _IP_PKTINFO, 1)
-            began_s = time.monotonic()
-            while not drain.closing:
-                try:
-                    _, extra, _, source = udp.recvmsg(_LARGEST, socket.CMSG_SPACE(_PACKET_INFO.size))
-                except TimeoutError:
-                    _none_since(began_s)
-                    continue
-                if source[0] == self._host and extra:
-                    _, _, ours = _PACKET_INFO.unpack(extra[0][2][: _PACKET_INFO.size])
-                    own = self._bound((socket.inet_ntoa(ours), VIDEO_PORT))
-                    own.connect(source)
-                    return own
-        return None
-
-    def _bound(self, place: tuple[str, int]) -> socket.socket:
-        udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        bind_to_adapter(udp, self._interface)
-        udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        udp.settimeout(_LOOK_S)
-        udp.bind(place)
-        return udp
-
-
-def _none_since(heard_s: float) -> None:
-    if time.monotonic() - heard_s > _SILENT_S:
-        raise DriverError(f"no video for {_SILENT_S:g} s: does its driver run?")
+        super().__init__(address[0], interface, VIDEO_PORT, WHOLE_BYTES)

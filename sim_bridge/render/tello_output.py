@@ -8,7 +8,6 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from drivers.tello.wire.text import VIDEO_PORT
-from drivers.tello.wire.video import cut
 from groundstation.arrays import Array
 from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.h264 import GreyStream
@@ -17,6 +16,7 @@ from sim_bridge.render.wrong_pictures import WrongPictures
 
 # WIRE (docs/reference/tello.md 4): the vehicle's own choice lies between 1 and 4 Mbit/s.
 _BIT_RATE = 2e6
+_WHOLE_BYTES = 1460
 
 
 class TelloOutput:
@@ -78,3 +78,9 @@ class TelloOutput:
             self._news.notify()
         self._thread.join(timeout=1.0)
         self._socket.close()
+
+
+def cut(data: bytes) -> list[bytes]:
+    """Return the datagrams of a picture; a zero, which a stream may have, ends one that fills them all."""
+    data += b"" if len(data) % _WHOLE_BYTES else b"\x00"
+    return [data[place : place + _WHOLE_BYTES] for place in range(0, len(data), _WHOLE_BYTES)]

@@ -11,8 +11,8 @@ from fractions import Fraction
 import av
 import numpy as np
 
-from drivers.camera.sources.container import has_parameters
 from drivers.camera.sources.frames import Packet
+from drivers.camera.sources.nal_units import has_parameters
 from drivers.camera.sources.opening import open_source
 
 

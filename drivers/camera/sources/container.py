@@ -11,6 +11,7 @@ import av
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
 from drivers.camera.sources.jitter_filter import SenderClock
+from drivers.camera.sources.nal_units import has_parameters
 from drivers.camera.sources.raw import RawDecoder
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from groundstation.bus import clock
@@ -19,7 +20,6 @@ from groundstation.time_units import NS_PER_S
 
 _OPEN_LIMIT_S = 5.0
 _READ_LIMIT_S = 2.0
-_SEQUENCE_PARAMETERS = 7
 Choice = Mapping[str, str]
 
 
@@ -91,18 +91,6 @@ def _units(
         (settled_ns,) = settled.settle([round(packet.pts * packet.time_base * NS_PER_S)], arrival_ns)
     data = prepared(bytes(packet), packet.is_keyframe)
     return [Unit(data, arrival_ns, settled_ns, starts=packet.is_keyframe, follows=not packet.is_corrupt)]
-
-
-def has_parameters(data: bytes) -> bool:
-    """Return whether an access unit (Annex B) begins with its own sequence parameters, as a decoder needs them."""
-    start = data.find(b"\x00\x00\x01")
-    while 0 <= start < len(data) - 3:
-        if data[start + 3] & 0x1F == _SEQUENCE_PARAMETERS:
-            return True
-        if data[start + 3] & 0x1F in (1, 5):  # the picture itself
-            return False
-        start = data.find(b"\x00\x00\x01", start + 3)
-    return False
 
 
 def rtsp(url: str, name: str) -> ContainerReader:

@@ -7,12 +7,15 @@ from contextlib import ExitStack, closing
 import numpy as np
 import pytest
 
+from drivers.camera.sources.cut_pictures import Assembly
 from drivers.camera.sources.frames import Packet
+from drivers.camera.sources.nal_units import unit_types
 from drivers.camera.sources.opening import open_source
+from drivers.tello.video import WHOLE_BYTES
 from drivers.tello.wire.text import VIDEO_PORT
-from drivers.tello.wire.video import WHOLE_BYTES, Assembly, cut, unit_kinds
 from groundstation.arrays import Image
 from sim_bridge.devices.h264 import GreyStream
+from sim_bridge.render.tello_output import cut
 
 SIZE = (320, 240)
 PARAMETERS, KEY, PICTURE = {7, 8}, {5}, {1}
@@ -30,18 +33,18 @@ def units() -> list[bytes]:
 
 
 def test_pictures_survive_being_cut(units: list[bytes]) -> None:
-    assembly, found = Assembly(), []
+    assembly, found = Assembly(WHOLE_BYTES), []
     for unit in units:
         found += [done for datagram in cut(unit) if (done := assembly.feed(datagram))]
     assert [one.data.rstrip(b"\0") for one in found] == [unit.rstrip(b"\0") for unit in units]
     assert [one.starts for one in found] == [True] + [False] * 5
-    assert unit_kinds(units[0]) >= PARAMETERS | KEY and unit_kinds(units[1]) >= PICTURE
+    assert set(unit_types(units[0])) >= PARAMETERS | KEY and set(unit_types(units[1])) >= PICTURE
 
 
 def test_parameter_sets_in_datagrams_of_their_own_begin_the_next_picture(units: list[bytes]) -> None:
     place = units[0].find(b"\0\0\1\x65")
     sets, key = units[0][:place], units[0][place:]
-    assembly = Assembly()
+    assembly = Assembly(WHOLE_BYTES)
     assert assembly.feed(sets) is None
     done = [one for datagram in cut(key) if (one := assembly.feed(datagram))]
     assert [one.starts for one in done] == [True]
@@ -51,13 +54,13 @@ def test_a_picture_that_fills_its_datagrams_ends_all_the_same() -> None:
     full = b"\0\0\1\x41" + b"\x55" * (2 * WHOLE_BYTES - 4)
     sizes = [len(datagram) for datagram in cut(full)]
     assert sizes == [WHOLE_BYTES, WHOLE_BYTES, 1]
-    assert [bool(Assembly().feed(datagram)) for datagram in cut(full)] == [False, False, False]
-    assembly = Assembly()
+    assert [bool(Assembly(WHOLE_BYTES).feed(datagram)) for datagram in cut(full)] == [False, False, False]
+    assembly = Assembly(WHOLE_BYTES)
     assert [bool(assembly.feed(datagram)) for datagram in cut(full)] == [False, False, True]
 
 
 def test_what_is_no_video_is_counted() -> None:
-    assembly = Assembly()
+    assembly = Assembly(WHOLE_BYTES)
     assert assembly.feed(b"ok") is None and assembly.skipped == 2
     for _ in range(1000):
         assert assembly.feed(b"\xff" * WHOLE_BYTES) is None

@@ -1,0 +1,121 @@
+"""The datagrams of one vehicle: a thread hands on what comes, everything is recorded, a loss is silent as in radio."""
+
+import logging
+import select
+import socket
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+
+from drivers.base import LinkHealth
+from drivers.datagrams import DatagramLog
+from drivers.vehicle_socket import Address, open_udp
+from groundstation.bus import clock
+
+# Takes a datagram with its arrival [ns] and returns whether it was a report of the vehicle. A ValueError refuses it;
+# the error's `reason`, if it has one, is the word that it is counted by.
+Take = Callable[[int, bytes], bool]
+
+_WAIT_S = 0.1
+_LARGEST = 4096
+_SILENT_NS = 300_000_000
+_log = logging.getLogger(__name__)
+
+
+class DatagramLink:
+    """Ports of this computer, each with who takes what comes there; the vehicle is spoken to from the first.
+
+    All are connected to the vehicle's one port: only it is heard, and several vehicles may share a port of ours. Takers
+    are called from the reader thread, which begins at once. Raises DriverError for a port or an address that cannot be
+    had.
+    """
+
+    def __init__(
+        self, log: DatagramLog, peer: Address, takers: Mapping[Address, Take], interface: str = ""
+    ) -> None:  # fmt: skip
+        self._log = log
+        self._takers: dict[socket.socket, Take] = {}
+        try:
+            for local, take in takers.items():
+                udp = open_udp(local, interface, peer)
+                udp.setblocking(False)
+                self._takers[udp] = take
+        except BaseException:
+            self._close_sockets()
+            raise
+        self._voice = next(iter(self._takers))
+        self._heard_ns, self._rate_hz = 0, 0.0
+        self._rejected: Counter[str] = Counter()
+        self._closing = threading.Event()
+        self._reader = threading.Thread(target=self._read, name="vehicle-link", daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        while not self._closing.is_set():
+            readable, _, _ = select.select(list(self._takers), [], [], _WAIT_S)
+            for udp in readable:
+                with suppress(OSError):  # nobody listens there yet
+                    self._hand_on(clock.now_ns(), udp.recv(_LARGEST), self._takers[udp])
+
+    def _hand_on(self, now_ns: int, data: bytes, take: Take) -> None:
+        self._log.received(now_ns, data)
+        try:
+            is_report = take(now_ns, data)
+        except ValueError as error:
+            self._rejected[getattr(error, "reason", "unreadable")] += 1
+        except Exception:  # noqa: BLE001 - the reader must outlive whatever a vehicle sends: count, log, go on
+            self._rejected["internal"] += 1
+            _log.exception("a datagram could not be used")
+        else:
+            if is_report:
+                self._count(now_ns)
+
+    def _count(self, now_ns: int) -> None:
+        if self._heard_ns:
+            self._rate_hz += 0.1 * (1e9 / max(1, now_ns - self._heard_ns) - self._rate_hz)
+        self._heard_ns = now_ns
+
+    def send(self, now_ns: int, data: bytes) -> None:
+        """Send a datagram; a full buffer or an absent vehicle loses it."""
+        with suppress(OSError):
+            self._voice.send(data)
+            self._log.sent(now_ns, data)
+
+    def health(self, now_ns: int) -> LinkHealth:
+        """Return the rate of the vehicle's reports, 0 after 0.3 s without any, and what was refused."""
+        silent = now_ns - self._heard_ns > _SILENT_NS
+        return LinkHealth(None, 0.0 if silent else self._rate_hz, dict(self._rejected))
+
+    def flush(self) -> None:
+        """Publish the raw datagrams that wait."""
+        self._log.flush()
+
+    def close(self) -> None:
+        """Stop the reader, close the ports, and publish what waits."""
+        self._closing.set()
+        self._reader.join(timeout=1.0)
+        self._close_sockets()
+        self._log.flush()
+
+    def _close_sockets(self) -> None:
+        for udp in self._takers:
+            udp.close()
+
+
+class DatagramVehicle:
+    """Base of a `drivers.base.Vehicle` behind one link, which it makes as `_link` once it can take what comes."""
+
+    _link: DatagramLink
+
+    def health(self, now_ns: int) -> LinkHealth:
+        """Return the state of the link."""
+        return self._link.health(now_ns)
+
+    def flush(self) -> None:
+        """Publish the raw datagrams that wait."""
+        self._link.flush()
+
+    def close(self) -> None:
+        """Stop the reader and close the link."""
+        self._link.close()

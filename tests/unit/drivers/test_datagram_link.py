@@ -1,0 +1,127 @@
+"""The link of datagrams: who takes what comes, what is refused, and what a taker's fault costs."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing
+
+import pytest
+
+from drivers.datagram_link import DatagramLink, Take
+from drivers.datagrams import DatagramLog, unpack
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.topics import RAW_RX, RAW_TX
+from groundstation.errors import DriverError
+
+HERE = "127.0.0.1"
+
+
+class RefusedError(ValueError):
+    reason = "too_short"
+
+
+@pytest.fixture
+def vehicle() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind((HERE, 0))
+        udp.settimeout(5.0)
+        yield udp
+
+
+def link_to(vehicle: socket.socket, *takers: Take, exchange: MemoryExchange | None = None) -> DatagramLink:
+    bus = MemoryBus(exchange or MemoryExchange(), "lab", "drone_1")
+    ports = {(f"127.0.0.{2 + number}", 0): take for number, take in enumerate(takers)}
+    return DatagramLink(DatagramLog(bus, "drone_1"), vehicle.getsockname(), ports)
+
+
+def until_refused(link: DatagramLink, reason: str) -> None:
+    deadline = time.monotonic() + 5.0
+    while reason not in link.health(clock.now_ns()).rejected and time.monotonic() < deadline:
+        time.sleep(0.005)
+    assert link.health(clock.now_ns()).rejected[reason] == 1
+
+
+def test_it_speaks_from_its_first_port_and_hears_only_the_vehicle(vehicle: socket.socket) -> None:
+    heard, came = list[bytes](), threading.Event()
+
+    def take(now_ns: int, data: bytes) -> bool:
+        heard.append(data)
+        came.set()
+        return True
+
+    with closing(link_to(vehicle, take, lambda now_ns, data: False)) as link:
+        link.send(clock.now_ns(), b"hello")
+        data, source = vehicle.recvfrom(100)
+        assert (data, source[0]) == (b"hello", "127.0.0.2")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.sendto(b"strange", source)
+        vehicle.sendto(b"known", source)
+        assert came.wait(5.0)
+    assert heard == [b"known"]
+
+
+def test_what_is_refused_is_counted_by_its_reason_and_a_fault_of_the_taker_ends_nothing(vehicle: socket.socket) -> None:
+    last = threading.Event()
+
+    def take(now_ns: int, data: bytes) -> bool:
+        match data:
+            case b"short":
+                raise RefusedError
+            case b"odd":
+                raise ValueError("odd")
+            case b"fault":
+                raise ZeroDivisionError
+        last.set()
+        return True
+
+    with closing(link_to(vehicle, take)) as link:
+        link.send(clock.now_ns(), b"hello")
+        _, source = vehicle.recvfrom(100)
+        for data, reason in ((b"short", "too_short"), (b"odd", "unreadable"), (b"fault", "internal")):
+            vehicle.sendto(data, source)
+            until_refused(link, reason)
+        assert link.health(clock.now_ns()).rate_hz == 0.0, "nothing refused is a report"
+        vehicle.sendto(b"good", source)
+        assert last.wait(5.0)
+
+
+def test_the_rate_is_that_of_reports_and_none_when_they_end(vehicle: socket.socket) -> None:
+    with closing(link_to(vehicle, lambda now_ns, data: data == b"report")) as link:
+        period_ns, now_ns = 50_000_000, 1_000_000_000
+        for number in range(80):
+            link._hand_on(now_ns + number * period_ns, b"report", lambda now_ns, data: True)
+            link._hand_on(now_ns + number * period_ns + 1, b"answer", lambda now_ns, data: False)
+        ended_ns = now_ns + 79 * period_ns
+        assert link.health(ended_ns).rate_hz == pytest.approx(20.0, rel=0.01)
+        assert link.health(ended_ns + 400_000_000).rate_hz == 0.0
+
+
+def test_datagrams_of_both_directions_are_recorded(vehicle: socket.socket) -> None:
+    exchange, came = MemoryExchange(), threading.Event()
+    raw = MemoryBus(exchange, "lab", "recorder").subscribe([RAW_RX, RAW_TX])
+
+    def take(now_ns: int, data: bytes) -> bool:
+        came.set()
+        return True
+
+    with closing(link_to(vehicle, take, exchange=exchange)) as link:
+        link.send(7, b"hello")
+        vehicle.sendto(b"report", vehicle.recvfrom(100)[1])
+        assert came.wait(5.0)
+    told = {received.key.topic: unpack(received.payload) for received in raw.drain()}
+    assert told[RAW_TX] == [(7, b"hello")]
+    assert [data for _, data in told[RAW_RX]] == [b"report"]
+
+
+def test_a_port_that_cannot_be_had_leaves_none_open(vehicle: socket.socket) -> None:
+    log = DatagramLog(MemoryBus(MemoryExchange(), "lab", "drone_1"), "drone_1")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.2", 0))
+        port = probe.getsockname()[1]
+    takers: dict[tuple[str, int], Take] = {("127.0.0.2", port): lambda *_: True, ("192.0.2.1", 0): lambda *_: True}
+    with pytest.raises(DriverError, match=r"192\.0\.2\.1"):
+        DatagramLink(log, vehicle.getsockname(), takers)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+        again.bind(("127.0.0.2", port))

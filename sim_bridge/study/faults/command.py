@@ -11,18 +11,17 @@ from groundstation.process import numba_cache
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.draw import KINDS, draw
+from sim_bridge.study.faults.hosted_kinds import UP_AFTER_S, WRONG_ORDER, unhosted
 
 # Faults begin when the team has found the target, and early enough for what must follow to be seen.
 _SETTLED_S, _LEFT_S = 3.0, 6.0
-WRONG_ORDER = 2
-_WARM_UP_S = {"ardrone": 8.0, "mavlink": 14.0}
 
 
 def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
     """Return the verdict on one seed."""
     from sim_bridge.study.faults.flight import FaultFlight
 
-    up_s = max(_WARM_UP_S[drone["kind"]] for drone in order["field"]["drones"].values())
+    up_s = max(UP_AFTER_S[drone["kind"]] for drone in order["field"]["drones"].values())
     window_s = (up_s + _SETTLED_S, up_s + order["seconds"] - _LEFT_S)
     kinds = tuple(FaultKind(kind) for kind in order.get("kinds") or KINDS)
     drawn = draw(order["field"], parse_scenario(json.dumps(order["scenario"])), seed, window_s, kinds)
@@ -34,11 +33,14 @@ def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Fly the seeds of the order on standard input; WRONG_ORDER where it names an unknown kind of fault."""
+    """Fly the seeds of the order on standard input; WRONG_ORDER for an unknown kind of fault or of vehicle."""
     order = json.load(sys.stdin)
     known = [str(kind) for kind in KINDS]
     if unknown := [kind for kind in order.get("kinds") or () if kind not in known]:
         print(f"no kind of fault: {', '.join(unknown)}; there are {', '.join(known)}", file=sys.stderr)
+        return WRONG_ORDER
+    if refusal := unhosted(order["field"]["drones"]):
+        print(refusal, file=sys.stderr)
         return WRONG_ORDER
     numba_cache.activate()
     for seed in order["seeds"]:

@@ -8,12 +8,11 @@ import sys
 
 from groundstation.process import numba_cache
 from sim_bridge.scenario import parse_scenario
-
-WRONG_ORDER = 2
+from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER, unhosted
 
 
 def main() -> int:
-    """Fly the seeds of the order on standard input; WRONG_ORDER where it names an unknown strategy."""
+    """Fly the seeds of the order on standard input; WRONG_ORDER for an unknown strategy or kind of vehicle."""
     order = json.load(sys.stdin)
     numba_cache.activate()
     from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
@@ -21,6 +20,9 @@ def main() -> int:
 
     if order["strategy"] not in STRATEGIES:
         print(f"no strategy {order['strategy']!r}; there are {', '.join(STRATEGIES)}", file=sys.stderr)
+        return WRONG_ORDER
+    if refusal := unhosted(order["field"]["drones"]):
+        print(refusal, file=sys.stderr)
         return WRONG_ORDER
     scenario = parse_scenario(json.dumps(order["scenario"]))
     sections = [(kind, section) for kind, section in order["sections"]]

@@ -117,3 +117,11 @@ def test_an_unknown_kind_is_the_operators_mistake() -> None:
     (batch,) = batches(json.dumps({"kinds": ["wind", "gremlins"]}), 1, 1)
     with pytest.raises(OperatorMistake, match=r"no kind of fault: gremlins; there are .*wind"):
         fly(batch)
+
+
+@pytest.mark.parametrize("study", ["faults", "scenarios"])
+def test_a_vehicle_that_cannot_be_hosted_is_named_with_what_flies_it(study: str) -> None:
+    order = {"field": {"drones": {"drone_1": {"kind": "ardrone"}, "scout": {"kind": "tello"}}}, "strategy": "ours"}
+    (batch,) = batches(json.dumps(order), 1, 1, study=study)
+    with pytest.raises(OperatorMistake, match=r"^scout is of kind tello: .*only; .*groundstation sitl"):
+        fly(batch)

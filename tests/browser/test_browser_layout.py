@@ -72,19 +72,23 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page = stage.open()
     stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
-    assert page.there("battery-lasts").inner_text() == "~5 min left"
+    assert page.there("battery-lasts").inner_text() == "lands in ~5 min"
     page.page.wait_for_timeout(31_000)
     stage.flight.battery["drone_2"] = 0.5
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "1 min left")
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "lands in 1 min")
+    stage.flight.battery["drone_1"] = 0.52  # it spends more: 37 points are left of 75
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "another: < 1 min")
+    assert page.there("worst-battery").inner_text() == "50 % drone_2"
     stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "~4 min left")
+    page.wait(lambda s: "flies ~4 min" in page.there("card-drone_2").inner_text())
+    assert "lands in < 1 min" in page.there("card-drone_1").inner_text()
 
 
 def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     page = stage.open()
     page.wait(lambda s: page.there("team-mode").inner_text() == "TRACK")
-    assert page.there("worst-battery").inner_text() == "34 % drone_2"
-    assert page.there("recording").inner_text() == "on"
+    page.wait(lambda s: page.there("worst-battery").inner_text() == "34 % drone_2")
+    page.wait(lambda s: page.there("recording").inner_text() == "on")
     assert page.there("air-time").inner_text().startswith("0:")
     stage.flight.modes["drone_1"] = "LANDING"
     page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING 1/2")

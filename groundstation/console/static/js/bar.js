@@ -1,7 +1,7 @@
 // The bar on top: the team at a glance, how far the run is, and what it would accept.
 
 import { byId, el, seconds, text } from "./dom.js";
-import { minutesWords, oldestS, recording, STAGES, stage, teamMode, worstBattery } from "./glance.js";
+import { oldestS, recording, STAGES, stage, teamLastsWords, teamMode, worstBattery } from "./glance.js";
 import { ageS, droneNames, replaying, store } from "./store.js";
 import { verdict } from "./verdict.js";
 
@@ -29,10 +29,10 @@ export function showBar() {
   showStages(stage());
 }
 
-// What stands under the worst battery: for how long it lasts, or the least of those that are known.
+// What stands under the worst battery: when it lands its drone, or the least of those that are known.
 function batteryLabel(battery) {
   if (battery?.value === null && battery.least) return `others ≥ ${(100 * battery.least[1]).toFixed(0)} %`;
-  return minutesWords(...droneNames()) || "worst battery";
+  return (battery && teamLastsWords(battery.name)) || "worst battery";
 }
 
 function showStages(now) {

@@ -65,12 +65,21 @@ export function minutesLeft(name) {
   return usual ? [(left * usual) / 60, false] : null;
 }
 
-// "6 min left" as measured, "~6 min left" by what its kind usually does, "" where nobody knows.
-export function minutesWords(...names) {
-  const known = names.map(minutesLeft).filter(Boolean);
-  if (!known.length) return "";
-  const [minutes, measured] = known.reduce((least, one) => (one[0] < least[0] ? one : least));
-  return minutes < 1 ? "< 1 min left" : `${measured ? "" : "~"}${Math.floor(minutes)} min left`;
+// As measured "6 min", by what its kind usually does "~6 min".
+const minuteWords = ([minutes, measured]) => (minutes < 1 ? "< 1 min" : `${measured ? "" : "~"}${Math.floor(minutes)} min`);
+
+// How long a drone's battery lasts, and until what; "" where nobody knows.
+export function lastsWords(name) {
+  const left = minutesLeft(name);
+  if (!left) return "";
+  return ALOFT.has(store.s.vehicles[name].mode) ? `lands in ${minuteWords(left)}` : `flies ${minuteWords(left)}`;
+}
+
+// The same of the worst battery; of another drone that has to land sooner, if there is one.
+export function teamLastsWords(worst) {
+  const own = minutesLeft(worst), flying = droneNames().filter((name) => ALOFT.has(store.s.vehicles?.[name]?.mode));
+  const soonest = flying.map(minutesLeft).filter(Boolean).reduce((least, one) => (!least || one[0] < least[0] ? one : least), null);
+  return soonest && (!own || soonest[0] < own[0]) ? `another: ${minuteWords(soonest)}` : lastsWords(worst);
 }
 
 // The least battery, and whose it is; an unknown one is worse than any unless that is to be charged. least: of those

@@ -4,7 +4,7 @@ import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
 import { dutyOf, landsIn } from "./duty.js";
-import { aloft, batteryLevel, minutesWords, modeOf } from "./glance.js";
+import { aloft, batteryLevel, lastsWords, modeOf } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
 
@@ -102,7 +102,7 @@ function showLink(node, share) {
 }
 
 function showBattery(node, name, value) {
-  text(node.previousElementSibling, minutesWords(name) || "battery");
+  text(node.previousElementSibling, lastsWords(name) || "battery");
   if (value === null || value === undefined) { delete node.dataset.words; node.className = ""; return text(node, "unknown"); }
   const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
   const words = `${(100 * value).toFixed(0)} %${level === "empty" ? (standing ? " charge!" : " land!") : level === "low" ? " low" : ""}`;

@@ -1,4 +1,4 @@
-"""The Tello driver: reader thread, what a decision means to the vehicle, and the process entry `run`."""
+"""The Tello driver: what the vehicle says, what a decision means to it, and the process entry `run`."""
 
 import math
 from dataclasses import dataclass

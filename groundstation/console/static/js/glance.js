@@ -68,17 +68,19 @@ export function minutesLeft(name) {
 // As measured "6 min", by what its kind usually does "~6 min".
 const minuteWords = ([minutes, measured]) => (minutes < 1 ? "< 1 min" : `${measured ? "" : "~"}${Math.floor(minutes)} min`);
 
-// How long a drone's battery lasts, and until what; "" where nobody knows.
+const modeNow = (name) => store.s.vehicles?.[name]?.mode;
+const willLand = (name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING";
+
+// How long a drone's battery lasts, and until what; "" where nobody knows, and while it lands already.
 export function lastsWords(name) {
-  const left = minutesLeft(name);
-  if (!left) return "";
-  return ALOFT.has(store.s.vehicles[name].mode) ? `lands in ${minuteWords(left)}` : `flies ${minuteWords(left)}`;
+  const left = modeNow(name) === "LANDING" ? null : minutesLeft(name);
+  return left ? `${willLand(name) ? "lands in" : "flies"} ${minuteWords(left)}` : "";
 }
 
 // The same of the worst battery; of another drone that has to land sooner, if there is one.
 export function teamLastsWords(worst) {
-  const own = minutesLeft(worst), flying = droneNames().filter((name) => ALOFT.has(store.s.vehicles?.[name]?.mode));
-  const soonest = flying.map(minutesLeft).filter(Boolean).reduce((least, one) => (!least || one[0] < least[0] ? one : least), null);
+  const own = minutesLeft(worst), others = droneNames().filter(willLand).map(minutesLeft).filter(Boolean);
+  const soonest = others.reduce((least, one) => (!least || one[0] < least[0] ? one : least), null);
   return soonest && (!own || soonest[0] < own[0]) ? `another: ${minuteWords(soonest)}` : lastsWords(worst);
 }
 

@@ -115,17 +115,19 @@ def fade_velocity_bias(
 
     A heavy tail of its prior (docs/decisions/0078-velocities-are-claims.md): where sightings have drawn the error out
     of it, the deviation follows the error, so that the next ones count for more than the vehicle's word. Surprises of
-    fixed cameras add to it before that.
+    fixed cameras add to it before that. Of an unseen robot only its own sightings of others tell, and a target that
+    turns looks to them like an error of the observer (0143).
     """
     start, size = entity.start, entity.size
     x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]
     believable = _BELIEVABLE * _BELIEVABLE * p.bias_std * p.bias_std
     square, variance, lasts_s = x * x + y * y, p.bias_std * p.bias_std, p.bias_tau_s
     variance += memory.velocity_doubt * memory.velocity_doubt
-    if square > believable:
+    seen = memory.unseen_s < _UNSEEN_S
+    if square > believable and seen:
         variance += square - believable
         lasts_s = max(lasts_s, lasts_s + (_LIE_S - lasts_s) * (1.0 - believable / square))
-    if square > _WRONG * _WRONG * p.bias_std * p.bias_std:
+    if square > _WRONG * _WRONG * p.bias_std * p.bias_std and seen:
         memory.velocity_lie = max(memory.velocity_lie, math.sqrt(square - believable))
     memory.unseen_s += dt
     if memory.velocity_lie > 0.0:

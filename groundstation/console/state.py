@@ -1,6 +1,7 @@
 """What the console knows, and how it is said to the page; the newest of everything is shared with the monitor."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any
 
@@ -122,8 +123,7 @@ class ConsoleState:
         board.put("processes", {name: _process(seen) for name, seen in known.processes.items()})
         board.put("standing", self._standing(now_ns))
         board.put("search_maps", self._search_maps())
-        alarms = [{"text": alarm.text, "grave": alarm.grave} for alarm in alarms_of(known, now_ns)]
-        board.put("alarms", alarms)
+        board.put("alarms", [asdict(alarm) for alarm in alarms_of(known, now_ns)])
         board.put("health", self.health.summary())
 
 

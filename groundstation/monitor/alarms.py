@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from groundstation.bus.messages import FlightState, Lifecycle, Severity
+from groundstation.bus.messages import FlightState, Lifecycle, Severity, VehicleStatus
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0
@@ -11,15 +11,17 @@ ESTIMATE_SILENT_S = 0.3
 PROCESS_SILENT_S = 3.0
 CAMERA_SILENT_S = 2.0
 TARGET_LOST_S = 3.0
+WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One line; `grave` ones are red, the others yellow."""
+    """One line; `grave` ones are red, the others yellow. advice: what happens next, and what an operator can do."""
 
     text: str
     grave: bool = True
+    advice: str = ""
 
 
 def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
@@ -36,14 +38,39 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
 
 def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.vehicles.items():
-        age, status = seen.age_s(now_ns), seen.message
-        if age > VEHICLE_SILENT_S:
-            yield Alarm(f"{name}: nothing heard for {age:.0f} s")
-        if status.flight_state in (FlightState.EMERGENCY, FlightState.LOST):
-            yield Alarm(f"{name}: {status.flight_state}")
-        limit = state.cast.drones.get(name, 0.15)
-        if status.battery is not None and status.battery < limit + 0.05:
-            yield Alarm(f"{name}: battery {status.battery:.0%} (lands at {limit:.0%})", status.battery < limit)
+        if seen.age_s(now_ns) > VEHICLE_SILENT_S:
+            yield Alarm(f"{name}: nothing heard for {seen.age_s(now_ns):.0f} s", advice="Stops are sent all the same.")
+        else:
+            yield from _failsafe(name, seen.message)
+        if seen.message.flight_state in (FlightState.EMERGENCY, FlightState.LOST):
+            yield Alarm(f"{name}: {seen.message.flight_state}")
+        yield from _battery(name, seen.message, state.cast.drones.get(name, 0.15))
+        yield from _link(name, seen.message.link_quality)
+
+
+def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
+    """What keeps a drone from its plan, or will land it."""
+    if status.lands_in_s is not None:
+        advice = "It lands by itself unless this ends; HOLD does not stop that."
+        yield Alarm(f"{name} lands in {status.lands_in_s:.0f} s: {status.detail}", advice=advice)
+    elif status.braked:
+        yield Alarm(f"{name} {status.detail}", False, "It follows its plan again when this ends.")
+
+
+def _battery(name: str, status: VehicleStatus, limit: float) -> Iterator[Alarm]:
+    if status.battery is None:
+        if status.flight_state is not FlightState.UNKNOWN:
+            yield Alarm(f"{name}: battery unknown", False, "Until it is known, it may not take off.")
+    elif status.battery < limit + 0.05 and status.flight_state is FlightState.LANDING:
+        yield Alarm(f"{name}: battery {status.battery:.0%}, it lands", False)
+    elif status.battery < limit + 0.05:
+        yield Alarm(f"{name}: battery {status.battery:.0%} (lands at {limit:.0%})", status.battery < limit)
+
+
+def _link(name: str, share: float | None) -> Iterator[Alarm]:
+    if share is not None and share < WEAK_LINK:
+        advice = "Bring it nearer, or land it: without a link it hovers, then lands by itself."
+        yield Alarm(f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 
 def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:

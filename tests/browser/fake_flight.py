@@ -15,6 +15,12 @@ from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
 TARGET = "turtlebot"
+_STATES = {
+    "LANDED": m.FlightState.LANDED,
+    "CUT": m.FlightState.LANDED,
+    "LANDING": m.FlightState.LANDING,
+    "TAKING_OFF": m.FlightState.TAKING_OFF,
+}
 _WHY = {"TRACK": "tracking for operator", "HOLD": "held by operator", "LANDING": "landing for operator"}
 _LEVEL = {m.Verb.HOLD: "HOLD", m.Verb.LAND: "LANDED", m.Verb.CUT_MOTORS: "CUT", m.Verb.TRACK: "TRACK"}
 
@@ -44,6 +50,7 @@ class FakeFlight(threading.Thread):
         self.detail: dict[str, str] = {}
         self.lands_in_s: dict[str, float] = {}
         self.braked: set[str] = set()
+        self.unseen_s: dict[str, float] = {}  # for how long nobody has seen it
         self.deaf: set[str] = set()
         self.frozen = False
         self.distance_m = 1.3  # of the drones from the target
@@ -99,6 +106,14 @@ class FakeFlight(threading.Thread):
         px, py = 0.75 * tx + self.distance_m * math.cos(angle), 0.75 * ty + self.distance_m * math.sin(angle)
         return px, py, {"drone_1": 2.1, "drone_3": 1.6}.get(name, 1.2), math.atan2(ty - py, tx - px)
 
+    def sees(self, observer: str, subject: str) -> bool:
+        """Whether this observer, if it flies, has this subject in sight."""
+        here = observer not in self.drones or observer in self.flying()
+        return here and subject not in self.unseen_s
+
+    def flying(self) -> list[str]:
+        return [name for name in self.drones if self.modes[name] not in ("LANDED", "CUT")]
+
     # --- what is said ---
 
     def _turn(self, tick: int, s: float) -> None:
@@ -133,17 +148,20 @@ class FakeFlight(threading.Thread):
     def _say_estimate(self, s: float) -> None:
         bus = self.bus("tracker")
         entities = []
-        for index, name in enumerate(self.drones):
+        for index, name in enumerate(self.flying()):
             x, y, z, yaw = self.drone_at(name, s)
             a, b, c = 0.004 + 0.002 * math.sin(s), 0.0015 * (1 - 2 * (index % 2)), 0.003
             cov = [0.0] * 16
             cov[0], cov[1], cov[4], cov[5], cov[10], cov[15] = a, b, b, c, 0.001, 0.002
             mean = (x + 0.04 * math.sin(3 * s), y + 0.04 * math.cos(2 * s), z, yaw)
-            entities.append(m.EntityEstimate(name, "robot", mean, tuple(cov), (0.2, 0.1, 0.0), True, 0.05))
+            entities.append(
+                m.EntityEstimate(name, "robot", mean, tuple(cov), (0.2, 0.1, 0.0), True, self.unseen_s.get(name, 0.05))
+            )
         x, y, vx, vy = self.target_at(s)
         place = (x + 0.06 * math.sin(1.3 * s), y + 0.05 * math.cos(1.1 * s))
         spread = (0.012 + 0.008 * math.sin(0.4 * s), 0.004, 0.004, 0.008)
-        entities.append(m.EntityEstimate(TARGET, "target", place, spread, (vx, vy), True, 0.1))
+        age_s = self.unseen_s.get(TARGET, 0.1)
+        entities.append(m.EntityEstimate(TARGET, "target", place, spread, (vx, vy), True, age_s))
         bus.publish(t.ESTIMATE, m.Estimate(header=bus.header("team"), entities=tuple(entities), epoch=1))
         for name in self.drones:
             setpoint = m.VelocitySetpoint(
@@ -164,6 +182,7 @@ class FakeFlight(threading.Thread):
             if string
             else [m.Edge(self.cameras[-1], "drone_2", 640.0), m.Edge("drone_2", TARGET, 330.0)]
         )
+        edges = [edge for edge in edges if self.sees(edge.observer, edge.subject)]
         controls = (
             m.Control("drone_1", (0.35, 0.15, 0.0), 0.1, ()),
             m.Control("drone_2", (0.1, 0.15, 0.0), 0.1, ("fence",), (0.55, 0.2, 0.0)),
@@ -220,6 +239,8 @@ class FakeFlight(threading.Thread):
                 self._picture(camera, (1280, 720), 1179.0, (x, -y, 4.2 - z), stamp_ns)
 
     def _observe(self, observer: str, camera: str, subject: str, at: tuple[float, float, float], stamp_ns: int) -> None:
+        if not self.sees(observer, subject):
+            return
         bus = self.bus(camera)
         observation = m.RelativeObservation(
             header=bus.header(observer, stamp_ns),
@@ -242,10 +263,9 @@ class FakeFlight(threading.Thread):
     def _say_vehicles(self, s: float) -> None:
         for name in self.drones:
             bus, mode = self.bus(name), self.modes[name]
-            down = mode in ("LANDED", "CUT")
             status = m.VehicleStatus(
                 header=bus.header(name),
-                flight_state=m.FlightState.LANDED if down else m.FlightState.FLYING,
+                flight_state=_STATES.get(mode, m.FlightState.FLYING),
                 mode=mode,
                 battery=self.battery.get(name),
                 link_quality=self.link.get(name, 0.93),

@@ -3,7 +3,9 @@
 from typing import Any
 
 import pytest
+from fake_flight import TARGET
 from seen_page import Seen
+from situations import SITUATIONS
 
 from groundstation.bus.messages import Severity
 
@@ -12,7 +14,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 FIXED = ("hold", "land-all", "cut-motors", "take-off", "track", "resume", "team", "map")
 # Elements whose content sticks out of them; inner_text returns what is cut off as well. Half a pixel is rounding.
 CUT_OFF = """() => [...document.querySelectorAll(
-    "button, dd, dt, .pill, .banner, .brand, .stages li, h2, figcaption, .order, #team strong, .detail")]
+    "button, dd, dt, .pill, .banner, .verdict, .brand, .stages li, h2, figcaption, .order, #team strong, .detail")]
   .filter((node) => node.clientWidth > 0 &&
     (node.scrollWidth > node.clientWidth + 1 || node.scrollHeight > node.clientHeight + 2))
   .map((node) => `${node.className || node.tagName}: ${node.textContent}`)"""
@@ -91,7 +93,8 @@ def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     page.wait(lambda s: page.there("recording").inner_text() == "on")
     assert page.there("air-time").inner_text().startswith("0:")
     stage.flight.modes["drone_1"] = "LANDING"
-    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING 1/2")
+    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
+    assert page.there("team-who").inner_text() == "drone_1"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("team-mode").inner_text() == "ON GROUND")
     stage.flight.battery["drone_1"] = None
@@ -102,18 +105,20 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     page = stage.open()
     verdict = page.there("verdict")
     stage.flight.battery["drone_2"] = 0.6
-    known = "No alarms. 2 of 2 fly, the places of 2 of 2 are known. "
-    page.wait(lambda s: verdict.inner_text() == f"{known}The target is seen.")
-    stage.flight.modes = {"drone_1": "HOLD", "drone_2": "HOLD"}
-    page.wait(lambda s: verdict.inner_text().endswith("They hover (held by operator): RESUME lets them go on."))
-    stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: "1 of 2 flies" in verdict.inner_text())
+    page.wait(lambda s: verdict.inner_text() == "drone_1 and drone_2 track the target. Nobody is lost.")
+    assert page.there("banner-none").inner_text() == "✓ No alarms"
+    stage.flight.modes = {"drone_1": "HOLD", "drone_2": "TRACK"}
+    said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets them go on."
+    page.wait(lambda s: verdict.inner_text() == said)
     stage.flight.battery["drone_2"] = 0.28
-    page.wait(lambda s: verdict.inner_text().startswith("No alarms, but the battery of drone_2 is low."))
+    low = "The battery of drone_2 is low: 28 %, lands in ~1 min"
+    page.wait(lambda s: page.there("banner-concern").inner_text() == low)
     stage.flight.battery["drone_2"] = 0.6
+    stage.flight.unseen_s[TARGET] = 2.0
+    page.wait(lambda s: "Not seen: turtlebot for 2 s." in verdict.inner_text())
     page.shot("verdict")
-    stage.flight.modes["drone_1"] = "LANDED"
-    page.wait(lambda s: verdict.inner_text().startswith("No alarms. Nobody flies."))
+    stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
+    page.wait(lambda s: verdict.inner_text() == "Nobody flies. TAKE OFF flies again.")
 
 
 def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
@@ -125,9 +130,10 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"
     stage.flight.lands_in_s["drone_1"] = 1.8
     stage.flight.braked.add("drone_1")
-    page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle. Lands in 2 s if nothing changes.")
-    assert "drone_1 LANDS IN 2 s" in page.there("banner-landing").inner_text()
-    assert page.there("drone_1-mode").inner_text() == "hover"
+    page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle.")
+    page.wait(lambda s: "drone_1 lands in 2 s: hovers: no telemetry" in page.there("banner-alarm").inner_text())
+    assert page.there("drone_1-mode").inner_text() == "lands in 2 s"
+    assert page.there("hold").inner_text() == "HOLD 2\nhover; 1 lands anyway"
     stage.flight.detail.clear()
     stage.flight.lands_in_s.clear()
     stage.flight.braked.clear()
@@ -135,18 +141,49 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page.wait(lambda s: duty.inner_text() == "Held by operator.")
     assert page.there("hold").inner_text().startswith("HOLD 2")
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
-    page.wait(lambda s: page.there("hold").inner_text().startswith("HOLD\n"))
+    page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nnobody flies")
     assert page.there("take-off").inner_text().startswith("TAKE OFF 2")
+
+
+# What stands in the place of alarms, below it, on HOLD, and on the cards of both drones.
+TOLD = {
+    "all_is_well": ("No alarms", "track the target. Nobody is lost.", "hover in place", "track", "track"),
+    "one_lands_for_its_battery": ("battery 13%", "drone_2 lands.", "hover; 1 lands anyway", "track", "landing"),
+    "all_are_held": ("No alarms", "RESUME lets them go on.", "hover in place", "hold", "hold"),
+    "one_is_unseen_and_will_land": ("lands in 6 s", "Not seen: drone_1", "1 lands anyway", "lands in 6 s", "track"),
+    "the_tracker_is_silent": ("TRACKER SILENT", "Who is lost is not", "lands anyway", "lands in 1 s", "lands in 1 s"),
+    "one_has_a_stuck_sensor": ("stuck at 0.27 m/s", "drone_2 hovers. Nobody", "hover in place", "track", "hover"),
+    "all_land": ("No alarms", "drone_1 and drone_2 land.", "lands anyway", "landing", "landing"),
+    "one_has_a_weak_link": ("weak link, 31%", "Nobody is lost.", "hover in place", "track", "track"),
+    "one_stands_with_an_unknown_battery": ("battery 19%", "drone_2 stands.", "hover in place", "track", "landed"),
+    "the_target_is_lost": ("turtlebot: not seen for 7 s", "look for the target", "hover in place", "track", "track"),
+}
+
+
+def test_every_situation_is_told_in_one_way_and_fits(stage: Any) -> None:
+    page = stage.open()
+    places = [page.there(name) for name in ("banners", "verdict", "hold", "drone_1-mode", "drone_2-mode")]
+
+    def told(name: str) -> bool:
+        return all(words in place.inner_text() for words, place in zip(TOLD[name], places, strict=True))
+
+    for name, arrange in SITUATIONS.items():
+        SITUATIONS["all_is_well"](stage.flight)
+        arrange(stage.flight)
+        page.wait(lambda s, name=name: told(name))
+        assert page.page.evaluate(CUT_OFF) == [], name
+        page.shot(f"situation_{name}")
 
 
 def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     page = stage.open()
-    page.wait(lambda s: page.there("take-off").get_attribute("title") == "no drone stands on the floor")
+    page.wait(lambda s: page.there("take-off").get_attribute("title") == "nobody stands")
     assert page.there("take-off").is_disabled() and page.there("drone_1-takeoff").is_disabled()
-    assert page.there("track").get_attribute("title") == "the team tracks already"
+    assert page.there("track").get_attribute("title") == "they track already"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}
     page.wait(lambda s: page.there("drone_1-takeoff").is_enabled())
     assert page.there("resume").is_enabled() and page.there("drone_2-takeoff").is_disabled()
+    assert page.there("track").inner_text() == "TRACK\nRESUME goes on"
     page.there("drone_1-takeoff").click()
     page.wait(lambda s: [command.scope for command in stage.flight.commands] == [("operator", "drone_1")])
 

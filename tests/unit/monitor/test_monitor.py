@@ -1,6 +1,7 @@
 """The monitor's picture of a given state."""
 
 import io
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -40,12 +41,14 @@ class World:
     def say(self, topic: t.Topic, message: m.Message) -> None:
         MemoryBus(self._exchange, "lab", message.header.source).publish(topic, message)
 
-    def vehicle(self, name: str, mode: str = "TRACK", battery: float | None = 0.8, age_s: float = 0.0) -> None:
+    def vehicle(
+        self, name: str, mode: str = "TRACK", battery: float | None = 0.8, age_s: float = 0.0, **more: Any
+    ) -> None:
+        state = more.pop("flight_state", m.FlightState.FLYING)
         header = self.header(name, age_s)
-        state = m.FlightState.FLYING
         self.say(
             t.VEHICLE_STATUS,
-            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7),
+            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7, **more),
         )
 
     def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch) -> None:
@@ -205,6 +208,36 @@ def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> 
         "process recorder: disk full",
     ]
     assert "nothing heard for 4 s" in world.text()
+
+
+def test_what_keeps_a_drone_from_its_plan_is_an_alarm_with_what_follows(world: World) -> None:
+    world.vehicle("drone_1", detail="no camera has seen it for too long", lands_in_s=6.2, braked=True)
+    world.vehicle("drone_2", detail="hovers: its velocity is stuck", braked=True)
+    world.text()
+    first, second = alarms_of(world.state, NOW)
+    assert (first.text, first.grave) == ("drone_1 lands in 6 s: no camera has seen it for too long", True)
+    assert "HOLD does not stop that" in first.advice
+    assert (second.text, second.grave) == ("drone_2 hovers: its velocity is stuck", False)
+
+
+@pytest.mark.parametrize(("share", "grave"), [(0.61, None), (0.59, False), (0.29, True), (None, None)])
+def test_a_weak_link_is_an_alarm(world: World, share: float | None, grave: bool | None) -> None:
+    world.vehicle("drone_1", link_quality=share)
+    world.text()
+    assert [alarm.grave for alarm in alarms_of(world.state, NOW)] == ([] if grave is None else [grave])
+
+
+def test_an_unknown_battery_is_an_alarm_once_the_vehicle_speaks(world: World) -> None:
+    world.vehicle("drone_1", battery=None, flight_state=m.FlightState.UNKNOWN)
+    world.vehicle("drone_2", battery=None, flight_state=m.FlightState.LANDED)
+    assert _alarms(world) == ["drone_2: battery unknown"]
+
+
+def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(world: World) -> None:
+    world.vehicle("drone_1", battery=0.13, flight_state=m.FlightState.LANDING)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert alarm.text == "drone_1: battery 13%, it lands" and not alarm.grave
 
 
 def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:

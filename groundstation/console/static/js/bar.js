@@ -1,7 +1,8 @@
 // The bar on top: the team at a glance, how far the run is, and what it would accept.
 
+import { teamLastsWords, worstBattery } from "./batteries.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { oldestS, recording, STAGES, stage, teamLastsWords, teamMode, worstBattery } from "./glance.js";
+import { oldestS, recording, STAGES, stage, teamMode } from "./glance.js";
 import { ageS, droneNames, replaying, store } from "./store.js";
 import { verdict } from "./verdict.js";
 
@@ -15,8 +16,9 @@ function show(id, words, level) {
 }
 
 export function showBar() {
-  const [mode, level, share = ""] = teamMode();
-  show("team-mode", `${mode}${share}`, level);
+  const [mode, level, who] = teamMode();
+  show("team-mode", mode, level);
+  text(byId("team-who"), who || "team");
   const since = store.s.flight?.airborne_since_ms, airborne = since ? ageS(since) : null;
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();

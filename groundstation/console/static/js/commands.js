@@ -2,7 +2,8 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { aloft, modes, refusalOf, STOPS } from "./glance.js";
+import { effectOf, refusalOf, STOPS } from "./effects.js";
+import { aloft, modes } from "./glance.js";
 import { me, on, send } from "./link.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
@@ -101,32 +102,58 @@ function showCounts(names) {
 }
 
 export function showControls() {
-  const names = droneNames(), session = store.s.session ?? {}, replay = replaying();
+  showStops();
+  showCounts(droneNames());
+  const session = store.s.session ?? {}, replay = replaying(), mine = session.operator === me.client;
+  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayGive("TAKEOFF") ? roleText() : !session.operator ? "starts: any page" : mine ? "starts: this page" : `starts: ${session.operator_name || "another page"}`);
+  byId("takeover").hidden = replay || !me.trusted || !mayGive("TAKEOFF") || !session.operator || mine;
+  showStarts(barred(session));
+}
+
+// A stop is never withheld while a run goes on; its caption says what it would do now, or that there is nothing to do.
+function showStops() {
   for (const node of document.querySelectorAll("#land, #hold, #cut, [data-land], [data-hold]")) {
     node.dataset.title ??= node.title;
-    node.disabled = replay || runOver() || !mayGive("LAND");
+    node.disabled = replaying() || runOver() || !mayGive("LAND");
     node.title = runOver() ? OVER : !mayGive("LAND") ? roleText() : node.dataset.title;
   }
   for (const node of document.querySelectorAll(".stops small")) {
     node.dataset.caption ??= node.textContent;
-    text(node, store.connected || runOver() ? node.dataset.caption : "no connection");
+    const effect = runOver() ? "" : store.connected ? effectOf(node.dataset.effect) : "no connection";
+    text(node, effect || node.dataset.caption);
+    node.closest("button").classList.toggle("idle", store.connected && Boolean(effect) && !effect.startsWith("hover"));
   }
-  showCounts(names);
-  const free = !session.operator, mine = session.operator === me.client, mayStart = mayGive("TAKEOFF");
-  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayStart ? roleText() : free ? "starts: any page" : mine ? "starts: this page" : `starts: ${session.operator_name || "another page"}`);
-  byId("takeover").hidden = replay || !me.trusted || !mayStart || free || mine;
-  const able = !replay && !runOver() && me.trusted && mayStart && store.connected && (free || mine) && Boolean(session.lease);
-  const why = replay ? "a replay: nothing here can be commanded" : runOver() ? OVER : !store.connected ? "no connection" : !me.trusted ? "this page may only look" : !mayStart ? roleText() : !(free || mine) ? "another page is the operator: take over first" : !session.lease ? "the ground station's main process holds no lease" : "";
+  for (const node of document.querySelectorAll("[data-land], [data-hold]")) {
+    node.classList.toggle("idle", Boolean(effectOf(node.dataset.land ? "LAND" : "HOLD", [node.dataset.land ?? node.dataset.hold])));
+  }
+}
+
+// Why this page may start nothing now: [in few words, in more]; null if it may.
+function barred(session) {
+  if (replaying()) return ["a replay", "a replay: nothing here can be commanded"];
+  if (runOver()) return ["run over", OVER];
+  if (!store.connected) return ["no connection", "no connection"];
+  if (!me.trusted) return ["looking only", "this page may only look"];
+  if (!mayGive("TAKEOFF")) return [`may ${me.role} only`, roleText()];
+  if (session.operator && session.operator !== me.client) return ["another page starts", "another page is the operator: take over first"];
+  return session.lease ? null : ["no lease", "the ground station's main process holds no lease"];
+}
+
+function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
-    const reason = why || refusalOf(verb);
-    byId(id).disabled = !able || Boolean(reason);
-    byId(id).title = reason;
+    const button = byId(id), reason = why ?? twice(refusalOf(verb)), caption = button.querySelector("small");
+    caption.dataset.caption ??= caption.textContent;
+    text(caption, reason?.[0] ?? caption.dataset.caption);
+    enable(button, reason);
   }
-  for (const node of document.querySelectorAll("[data-takeoff]")) {
-    const reason = why || refusalOf("TAKEOFF", [node.dataset.takeoff]);
-    node.disabled = !able || Boolean(reason);
-    node.title = reason;
-  }
+  for (const node of document.querySelectorAll("[data-takeoff]")) enable(node, why ?? twice(refusalOf("TAKEOFF", [node.dataset.takeoff])));
+}
+
+const twice = (words) => (words ? [words, words] : null);
+
+function enable(button, reason) {
+  button.disabled = Boolean(reason);
+  button.title = reason?.[1] ?? "";
 }
 
 export function showOrders() {

@@ -31,3 +31,6 @@ export function seconds(value) {
   if (value < 9.95) return `${value.toFixed(1)} s`;
   return value < 600 ? `${value.toFixed(0)} s` : `${(value / 60).toFixed(0)} min`;
 }
+
+// "drone_1, drone_2 and drone_3".
+export const joined = (names) => (names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${names.at(-1)}` : names[0]);

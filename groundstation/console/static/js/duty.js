@@ -1,5 +1,6 @@
 // What a drone does now and why, in a sentence or two, and what limits it.
 
+import { joined } from "./dom.js";
 import { ageS, store } from "./store.js";
 
 const FRESH_S = 1;
@@ -7,7 +8,7 @@ const FRESH_S = 1;
 const RELIED_ON = 100;
 const LIMITS = {
   fence: "the fence",
-  separation: "the distance to another drone",
+  separation: "a drone nearby",
   speed: "its top speed",
   stale: "an old estimate",
   uncertain: "an uncertain place",
@@ -16,11 +17,10 @@ const LIMITS = {
 
 // What limits a drone that follows its plan; "" if nothing does.
 export function limitsOf(control) {
-  const follows = store.s.vehicles?.[control?.robot]?.mode === "TRACK";
-  return follows ? control.limited_by.map((limit) => LIMITS[limit] ?? limit).join(" and ") : "";
+  const status = store.s.vehicles?.[control?.robot];
+  return status?.mode === "TRACK" && !status.braked ? control.limited_by.map((limit) => LIMITS[limit] ?? limit).join(" and ") : "";
 }
 
-const joined = (names) => names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${names.at(-1)}` : names[0];
 const sentence = (words) => words ? `${words[0].toUpperCase()}${words.slice(1)}${/[.!?]$/.test(words) ? "" : "."}` : "";
 
 function tracked(name, plan) {
@@ -34,12 +34,18 @@ function tracked(name, plan) {
   return sentence([does, known, limits && `limited by ${limits}`].filter(Boolean).join("; "));
 }
 
+// The driver's own reason; what it is the reason for, where it does not say so.
+function reasonOf({ mode, detail }) {
+  if (mode === "LANDED" || mode === "CUT") return `stands with its motors off: ${detail}`;
+  return mode === "LANDING" && detail && !detail.startsWith("land") ? `lands: ${detail}` : detail;
+}
+
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.
 export function dutyOf(name) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
-  const planned = status.mode === "TRACK" && !status.braked && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
-  return planned ? tracked(name, plan) : sentence(status.detail);
+  const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
+  return planned ? tracked(name, plan) : sentence(reasonOf(status));
 }
 
 // In how many seconds a failsafe will land it, if nothing changes; "" if none is near.

@@ -2,9 +2,9 @@
 
 import { label } from "./canvas.js";
 import { colourOf, ink } from "./palette.js";
-import { entities, isTarget, store } from "./store.js";
+import { entities, estimateAge, isTarget, store } from "./store.js";
 
-const MARGIN = 14, GAP = 13;
+const MARGIN = 14, GAP = 13, STALE_S = 0.5;
 
 export function drawHeights(canvas, ratio) {
   const width = canvas.clientWidth, height = canvas.clientHeight;
@@ -18,6 +18,7 @@ export function drawHeights(canvas, ratio) {
   drawScale(g, y, top);
   const flying = entities().filter(({ name, mean }) => !isTarget(name) && mean.length > 2).sort((a, b) => b.mean[2] - a.mean[2]);
   let last = -Infinity;
+  g.globalAlpha = estimateAge() > STALE_S || !store.connected ? 0.4 : 1; // as on the map
   for (const { name, mean } of flying) {
     const at = y(Math.min(top, Math.max(0, mean[2]))), words = Math.max(at, last + GAP);
     last = words;
@@ -26,6 +27,7 @@ export function drawHeights(canvas, ratio) {
     g.beginPath(); g.moveTo(22, at); g.lineTo(36, at); g.stroke();
     label(g, `${mean[2].toFixed(2)} m`, 39, words + 4, colourOf(name), 12, 600, "left");
   }
+  g.globalAlpha = 1;
   canvas.setAttribute("aria-label", `Heights. ${flying.map(({ name, mean }) => `${name} ${mean[2].toFixed(1)} m`).join("; ")}`);
 }
 

@@ -87,10 +87,16 @@ export function drawGraph(g, view) {
     g.globalAlpha = alpha;
     // Where the link is shorter than its figure the thickness must do.
     if (Math.hypot(a[0] - b[0], a[1] - b[1]) * view.scale < FIGURE_PX) continue;
-    const figure = `${information >= 10 ? Math.round(information) : information.toFixed(1)} m⁻²`;
+    const figure = information > 0 ? `± ${precision(information)}` : "";
     const places = [0.5, 0.4, 0.6, 0.3, 0.7].map((share) => onLink(view, a, b, share));
     note(g, FIGURE, `${observer} ${subject}`, `${figure}${seen ? "" : " unseen"}`, places, colour, 11, 500);
   }
+}
+
+// How well one reading tells a place: the standard deviation that its information [1/m²] amounts to.
+function precision(information) {
+  const metres = 1 / Math.sqrt(information);
+  return metres < 1 ? `${(100 * metres).toFixed(0)} cm` : `${metres.toFixed(1)} m`;
 }
 
 function onLink(view, [ax, ay], [bx, by], share) {

@@ -1,7 +1,8 @@
 // What is worth hearing: stops, alarms, a battery that runs low, a lost target. Muting silences all but stops.
 
+import { worstBattery } from "./batteries.js";
 import { byId } from "./dom.js";
-import { targetAgeS, worstBattery } from "./glance.js";
+import { targetAgeS } from "./glance.js";
 import { now, replaying, store } from "./store.js";
 
 const KEY = "skein-muted", NEW_MS = 3000;

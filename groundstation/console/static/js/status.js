@@ -2,10 +2,10 @@
 
 import { showMore } from "./bar.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { landsIn } from "./duty.js";
-import { unheardStop } from "./glance.js";
+import { unheardStop } from "./effects.js";
 import { drawn } from "./map.js";
 import { ageS, estimateAge, replaying, runOver, silentS, store } from "./store.js";
+import { calm } from "./verdict.js";
 
 const SILENT_S = 0.8, TRACKER_S = 0.5, OLD_S = 1;
 const notices = [];
@@ -23,17 +23,14 @@ export function showBanners() {
   if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", ended.text[0].toUpperCase() + ended.text.slice(1), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
   else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
-  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover without its setpoints, and land 3 s after its last word."]);
+  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover, and land 3 s after its last word; LAND ALL works without it."]);
   const stop = store.connected ? unheardStop() : null;
   if (stop) banners.push(["unheard", "grave", `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, "Press again. What flies on: groundstation land in a shell, or its own remote control."]);
-  for (const [name, status] of store.connected && !ended ? Object.entries(store.s.vehicles ?? {}) : []) {
-    const left = landsIn(name);
-    if (left && ageS(status.at) < OLD_S) banners.push(["landing", "grave", `${name} LANDS IN ${left}`, `${status.detail}. It lands by itself unless this ends.`]);
-  }
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);
   for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, 4) : []) {
-    if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave ? "grave" : "mild", alarm.text, ""]);
+    if (!alarm.text.startsWith("tracker: no estimate")) banners.push(["alarm", alarm.grave ? "grave" : "mild", alarm.text, alarm.advice]);
   }
+  if (!banners.length && !replaying()) banners.push([...calm(), ""]);
   banners.sort(([, a], [, b]) => (b === "grave") - (a === "grave"));
   const host = byId("banners"), kinds = banners.map(([kind]) => kind).join();
   if (host.dataset.kinds !== kinds) {

@@ -1,10 +1,11 @@
 // A card for each drone and one for each target.
 
+import { batteryLevel, lastsWords } from "./batteries.js";
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
 import { dutyOf, landsIn } from "./duty.js";
-import { aloft, batteryLevel, lastsWords, modeOf } from "./glance.js";
+import { aloft, doing, modeOf, trackerSilent } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
 
@@ -73,8 +74,9 @@ function showVehicle(name, { root, values, mode, detail }) {
   const status = store.s.vehicles?.[name], age = ageS(status?.at), stale = age > STALE_S || !store.connected;
   const silent = status && age > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
-  text(mode, silent ? "silent" : status ? modeOf(status).replace("_", " ").toLowerCase() : "no word yet");
-  mode.dataset.level = silent ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : (modeOf(status) === status.mode ? LEVELS[status.mode] : "warn") ?? "wait";
+  const left = status && landsIn(name);
+  text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeOf(status).replace("_", " ").toLowerCase() : "no word yet");
+  mode.dataset.level = silent || left ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : (modeOf(status) === status.mode ? LEVELS[status.mode] : "warn") ?? "wait";
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
@@ -88,9 +90,8 @@ function showVehicle(name, { root, values, mode, detail }) {
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.
 function showDuty(node, name, silent) {
-  const left = landsIn(name), landing = left && ` Lands in ${left} if nothing changes.`;
-  text(node, silent ? "Nothing is heard of it: its own failsafes count." : `${dutyOf(name)}${landing}`);
-  node.classList.toggle("low", Boolean(left || silent));
+  text(node, silent ? "Nothing is heard of it: its own failsafes count." : dutyOf(name));
+  node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
 // What share of the packets or of the signal arrives, as the driver says it.
@@ -105,7 +106,7 @@ function showBattery(node, name, value) {
   text(node.previousElementSibling, lastsWords(name) || "battery");
   if (value === null || value === undefined) { delete node.dataset.words; node.className = ""; return text(node, "unknown"); }
   const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
-  const words = `${(100 * value).toFixed(0)} %${level === "empty" ? (standing ? " charge!" : " land!") : level === "low" ? " low" : ""}`;
+  const words = `${(100 * value).toFixed(0)} %${level === "full" ? "" : level === "empty" && standing ? " charge!" : " low"}`;
   if (node.dataset.words === words) return;
   node.dataset.words = words;
   node.className = level === "full" ? "" : level;
@@ -116,23 +117,28 @@ function showBattery(node, name, value) {
 }
 
 function beliefWords(body, age, lost) {
-  if (!body || lost) return "";
-  return age > 1 ? `Not seen for ${seconds(age)}: expected where it is drawn.` : aloft() ? "Seen: the team tracks it." : "Seen.";
+  if (trackerSilent()) return "Where it is now nobody knows: the tracker is silent.";
+  if (!body) return "";
+  if (lost) return doing("TRACK").length ? "Nobody sees it: the team looks for it." : "Nobody sees it.";
+  if (age > 1) return `Not seen for ${seconds(age)}: expected where it is drawn.`;
+  return doing("TRACK").length ? "Seen: the team tracks it." : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
+
+// A fixed camera sees it, and no filter has it: it does not fly.
+const standsInSight = (name) => (store.s.standing ?? []).some((one) => one.name === name);
 
 function showBelief(name, { root, values, mode, detail, drone }) {
   const body = entity(name), age = body ? estimateAge() + body.age_s : Infinity;
   const old = estimateAge() > STALE_S;
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
-    const lost = age > store.scene.lost_after_s;
-    const [search, words] = store.s.estimate?.searches?.[name] ?? [];
-    text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : "tracked"));
+    const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? ["unknown"] : store.s.estimate?.searches?.[name] ?? [];
+    text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : doing("TRACK").length ? "tracked" : "seen"));
     mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
     text(detail, words ?? beliefWords(body, age, lost));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
-  text(values.seen, body ? `${seconds(age)} ago` : "not yet");
+  text(values.seen, body ? `${seconds(age)} ago` : standsInSight(name) ? "it stands" : "not yet");
   values.seen.className = !body ? "" : age > 3 ? "empty" : age > 1 ? "low" : "";
   text(values.by, seenBy(name).join(", ") || "nobody");
   if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }

@@ -1,46 +1,63 @@
-// One sentence on the whole team, where an alarm would stand: what it does, and what an operator may do about it.
+// What the team does and who is lost, in a line that is always there, below the alarms; and what stands there without one.
 
-import { aloft, modes, stage, targetAgeS, teamMode, worstBattery } from "./glance.js";
+import { lastsWords, worstBattery } from "./batteries.js";
+import { joined } from "./dom.js";
+import { landsIn } from "./duty.js";
+import { refusalOf } from "./effects.js";
+import { aloft, doing, lostTarget, modes, stage, teamMode, trackerSilent } from "./glance.js";
 import { droneNames, entity, estimateAge, store } from "./store.js";
 
-const FRESH_S = 1;
-
+const FRESH_S = 1, NAMED = 4; // more drones than this are counted
+// Of one, of several.
+const DEEDS = {
+  TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], HOLD: ["holds", "hold"], TAKING_OFF: ["takes off", "take off"],
+  LANDING: ["lands", "land"], LANDED: ["stands", "stand"], CUT: ["has its motors cut", "have their motors cut"],
+};
+const LOOKS = ["looks for the target", "look for the target"];
 const NEXT = {
   "TAKING OFF": "Each is seen from outside before the next one rises.",
-  HOVER: "They hover: the cards say why.",
-  SEARCH: "Nobody sees the target: they look for it.",
-  LANDING: "Those that land stay down until a new TAKE OFF.",
-  CUT: "Motors were cut.",
+  LANDING: "Who lands stays down until a new TAKE OFF.",
 };
 
-// Why they hover, in the words of the first driver that says it.
-function held() {
-  const status = droneNames().map((name) => store.s.vehicles?.[name]).find((one) => one?.mode === "HOLD" && one.detail);
-  return `They hover${status ? ` (${status.detail})` : " because of an order or a failsafe"}: RESUME lets them go on.`;
+function deeds() {
+  const counted = droneNames().length > NAMED, soon = droneNames().filter(landsIn);
+  const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name)), mode === "TRACK" && lostTarget() ? LOOKS : words]);
+  const told = [[soon, ["lands soon", "land soon"]], ...modal].filter(([names]) => names.length);
+  const parts = told.map(([names, [one, many]]) => `${counted ? names.length : joined(names)} ${names.length > 1 ? many : one}`);
+  return parts.length ? `${parts.join("; ")}.` : "";
 }
 
-function next(mode) {
-  if (mode === "HOLD") return held();
-  if (mode === "TRACK") return targetAgeS() <= FRESH_S ? "The target is seen." : "Nobody sees the target just now.";
-  return NEXT[mode] ?? "";
+// Who should be seen: the target, and who flies.
+function sought() {
+  const floor = new Set([...doing("LANDED"), ...doing("CUT"), ...doing("CONNECTING")]);
+  return [...droneNames().filter((name) => !floor.has(name)), ...store.scene.targets.map(({ name }) => name)];
 }
 
-// How many drones have a place that is newer than a second.
-function localised() {
-  return droneNames().filter((name) => { const body = entity(name); return body && body.age_s + estimateAge() < FRESH_S; }).length;
+function lost() {
+  if (trackerSilent()) return "Who is lost is not known while the tracker is silent.";
+  const ages = sought().map((name) => [name, entity(name)]).map(([name, body]) => [name, body ? body.age_s + estimateAge() : Infinity]);
+  const unseen = ages.filter(([, age]) => age > FRESH_S).map(([name, age]) => `${name} ${Number.isFinite(age) && age < 1e5 ? `for ${age.toFixed(0)} s` : "yet"}`);
+  return unseen.length ? `Not seen: ${joined(unseen)}.` : "Nobody is lost.";
 }
 
-// What is no alarm yet, and no calm either.
-function concern() {
-  const battery = worstBattery();
-  if (!battery || battery.level === "good") return "No alarms.";
-  return `No alarms, but the battery of ${battery.name} is ${battery.value === null ? "unknown" : "low"}.`;
+// What lets those go on that wait for it.
+function start() {
+  if (!refusalOf("RESUME")) return "RESUME lets them go on.";
+  return refusalOf("TRACK") ? "" : "TRACK begins the task.";
 }
 
 export function verdict() {
-  const all = droneNames().length, up = aloft(), [mode] = teamMode();
-  if (!all || !modes().length) return "No alarms. Nothing is heard of the drones yet.";
+  if (!modes().length) return "Nothing is heard of the drones yet.";
   if (stage() === "over") return "The run is over: nothing flies.";
-  if (!up) return `${concern()} Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;
-  return `${concern()} ${up} of ${all} fl${up === 1 ? "ies" : "y"}, the places of ${localised()} of ${all} are known. ${next(mode)}`.trim();
+  if (!aloft()) return `Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;
+  return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");
+}
+
+// [kind, level, words]: what stands in the place of an alarm.
+export function calm() {
+  const battery = worstBattery();
+  if (!battery || battery.level === "good") return ["none", "calm", modes().length ? "✓ No alarms" : "No alarms yet"];
+  if (battery.value === null) return ["concern", "mild", `The battery of ${battery.name} is unknown`];
+  const figures = [`${(100 * battery.value).toFixed(0)} %`, lastsWords(battery.name)].filter(Boolean).join(", ");
+  return ["concern", "mild", `The battery of ${battery.name} is low: ${figures}`];
 }

@@ -1,0 +1,52 @@
+// What a start or a stop would do now.
+
+import { leastBattery } from "./batteries.js";
+import { ALOFT, aloft, modes } from "./glance.js";
+import { ageS, droneNames, runOver, store } from "./store.js";
+
+// Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
+export function refusalOf(verb, names = droneNames()) {
+  const all = modes(names);
+  if (modes().includes("TAKING_OFF")) return "one is taking off";
+  if (verb === "TAKEOFF") return takeOffRefusal(names.map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => ["LANDED", "CUT"].includes(status?.mode)));
+  if (!aloft()) return "nobody flies";
+  const resumes = needResume(names);
+  if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
+  if (resumes) return "RESUME goes on";
+  return all.includes("HOVER") ? "" : all.includes("TRACK") ? "they track already" : "nobody hovers";
+}
+
+function takeOffRefusal(standing) {
+  if (!standing.length) return "nobody stands";
+  if (standing.every(([, status]) => status.battery === null)) return "battery unknown";
+  return standing.every(([name, status]) => status.battery < leastBattery(name)) ? "battery too low" : "";
+}
+
+// After an order or a failsafe a drone hovers until RESUME; after its take-off until TRACK. RESUME lets both go on.
+function needResume(names) {
+  return names.map((name) => store.s.vehicles?.[name]).some((status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && status.detail.includes("RESUME")));
+}
+
+// What a stop of these drones would do now, where that is not what it is for; "" where it is.
+export function effectOf(verb, names = droneNames()) {
+  const all = modes(names), up = all.filter((mode) => ALOFT.has(mode)).length, land = all.filter((mode) => mode === "LANDING").length;
+  if (!all.length) return "";
+  if (!up) return names.length > 1 ? "nobody flies" : "it stands";
+  if (verb === "LAND") return land === up ? "landing already" : "";
+  if (verb === "CUT_MOTORS") return "";
+  const anyway = land + names.filter(landsSoon).length;
+  return anyway >= up ? "lands anyway" : anyway ? `hover; ${anyway} lands anyway` : "";
+}
+
+// Neither a landing nor what leads to one by itself is stopped by HOLD.
+const landsSoon = (name) => (store.s.vehicles?.[name]?.lands_in_s ?? null) !== null && store.s.vehicles[name].mode !== "LANDING";
+
+export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
+const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
+
+// The newest stop, if a drone has not answered it: an alarm, wherever it was given.
+export function unheardStop() {
+  const order = runOver() ? null : (store.s.orders ?? []).find(({ verb }) => STOPS.has(verb));
+  const silent = (order?.rows ?? []).filter(({ stage }) => !stage).map(({ name }) => name), age = ageS(order?.given_ms);
+  return silent.length && age > UNHEARD_S && age < FORGOTTEN_S ? { verb: order.verb.replace("_", " "), names: silent.join(", ") } : null;
+}

@@ -87,7 +87,7 @@ def test_one_operator_at_a_time(stage: Any) -> None:
     second.page.wait_for_timeout(600)
     assert "starts: this page" in second.there("operator").inner_text()
     assert first.there("track").is_disabled()
-    stage.flight.modes["drone_1"] = "HOVER"
+    stage.flight.modes = dict.fromkeys(stage.flight.modes, "HOVER")
     second.there("track").click()
     second.wait(lambda s: verbs(stage)[-1] == "TRACK")
     first.shot("taken_over")

@@ -186,6 +186,9 @@ def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     assert page.there("track").inner_text() == "TRACK\nRESUME goes on"
     page.there("drone_1-takeoff").click()
     page.wait(lambda s: [command.scope for command in stage.flight.commands] == [("operator", "drone_1")])
+    stage.flight.frozen = True
+    page.wait(lambda s: page.there("resume").get_attribute("title") == "tracker silent")
+    assert page.there("track").is_disabled()
 
 
 def test_the_wall_is_read_from_three_metres(stage: Any) -> None:

@@ -2,7 +2,7 @@
 
 import { leastBattery } from "./batteries.js";
 import { ALOFT, aloft, modes } from "./glance.js";
-import { ageS, droneNames, runOver, store } from "./store.js";
+import { ageS, droneNames, runOver, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
 export function refusalOf(verb, names = droneNames()) {
@@ -10,6 +10,7 @@ export function refusalOf(verb, names = droneNames()) {
   if (modes().includes("TAKING_OFF")) return "one is taking off";
   if (verb === "TAKEOFF") return takeOffRefusal(names.map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => ["LANDED", "CUT"].includes(status?.mode)));
   if (!aloft()) return "nobody flies";
+  if (trackerSilent()) return "tracker silent";
   const resumes = needResume(names);
   if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
   if (resumes) return "RESUME goes on";

@@ -4,10 +4,10 @@ import { showMore } from "./bar.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { unheardStop } from "./effects.js";
 import { drawn } from "./map.js";
-import { ageS, estimateAge, replaying, runOver, silentS, store } from "./store.js";
+import { ageS, estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 import { calm } from "./verdict.js";
 
-const SILENT_S = 0.8, TRACKER_S = 0.5, OLD_S = 1;
+const SILENT_S = 0.8, OLD_S = 1;
 const notices = [];
 let eventsShown = "";
 
@@ -23,7 +23,7 @@ export function showBanners() {
   if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", ended.text[0].toUpperCase() + ended.text.slice(1), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
   else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
-  else if (Number.isFinite(age) && age > TRACKER_S) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover, and land 3 s after its last word; LAND ALL works without it."]);
+  else if (trackerSilent()) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover, and land 3 s after its last word; LAND ALL works without it."]);
   const stop = store.connected ? unheardStop() : null;
   if (stop) banners.push(["unheard", "grave", `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, "Press again. What flies on: groundstation land in a shell, or its own remote control."]);
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);
@@ -54,7 +54,7 @@ function noteSilence(kinds, before, ages) {
 
 export function showTop() {
   const link = byId("link"), silent = silentS() > SILENT_S, age = estimateAge();
-  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : age > TRACKER_S ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
+  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : trackerSilent() ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
   link.dataset.level = level;
   text(link, words);
   const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];

@@ -85,6 +85,9 @@ function extendTrails(estimate) {
 export const entities = () => store.s.estimate?.entities ?? [];
 export const entity = (name) => entities().find((candidate) => candidate.name === name);
 export const estimateAge = () => ageS(store.s.estimate?.at);
+const TRACKER_S = 0.5;
+// It was heard once, and is not any more.
+export const trackerSilent = () => Number.isFinite(estimateAge()) && estimateAge() > TRACKER_S;
 export const isTarget = (name) => (store.scene?.targets ?? []).some((target) => target.name === name);
 // Footprints are drawn at one height: that of the highest target's marker.
 export const targetHeight = () => Math.max(0, ...(store.scene?.targets ?? []).map((target) => target.height_m));

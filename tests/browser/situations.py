@@ -65,7 +65,6 @@ SITUATIONS: dict[str, Callable[[FakeFlight], None]] = {
     made.__name__: made
     for made in (
         all_is_well,
-        one_lands_for_its_battery,
         all_are_held,
         one_is_unseen_and_will_land,
         the_tracker_is_silent,
@@ -74,5 +73,6 @@ SITUATIONS: dict[str, Callable[[FakeFlight], None]] = {
         one_has_a_weak_link,
         one_stands_with_an_unknown_battery,
         the_target_is_lost,
+        one_lands_for_its_battery,  # the last: its event stays in the list
     )
 }

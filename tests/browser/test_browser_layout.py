@@ -156,7 +156,7 @@ TOLD = {
     "all_land": ("No alarms", "drone_1 and drone_2 land.", "lands anyway", "landing", "landing"),
     "one_has_a_weak_link": ("weak link, 31%", "Nobody is lost.", "hover in place", "track", "track"),
     "one_stands_with_an_unknown_battery": ("battery 19%", "drone_2 stands.", "hover in place", "track", "landed"),
-    "the_target_is_lost": ("turtlebot: not seen for 7 s", "look for the target", "hover in place", "track", "track"),
+    "the_target_is_lost": ("turtlebot: not seen for 7 s", "look for the target", "hover in place", "search", "search"),
 }
 
 
@@ -179,7 +179,7 @@ def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     page = stage.open()
     page.wait(lambda s: page.there("take-off").get_attribute("title") == "nobody stands")
     assert page.there("take-off").is_disabled() and page.there("drone_1-takeoff").is_disabled()
-    assert page.there("track").get_attribute("title") == "they track already"
+    assert page.there("track").get_attribute("title") == "under way"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}
     page.wait(lambda s: page.there("drone_1-takeoff").is_enabled())
     assert page.there("resume").is_enabled() and page.there("drone_2-takeoff").is_disabled()

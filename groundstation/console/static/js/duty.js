@@ -45,7 +45,8 @@ export function dutyOf(name) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
-  return planned ? tracked(name, plan) : sentence(reasonOf(status));
+  const goesOn = status.mode === "TRACK" && !status.braked && status.lands_in_s !== null ? "Flies on for now. " : "";
+  return planned ? tracked(name, plan) : goesOn + sentence(reasonOf(status));
 }
 
 // In how many seconds a failsafe will land it, if nothing changes; "" if none is near.

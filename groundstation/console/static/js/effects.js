@@ -14,7 +14,7 @@ export function refusalOf(verb, names = droneNames()) {
   const resumes = needResume(names);
   if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
   if (resumes) return "RESUME goes on";
-  return all.includes("HOVER") ? "" : all.includes("TRACK") ? "they track already" : "nobody hovers";
+  return all.includes("HOVER") ? "" : all.includes("TRACK") ? "under way" : "nobody hovers";
 }
 
 function takeOffRefusal(standing) {

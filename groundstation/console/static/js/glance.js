@@ -1,6 +1,6 @@
 // What the bar says of the whole team, worked out of the newest of everything.
 
-import { ageS, droneNames, estimateAge, isTarget, entities, runOver, store } from "./store.js";
+import { ageS, droneNames, estimateAge, isTarget, entities, runOver, store, trackerSilent } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
@@ -33,7 +33,6 @@ function tracking() {
 }
 
 export const lostTarget = () => targetAgeS() > (store.scene?.lost_after_s ?? 3);
-export const trackerSilent = () => Number.isFinite(estimateAge()) && estimateAge() > HEARD_S;
 // Who does this now, among those that are heard of.
 export const doing = (mode) => droneNames().filter((name) => modeOf(store.s.vehicles?.[name]) === mode);
 

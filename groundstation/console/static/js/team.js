@@ -5,9 +5,9 @@ import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
 import { dutyOf, landsIn } from "./duty.js";
-import { aloft, doing, modeOf, trackerSilent } from "./glance.js";
+import { aloft, doing, lostTarget, modeOf } from "./glance.js";
 import { colourOf } from "./palette.js";
-import { ageS, entity, estimateAge, runOver, seenBy, store } from "./store.js";
+import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from "./store.js";
 
 const STALE_S = 1;
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
@@ -75,7 +75,7 @@ function showVehicle(name, { root, values, mode, detail }) {
   const silent = status && age > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
   const left = status && landsIn(name);
-  text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeOf(status).replace("_", " ").toLowerCase() : "no word yet");
+  text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeWord(status) : "no word yet");
   mode.dataset.level = silent || left ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : (modeOf(status) === status.mode ? LEVELS[status.mode] : "warn") ?? "wait";
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
@@ -86,6 +86,12 @@ function showVehicle(name, { root, values, mode, detail }) {
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
   showLink(values.link, status.link);
   showDuty(detail, name, silent);
+}
+
+// What its mode is for now, as the bar has it for the team.
+function modeWord(status) {
+  const mode = modeOf(status);
+  return mode === "TRACK" && lostTarget() ? "search" : mode.replace("_", " ").toLowerCase();
 }
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.

@@ -4,8 +4,8 @@ import { lastsWords, worstBattery } from "./batteries.js";
 import { joined } from "./dom.js";
 import { landsIn } from "./duty.js";
 import { refusalOf } from "./effects.js";
-import { aloft, doing, lostTarget, modes, stage, teamMode, trackerSilent } from "./glance.js";
-import { droneNames, entity, estimateAge, store } from "./store.js";
+import { aloft, doing, lostTarget, modes, stage, teamMode } from "./glance.js";
+import { droneNames, entity, estimateAge, store, trackerSilent } from "./store.js";
 
 const FRESH_S = 1, NAMED = 4; // more drones than this are counted
 // Of one, of several.

@@ -15,6 +15,8 @@ from sim_bridge.conformance.record import Heard
 _LEGS = ("forward", "left", "back", "right")
 _STD_M_S = 0.15
 _GRAVITY_M_S2 = 9.81
+_RATE_NS = 20_000_000  # on both sides, over which a true rate is taken
+_HARDLY = 0.01  # rad or rad/s
 _FRAMING = struct.Struct("<qI")  # of recorded datagrams: stamp, length
 
 
@@ -172,6 +174,55 @@ def gyroscopes_turn_the_right_way(case: Case) -> None:
     """The body rate about z, where it is told, is positive in a counter-clockwise turn."""
     rate = float(np.median([one.message.angular_velocity_rad_s[2] for one in _imu(case, "turn")]))
     assert 0.6 * TURN_RAD_S < rate < 1.4 * TURN_RAD_S, f"{rate:.2f} rad/s"
+
+
+def _true_rate(case: Case, at_ns: int, axis: int) -> float:
+    """Return the true rate of roll (0) or pitch (1) [rad/s]; nearly the body's own, for it leans little."""
+    before, after = (case.record.at(at_ns + offset).attitude[axis] for offset in (-_RATE_NS, _RATE_NS))
+    return (after - before) / (2e-9 * _RATE_NS)
+
+
+def _agrees(told: Sequence[float], true: Sequence[float]) -> float:
+    """Return the correlation of what is told with the truth."""
+    if float(np.std(true)) < _HARDLY:
+        raise NotApplicable("it hardly leans")
+    return float(np.corrcoef(told, true)[0, 1])
+
+
+@check("square")
+def gyroscopes_roll_the_right_way(case: Case) -> None:
+    """The body rate about x, where it is told, is positive as the right side goes down."""
+    heard = [one for mark in ("left", "right") for one in _imu(case, mark)]
+    true = [_true_rate(case, one.message.header.stamp_ns, 0) for one in heard]
+    correlation = _agrees([one.message.angular_velocity_rad_s[0] for one in heard], true)
+    assert correlation > 0.3, f"correlation with the true rate {correlation:.2f}"
+
+
+@check("square")
+def gyroscopes_pitch_the_right_way(case: Case) -> None:
+    """The body rate about y, where it is told, is positive as the nose goes down."""
+    heard = [one for mark in ("forward", "back") for one in _imu(case, mark)]
+    true = [_true_rate(case, one.message.header.stamp_ns, 1) for one in heard]
+    correlation = _agrees([one.message.angular_velocity_rad_s[1] for one in heard], true)
+    assert correlation > 0.3, f"correlation with the true rate {correlation:.2f}"
+
+
+@check("square")
+def attitude_of_the_imu_is_that_of_the_body(case: Case) -> None:
+    """The quaternion of IMU samples, where they have one, turns body into world: it leans as the vehicle does."""
+    heard = [one for mark in _LEGS for one in _imu(case, mark) if one.message.attitude is not None]
+    if not heard:
+        raise NotApplicable("its IMU tells no attitude")
+    true = [case.record.at(one.message.header.stamp_ns).attitude for one in heard]
+    leans = [_lean(one.message.attitude) for one in heard]
+    least = min(_agrees([lean[axis] for lean in leans], [a[axis] for a in true]) for axis in (0, 1))
+    assert least > 0.5, f"correlation with the true lean {least:.2f}"
+
+
+def _lean(attitude: Sequence[float]) -> tuple[float, float]:
+    """Return roll and pitch [rad] of a quaternion (w, x, y, z)."""
+    w, x, y, z = attitude
+    return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), math.asin(2.0 * (w * y - z * x))
 
 
 @check("square")

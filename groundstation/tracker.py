@@ -35,7 +35,6 @@ from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
-
 # Between two sightings of a robot in view.
 _SEEN_S = 0.5
 

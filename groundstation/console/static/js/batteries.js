@@ -33,11 +33,11 @@ const minuteWords = ([minutes, measured]) => (minutes < 1 ? "< 1 min" : `${measu
 const modeNow = (name) => store.s.vehicles?.[name]?.mode;
 const willLand = (name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING";
 
-// How long a drone's battery lasts, and until what; "" where nobody knows. Who lands for another reason needs it no longer.
+// How long a drone's battery lasts, and until what; "" where nobody knows. Who lands sooner for another reason does so then.
 export function lastsWords(name) {
   const status = store.s.vehicles?.[name], left = minutesLeft(name);
   if (status?.mode === "LANDING") return "lands now";
-  if ((status?.lands_in_s ?? null) !== null) return "lands before";
+  if ((status?.lands_in_s ?? null) !== null) return `lands in ${status.lands_in_s.toFixed(0)} s`;
   return left ? `${willLand(name) ? "lands in" : "flies"} ${minuteWords(left)}` : "";
 }
 

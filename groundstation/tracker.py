@@ -16,7 +16,7 @@ from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
 from groundstation.control.search_parameters import SearchParameters, search_from_field
 from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
-from groundstation.control.view import spread_m, velocity_error_m_s
+from groundstation.control.view import is_localised, spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
 from groundstation.estimation.attitude_intake import Lean
@@ -34,9 +34,6 @@ from groundstation.planning.planner import Planner, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
-
-# Between two sightings of a robot in view.
-_SEEN_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,16 +177,10 @@ class Tracker:
         return notices
 
     def converged(self, name: str) -> bool:
-        """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is.
-
-        Whom nobody sees must know its velocity as well: else its place is a guess sooner than its deviation says.
-        """
+        """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
         if name not in self._belief.layout or self._mounts.is_rootless:
             return False
-        safety, P = self.parameters.safety, self._belief.covariance_of(name)
-        if self.filter.age_s(name) > _SEEN_S and velocity_error_m_s(self._belief, name) > safety.max_velocity_error_m_s:
-            return False
-        return bool(max(P[0, 0], P[1, 1]) <= safety.max_position_std_m**2)
+        return is_localised(self._belief, name, self.filter.age_s(name), self.parameters.safety)
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""

@@ -5,13 +5,14 @@ import math
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.control.parameters import ControlParameters
+from groundstation.control.parameters import ControlParameters, SafetyParameters
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
 VIEW_INSET_M = 0.3
 _VELOCITY_ERRORS = ("velocity_bias_x", "velocity_bias_y")
 _POINT_M = 1e-6  # a view that is narrower is a line
+_SEEN_S = 0.5  # between two sightings of a robot in view
 
 
 def view_of(x: float, y: float, name: str, parameters: ControlParameters, sensors: SensorSuite) -> Rectangle | None:
@@ -36,6 +37,17 @@ def velocity_error_m_s(belief: JointBelief, name: str) -> float:
     block, variances = belief.layout.block(name), belief.covariance_of(name).diagonal()
     entries = [block.labels.index(label) for label in _VELOCITY_ERRORS if label in block.labels]
     return math.sqrt(max((float(belief.mean_of(name)[i] ** 2 + variances[i]) for i in entries), default=0.0))
+
+
+def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: SafetyParameters) -> bool:
+    """Return whether a robot is known well enough to fly on.
+
+    Whom nobody sees must know its velocity as well: else its place is a guess sooner than its deviation says.
+    """
+    P = belief.covariance_of(name)
+    if unseen_s > _SEEN_S and velocity_error_m_s(belief, name) > parameters.max_velocity_error_m_s:
+        return False
+    return bool(max(P[0, 0], P[1, 1]) <= parameters.max_position_std_m**2)
 
 
 def way_back_m(places: Array, view: Rectangle) -> Array:

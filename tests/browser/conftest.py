@@ -11,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 from fake_flight import FakeFlight
-from fake_flight import free_port as any_port
+from free_port import free_port as any_port
 from real_flight import answers, kernels, live, served  # noqa: F401
 from seen_page import Seen, open_seen
 from serve_fake import start_console

@@ -1,13 +1,13 @@
 """A flight that nobody flies: two drones, a target, plans, pictures and answers to commands, on a real Zenoh router."""
 
 import math
-import socket
 import threading
 import time
-from contextlib import closing
 
 import numpy as np
 from fake_pictures import paint
+from fake_words import LEVEL, STATES, WHY
+from free_port import free_port
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
@@ -15,20 +15,6 @@ from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
 TARGET = "turtlebot"
-_STATES = {
-    "LANDED": m.FlightState.LANDED,
-    "CUT": m.FlightState.LANDED,
-    "LANDING": m.FlightState.LANDING,
-    "TAKING_OFF": m.FlightState.TAKING_OFF,
-}
-_WHY = {"TRACK": "tracking for operator", "HOLD": "held by operator", "LANDING": "landing for operator"}
-_LEVEL = {m.Verb.HOLD: "HOLD", m.Verb.LAND: "LANDED", m.Verb.CUT_MOTORS: "CUT", m.Verb.TRACK: "TRACK"}
-
-
-def free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class FakeFlight(threading.Thread):
@@ -265,12 +251,12 @@ class FakeFlight(threading.Thread):
             bus, mode = self.bus(name), self.modes[name]
             status = m.VehicleStatus(
                 header=bus.header(name),
-                flight_state=_STATES.get(mode, m.FlightState.FLYING),
+                flight_state=STATES.get(mode, m.FlightState.FLYING),
                 mode=mode,
                 battery=self.battery.get(name),
                 link_quality=self.link.get(name, 0.93),
                 rate_hz=self.rate_hz.get(name, 198.0 + math.sin(s)),
-                detail=self.detail.get(name, _WHY.get(mode, "")),
+                detail=self.detail.get(name, WHY.get(mode, "")),
                 braked=name in self.braked,
                 lands_in_s=self.lands_in_s.get(name),
             )
@@ -317,7 +303,7 @@ class FakeFlight(threading.Thread):
         for delay, stage in enumerate((m.AckStage.RECEIVED, m.AckStage.ACCEPTED, m.AckStage.EFFECTIVE)):
             self._later.append((now + 0.2 * delay, "operator", command, stage))
         for name in names or self.drones:
-            self.modes[name] = _LEVEL.get(command.verb, "HOVER")
+            self.modes[name] = LEVEL.get(command.verb, "HOVER")
 
     def _answer(self) -> None:
         now = time.monotonic()
@@ -331,4 +317,4 @@ class FakeFlight(threading.Thread):
             bus.publish(t.COMMAND_ACK, ack)
             if name in self.modes:
                 landing = command.verb is m.Verb.LAND and stage is not m.AckStage.EFFECTIVE
-                self.modes[name] = "LANDING" if landing else _LEVEL.get(command.verb, "HOVER")
+                self.modes[name] = "LANDING" if landing else LEVEL.get(command.verb, "HOVER")

@@ -113,10 +113,8 @@ def fade_velocity_bias(
 ) -> None:
     """Let the velocity's error decay over dt; one that no sound sensor has is given room, and stays longer.
 
-    A heavy tail of its prior (docs/decisions/0078-velocities-are-claims.md): where sightings have drawn the error out
-    of it, the deviation follows the error, so that the next ones count for more than the vehicle's word. Surprises of
-    fixed cameras add to it before that. Of an unseen robot only its own sightings of others tell, and a target that
-    turns looks to them like an error of the observer (0143).
+    A heavy tail of its prior (0078): where sightings have drawn the error out of it, the deviation follows the error,
+    so that the next ones count for more; surprises of fixed cameras add to it. Not so of an unseen robot (0143).
     """
     start, size = entity.start, entity.size
     x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]

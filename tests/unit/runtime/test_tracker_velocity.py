@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -137,3 +138,13 @@ def test_an_honest_velocity_is_as_good_as_before(flight: Flight) -> None:
     assert flight.run(3.0, speed=0.5, look=False) < 0.15
     variance = float(flight.tracker.belief.covariance_of("drone_1")[0, 0])
     assert math.sqrt(variance) < 0.12
+
+
+def test_whom_nobody_sees_must_know_its_velocity(flight: Flight) -> None:
+    flight.run(2.0)
+    tracker = flight.tracker
+    strict = replace(tracker.parameters.safety, max_velocity_error_m_s=0.001)
+    tracker.parameters = replace(tracker.parameters, safety=strict)
+    assert tracker.converged("drone_1")
+    flight.run(0.7, look=False)
+    assert not tracker.converged("drone_1")

@@ -1,0 +1,12 @@
+"""What the fake drones say of themselves in each mode, and the mode that an order leads to."""
+
+from groundstation.bus import messages as m
+
+STATES = {
+    "LANDED": m.FlightState.LANDED,
+    "CUT": m.FlightState.LANDED,
+    "LANDING": m.FlightState.LANDING,
+    "TAKING_OFF": m.FlightState.TAKING_OFF,
+}
+WHY = {"TRACK": "tracking for operator", "HOLD": "held by operator", "LANDING": "landing for operator"}
+LEVEL = {m.Verb.HOLD: "HOLD", m.Verb.LAND: "LANDED", m.Verb.CUT_MOTORS: "CUT", m.Verb.TRACK: "TRACK"}

@@ -1,8 +1,17 @@
 """Detects frozen sensors: values that repeat to the last bit for longer than any working sensor's do."""
 
 from dataclasses import dataclass
+from enum import Enum, auto
 
 Values = tuple[object, ...]
+
+
+class Novelty(Enum):
+    """What a value is beside the ones before it; REPEATED: the same again, though not for long yet."""
+
+    NEW = auto()
+    REPEATED = auto()
+    FROZEN = auto()
 
 
 @dataclass(slots=True)
@@ -19,11 +28,16 @@ class FreezeWatch:
         self._count, self._span_ns = count, round(span_s * 1e9)
         self._spells: dict[object, _Spell] = {}
 
-    def is_frozen(self, source: object, values: Values, stamp_ns: int) -> bool:
+    def judge(self, source: object, values: Values, stamp_ns: int) -> Novelty:
         """Take what a source says at a time of measurement; sources are few, and one spell is kept of each."""
         spell = self._spells.get(source)
         if spell is None or spell.values != values:
             self._spells[source] = _Spell(values, stamp_ns)
-            return False
+            return Novelty.NEW
         spell.count += 1
-        return spell.count > self._count and stamp_ns - spell.since_ns >= self._span_ns
+        frozen = spell.count > self._count and stamp_ns - spell.since_ns >= self._span_ns
+        return Novelty.FROZEN if frozen else Novelty.REPEATED
+
+    def is_frozen(self, source: object, values: Values, stamp_ns: int) -> bool:
+        """Take likewise what a source says; returns whether it is frozen."""
+        return self.judge(source, values, stamp_ns) is Novelty.FROZEN

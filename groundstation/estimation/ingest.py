@@ -18,7 +18,7 @@ from groundstation.bus.messages import (
 )
 from groundstation.estimation.attitude_intake import AttitudeIntake, Lean
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
-from groundstation.estimation.frozen_sensor import FreezeWatch
+from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.range_intake import RangeIntake
 
@@ -41,11 +41,13 @@ _TRIANGLES = {
     4: (itemgetter(1, 2, 3, 6, 7, 11), itemgetter(4, 8, 12, 9, 13, 14)),
 }
 
+_STALE = {Novelty.NEW: None, Novelty.REPEATED: Verdict.DUPLICATE, Novelty.FROZEN: Verdict.FROZEN}
+
 REASONS = {
     Verdict.LATE: "older than the rewind reaches",
     Verdict.UNSYNCED: "its clock has no known offset",
     Verdict.UNKNOWN_ENTITY: "observer, camera or subject is not in the field",
-    Verdict.DUPLICATE: "already had this message",
+    Verdict.DUPLICATE: "already had this message, or this reading",
     Verdict.NOT_PERMITTED: "this camera must not observe targets",
     Verdict.IMPLAUSIBLE: "not finite, absurdly large, or from the future",
     Verdict.SINGULAR: "covariance is of the wrong shape, not symmetric, or not positive",
@@ -143,8 +145,8 @@ class Intake:
         if not _plausible(message.roll_rad, message.pitch_rad):
             return Verdict.IMPLAUSIBLE
         values = (message.position_m, message.yaw_rad)
-        if self._sight_watch.is_frozen((message.observer, message.camera, message.subject), values, stamp_ns):
-            return Verdict.FROZEN
+        if stale := self._stale((message.observer, message.camera, message.subject), values, stamp_ns):
+            return stale
         roll_rad, pitch_rad = self._tilt(message, stamp_ns)
         measurement = Measurement(
             stamp_ns,
@@ -169,9 +171,13 @@ class Intake:
         ):
             return Verdict.SINGULAR
         told = tuple(sorted(message.ranges_m.items()))
-        if len(told) > 1 and self._sight_watch.is_frozen((message.observer, "", message.subject), told, stamp_ns):
-            return Verdict.FROZEN
+        if len(told) > 1 and (stale := self._stale((message.observer, "", message.subject), told, stamp_ns)):
+            return stale
         return self.ranges.take(key, message, stamp_ns, now_ns)
+
+    def _stale(self, source: tuple[str, ...], values: tuple[object, ...], stamp_ns: int) -> Verdict | None:
+        """Return why a reading says nothing new, or None: no second picture measures the same to the last bit."""
+        return _STALE[self._sight_watch.judge(source, values, stamp_ns)]
 
     def _tilt(self, message: RelativeObservation, stamp_ns: int) -> tuple[float, float]:
         return self._attitudes.tilt(message.observer, stamp_ns, (message.roll_rad, message.pitch_rad))

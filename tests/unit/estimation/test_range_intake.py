@@ -211,4 +211,4 @@ def test_a_stream_that_repeats_itself_is_frozen(desk: Desk) -> None:
         desk.now += 100 * MS
         desk.odometry()
         verdicts.append(desk.take(msgspec.structs.replace(told, header=desk.header("uwb"))))
-    assert verdicts[0] is Verdict.ACCEPTED and verdicts[-1] is Verdict.FROZEN
+    assert verdicts[:2] == [Verdict.ACCEPTED, Verdict.DUPLICATE] and verdicts[-1] is Verdict.FROZEN

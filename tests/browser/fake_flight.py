@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 from fake_pictures import paint
+from fake_plan import TARGET, plan_at
 from fake_words import LEVEL, STATES, WHY
 from free_port import free_port
 
@@ -14,7 +15,6 @@ from groundstation.bus import topics as t
 from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
-TARGET = "turtlebot"
 
 
 class FakeFlight(threading.Thread):
@@ -160,37 +160,8 @@ class FakeFlight(threading.Thread):
             bus.publish(t.SETPOINT, setpoint)
 
     def _say_plan(self, s: float) -> None:
-        bus = self.bus("tracker")
-        string = math.sin(0.3 * s) > 0
-        edges = [m.Edge(self.cameras[0], "drone_1", 820.0), m.Edge("drone_1", TARGET, 145.0)]
-        edges += (
-            [m.Edge("drone_1", "drone_2", 210.0), m.Edge("drone_2", TARGET, 380.0)]
-            if string
-            else [m.Edge(self.cameras[-1], "drone_2", 640.0), m.Edge("drone_2", TARGET, 330.0)]
-        )
-        edges = [edge for edge in edges if self.sees(edge.observer, edge.subject)]
-        controls = (
-            m.Control("drone_1", (0.35, 0.15, 0.0), 0.1, ()),
-            m.Control("drone_2", (0.1, 0.15, 0.0), 0.1, ("fence",), (0.55, 0.2, 0.0)),
-        )
-        cost = 0.0123 + 0.004 * math.sin(0.5 * s)
-        chosen, other = ("drone_1/drone_2", "drone_1,drone_2") if string else ("drone_1,drone_2", "drone_1/drone_2")
-        alternatives = (
-            m.Alternative(chosen, cost),
-            m.Alternative(other, cost * 1.18),
-            m.Alternative("drone_2/drone_1", cost * 1.7, bound_only=True),
-        )
-        plan = m.Plan(
-            header=bus.header("team"),
-            topology=chosen,
-            cost=cost,
-            controls=controls,
-            edges=tuple(edges),
-            alternatives=alternatives,
-            solver=m.SolverReport("converged", 84, 0.018, 3, 2),
-            mode="TRACK",
-        )
-        bus.publish(t.PLAN, plan)
+        bus, up = self.bus("tracker"), self.flying()
+        bus.publish(t.PLAN, plan_at(s, bus.header("team"), up, self.cameras, self.sees))
 
     def _say_innovations(self, s: float, tick: int) -> None:
         bus = self.bus("tracker")

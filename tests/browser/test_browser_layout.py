@@ -111,7 +111,7 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets them go on."
     page.wait(lambda s: verdict.inner_text() == said)
     stage.flight.battery["drone_2"] = 0.28
-    low = "The battery of drone_2 is low: 28 %, lands in ~1 min"
+    low = "CAUTION: The battery of drone_2 is low: 28 %, lands in ~1 min"
     page.wait(lambda s: page.there("banner-concern").inner_text() == low)
     stage.flight.battery["drone_2"] = 0.6
     stage.flight.unseen_s[TARGET] = 2.0
@@ -169,8 +169,10 @@ def test_every_situation_is_told_in_one_way_and_fits(stage: Any) -> None:
 
     for name, arrange in SITUATIONS.items():
         SITUATIONS["all_is_well"](stage.flight)
+        page.page.wait_for_timeout(300)  # until the page has it
         arrange(stage.flight)
         page.wait(lambda s, name=name: told(name))
+        page.page.wait_for_timeout(700)  # until what was seen in the situation before counts no more
         assert page.page.evaluate(CUT_OFF) == [], name
         page.shot(f"situation_{name}")
 
@@ -183,7 +185,7 @@ def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}
     page.wait(lambda s: page.there("drone_1-takeoff").is_enabled())
     assert page.there("resume").is_enabled() and page.there("drone_2-takeoff").is_disabled()
-    assert page.there("track").inner_text() == "TRACK\nRESUME goes on"
+    assert page.there("track").inner_text() == "TRACK\npress RESUME"
     page.there("drone_1-takeoff").click()
     page.wait(lambda s: [command.scope for command in stage.flight.commands] == [("operator", "drone_1")])
     stage.flight.frozen = True

@@ -63,10 +63,15 @@ function openAlarms(open) {
   byId("more").setAttribute("aria-expanded", `${open}`);
 }
 
-// All but the gravest alarm stand behind this button, so that none of them moves the page.
-export function showMore(count) {
+// All but the gravest alarm stand behind this button, so that none of them moves the page; it counts them by rank.
+export function showMore(ranks) {
   const more = byId("more");
-  if (count < 2) openAlarms(false);
-  more.hidden = count < 2;
-  text(more, byId("alarms").classList.contains("open") ? "close" : `+ ${count - 1} more alarm${count > 2 ? "s" : ""}`);
+  if (!ranks.length) openAlarms(false);
+  more.hidden = !ranks.length;
+  text(more, byId("alarms").classList.contains("open") ? "close" : `+ ${counted(ranks).join(", ")}`);
+}
+
+function counted(ranks) {
+  const counts = ["warning", "caution", "notice"].map((rank) => [rank, ranks.filter((one) => one === rank).length]);
+  return counts.filter(([, count]) => count).map(([rank, count]) => `${count} ${rank}${count > 1 ? "s" : ""}`);
 }

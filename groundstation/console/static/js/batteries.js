@@ -33,12 +33,12 @@ const minuteWords = ([minutes, measured]) => (minutes < 1 ? "< 1 min" : `${measu
 const modeNow = (name) => store.s.vehicles?.[name]?.mode;
 const willLand = (name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING";
 
-// How long a drone's battery lasts, and until what; "" where nobody knows. Who lands sooner for another reason does so then.
+// How long a drone's battery lasts, and until what; "" where nobody knows. Whatever lands it sooner stands elsewhere.
 export function lastsWords(name) {
-  const status = store.s.vehicles?.[name], left = minutesLeft(name);
-  if (status?.mode === "LANDING") return "lands now";
-  if ((status?.lands_in_s ?? null) !== null) return `lands in ${status.lands_in_s.toFixed(0)} s`;
-  return left ? `${willLand(name) ? "lands in" : "flies"} ${minuteWords(left)}` : "";
+  const left = minutesLeft(name), status = store.s.vehicles?.[name], lands = willLand(name) && status.lands_in_s === null;
+  if (!left) return "";
+  if (left[0] === 0) return `below its ${(100 * leastBattery(name)).toFixed(0)} %`;
+  return `${lands ? "lands in" : ALOFT.has(status.mode) ? "lasts" : "flies"} ${minuteWords(left)}`;
 }
 
 // The same of the worst battery; of another drone that has to land sooner, if there is one.

@@ -13,7 +13,7 @@ export function refusalOf(verb, names = droneNames()) {
   if (trackerSilent()) return "tracker silent";
   const resumes = needResume(names);
   if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
-  if (resumes) return "RESUME goes on";
+  if (resumes) return "press RESUME";
   return all.includes("HOVER") ? "" : all.includes("TRACK") ? "under way" : "nobody hovers";
 }
 

@@ -158,7 +158,7 @@ export function drawVelocities(g, view, stale) {
     const limits = limitsOf(control);
     if (!limits) continue;
     const places = around(from[0], from[1], bodyRadius(view) + 6, 11).slice(1);
-    note(g, FIGURE, name, `limited by ${limits}`, places, ink().fence, 11, 700);
+    note(g, FIGURE, name, `limited by ${limits}`, places, ink().text, 11, 500);
   }
 }
 

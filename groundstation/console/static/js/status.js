@@ -38,14 +38,19 @@ export function showBanners() {
     host.dataset.kinds = kinds;
     host.replaceChildren(...banners.map(([kind, , , , shell]) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
   }
-  banners.forEach(([, level, title, more], index) => {
+  banners.forEach((banner, index) => {
+    const [, level, title, more] = banner;
     const node = host.children[index];
     node.className = `banner ${level}`;
-    text(node.children[0], `${level === "grave" ? "⚠ " : ""}${title}`);
+    text(node.children[0], `${LEADS[rank(banner)] ?? ""}${title}`);
     text(node.children[1], more);
   });
-  showMore(banners.length);
+  showMore(banners.slice(1).map(rank));
 }
+
+// As alerting systems have it, a warning needs an act, a caution attention; a notice answers a press.
+const rank = ([kind, level]) => (level === "grave" ? "warning" : level === "mild" && kind !== "notice" ? "caution" : "notice");
+const LEADS = { warning: "⚠ WARNING: ", caution: "CAUTION: " };
 
 // For tests: how late the page was to say that something is silent.
 function noteSilence(kinds, before, ages) {

@@ -31,11 +31,14 @@ from sim_bridge.site import SiteCapture
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
 from firmware import VARIABLES, Firmware, binary_of  # noqa: E402
+from sitl_run import FEW_PICTURES  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.firmware, pytest.mark.timeout(400)]
 SYSTEM = 8
 STAND_IN = "127.95.1.2"
 GROUND = (sys.executable, "-m", "groundstation")
+# Fourteen processes beside a firmware: two cores have no room for the pictures that a lab would take.
+FEW = ("--scenario", str(FEW_PICTURES), "--set", "planner.rate_hz=5", "--set", "recording.image_fps=1")
 
 
 def field(folder: Path, mavlink: str, address: str = "127.0.0.1", **sources: str) -> Path:
@@ -57,7 +60,7 @@ class Run:
     def __init__(self, path: Path, *arguments: str) -> None:
         self.folder = path.parent
         pipe = subprocess.PIPE
-        command = [*GROUND, "sitl", str(path), "--headless", "--seed", "1", "--report", str(self.folder), *arguments]
+        command = [*GROUND, "sitl", str(path), "--headless", "--seed", "1", "--report", str(self.folder), *FEW, *arguments]
         self.process = subprocess.Popen(
             command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=self.folder
         )
@@ -272,3 +275,4 @@ def test_emulated_drones_fly_beside_a_real_ceiling_camera(tmp_path: Path, starte
         assert run.report()["landed"], run.said
     finally:
         server.shutdown()
+        server.server_close()

@@ -193,10 +193,18 @@ def test_healthy_flights_and_gaps_in_them_are_let_be(limits, period_ms):
 
 def test_a_restarted_clock_and_one_that_wraps_are_no_faults():
     watch = ClockWatch(wrap_s=2048.0)
-    for number in range(2000):
+    for number in range(4000):
         stands_s, late_s = watch.update(number * 5 * MS, (2_043_000 * MS + number * 5 * MS) % (2048 * S))
         assert stands_s == 0.0 and late_s == 0.0
-    assert watch.update(10_000 * MS, 1_000 * MS) == (0.0, 0.0)
+    assert watch.update(20_000 * MS, 1_000 * MS) == (0.0, 0.0)
+
+
+def test_a_clock_that_goes_back_a_little_is_late():
+    watch = ClockWatch()
+    for number in range(2000):
+        watch.update(number * 5 * MS, 70_000 * MS + number * 5 * MS)
+    assert watch.update(10_000 * MS, (80_000 - 1_800) * MS)[1] == pytest.approx(1.8)
+    assert watch.update(10_500 * MS, (80_500 - 1_800) * MS)[1] == pytest.approx(1.8)
 
 
 def test_the_recorded_flight_gives_no_alarm(real_data):

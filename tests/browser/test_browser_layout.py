@@ -125,7 +125,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
     page.wait(lambda s: duty.inner_text().startswith("Watches turtlebot"))
-    assert "its place comes from ceiling" in duty.inner_text()
+    assert "drone_1 is located by ceiling" in duty.inner_text()
     assert "limited by the fence" in page.there("drone_2-duty").inner_text()
     stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"
     stage.flight.lands_in_s["drone_1"] = 1.8
@@ -133,7 +133,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle.")
     page.wait(lambda s: "drone_1 lands in 2 s: hovers: no telemetry" in page.there("banner-alarm").inner_text())
     assert page.there("drone_1-mode").inner_text() == "lands in 2 s"
-    assert page.there("hold").inner_text() == "HOLD 2\nhover; 1 lands anyway"
+    assert page.there("hold").inner_text() == "HOLD 1\ndrone_1 lands anyway"
     stage.flight.detail.clear()
     stage.flight.lands_in_s.clear()
     stage.flight.braked.clear()
@@ -148,9 +148,9 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
 # What stands in the place of alarms, below it, on HOLD, and on the cards of both drones.
 TOLD = {
     "all_is_well": ("No alarms", "track the target. Nobody is lost.", "hover in place", "track", "track"),
-    "one_lands_for_its_battery": ("battery 13%", "drone_2 lands.", "hover; 1 lands anyway", "track", "landing"),
-    "all_are_held": ("No alarms", "RESUME lets them go on.", "hover in place", "hold", "hold"),
-    "one_is_unseen_and_will_land": ("lands in 6 s", "Not seen: drone_1", "1 lands anyway", "lands in 6 s", "track"),
+    "one_lands_for_its_battery": ("battery 13%", "drone_2 lands.", "drone_2 lands anyway", "track", "landing"),
+    "all_are_held": ("No alarms", "RESUME lets them go on.", "hold already", "hold", "hold"),
+    "one_is_unseen_and_will_land": ("lands in 6 s", "Not seen: drone_1", "drone_1 lands anyway", "lands in 6 s", "track"),
     "the_tracker_is_silent": ("TRACKER SILENT", "Who is lost is not", "lands anyway", "lands in 1 s", "lands in 1 s"),
     "one_has_a_stuck_sensor": ("stuck at 0.27 m/s", "drone_2 hovers. Nobody", "hover in place", "track", "hover"),
     "all_land": ("No alarms", "drone_1 and drone_2 land.", "lands anyway", "landing", "landing"),
@@ -179,7 +179,7 @@ def test_every_situation_is_told_in_one_way_and_fits(stage: Any) -> None:
 
 def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     page = stage.open()
-    page.wait(lambda s: page.there("take-off").get_attribute("title") == "nobody stands")
+    page.wait(lambda s: page.there("take-off").get_attribute("title") == "nobody on the floor")
     assert page.there("take-off").is_disabled() and page.there("drone_1-takeoff").is_disabled()
     assert page.there("track").get_attribute("title") == "under way"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}

@@ -36,9 +36,9 @@ const willLand = (name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDIN
 // How long a drone's battery lasts, and until what; "" where nobody knows. Whatever lands it sooner stands elsewhere.
 export function lastsWords(name) {
   const left = minutesLeft(name), status = store.s.vehicles?.[name], lands = willLand(name) && status.lands_in_s === null;
+  if (status?.mode === "LANDING") return "landing now";
   if (!left) return "";
-  if (left[0] === 0) return `below its ${(100 * leastBattery(name)).toFixed(0)} %`;
-  return `${lands ? "lands in" : ALOFT.has(status.mode) ? "lasts" : "flies"} ${minuteWords(left)}`;
+  return `${lands ? "lands in" : ALOFT.has(status.mode) ? "good for" : "flies"} ${minuteWords(left)}`;
 }
 
 // The same of the worst battery; of another drone that has to land sooner, if there is one.

@@ -2,7 +2,7 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { effectOf, refusalOf, STOPS } from "./effects.js";
+import { effectOf, holding, isIdle, refusalOf, STOPS } from "./effects.js";
 import { aloft, modes } from "./glance.js";
 import { me, on, send } from "./link.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
@@ -92,11 +92,11 @@ function holdToPress(button, fire) {
   button.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-// How many are in the air for those that stop, how many stand for the one that starts; nothing where nobody is heard.
+// How many obey: in the air for those that stop, on the floor for the one that starts; nothing where nobody is heard.
 function showCounts(names) {
   const known = modes(names).length, up = aloft();
   for (const node of document.querySelectorAll(".count")) {
-    const count = node.closest("#takeoff") ? known - up : up;
+    const count = node.closest("#takeoff") ? known - up : node.closest("#hold") ? holding(names).length : up;
     text(node, known && count ? `${count}` : "");
   }
 }
@@ -121,10 +121,10 @@ function showStops() {
     node.dataset.caption ??= node.textContent;
     const effect = runOver() ? "" : store.connected ? effectOf(node.dataset.effect) : "no connection";
     text(node, effect || node.dataset.caption);
-    node.closest("button").classList.toggle("idle", store.connected && Boolean(effect) && !effect.startsWith("hover"));
+    node.closest("button").classList.toggle("idle", store.connected && !runOver() && isIdle(node.dataset.effect));
   }
   for (const node of document.querySelectorAll("[data-land], [data-hold]")) {
-    node.classList.toggle("idle", Boolean(effectOf(node.dataset.land ? "LAND" : "HOLD", [node.dataset.land ?? node.dataset.hold])));
+    node.classList.toggle("idle", isIdle(node.dataset.land ? "LAND" : "HOLD", [node.dataset.land ?? node.dataset.hold]));
   }
 }
 

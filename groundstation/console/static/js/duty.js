@@ -30,13 +30,15 @@ function tracked(name, plan) {
   const sought = Object.keys(store.s.estimate?.searches ?? {});
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const does = watched.length ? `watches ${joined(watched)}` : sought.length ? `looks for ${joined(sought)}` : "moves to where it will see more";
-  const known = watchers.length ? `its place comes from ${joined(watchers)}` : "nobody sees it now";
+  const known = watchers.length ? `${name} is located by ${joined(watchers)}` : `nobody sees ${name} now`;
   return sentence([does, known, limits && `limited by ${limits}`].filter(Boolean).join("; "));
 }
 
-// The driver's own reason; what it is the reason for, where it does not say so.
+// The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
 function reasonOf({ mode, detail }) {
   if (mode === "LANDED" || mode === "CUT") return `stands with its motors off: ${detail}`;
+  const [, doing, who] = detail.match(/^(landing|taking off) for (.+)$/) ?? [];
+  if (who) return `${doing === "landing" ? "lands" : "takes off"}: ordered by ${who}`;
   return mode === "LANDING" && detail && !detail.startsWith("land") ? `lands: ${detail}` : detail;
 }
 
@@ -45,7 +47,7 @@ export function dutyOf(name) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
-  const goesOn = status.mode === "TRACK" && !status.braked && status.lands_in_s !== null ? "Flies on for now. " : "";
+  const goesOn = status.mode === "TRACK" && !status.braked && status.lands_in_s !== null ? "Follows its plan still. " : "";
   return planned ? tracked(name, plan) : goesOn + sentence(reasonOf(status));
 }
 

@@ -18,7 +18,7 @@ export function refusalOf(verb, names = droneNames()) {
 }
 
 function takeOffRefusal(standing) {
-  if (!standing.length) return "nobody stands";
+  if (!standing.length) return "nobody on the floor";
   if (standing.every(([, status]) => status.battery === null)) return "battery unknown";
   return standing.every(([name, status]) => status.battery < leastBattery(name)) ? "battery too low" : "";
 }
@@ -28,19 +28,31 @@ function needResume(names) {
   return names.map((name) => store.s.vehicles?.[name]).some((status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && status.detail.includes("RESUME")));
 }
 
+const SHORT = 8; // letters of a name that has room on a button
+
 // What a stop of these drones would do now, where that is not what it is for; "" where it is.
 export function effectOf(verb, names = droneNames()) {
-  const all = modes(names), up = all.filter((mode) => ALOFT.has(mode)).length, land = all.filter((mode) => mode === "LANDING").length;
-  if (!all.length) return "";
-  if (!up) return names.length > 1 ? "nobody flies" : "it stands";
-  if (verb === "LAND") return land === up ? "landing already" : "";
+  const up = names.filter((name) => ALOFT.has(modeOf(name)));
+  if (!modes(names).length) return "";
+  if (!up.length) return names.length > 1 ? "nobody flies" : "it stands";
+  if (verb === "LAND") return isIdle(verb, names) ? "landing already" : "";
   if (verb === "CUT_MOTORS") return "";
-  const anyway = land + names.filter(landsSoon).length;
-  return anyway >= up ? "lands anyway" : anyway ? `hover; ${anyway} lands anyway` : "";
+  const bound = up.filter((name) => !holding([name]).length);
+  if (bound.length === up.length) return "lands anyway";
+  if (bound.length) return bound.length > 1 ? `${bound.length} land anyway` : `${bound[0].length > SHORT ? "1" : bound[0]} lands anyway`;
+  return isIdle(verb, names) ? "hold already" : "";
 }
 
-// Neither a landing nor what leads to one by itself is stopped by HOLD.
-const landsSoon = (name) => (store.s.vehicles?.[name]?.lands_in_s ?? null) !== null && store.s.vehicles[name].mode !== "LANDING";
+// Whether a stop would change nothing now.
+export function isIdle(verb, names = droneNames()) {
+  if (!modes(names).length) return false;
+  const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : names.filter((name) => ALOFT.has(modeOf(name)));
+  return moved.every((name) => modeOf(name) === left);
+}
+
+// Whom HOLD holds: neither a landing nor what leads to one by itself is stopped by it.
+export const holding = (names = droneNames()) => names.filter((name) => ALOFT.has(modeOf(name)) && modeOf(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
+const modeOf = (name) => store.s.vehicles?.[name]?.mode;
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
 const UNHEARD_S = 0.8, FORGOTTEN_S = 30;

@@ -63,13 +63,15 @@ class SafetyParameters:
     fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity;
     margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief. drift_m_s: motion
     besides the commanded one that nobody has noticed yet; most_drift_m_s: largest one that is held off.
-    max_velocity_error_m_s: rms error of the odometry with which nobody may fly unseen.
+    max_known_velocity_error_m_s, max_velocity_error_m_s: mean and rms error of the odometry, as the belief has it, with
+    which nobody may fly unseen.
     """
 
     fence: tuple[Interval, Interval, Interval]
     min_separation_m: float = 0.6
     max_position_std_m: float = 0.6
-    max_velocity_error_m_s: float = 0.3
+    max_known_velocity_error_m_s: float = 0.3
+    max_velocity_error_m_s: float = 0.5
     max_belief_age_s: float = 0.3
     reaction_s: float = 0.5
     margin_m: float = 0.15

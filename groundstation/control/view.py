@@ -34,9 +34,19 @@ def velocity_error_m_s(belief: JointBelief, name: str) -> float:
 
     0 where the belief has no such states: in its core, and for vehicles without them.
     """
-    block, variances = belief.layout.block(name), belief.covariance_of(name).diagonal()
-    entries = [block.labels.index(label) for label in _VELOCITY_ERRORS if label in block.labels]
+    variances = belief.covariance_of(name).diagonal()
+    entries = _velocity_errors(belief, name)
     return math.sqrt(max((float(belief.mean_of(name)[i] ** 2 + variances[i]) for i in entries), default=0.0))
+
+
+def known_velocity_error_m_s(belief: JointBelief, name: str) -> float:
+    """Return the mean alone: what the filter has learnt of that error, the larger of both axes [m/s]."""
+    return max((abs(float(belief.mean_of(name)[i])) for i in _velocity_errors(belief, name)), default=0.0)
+
+
+def _velocity_errors(belief: JointBelief, name: str) -> list[int]:
+    labels = belief.layout.block(name).labels
+    return [labels.index(label) for label in _VELOCITY_ERRORS if label in labels]
 
 
 def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: SafetyParameters) -> bool:
@@ -45,7 +55,11 @@ def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: Sa
     Whom nobody sees must know its velocity as well: else its place is a guess sooner than its deviation says.
     """
     P = belief.covariance_of(name)
-    if unseen_s > _SEEN_S and velocity_error_m_s(belief, name) > parameters.max_velocity_error_m_s:
+    lies = (
+        known_velocity_error_m_s(belief, name) > parameters.max_known_velocity_error_m_s
+        or velocity_error_m_s(belief, name) > parameters.max_velocity_error_m_s
+    )
+    if unseen_s > _SEEN_S and lies:
         return False
     return bool(max(P[0, 0], P[1, 1]) <= parameters.max_position_std_m**2)
 

@@ -1,8 +1,9 @@
 """A vehicle's own clock against ours: standing, or late. Pure."""
 
 _BUCKET_NS = 5_000_000_000
-# No vehicle starts anew so fast: a clock that went back by less tells that what comes is older than what came.
-_RESTART_NS = 5_000_000_000
+# A clock that went back by less tells that what comes is older than what came. By more: it was set, or the vehicle was
+# started again; on no link do values wait for so long.
+_LONGEST_NS = 3_000_000_000
 
 
 class ClockWatch:
@@ -26,7 +27,7 @@ class ClockWatch:
         vehicle_ns += self._turns_ns
         if before is not None and vehicle_ns < before:
             vehicle_ns = self._wrapped(before, vehicle_ns)
-            if vehicle_ns < before - _RESTART_NS:
+            if vehicle_ns < before - _LONGEST_NS:
                 self.reset()
                 before = None
         if before is None or vehicle_ns != before:

@@ -60,18 +60,8 @@ class Run:
     def __init__(self, path: Path, *arguments: str) -> None:
         self.folder = path.parent
         pipe = subprocess.PIPE
-        command = [
-            *GROUND,
-            "sitl",
-            str(path),
-            "--headless",
-            "--seed",
-            "1",
-            "--report",
-            str(self.folder),
-            *FEW,
-            *arguments,
-        ]
+        options = ("--headless", "--seed", "1", "--report", str(self.folder), *FEW)
+        command = [*GROUND, "sitl", str(path), *options, *arguments]
         self.process = subprocess.Popen(
             command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=self.folder
         )

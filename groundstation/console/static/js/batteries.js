@@ -1,6 +1,6 @@
 // What the batteries hold, and how long they last.
 
-import { ALOFT } from "./glance.js";
+import { ALOFT, modeNow } from "./glance.js";
 import { droneNames, store } from "./store.js";
 
 const LEAST_DRAIN = 0.02, LEAST_MIN = 0.5, LOW_MIN = 3;
@@ -30,7 +30,6 @@ export function minutesLeft(name) {
 // As measured "6 min", by what its kind usually does "~6 min".
 const minuteWords = ([minutes, measured]) => (minutes < 1 ? "< 1 min" : `${measured ? "" : "~"}${Math.floor(minutes)} min`);
 
-const modeNow = (name) => store.s.vehicles?.[name]?.mode;
 const willLand = (name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING";
 
 // How long a drone's battery lasts, and until what; "" where nobody knows. Whatever lands it sooner stands elsewhere.

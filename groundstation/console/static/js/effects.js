@@ -1,7 +1,7 @@
 // What a start or a stop would do now.
 
 import { leastBattery } from "./batteries.js";
-import { ALOFT, aloft, modes } from "./glance.js";
+import { ALOFT, aloft, modeNow, modes } from "./glance.js";
 import { ageS, droneNames, runOver, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
@@ -32,7 +32,7 @@ const SHORT = 8; // letters of a name that has room on a button
 
 // What a stop of these drones would do now, where that is not what it is for; "" where it is.
 export function effectOf(verb, names = droneNames()) {
-  const up = names.filter((name) => ALOFT.has(modeOf(name)));
+  const up = names.filter((name) => ALOFT.has(modeNow(name)));
   if (!modes(names).length) return "";
   if (!up.length) return names.length > 1 ? "nobody flies" : "it stands";
   if (verb === "LAND") return isIdle(verb, names) ? "landing already" : "";
@@ -46,13 +46,12 @@ export function effectOf(verb, names = droneNames()) {
 // Whether a stop would change nothing now.
 export function isIdle(verb, names = droneNames()) {
   if (!modes(names).length) return false;
-  const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : names.filter((name) => ALOFT.has(modeOf(name)));
-  return moved.every((name) => modeOf(name) === left);
+  const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : names.filter((name) => ALOFT.has(modeNow(name)));
+  return moved.every((name) => modeNow(name) === left);
 }
 
 // Whom HOLD holds: neither a landing nor what leads to one by itself is stopped by it.
-export const holding = (names = droneNames()) => names.filter((name) => ALOFT.has(modeOf(name)) && modeOf(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
-const modeOf = (name) => store.s.vehicles?.[name]?.mode;
+export const holding = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
 const UNHEARD_S = 0.8, FORGOTTEN_S = 30;

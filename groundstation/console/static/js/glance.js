@@ -10,7 +10,8 @@ export const STAGES = ["pre-flight", "take-off", "track", "land", "over"];
 const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filter(Boolean);
 // Its mode; HOVER as well while a failsafe keeps it from following the plan in TRACK.
 export const modeOf = (status) => (status?.braked ? "HOVER" : status?.mode);
-export const modes = (names = droneNames()) => names.map((name) => store.s.vehicles?.[name]?.mode).filter(Boolean);
+export const modeNow = (name) => store.s.vehicles?.[name]?.mode;
+export const modes = (names = droneNames()) => names.map(modeNow).filter(Boolean);
 export const aloft = () => modes().filter((mode) => ALOFT.has(mode)).length;
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.arrays import Array
 from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
@@ -30,7 +29,7 @@ from groundstation.estimation.mount_watch import MOVED, MountWatch
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning import parameters as planning
-from groundstation.planning.planner import Planner, PlanResult
+from groundstation.planning.planner import Planner, PlanRequest, PlanResult
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
@@ -61,15 +60,6 @@ def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker
         field.planner.initial_topology == "string",
     )
     return Tracker(parameters, clock, epoch)
-
-
-@dataclass(frozen=True, slots=True)
-class PlanRequest:
-    """A snapshot to plan on, away from the tracker's loop."""
-
-    belief: JointBelief
-    topology: Topology
-    warm_start: Mapping[str, Array]
 
 
 class Tracker:

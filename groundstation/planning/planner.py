@@ -26,6 +26,15 @@ from groundstation.sensing.topology import Topology
 
 
 @dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """A snapshot to plan on, away from the tracker's loop."""
+
+    belief: JointBelief
+    topology: Topology
+    warm_start: Mapping[str, Array]
+
+
+@dataclass(frozen=True, slots=True)
 class PlanResult:
     """The chosen topology with held controls.
 

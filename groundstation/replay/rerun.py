@@ -9,11 +9,10 @@ from groundstation.bus.sender import Sender
 from groundstation.bus.topics import Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.planner import Planner
+from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
-from groundstation.tracker import PlanRequest
 
 Words = list[tuple[Topic, Message]]
 

@@ -9,11 +9,10 @@ from dataclasses import replace
 import msgspec
 
 from groundstation.errors import EstimatorFault
-from groundstation.planning.planner import Planner
+from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.planning.time_budget import TimeBudget
 from groundstation.process.priority import Rank, go_first
 from groundstation.runtime.journal import Adoption
-from groundstation.tracker import PlanRequest
 
 _log = logging.getLogger(__name__)
 

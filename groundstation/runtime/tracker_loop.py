@@ -14,7 +14,7 @@ from groundstation.bus.messages import Message, RelativeObservation, Severity
 from groundstation.bus.notice import Notice
 from groundstation.bus.topics import SEARCH_MAP
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.planner import Planner
+from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.announcer import TEAM, Announcer
 from groundstation.runtime.consistency_watch import ConsistencyWatch
 from groundstation.runtime.figure_watch import FigureWatch
@@ -24,7 +24,7 @@ from groundstation.runtime.journal import FAULT, Adoption, entry_of
 from groundstation.runtime.latency_watch import PictureAge
 from groundstation.runtime.plan_worker import PlanWorker
 from groundstation.runtime.rejoin_watch import RejoinWatch
-from groundstation.tracker import PlanRequest, Tracker, tracker_from_field
+from groundstation.tracker import Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
 _LOOPS_HZ = 5

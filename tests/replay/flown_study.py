@@ -11,7 +11,7 @@ from groundstation.bus import topics as t
 from groundstation.bus.api import Sample
 from groundstation.bus.topics import Topic
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.planner import Planner
+from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import Preamble, preamble_of_run
@@ -19,7 +19,6 @@ from groundstation.recording.timeline import Timeline
 from groundstation.replay.rerun import JournalBus
 from groundstation.runtime.journal import Adoption
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
-from groundstation.tracker import PlanRequest
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import CLOCK, Study, StudyOptions
 

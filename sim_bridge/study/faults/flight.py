@@ -19,11 +19,10 @@ from groundstation.bus.messages import Message
 from groundstation.bus.topics import OBSERVATION, SEARCHED_PICTURE, Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
-from groundstation.planning.planner import Planner
+from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.inbox import TOPICS
 from groundstation.runtime.journal import Adoption
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
-from groundstation.tracker import PlanRequest
 from sim_bridge.fault_kinds import Fault
 from sim_bridge.faults import FaultSchedule, described
 from sim_bridge.scenario import Scenario

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from groundstation.control.drift import DriftWatch
 from groundstation.control.lookout import Lookout
 from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
+from groundstation.control.root_watch import RootWatch
 from groundstation.control.search_parameters import SearchParameters, search_from_field
 from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
 from groundstation.control.view import is_localised, spread_m
@@ -89,6 +90,7 @@ class Tracker:
         self._robots = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.ROBOT)
         self._targets = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.TARGET)
         self.lookout = Lookout(parameters.search, parameters.control, parameters.sensors, self._robots, self._targets)
+        self._roots = RootWatch(self._mounts.roots, self._robots + self._targets)
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -121,6 +123,7 @@ class Tracker:
         refused = moved and isinstance(message, RelativeObservation)
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if verdict is Verdict.ACCEPTED:
+            self._roots.hear(message, now_ns)
             if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
                 self._mounts.see(message)
             return None
@@ -144,6 +147,7 @@ class Tracker:
             self._report_joining(correction)
         velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
         self._notices += self._mounts.advance(now_ns, velocities, corrections, self.airborne)
+        self._notices += self._roots.advance(now_ns, corrections, flying=bool(self.airborne))
         self._notices += self._intake.ranges.take_notices()
         self._heed_absence(now_ns)
         self._topology = self._topology_now()
@@ -168,7 +172,7 @@ class Tracker:
 
     def converged(self, name: str) -> bool:
         """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
-        if name not in self._belief.layout or self._mounts.is_rootless:
+        if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
             return False
         return is_localised(self._belief, name, self.filter.age_s(name), self.parameters.safety)
 
@@ -194,14 +198,21 @@ class Tracker:
         missed, trusted_s = self.lookout.missed_s, 2.0 * self.parameters.control.return_within_s
         ages_s = {name: self.filter.age_s(name) for name in self.airborne}
         return {
-            name: 0.0 if self.converged(name) and name not in missed and age_s <= trusted_s else age_s
+            name: 0.0
+            if self.converged(name) and name not in missed and age_s <= trusted_s
+            else self._rooted_age_s(name)
             for name, age_s in ages_s.items()
         }
+
+    def _rooted_age_s(self, robot: str) -> float:
+        """Return since when nothing fixed in the room has told where a robot is; infinite if it has not joined."""
+        return max(self.filter.age_s(robot), self._roots.age_s(robot))
 
     def _heed_absence(self, now_ns: int) -> None:
         """Take account of what pictures do not show; what is not where it was believed leaves the belief."""
         ages_s = {name: self.filter.age_s(name) for name in (*self.airborne, *self._targets)}
-        gone = self.lookout.advance(self._belief, ages_s)
+        rooted_s = {name: self._rooted_age_s(name) for name in self.airborne}
+        gone = self.lookout.advance(self._belief, ages_s, rooted_s)
         self._notices += self.lookout.take_notices()
         for name in gone:
             for present in (False, True):

@@ -65,16 +65,19 @@ class Lookout:
                 self._search.take(message)
                 self._robots.take(message)
 
-    def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
+    def advance(
+        self, belief: JointBelief, ages_s: Mapping[str, float], rooted_s: Mapping[str, float]
+    ) -> tuple[str, ...]:
         """Count all pictures; returns the targets that are not where the belief has them any more.
 
-        ages_s: since each airborne robot and each target was last seen; infinite: not in the belief.
+        ages_s: since each airborne robot and each target was last seen; rooted_s: since something fixed last told where
+        each airborne robot is, itself or through others. Infinite: not in the belief.
         """
         self._excursions.unseen_s = {name: age_s for name, age_s in ages_s.items() if name in self._names}
         self._excursions.velocity_errors_m_s = {
             n: velocity_error_m_s(belief, n) for n in self._names if n in belief.layout
         }
-        for name in self._robots.advance(belief, self._excursions.unseen_s):
+        for name in self._robots.advance(belief, rooted_s):
             text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))
         gone = self._search.advance(belief, {name: age_s for name, age_s in ages_s.items() if name in self.targets})

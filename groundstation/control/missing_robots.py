@@ -41,7 +41,11 @@ class MissingRobots:
             self._pictures.append(picture)
 
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
-        """Count the pictures; returns who is missing from now on. ages_s: since each airborne robot was last seen."""
+        """Count the pictures; returns who is missing from now on.
+
+        ages_s: since a fixed camera last saw each airborne robot, itself or through others: two that see only each
+        other are both missing where it should see them.
+        """
         self._history.append(belief)
         for name in self._robots:
             if not _SEEN_S < ages_s.get(name, math.inf) < math.inf:

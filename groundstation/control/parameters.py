@@ -71,7 +71,7 @@ class SafetyParameters:
     min_separation_m: float = 0.6
     max_position_std_m: float = 0.6
     max_known_velocity_error_m_s: float = 0.3
-    max_velocity_error_m_s: float = 0.5
+    max_velocity_error_m_s: float = 0.45
     max_belief_age_s: float = 0.3
     reaction_s: float = 0.5
     margin_m: float = 0.15

@@ -26,7 +26,7 @@ _REMEDY = (
 
 
 class MountWatch:
-    """Use: `see` each sighting, `advance` once a tick; ask `distrusts` and `is_rootless`."""
+    """Use: `see` each sighting, `advance` once a tick; ask `distrusts` and `is_rootless`. roots: what is fixed."""
 
     def __init__(self, parameters: EstimatorParameters) -> None:
         fixed: dict[str, Matrix] = {
@@ -37,7 +37,7 @@ class MountWatch:
         mounts = {name: rotation for name, rotation in fixed.items() if name in parameters.world_cameras}
         robots = [name for name, model in parameters.entities.items() if model.kind is EntityKind.ROBOT]
         ranging = frozenset(parameters.ranging)
-        self._roots, self._cameras, self._robots = frozenset(fixed) | ranging, frozenset(mounts), frozenset(robots)
+        self.roots, self._cameras, self._robots = frozenset(fixed) | ranging, frozenset(mounts), frozenset(robots)
         self._jumps, self._ties = SightJumps(mounts), TiedContradictions(mounts, robots)
         self._seen: dict[Pair, Vector] = {}
         self._moved: set[str] = set()
@@ -45,7 +45,7 @@ class MountWatch:
     @property
     def is_rootless(self) -> bool:
         """Return whether no fixed camera is left that tells where the team is in the room."""
-        return bool(self._moved) and self._moved == self._roots
+        return bool(self._moved) and self._moved == self.roots
 
     def distrusts(self, observer: str) -> bool:
         """Return whether a camera's sightings are to be refused."""

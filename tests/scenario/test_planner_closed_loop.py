@@ -102,7 +102,8 @@ class World:
     def sight(self, belief: JointBelief, now: float) -> Sight:
         """Return what the tracker makes of the pictures; a target that is given up may be anywhere."""
         age_s = now - self.last_seen
-        if self.lookout.advance(belief, {**dict.fromkeys(self.names, 0.0), self.target: age_s}):
+        seen_now = dict.fromkeys(self.names, 0.0)
+        if self.lookout.advance(belief, {**seen_now, self.target: age_s}, seen_now):
             t = 4 * len(self.names)
             self.P[t:, :] = self.P[:, t:] = 0.0
             self.P[range(t, t + 4), range(t, t + 4)] = 9.0, 9.0, 0.04, 0.04

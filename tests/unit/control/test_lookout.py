@@ -43,14 +43,14 @@ def look_in_vain(lookout: Lookout) -> None:
         header = Header(round(now_s * 1e9), "c", "drone_1", "drone_1_camera", tick)
         if tick % 5 == 0:
             lookout.take(SearchedPicture(header=header, observer="drone_1", camera="drone_1_camera"))
-        lookout.advance(belief(now_s), {"drone_1": 0.1, "turtlebot": now_s})
+        lookout.advance(belief(now_s), {"drone_1": 0.1, "turtlebot": now_s}, {"drone_1": 0.1})
         lookout.stands(("drone_1",), lookout.missing, belief(now_s))
 
 
 def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() -> None:
     lookout = lookout_of_the_lab()
     lookout.take(driver_in("TRACK"))
-    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1})
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
     lookout.take_notices()
     assert lookout.searches(0) == ()
     look_in_vain(lookout)
@@ -66,7 +66,7 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     assert math.hypot(search.place_m[0] - 1.0, search.place_m[1]) > 0.2
     assert "of the room done" in search.text
     assert lookout.maps()["turtlebot"].chances.sum() == pytest.approx(1.0)
-    lookout.advance(belief(2.9), {"drone_1": 0.1, "turtlebot": 0.1})
+    lookout.advance(belief(2.9), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     assert lookout.searches(round(2.9e9)) == ()
     assert lookout.maps() == {}
@@ -75,7 +75,7 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
 def test_nobody_is_said_to_search_who_lands_or_holds() -> None:
     lookout = lookout_of_the_lab()
     lookout.take(driver_in("TRACK"))
-    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1})
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     lookout.take(driver_in("LANDING"))
     look_in_vain(lookout)
@@ -83,7 +83,7 @@ def test_nobody_is_said_to_search_who_lands_or_holds() -> None:
     assert lookout.take_notices() == []
     assert lookout.searches(round(2.8e9)) == ()
     lookout.take(driver_in("TRACK"))
-    lookout.advance(belief(2.84), {"drone_1": 0.1, "turtlebot": 2.8})
+    lookout.advance(belief(2.84), {"drone_1": 0.1, "turtlebot": 2.8}, {"drone_1": 0.1})
     (notice,) = lookout.take_notices()
     assert "the team searches around" in notice.text
     assert [search.target for search in lookout.searches(round(2.84e9))] == ["turtlebot"]

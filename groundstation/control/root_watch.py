@@ -1,0 +1,81 @@
+"""How long ago something fixed in the room last told where each robot is; and whether anything still does. Pure."""
+
+import math
+from collections.abc import Collection, Iterable
+
+from groundstation.bus.messages import (
+    Message,
+    RangeObservation,
+    RelativeObservation,
+    SearchedPicture,
+    Severity,
+    Verdict,
+)
+from groundstation.bus.notice import Notice
+from groundstation.estimation.measurement import Correction
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+_USED = (Verdict.ACCEPTED, Verdict.INFLATED)
+# Longer than a camera of 2 pictures a second, or one that is started again, is silent.
+_SILENT_NS = 1_500_000_000
+_SILENCE = "no fixed sensor tells anything new of the room: drones hover, and land if none does"
+_REMEDY = "see to the cameras (frozen? unplugged?); the team goes on once one sees it"
+
+
+class RootWatch:
+    """Use: `hear` each message that counts, `advance` once a tick; ask `age_s` and `is_silent`.
+
+    roots: sensors that are fixed in the room; carried: robots and targets, of which one that sees another passes on
+    where it is. Two that see only each other drift together, and nothing in their sightings shows it.
+    """
+
+    def __init__(self, roots: Collection[str], carried: Iterable[str]) -> None:
+        self._roots, self._carried = frozenset(roots), frozenset(carried)
+        self._rooted_ns: dict[str, int] = {}
+        self._heard_ns: dict[str, int] = {}
+        self._searching: set[str] = set()
+        self._now_ns = 0
+        self._told = False
+
+    @property
+    def is_silent(self) -> bool:
+        """Return whether no root has told anything new for 1.5 s; not known where one never says that it sees nothing.
+
+        One that goes on finding robots whose sightings are refused, because its picture hangs, is silent.
+        """
+        if not self._roots or self._roots != self._searching:
+            return False
+        return self._now_ns - max(self._heard_ns.values()) > _SILENT_NS
+
+    def hear(self, message: Message, now_ns: int) -> None:
+        """Take a message that was not refused."""
+        match message:
+            case SearchedPicture() if message.observer in self._roots:
+                self._searching.add(message.observer)
+                if not message.found or message.observer not in self._heard_ns:
+                    self._heard_ns[message.observer] = now_ns
+            case RelativeObservation() | RangeObservation() if message.observer in self._roots:
+                self._heard_ns[message.observer] = now_ns
+
+    def advance(self, now_ns: int, corrections: Iterable[Correction], *, flying: bool) -> list[Notice]:
+        """Take what the filter used since the last call; returns what is to be told."""
+        self._now_ns = now_ns
+        for one in corrections:
+            if one.verdict in _USED and one.subject in self._carried:
+                self._tie(one, now_ns - round(one.latency_ms * NS_PER_MS))
+        told, self._told = self._told, self.is_silent and flying
+        return [Notice(Severity.ERROR, _SILENCE, _REMEDY)] if self._told and not told else []
+
+    def age_s(self, name: str) -> float:
+        """Return how old the newest sighting by a root is that reached an entity, itself or by others; or infinity."""
+        return (self._now_ns - self._rooted_ns[name]) / NS_PER_S if name in self._rooted_ns else math.inf
+
+    def _tie(self, one: Correction, at_ns: int) -> None:
+        """Let both ends of a sighting know what the better rooted one knows."""
+        if one.observer in self._roots:
+            self._rooted_ns[one.subject] = max(at_ns, self._rooted_ns.get(one.subject, at_ns))
+            return
+        ends = (one.observer, one.subject)
+        known = [self._rooted_ns[name] for name in ends if name in self._rooted_ns]
+        if known:
+            self._rooted_ns |= dict.fromkeys(ends, max(known))

@@ -1,0 +1,110 @@
+"""Where the team is in the room is told by what is fixed there, directly or through whom it sees; or by nothing."""
+
+import math
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import Header, Message, RelativeObservation, SearchedPicture, Verdict
+from groundstation.control.root_watch import RootWatch
+from groundstation.estimation.measurement import Correction
+
+TICK_NS = 100_000_000
+CARRIED = ("drone_1", "drone_2", "turtlebot")
+
+
+def used(observer: str, subject: str, verdict: Verdict = Verdict.ACCEPTED, latency_ms: float = 0.0) -> Correction:
+    return Correction(observer, subject, verdict, "", latency_ms=latency_ms)
+
+
+def ages_s(watch: RootWatch) -> list[float]:
+    return [round(watch.age_s(name), 3) for name in CARRIED]
+
+
+def test_what_a_root_sees_is_passed_on_along_sightings_in_either_direction() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.advance(
+        TICK_NS, [used("ceiling", "drone_1"), used("drone_1", "turtlebot"), used("drone_2", "turtlebot")], flying=True
+    )
+    assert ages_s(watch) == [0.0, 0.0, 0.0]
+
+
+def test_two_that_see_only_each_other_grow_older_together() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.advance(TICK_NS, [used("ceiling", "drone_1")], flying=True)
+    for tick in range(2, 32):
+        watch.advance(tick * TICK_NS, [used("drone_1", "drone_2"), used("drone_2", "drone_1")], flying=True)
+    assert ages_s(watch) == [3.0, 3.0, math.inf]
+
+
+@pytest.mark.parametrize("verdict", [Verdict.IMPLAUSIBLE, Verdict.FROZEN, Verdict.LATE])
+def test_a_refused_sighting_tells_nothing(verdict: Verdict) -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.advance(TICK_NS, [used("ceiling", "drone_1", verdict)], flying=True)
+    assert ages_s(watch) == [math.inf] * 3
+
+
+def test_a_late_sighting_is_as_old_as_its_picture_and_makes_nobody_older() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.advance(10 * TICK_NS, [used("ceiling", "drone_1", latency_ms=200.0)], flying=True)
+    assert watch.age_s("drone_1") == pytest.approx(0.2)
+    watch.advance(10 * TICK_NS, [used("ceiling", "drone_1", latency_ms=500.0)], flying=True)
+    assert watch.age_s("drone_1") == pytest.approx(0.2)
+
+
+def picture(*found: str, observer: str = "ceiling") -> SearchedPicture:
+    return SearchedPicture(
+        header=Header(1, "c", observer, observer, 1), observer=observer, camera=observer, found=found
+    )
+
+
+def sighting(observer: str = "ceiling") -> RelativeObservation:
+    return RelativeObservation(
+        header=Header(1, "c", observer, observer, 1), observer=observer, subject="drone_1", camera=observer,
+        position_m=(0.0, 0.0, 2.0), yaw_rad=None, covariance=tuple(np.eye(3).ravel().tolist()),
+    )  # fmt: skip
+
+
+def silent_after(message: Message | None, ticks: int, roots: tuple[str, ...] = ("ceiling",)) -> list[str]:
+    """Return what is told while roots that have worked say only this, each tick."""
+    watch, told = RootWatch(roots, CARRIED), []
+    for root in roots:
+        watch.hear(picture(observer=root), TICK_NS)
+    for tick in range(1, ticks + 1):
+        if message is not None:
+            watch.hear(message, tick * TICK_NS)
+        told += [notice.text for notice in watch.advance(tick * TICK_NS, [], flying=True)]
+    assert watch.is_silent == bool(told)
+    return told
+
+
+def test_roots_that_say_nothing_are_silent_after_a_while_and_are_told_of_once() -> None:
+    assert silent_after(None, 16) == []
+    assert len(silent_after(None, 60)) == 1
+
+
+def test_one_that_finds_robots_in_a_picture_that_hangs_is_silent() -> None:
+    assert len(silent_after(picture("drone_1"), 60)) == 1
+
+
+@pytest.mark.parametrize("message", [picture(), sighting()])
+def test_one_that_sees_somebody_or_nobody_is_not_silent(message: Message) -> None:
+    assert silent_after(message, 60) == []
+
+
+def test_one_root_that_works_is_enough() -> None:
+    assert silent_after(sighting("hall_2"), 60, ("hall_1", "hall_2")) == []
+
+
+def test_a_root_that_never_says_that_it_sees_nobody_is_not_judged() -> None:
+    watch = RootWatch(["mocap"], CARRIED)
+    watch.hear(sighting("mocap"), TICK_NS)
+    assert watch.advance(100 * TICK_NS, [], flying=True) == []
+    assert not watch.is_silent
+
+
+def test_nothing_is_told_while_nobody_flies() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.hear(picture(), TICK_NS)
+    assert watch.advance(100 * TICK_NS, [], flying=False) == []
+    assert watch.is_silent

@@ -10,6 +10,7 @@ import numpy as np
 from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
+from groundstation.control.joinings import Joinings
 from groundstation.control.lookout import Lookout
 from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
@@ -81,6 +82,7 @@ class Tracker:
         self.rejected: Counter[str] = Counter()
         self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
         self._mounts = MountWatch(parameters.estimator)
+        self._joinings = Joinings()
         self._topology = Topology(())
         self._plan_stale = False
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
@@ -143,8 +145,7 @@ class Tracker:
         self._belief = self.filter.belief()
         corrections = self.filter.take_corrections()
         self._corrections += corrections
-        for correction in corrections:
-            self._report_joining(correction)
+        self._notices += self._joinings.take(now_ns, corrections)
         velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
         self._notices += self._mounts.advance(now_ns, velocities, corrections, self.airborne)
         self._notices += self._roots.advance(now_ns, corrections, flying=bool(self.airborne))
@@ -173,6 +174,8 @@ class Tracker:
     def converged(self, name: str) -> bool:
         """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
         if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
+            return False
+        if self._joinings.is_unsettled(name):
             return False
         return is_localised(self._belief, name, self.filter.age_s(name), self.parameters.safety)
 
@@ -310,11 +313,3 @@ class Tracker:
         self.epoch += 1
         remedy = "drones hover; RESUME once they are localised again, or land them"
         self._notices.append(Notice(Severity.ERROR, f"estimator fault: {text}", remedy))
-
-    def _report_joining(self, correction: Correction) -> None:
-        if not correction.joined:
-            return
-        again = correction.nis is not None
-        severity = Severity.WARNING if again else Severity.INFO
-        text = f"{correction.subject} {'re-initialised' if again else 'localised'} by {correction.observer}"
-        self._notices.append(Notice(severity, text, entity=correction.subject))

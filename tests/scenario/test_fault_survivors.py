@@ -42,6 +42,8 @@ UNROOTED = {
     "while_a_velocity_drifts": (34010, ["picture_frozen", "velocity_drifting"]),
     "and_they_see_each_other": (34322, ["camera_stall", "picture_black"]),
 }
+# Telemetry 0.7 s old: the ceiling re-initialised the drone again and again, which swung faster each time.
+SWINGING = (34051, ["camera_stall", "telemetry_delayed"])
 
 
 def order_of(changes: list[str]) -> dict[str, Any]:
@@ -106,3 +108,9 @@ def test_a_drone_whose_velocity_lies_does_not_fly_on_where_it_is_not(
 @pytest.mark.parametrize(("seed", "kinds"), UNROOTED.values(), ids=UNROOTED)
 def test_a_team_that_no_fixed_camera_tells_where_it_is_hovers(seed: int, kinds: list[str]) -> None:
     safely_flown(order_of([]), seed, kinds)
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_drone_that_is_put_elsewhere_again_and_again_stands_still() -> None:
+    safely_flown(order_of([]), *SWINGING)

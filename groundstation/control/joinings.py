@@ -1,0 +1,40 @@
+"""Who joined the belief and who was put somewhere else in it: told, and not flown on if it happens again soon. Pure."""
+
+import math
+from collections.abc import Iterable
+
+from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
+from groundstation.estimation.measurement import Correction
+from groundstation.time_units import NS_PER_S
+
+# Two within so long: what the belief goes by is wrong, and goes on being so.
+_AGAIN_NS = 5 * NS_PER_S
+# Without a further one for so long, it is settled.
+_SETTLED_NS = 3 * NS_PER_S
+
+
+class Joinings:
+    """Use: `take` what became of the observations, once a tick; ask `is_unsettled`."""
+
+    def __init__(self) -> None:
+        self._last_ns: dict[str, int] = {}
+        self._unsettled_ns: dict[str, int] = {}
+        self._now_ns = 0
+
+    def take(self, now_ns: int, corrections: Iterable[Correction]) -> list[Notice]:
+        """Return what is to be told."""
+        self._now_ns = now_ns
+        return [self._note(one) for one in corrections if one.joined]
+
+    def is_unsettled(self, name: str) -> bool:
+        """Return whether an entity was re-initialised twice within 5 s, and the last time within 3 s."""
+        return self._now_ns - self._unsettled_ns.get(name, -math.inf) < _SETTLED_NS
+
+    def _note(self, one: Correction) -> Notice:
+        if one.nis is None:
+            return Notice(Severity.INFO, f"{one.subject} localised by {one.observer}", entity=one.subject)
+        if self._now_ns - self._last_ns.get(one.subject, -math.inf) < _AGAIN_NS:
+            self._unsettled_ns[one.subject] = self._now_ns
+        self._last_ns[one.subject] = self._now_ns
+        return Notice(Severity.WARNING, f"{one.subject} re-initialised by {one.observer}", entity=one.subject)

@@ -125,7 +125,8 @@ class Tracker:
         refused = moved and isinstance(message, RelativeObservation)
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if verdict is Verdict.ACCEPTED:
-            self._roots.hear(message, now_ns)
+            if not moved:
+                self._roots.hear(message, now_ns)
             if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
                 self._mounts.see(message)
             return None

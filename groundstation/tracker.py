@@ -131,6 +131,8 @@ class Tracker:
                 self._mounts.see(message)
             return None
         self.rejected[f"{type(message).__name__} {verdict}"] += 1
+        if verdict is Verdict.FROZEN:
+            self._roots.hear_frozen(message)
         if isinstance(message, RelativeObservation):
             reason, latency_ms = MOVED if moved else REASONS[verdict], (now_ns - message.header.stamp_ns) / 1e6
             self._corrections.append(

@@ -32,7 +32,11 @@ from groundstation.cli.numbers import FiniteRange
 )
 @click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
 @click.option("--scenario", default="realistic", show_default=True, help="Scenario without faults: sensor errors.")
-@click.option("--kinds", default="", help="Only these kinds of faults, by commas (default: all that are drawn).")
+@click.option(
+    "--kinds",
+    default="",
+    help="Only these kinds of faults, by commas (default: all that are drawn); none: healthy flights only.",
+)
 @campaign_options("faults")
 def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any) -> int:
     """Fly random fields with one or two random faults; the drivers, watchdogs and tracker are those that fly.

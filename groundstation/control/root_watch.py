@@ -16,8 +16,9 @@ from groundstation.estimation.measurement import Correction
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _USED = (Verdict.ACCEPTED, Verdict.INFLATED)
-# Longer than a camera of 2 pictures a second, or one that is started again, is silent.
-_SILENT_NS = 1_500_000_000
+# Longer than a camera of 2 pictures a second, or one that is started again, is silent; of one that goes on repeating
+# itself, no longer than two of its pictures take.
+_SILENT_NS, _HANGS_NS = 1_500_000_000, 500_000_000
 _SILENCE = "no fixed sensor tells anything new of the room: drones hover, and land if none does"
 _REMEDY = "see to the cameras (frozen? unplugged?); the team goes on once one sees it"
 
@@ -34,18 +35,17 @@ class RootWatch:
         self._rooted_ns: dict[str, int] = {}
         self._heard_ns: dict[str, int] = {}
         self._searching: set[str] = set()
+        self._hanging: set[str] = set()
         self._now_ns = 0
         self._told = False
 
     @property
     def is_silent(self) -> bool:
-        """Return whether no root has told anything new for 1.5 s; not known where one never says that it sees nothing.
+        """Return whether no root has told anything new for 1.5 s, or 0.5 s where it goes on repeating itself.
 
-        One that goes on finding robots whose sightings are refused, because its picture hangs, is silent.
+        One that never says that it sees nobody may just see nobody; it is judged only while it repeats itself.
         """
-        if not self._roots or self._roots != self._searching:
-            return False
-        return self._now_ns - max(self._heard_ns.values()) > _SILENT_NS
+        return bool(self._roots) and all(map(self._says_nothing, self._roots))
 
     def hear(self, message: Message, now_ns: int) -> None:
         """Take a message that was not refused."""
@@ -53,9 +53,14 @@ class RootWatch:
             case SearchedPicture() if message.observer in self._roots:
                 self._searching.add(message.observer)
                 if not message.found or message.observer not in self._heard_ns:
-                    self._heard_ns[message.observer] = now_ns
+                    self._renew(message.observer, now_ns)
             case RelativeObservation() | RangeObservation() if message.observer in self._roots:
-                self._heard_ns[message.observer] = now_ns
+                self._renew(message.observer, now_ns)
+
+    def hear_frozen(self, message: Message) -> None:
+        """Take a message that was refused since its sensor hangs; what is new in the same picture comes with it."""
+        if isinstance(message, RelativeObservation | RangeObservation) and message.observer in self._roots:
+            self._hanging.add(message.observer)
 
     def advance(self, now_ns: int, corrections: Iterable[Correction], *, flying: bool) -> list[Notice]:
         """Take what the filter used since the last call; returns what is to be told."""
@@ -69,6 +74,16 @@ class RootWatch:
     def age_s(self, name: str) -> float:
         """Return how old the newest sighting by a root is that reached an entity, itself or by others; or infinity."""
         return (self._now_ns - self._rooted_ns[name]) / NS_PER_S if name in self._rooted_ns else math.inf
+
+    def _renew(self, root: str, now_ns: int) -> None:
+        self._heard_ns[root] = now_ns
+        self._hanging.discard(root)
+
+    def _says_nothing(self, root: str) -> bool:
+        if root not in self._hanging | self._searching:
+            return False
+        limit_ns = _HANGS_NS if root in self._hanging else _SILENT_NS
+        return self._now_ns - self._heard_ns.get(root, self._now_ns) > limit_ns
 
     def _tie(self, one: Correction, at_ns: int) -> None:
         """Let both ends of a sighting know what the better rooted one knows."""

@@ -50,6 +50,14 @@ def test_a_seed_ends_the_same_again(silent: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
+def test_nobody_flies_on_by_a_ceiling_picture_that_hangs() -> None:
+    frozen = fly("lab", Fault(kind=FaultKind.PICTURE_FROZEN, entity="ceiling", start_s=9.5), seconds=9.0)
+    assert frozen["unsafe"] == {}
+    assert 0.4 <= frozen["hover_s"] <= 1.0
+    assert frozen["rest_s"] <= 3.5
+
+
+@pytest.mark.slow
 def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
     flown = fly("mixed-team", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=15.0), seconds=5.0)
     assert flown["tracking_since_s"] is not None

@@ -1,6 +1,7 @@
 """`python -m sim_bridge.study faults < order.json`: fly some seeds of the campaign; a JSON line for each.
 
-The order: field (resolved), sections of its drivers as [kind, section], scenario, seeds, seconds, kinds.
+The order: field (resolved), sections of its drivers as [kind, section], scenario, seeds, seconds, kinds (an empty list:
+all that are drawn; "none": healthy flights only).
 """
 
 import json
@@ -15,6 +16,7 @@ from sim_bridge.study.faults.hosted_kinds import UP_AFTER_S, WRONG_ORDER, unhost
 
 # Faults begin when the team has found the target, and early enough for what must follow to be seen.
 _SETTLED_S, _LEFT_S = 3.0, 6.0
+_HEALTHY = "none"
 
 
 def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
@@ -23,7 +25,7 @@ def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
 
     up_s = max(UP_AFTER_S[drone["kind"]] for drone in order["field"]["drones"].values())
     window_s = (up_s + _SETTLED_S, up_s + order["seconds"] - _LEFT_S)
-    kinds = tuple(FaultKind(kind) for kind in order.get("kinds") or KINDS)
+    kinds = tuple(FaultKind(kind) for kind in order.get("kinds") or KINDS if kind != _HEALTHY)
     drawn = draw(order["field"], parse_scenario(json.dumps(order["scenario"])), seed, window_s, kinds)
     flight = FaultFlight(drawn, [(kind, section) for kind, section in order["sections"]], order["seconds"])
     report = flight.run()
@@ -35,7 +37,7 @@ def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
 def main() -> int:
     """Fly the seeds of the order on standard input; WRONG_ORDER for an unknown kind of fault or of vehicle."""
     order = json.load(sys.stdin)
-    known = [str(kind) for kind in KINDS]
+    known = [*map(str, KINDS), _HEALTHY]
     if unknown := [kind for kind in order.get("kinds") or () if kind not in known]:
         print(f"no kind of fault: {', '.join(unknown)}; there are {', '.join(known)}", file=sys.stderr)
         return WRONG_ORDER

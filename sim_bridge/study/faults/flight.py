@@ -23,7 +23,7 @@ from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.inbox import TOPICS
 from groundstation.runtime.journal import Adoption
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
-from sim_bridge.fault_kinds import Fault
+from sim_bridge.fault_kinds import RULES, Fault, Part
 from sim_bridge.faults import FaultSchedule, described
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
@@ -140,10 +140,11 @@ class FaultFlight:
         )
         self.tracking = Tracking(self._tracker_bus, section, feed)
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
-        self._exposures = Exposures([WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)])
+        eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
+        self._exposures, self._eyes = Exposures(eyes), {eye.name: eye for eye in eyes}
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
-        self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S)
+        self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S, root=self._only_root())
         self._tracking_since_s: float | None = None
 
     def _bus(self, source: str) -> LocalBus:
@@ -251,7 +252,13 @@ class FaultFlight:
         belief = self.tracking.tracker.belief
         return np.asarray(belief.mean_of(name)[:2]) if name in belief.layout else None
 
+    def _only_root(self) -> str | None:
+        roots = self._field.world_sensors
+        return roots[0] if len(roots) == 1 else None
+
     def _observable(self, fault: Fault) -> float | None:
+        if RULES[fault.kind].part is Part.CAMERA:
+            return self._eyes[fault.entity].observable_s(fault)
         values = self._values.get(fault.entity)
         return fault.start_s if values is None else values.observable_s(fault)
 

@@ -1,7 +1,7 @@
 """How a flight with faults is judged, by truth alone."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -41,11 +41,16 @@ class _Flown:
 
 
 class Judge:
-    """Call `see` at an even rate while the team tracks; `verdict` says what came of it."""
+    """Call `see` at an even rate while the team tracks; `verdict` says what came of it.
 
-    def __init__(self, fence: Mapping[str, Any], limits_m_s: Mapping[str, float], period_s: float) -> None:
+    root: the only camera that hangs in the room, if there is but one: when its picture freezes, nobody may fly on.
+    """
+
+    def __init__(
+        self, fence: Mapping[str, Any], limits_m_s: Mapping[str, float], period_s: float, root: str | None = None
+    ) -> None:
         self._fence = np.array([fence["x_m"], fence["y_m"], fence["z_m"]])
-        self._limits, self._period_s = limits_m_s, period_s
+        self._limits, self._period_s, self._root = limits_m_s, period_s, root
         self._flown = {name: _Flown() for name in limits_m_s}
         self._lost_s = dict.fromkeys(limits_m_s, 0.0)
         self.separation_m, self.fence_m, self.speed_m_s, self.lost_s = math.inf, 0.0, 0.0, 0.0
@@ -91,14 +96,7 @@ class Judge:
     def verdict(self, faults: tuple[Fault, ...], observable_s: tuple[float | None, ...]) -> dict[str, Any]:
         """Return the figures; unsafe: what was violated, with the time at which [s]."""
         hover, rest = 0.0, 0.0
-        for fault, since_s in zip(faults, observable_s, strict=True):
-            if since_s is None or fault.entity not in self._flown or fault.kind not in MUST_STOP:
-                continue
-            if fault.end_s is not None and fault.end_s - since_s < REST_S:
-                continue  # it healed before anything was due
-            flown = self._flown[fault.entity]
-            if flown.times[-1] - since_s < REST_S + _STAYS_S:
-                continue
+        for flown, since_s in self._due(zip(faults, observable_s, strict=True)):
             hover, rest = max(hover, _until_hover(flown, since_s)), max(rest, _until_rest(flown, since_s))
             if hover > HOVER_S:
                 self.first.setdefault("hover", round(since_s, 2))
@@ -113,6 +111,20 @@ class Judge:
             "rest_s": round(rest, 2),
             "unsafe": dict(sorted(self.first.items(), key=lambda item: item[1])),
         }
+
+    def _due(self, faults: Iterable[tuple[Fault, float | None]]) -> Iterable[tuple[_Flown, float]]:
+        """Return who had to stop, and since when [s], of faults that lasted until it was due."""
+        for fault, since_s in faults:
+            if since_s is None or (fault.end_s is not None and fault.end_s - since_s < REST_S):
+                continue
+            for name in self._stopped_by(fault):
+                if self._flown[name].times[-1] - since_s >= REST_S + _STAYS_S:
+                    yield self._flown[name], since_s
+
+    def _stopped_by(self, fault: Fault) -> Iterable[str]:
+        if fault.kind is FaultKind.PICTURE_FROZEN:
+            return self._flown if fault.entity == self._root else ()
+        return (fault.entity,) if fault.kind in MUST_STOP and fault.entity in self._flown else ()
 
 
 def _until_hover(flown: _Flown, since_s: float) -> float:

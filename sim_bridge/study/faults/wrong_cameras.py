@@ -20,6 +20,7 @@ class WrongEye:
         self.eye, self.name, self.period_s = eye, eye.name, eye.period_s
         self._faults = tuple(fault for fault in faults if fault.entity == eye.name)
         self._frozen: list[RelativeObservation] = []
+        self._repeats_s: dict[Fault, float] = {}
         self._shows = True
         self._numbers = itertools.count(1_000_000)  # beyond those of the eye
 
@@ -36,7 +37,13 @@ class WrongEye:
         if FaultKind.PICTURE_FROZEN not in kinds:
             self._frozen = seen or self._frozen
             return seen
+        if self._frozen:
+            self._repeats_s |= {fault: world.time_s for fault in active if fault not in self._repeats_s}
         return [self._again(old, stamp_ns) for old in self._frozen]
+
+    def observable_s(self, fault: Fault) -> float | None:
+        """Return from when on a fault shows [s]; a frozen picture does once it repeats somebody; None: it never did."""
+        return self._repeats_s.get(fault) if fault.kind is FaultKind.PICTURE_FROZEN else fault.start_s
 
     def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
         """Return that the last picture, if there was one, was searched all over, and what it shows."""

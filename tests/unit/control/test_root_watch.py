@@ -87,6 +87,45 @@ def test_one_that_finds_robots_in_a_picture_that_hangs_is_silent() -> None:
     assert len(silent_after(picture("drone_1"), 60)) == 1
 
 
+def hangs_after_s(root: str, others: tuple[str, ...] = (), also_new: bool = False) -> float | None:
+    """Return how long after its last new sighting a root that only repeats itself leaves nothing to go by [s]."""
+    watch = RootWatch((root, *others), CARRIED)
+    watch.hear(sighting(root), 0)
+    for tick in range(1, 31):
+        watch.hear_frozen(sighting(root))
+        for one in (*others, *([root] if also_new else [])):
+            watch.hear(sighting(one), tick * TICK_NS)
+        watch.advance(tick * TICK_NS, [], flying=True)
+        if watch.is_silent:
+            return tick / 10
+    return None
+
+
+@pytest.mark.parametrize("root", ["ceiling", "mocap"])
+def test_a_root_that_goes_on_repeating_itself_is_silent_sooner_whether_or_not_it_says_that_it_sees_nobody(
+    root: str,
+) -> None:
+    assert hangs_after_s(root) == 0.6
+
+
+def test_a_root_does_not_hang_that_repeats_one_robot_and_sees_another_anew() -> None:
+    assert hangs_after_s("ceiling", also_new=True) is None
+
+
+def test_a_root_that_hangs_matters_not_beside_one_that_works() -> None:
+    assert hangs_after_s("ceiling", others=("hall_2",)) is None
+
+
+def test_a_root_that_hung_and_sees_somebody_again_works() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.hear(sighting(), 0)
+    watch.hear_frozen(sighting())
+    watch.advance(10 * TICK_NS, [], flying=True)
+    assert watch.is_silent
+    watch.hear(sighting(), 10 * TICK_NS)
+    assert not watch.is_silent
+
+
 @pytest.mark.parametrize("message", [picture(), sighting()])
 def test_one_that_sees_somebody_or_nobody_is_not_silent(message: Message) -> None:
     assert silent_after(message, 60) == []

@@ -66,9 +66,15 @@ def row(x: float, y: float, vx: float = 0.0, ground: bool = False) -> Any:
     return np.array([x, y, 1.2, vx, 0.0, 0.0, 0, 0, 0, 0, 0, 0, float(ground)])
 
 
-def judged(rows: Any, told: Any = lambda t: True, off_m: float = 0.0, faults: tuple[Fault, ...] = ()) -> dict[str, Any]:
+def judged(
+    rows: Any,
+    told: Any = lambda t: True,
+    off_m: float = 0.0,
+    faults: tuple[Fault, ...] = (),
+    root: str | None = None,
+) -> dict[str, Any]:
     """Return the verdict on 15 s in which drone a flies rows(t) and drone b stands still 3 m away."""
-    judge = Judge(FENCE, {"a": 0.6, "b": 0.6}, PERIOD_S)
+    judge = Judge(FENCE, {"a": 0.6, "b": 0.6}, PERIOD_S, root)
     for n in range(300):
         t = 5.0 + n * PERIOD_S
         truth = {"a": rows(t), "b": row(0.0, -2.0)}
@@ -114,6 +120,12 @@ def test_after_useless_words_hover_and_rest_are_due(stops_s: float, rests_s: flo
     verdict = judged(**flown(stops_s, rests_s), faults=(fault("telemetry_frozen"),))
     assert set(verdict["unsafe"]) == broken
     assert verdict["hover_s"] == pytest.approx(min(stops_s, 19.95) - 10.0, abs=0.11)
+
+
+@pytest.mark.parametrize(("root", "broken"), [("ceiling", {"hover", "rest"}), ("other", set()), (None, set())])
+def test_nobody_flies_on_where_the_picture_of_the_only_fixed_camera_freezes(root: str | None, broken: set[str]) -> None:
+    frozen = fault("picture_frozen", entity="ceiling")
+    assert set(judged(**flown(99.0, 99.0), faults=(frozen,), root=root)["unsafe"]) == broken
 
 
 def test_nothing_is_due_after_a_fault_that_need_not_stop_or_healed_at_once() -> None:
@@ -232,6 +244,17 @@ def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
         found += camera.look(world, int(t * 1e9), "c")
     assert [one.position_m[0] for one in found] == seen
     assert len({(one.header.stamp_ns, one.header.seq) for one in found}) == len(found)
+
+
+def test_a_frozen_picture_shows_once_it_repeats_somebody() -> None:
+    frozen, black = fault("picture_frozen", start_s=1.0), fault("picture_black", start_s=1.0)
+    eye: Any = Eye()
+    camera = WrongEye(eye, [frozen])
+    assert camera.observable_s(frozen) is None
+    for t in (0.5, 1.5, 2.0):
+        world: Any = SimpleNamespace(time_s=t)
+        camera.look(world, 0, "c")
+    assert (camera.observable_s(frozen), camera.observable_s(black)) == (1.5, 1.0)
 
 
 def test_a_bumped_camera_stays_turned_until_it_is_put_back() -> None:

@@ -75,8 +75,9 @@ fuzz: $(STAMP)-test
 	FUZZ_INPUTS=$(or $(COUNT),1000000) nice $(PYTEST) -m fuzz --timeout 7200 -k "many_damaged $(if $(DECODER),and $(DECODER))" tests/property
 
 # Who judges the judges: MODULES names parts of paths in tests/mutation/targets.toml, e.g. make mutants MODULES="watchdog lease".
+# All take hours: PART=K/N judges every N-th mutant, for 20 minutes at most.
 mutants: $(STAMP)-test
-	nice $(BIN)/python tests/mutation/run.py $(MODULES) --seconds 1200 $(MUTANTS_ARGS)
+	nice $(BIN)/python tests/mutation/run.py $(MODULES) --part $(or $(PART),1/1) --seconds 1200 $(MUTANTS_ARGS)
 
 # Every single kill and freeze of a process, and every pair, in flight: 200 flights of some 35 s. PART=K/N flies a part, e.g. PART=1/6.
 wire-faults: $(STAMP)-test

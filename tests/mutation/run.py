@@ -2,7 +2,7 @@
 
 Each mutant is written into a copy of the sources and judged by the tests that targets.toml maps to its module, in a
 process forked from one which has the libraries loaded already. Exit code 1: a mutant survived that explained.toml does
-not name.
+not name; 3: none did, and some were not judged for want of time.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import time
 import tomllib
 from collections import Counter
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -43,6 +44,30 @@ QUIET = (
     "60",
 )
 KILLED, SURVIVED, LATE, BROKEN = "killed", "survived", "late", "no tests"
+UNFINISHED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Which of a module's mutants are judged: every parts-th from the part-th on; of these all, or a seeded sample."""
+
+    part: int
+    parts: int
+    sample: int
+    seed: int
+
+    @classmethod
+    def parsed(cls, part: str, sample: int, seed: int) -> "Share":
+        """Read K/N."""
+        k, n = (int(number) for number in part.split("/"))
+        if not 1 <= k <= n:
+            raise ValueError(f"part {part}: K/N with K from 1 to N")
+        return cls(k, n, sample, seed)
+
+    def of(self, mutants: list[Mutant]) -> list[Mutant]:
+        """Return those of one module."""
+        mine = mutants[self.part - 1 :: self.parts]
+        return random.Random(self.seed).sample(mine, min(self.sample, len(mine))) if self.sample else mine
 
 
 class Bench:
@@ -137,14 +162,10 @@ def explained(module: str) -> dict[str, str]:
 def main() -> int:
     """Judge the mutants of the named modules, or of all."""
     targets: dict[str, list[str]] = tomllib.loads((HERE / "targets.toml").read_text(encoding="utf-8"))
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("modules", nargs="*", help="parts of module paths; default: all of targets.toml")
-    parser.add_argument("--seconds", type=float, default=1200.0, help="stop after so long, and say what is left")
-    parser.add_argument("--sample", type=int, default=0, help="so many mutants of each module, drawn by --seed")
-    parser.add_argument("--seed", type=int, default=1)
-    told = parser.parse_args()
+    told = _told()
+    share = Share.parsed(told.part, told.sample, told.seed)
     chosen = [name for name in targets if not told.modules or any(part in name for part in told.modules)]
-    deadline, unexplained = time.monotonic() + told.seconds, 0
+    deadline, unexplained, left = time.monotonic() + told.seconds, 0, 0
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     with tempfile.TemporaryDirectory(prefix="skein-mutants-") as name:
@@ -155,18 +176,31 @@ def main() -> int:
         sys.path.insert(0, str(folder))
         os.environ["PYTHONPATH"] = str(folder)
         for module in chosen:
-            unexplained += _module(Bench(folder, module, targets[module]), module, told, deadline)
-    return 1 if unexplained else 0
+            survived, not_judged = _module(Bench(folder, module, targets[module]), module, share, deadline)
+            unexplained, left = unexplained + survived, left + not_judged
+    print(f"{unexplained} survived unexplained; {left} not judged for want of time", flush=True)
+    return 1 if unexplained else UNFINISHED if left else 0
 
 
-def _module(bench: Bench, module: str, told: argparse.Namespace, deadline: float) -> int:
-    fault = bench.prepare()
-    if fault:
+def _told() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("modules", nargs="*", help="parts of module paths; default: all of targets.toml")
+    parser.add_argument("--seconds", type=float, default=1200.0, help="stop after so long, and say what is left")
+    parser.add_argument("--part", default="1/1", help="K/N: of each module every N-th mutant from the K-th on")
+    parser.add_argument("--sample", type=int, default=0, help="so many mutants of each module, drawn by --seed")
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args()
+
+
+def _module(bench: Bench, module: str, share: Share, deadline: float) -> tuple[int, int]:
+    """Judge a module's mutants; returns how many survived unexplained, and how many were not judged."""
+    mutants, counts, survivors = share.of(bench.mutants), Counter[str](), list[Mutant]()
+    if time.monotonic() > deadline:
+        print(f"{module}: none of {len(mutants)} judged", flush=True)
+        return 0, len(mutants)
+    if fault := bench.prepare():
         print(f"{module}: {fault}", flush=True)
-        return 1
-    mutants, known, counts, survivors = bench.mutants, explained(module), Counter[str](), list[Mutant]()
-    if told.sample:
-        mutants = random.Random(told.seed).sample(mutants, min(told.sample, len(mutants)))
+        return 1, 0
     for mutant in mutants:
         if time.monotonic() > deadline:
             break
@@ -175,12 +209,18 @@ def _module(bench: Bench, module: str, told: argparse.Namespace, deadline: float
         if verdict in (SURVIVED, BROKEN):
             survivors.append(mutant)
     bench.close()
-    judged, killed = counts.total(), counts[KILLED] + counts[LATE]
+    late = f", {counts[LATE]} of them by taking too long" * bool(counts[LATE])
     print(
-        f"{module}: {killed} of {judged} killed ({len(bench.mutants)} in all; {bench.baseline_s:.1f} s each)",
+        f"{module}: {counts[KILLED] + counts[LATE]} of {counts.total()} killed{late} "
+        f"({len(bench.mutants)} in all; {bench.baseline_s:.1f} s each)",
         flush=True,
     )
-    open_ends = 0
+    return _tell(survivors, module), len(mutants) - counts.total()
+
+
+def _tell(survivors: list[Mutant], module: str) -> int:
+    """Name the survivors; returns how many nothing explains."""
+    known, open_ends = explained(module), 0
     for mutant in survivors:
         why = known.get(mutant.name.partition(" #")[0], "")
         open_ends += not why

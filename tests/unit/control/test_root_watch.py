@@ -116,6 +116,15 @@ def test_a_root_that_hangs_matters_not_beside_one_that_works() -> None:
     assert hangs_after_s("ceiling", others=("hall_2",)) is None
 
 
+def test_a_root_is_not_silent_before_anything_was_heard_nor_by_what_is_no_sighting() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    assert not watch.is_silent
+    watch.hear(sighting(), 0)
+    watch.hear_frozen(picture("drone_1"))
+    watch.advance(10 * TICK_NS, [], flying=True)
+    assert not watch.is_silent
+
+
 def test_a_root_that_hung_and_sees_somebody_again_works() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
     watch.hear(sighting(), 0)

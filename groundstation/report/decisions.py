@@ -4,24 +4,10 @@ from itertools import pairwise
 
 import msgspec
 
-from groundstation.bus.messages import Plan
 from groundstation.report.tracks import RunData
+from groundstation.sensing.switches import Switch, switch_between
 
 _EPISODE_GAP_S = 0.5
-
-
-class Switch(msgspec.Struct, frozen=True):
-    """A change of topology: when, from what to what, the cost of both as weighed then [m^2], and the reason in words.
-
-    stay_cost is None where the former topology was no alternative any more (a robot came or went).
-    """
-
-    time_s: float
-    before: str
-    after: str
-    cost: float
-    stay_cost: float | None
-    reason: str
 
 
 class Intervention(msgspec.Struct, frozen=True):
@@ -37,33 +23,8 @@ class Intervention(msgspec.Struct, frozen=True):
 
 def switches(data: RunData) -> list[Switch]:
     """Return every change of the chosen topology in order of time."""
-    return [
-        _switch(now.time_s, before.message, now.message)
-        for before, now in pairwise(data.plans)
-        if before.message.topology != now.message.topology
-    ]
-
-
-def _switch(time_s: float, before: Plan, now: Plan) -> Switch:
-    costs = {other.topology: other.cost for other in now.alternatives}
-    stay = costs.get(before.topology)
-    return Switch(time_s, before.topology, now.topology, now.cost, stay, _reason(before, now, stay))
-
-
-def _robots(topology: str) -> set[str]:
-    return {name for name in topology.replace("/", ",").split(",") if name}
-
-
-def _reason(before: Plan, now: Plan, stay: float | None) -> str:
-    came, went = _robots(now.topology) - _robots(before.topology), _robots(before.topology) - _robots(now.topology)
-    if came or went:
-        parts = [f"{', '.join(sorted(names))} {what}" for names, what in ((came, "joined"), (went, "left")) if names]
-        return " and ".join(parts)
-    if now.mode != before.mode:
-        return f"mode {before.mode} to {now.mode}"
-    if stay is None or stay <= 0.0:
-        return "the former topology was no alternative"
-    return f"expected uncertainty {100 * (1 - now.cost / stay):.0f} % lower"
+    changes = [switch_between(before.message, now.message, now.time_s) for before, now in pairwise(data.plans)]
+    return [change for change in changes if change is not None]
 
 
 def interventions(data: RunData) -> list[Intervention]:

@@ -3,11 +3,12 @@
 import msgspec
 
 from groundstation.report.consistency import EdgeConsistency, edges
-from groundstation.report.decisions import Intervention, Switch, interventions, switches
+from groundstation.report.decisions import Intervention, interventions, switches
 from groundstation.report.happenings import Happening, happenings
 from groundstation.report.links import VehicleLink, links
 from groundstation.report.tracks import RunData
 from groundstation.report.trust import Trust, trust_of
+from groundstation.sensing.switches import Switch
 
 
 class Findings(msgspec.Struct, frozen=True):

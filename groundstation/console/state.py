@@ -7,6 +7,7 @@ from typing import Any
 
 from groundstation.bus import messages as m
 from groundstation.bus.api import Received
+from groundstation.console.alarm_log import AlarmLog
 from groundstation.console.history import History
 from groundstation.console.innovation_statistics import InnovationStatistics
 from groundstation.console.snapshot import Snapshot
@@ -14,6 +15,7 @@ from groundstation.console.standing import StandingDrones
 from groundstation.field.room import WorldCamera
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.state import Cast, MonitorState, StampedMessage
+from groundstation.sensing.switches import Switch, switch_between
 
 _EVENTS = 40
 _ALTERNATIVES = 8
@@ -31,6 +33,8 @@ class ConsoleState:
         self.monitor = MonitorState(cast=cast, started_ns=started_ns)
         self.health = InnovationStatistics()
         self.history = History(cast.targets)
+        self.alarm_log = AlarmLog()
+        self.switch: Switch | None = None
         self.setpoints: dict[str, StampedMessage[m.VelocitySetpoint]] = {}
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self.search_maps: dict[str, m.SearchMap] = {}
@@ -52,6 +56,10 @@ class ConsoleState:
                     self.health.take(innovation)
                 case m.RelativeObservation() as sighting:
                     self.standing.see(sighting)
+                    self.monitor.ingest((item,))
+                case m.Plan() as plan:
+                    before = self.monitor.plan.message if self.monitor.plan else plan
+                    self.switch = switch_between(before, plan, item.header.stamp_ns / 1e9) or self.switch
                     self.monitor.ingest((item,))
                 case _:
                     self.monitor.ingest((item,))
@@ -85,6 +93,7 @@ class ConsoleState:
         board.put("vehicles", {name: _vehicle(seen) for name, seen in known.vehicles.items()})
         board.put("flight", self._flight())
         board.put("plan", _plan(known.plan))
+        board.put("switch", _switch(self.switch))
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [_event(seen) for seen in list(known.events)[-_EVENTS:]])
 
@@ -123,7 +132,10 @@ class ConsoleState:
         board.put("processes", {name: _process(seen) for name, seen in known.processes.items()})
         board.put("standing", self._standing(now_ns))
         board.put("search_maps", self._search_maps())
-        board.put("alarms", [asdict(alarm) for alarm in alarms_of(known, now_ns)])
+        alarms = alarms_of(known, now_ns)
+        self.alarm_log.note(alarms, now_ns)
+        board.put("alarms", [asdict(alarm) for alarm in alarms])
+        board.put("past_alarms", self.alarm_log.as_json())
         board.put("health", self.health.summary())
 
 
@@ -223,6 +235,12 @@ def _event(seen: StampedMessage[m.Event]) -> dict[str, Any]:
         "text": event.text,
         "remedy": event.remedy,
     }
+
+
+def _switch(switch: Switch | None) -> dict[str, Any] | None:
+    if switch is None:
+        return None
+    return {"at": switch.time_s * 1e3, "before": switch.before, "reason": switch.reason}
 
 
 def _plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:

@@ -17,8 +17,13 @@ _EVENT_SHOWN_S = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One line; `grave` ones are red, the others yellow. advice: what happens next, and what an operator can do."""
+    """One line; `grave` ones are red, the others yellow.
 
+    about: the same for as long as it is the same alarm, while figures in its text change.
+    advice: what happens next, and what an operator can do.
+    """
+
+    about: str
     text: str
     grave: bool = True
     advice: str = ""
@@ -39,11 +44,13 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
 def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.vehicles.items():
         if seen.age_s(now_ns) > VEHICLE_SILENT_S:
-            yield Alarm(f"{name}: nothing heard for {seen.age_s(now_ns):.0f} s", advice="Stops are sent all the same.")
+            silence = f"{name}: nothing heard for {seen.age_s(now_ns):.0f} s"
+            yield Alarm(f"{name} silent", silence, advice="Stops are sent all the same.")
         else:
             yield from _failsafe(name, seen.message)
         if seen.message.flight_state in (FlightState.EMERGENCY, FlightState.LOST):
-            yield Alarm(f"{name}: {seen.message.flight_state}")
+            state_words = f"{name}: {seen.message.flight_state}"
+            yield Alarm(state_words, state_words)
         yield from _battery(name, seen.message, state.cast.drones.get(name, 0.15))
         yield from _link(name, seen.message.link_quality)
 
@@ -52,25 +59,26 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
     """What keeps a drone from its plan, or will land it."""
     if status.lands_in_s is not None:
         advice = "It lands by itself unless this ends; HOLD does not stop that."
-        yield Alarm(f"{name} lands in {status.lands_in_s:.0f} s: {status.detail}", advice=advice)
+        yield Alarm(f"{name} lands", f"{name} lands in {status.lands_in_s:.0f} s: {status.detail}", advice=advice)
     elif status.braked:
-        yield Alarm(f"{name} {status.detail}", False, "It follows its plan again when this ends.")
+        yield Alarm(f"{name} braked", f"{name} {status.detail}", False, "It follows its plan again when this ends.")
 
 
 def _battery(name: str, status: VehicleStatus, limit: float) -> Iterator[Alarm]:
+    about = f"{name} battery"
     if status.battery is None:
         if status.flight_state is not FlightState.UNKNOWN:
-            yield Alarm(f"{name}: battery unknown", False, "Until it is known, it may not take off.")
+            yield Alarm(about, f"{name}: battery unknown", False, "Until it is known, it may not take off.")
     elif status.battery < limit + 0.05 and status.flight_state is FlightState.LANDING:
-        yield Alarm(f"{name}: battery {status.battery:.0%}, it lands", False)
+        yield Alarm(about, f"{name}: battery {status.battery:.0%}, it lands", False)
     elif status.battery < limit + 0.05:
-        yield Alarm(f"{name}: battery {status.battery:.0%} (lands at {limit:.0%})", status.battery < limit)
+        yield Alarm(about, f"{name}: battery {status.battery:.0%} (lands at {limit:.0%})", status.battery < limit)
 
 
 def _link(name: str, share: float | None) -> Iterator[Alarm]:
     if share is not None and share < WEAK_LINK:
         advice = "Bring it nearer, or land it: without a link it hovers, then lands by itself."
-        yield Alarm(f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
+        yield Alarm(f"{name} link", f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 
 def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
@@ -78,28 +86,29 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         return
     age = state.estimate.age_s(now_ns)
     if age > ESTIMATE_SILENT_S:
-        yield Alarm(f"tracker: no estimate for {age:.1f} s")
+        yield Alarm("tracker silent", f"tracker: no estimate for {age:.1f} s")
     for target in map(state.entity, state.cast.targets):
         if target is not None and target.age_s > TARGET_LOST_S:
-            yield Alarm(f"{target.name}: not seen for {target.age_s:.0f} s", False)
+            yield Alarm(f"{target.name} lost", f"{target.name}: not seen for {target.age_s:.0f} s", False)
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.cameras.items():
         if not seen.message.connected or seen.age_s(now_ns) > CAMERA_SILENT_S:
-            yield Alarm(f"{name}: no pictures{f' ({seen.message.detail})' if seen.message.detail else ''}", False)
+            why = f" ({seen.message.detail})" if seen.message.detail else ""
+            yield Alarm(f"{name} pictures", f"{name}: no pictures{why}", False)
 
 
 def _processes(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.processes.items():
         status = seen.message
         if seen.age_s(now_ns) > PROCESS_SILENT_S and status.state is not Lifecycle.STOPPING:
-            yield Alarm(f"process {name}: silent for {seen.age_s(now_ns):.0f} s")
+            yield Alarm(f"process {name} silent", f"process {name}: silent for {seen.age_s(now_ns):.0f} s")
         elif status.state is Lifecycle.DEGRADED:
-            yield Alarm(f"process {name}: {status.detail or 'degraded'}", False)
+            yield Alarm(f"process {name} degraded", f"process {name}: {status.detail or 'degraded'}", False)
 
 
 def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for seen in state.events:
         if seen.message.severity is Severity.ERROR and seen.age_s(now_ns) < _EVENT_SHOWN_S:
-            yield Alarm(seen.message.sentence)
+            yield Alarm(seen.message.sentence, seen.message.sentence)

@@ -146,6 +146,30 @@ def test_sections_say_what_came() -> None:
     assert any("bang" in alarm["text"] and alarm["grave"] for alarm in said["alarms"])
 
 
+def plan(at_s: float, topology: str, cost: float, stay: dict[str, float]) -> Received:
+    made = m.Plan(
+        header=header("team", int(at_s * NS_PER_S)),
+        topology=topology,
+        cost=cost,
+        controls=(),
+        edges=(),
+        alternatives=tuple(m.Alternative(*other) for other in stay.items()),
+        solver=m.SolverReport("converged", 10, 0.02, 1, 1),
+        mode="TRACK",
+    )
+    return received(t.PLAN, made)
+
+
+def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
+    state, board = ConsoleState(Cast(), 0), Snapshot()
+    state.ingest([plan(1.0, "a,b", 0.2, {}), plan(2.0, "a/b", 0.1, {"a,b": 0.2})])
+    state.ingest([plan(3.0, "a/b", 0.1, {"a,b": 0.2})])
+    board.begin()
+    state.put_often(board)
+    said = json.loads(board.since(-1))["switch"]
+    assert said == {"at": 2000.0, "before": "a,b", "reason": "expected uncertainty 50 % lower"}
+
+
 def test_what_was_never_seen_can_still_be_said() -> None:
     state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Snapshot()
     state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])

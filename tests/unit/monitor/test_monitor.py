@@ -193,6 +193,14 @@ def test_an_error_names_whom_it_is_about_once(world: World, text: str) -> None:
     assert alarm in world.text()
 
 
+def test_an_alarm_keeps_what_it_is_about_while_its_figures_change(world: World) -> None:
+    for silence_s in (2.0, 4.0):
+        world.vehicle("drone_1", age_s=silence_s)
+        world.estimate(target_age_s=silence_s + 4.0)
+        world.text()
+        assert {alarm.about for alarm in alarms_of(world.state, NOW)} == {"drone_1 silent", "turtlebot lost"}
+
+
 def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> None:
     world.vehicle("drone_1", battery=0.18)
     world.vehicle("drone_2", age_s=4.0)

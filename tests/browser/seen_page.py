@@ -72,14 +72,16 @@ def give_role(context: Any, role: str) -> None:
     context.route_web_socket("**/ws", between)
 
 
-def open_seen(browser: Any, contexts: list[Any], url: str, role: str = "", **options: Any) -> Seen:
-    """Return a page of its own profile at the address, once it has the first frames."""
+def open_seen(browser: Any, contexts: list[Any], url: str, role: str = "", script: str = "", **options: Any) -> Seen:
+    """Return a page of its own profile at the address, once it has the first frames; the script runs before its own."""
     from playwright.sync_api import Error
 
     context = browser.new_context(**{"viewport": {"width": 1440, "height": 900}} | options)
     contexts.append(context)
     if role:
         give_role(context, role)
+    if script:
+        context.add_init_script(script)
     seen = Seen(context.new_page())
     seen.page.on("request", lambda request: seen.requests.append(request.url))
     seen.page.on("websocket", lambda socket: seen.requests.append(socket.url))

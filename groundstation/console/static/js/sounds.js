@@ -1,4 +1,4 @@
-// What is worth hearing: stops, alarms, a battery that runs low, a lost target. Muting silences all but stops.
+// What is worth hearing and feeling: stops, alarms, a battery that runs low, a lost target. Muting silences all but stops.
 
 import { worstBattery } from "./batteries.js";
 import { byId } from "./dom.js";
@@ -7,6 +7,14 @@ import { now, replaying, store } from "./store.js";
 
 const KEY = "skein-muted", NEW_MS = 3000;
 const STOPS = { HOLD: "hold", LAND: "landing", CUT_MOTORS: "motors cut" };
+// The tone [Hz], and for how many milliseconds by turns a device in the hand shakes and rests.
+const CUES = {
+  stop: { hertz: 880, shakes: [400] },
+  alarm: { hertz: 520, shakes: [150, 100, 150] },
+  battery: { hertz: 520, shakes: [150, 100, 150] },
+  lost: { hertz: 440, shakes: [150, 100, 150, 100, 150] },
+  found: { hertz: 660, shakes: [] },
+};
 const heard = new Set();
 let muted = false, before = { battery: "good", lost: false, alarm: "" }, context = null;
 
@@ -29,7 +37,7 @@ export function listen() {
   for (const order of store.s.orders ?? []) {
     if (!STOPS[order.verb] || heard.has(order.id)) continue;
     heard.add(order.id);
-    if (now() - order.given_ms < NEW_MS) say(STOPS[order.verb], true, 880);
+    if (now() - order.given_ms < NEW_MS) say("stop", STOPS[order.verb]);
   }
   const battery = worstBattery(), age = targetAgeS();
   const after = {
@@ -37,23 +45,23 @@ export function listen() {
     lost: Number.isFinite(age) && age > store.scene.lost_after_s,
     alarm: (store.s.alarms ?? []).find(({ grave }) => grave)?.text ?? "",
   };
-  if (after.battery !== before.battery && after.battery !== "good") say(`battery ${battery.name} ${after.battery === "bad" ? "empty" : "low"}`, false, 520);
-  if (after.lost !== before.lost) say(after.lost ? "target lost" : "target found", false, after.lost ? 440 : 660);
-  if (after.alarm && after.alarm !== before.alarm) say(after.alarm, false, 520);
+  if (after.battery !== before.battery && after.battery !== "good") say("battery", `battery ${battery.name} ${after.battery === "bad" ? "empty" : "low"}`);
+  if (after.lost !== before.lost) say(after.lost ? "lost" : "found", after.lost ? "target lost" : "target found");
+  if (after.alarm && after.alarm !== before.alarm) say("alarm", after.alarm);
   before = after;
 }
 
-function say(words, stop, hertz) {
-  if (muted && !stop) return;
-  beep(hertz);
+function say(cue, words) {
+  if (muted && cue !== "stop") return;
+  // A browser gives neither sound nor shake before the first click or key on the page.
+  if (navigator.userActivation?.hasBeenActive) signal(CUES[cue]);
   if (!("speechSynthesis" in window)) return;
   speechSynthesis.cancel();
   speechSynthesis.speak(new SpeechSynthesisUtterance(words));
 }
 
-// A browser gives no sound before the first click or key on the page.
-function beep(hertz) {
-  if (!navigator.userActivation?.hasBeenActive) return;
+function signal({ hertz, shakes }) {
+  if (shakes.length) navigator.vibrate?.(shakes);
   try {
     context ??= new AudioContext();
     const tone = context.createOscillator(), volume = context.createGain();

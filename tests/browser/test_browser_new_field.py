@@ -1,15 +1,14 @@
 """The page of `groundstation new --page`: it draws while one answers, names mistakes, and writes once."""
 
-import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 from accessibility import violations
+from new_field_form import new_field_form
 
 from groundstation.settings.load import load_field
 
@@ -24,20 +23,12 @@ class Form(NamedTuple):
 
 @pytest.fixture
 def form(browser: Any, tmp_path: Path) -> Iterator[Form]:
-    command = [sys.executable, "-m", "groundstation", "new", str(tmp_path / "hall"), "--page"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ, PYTHONUNBUFFERED="1"))
-    assert process.stdout is not None
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     page = context.new_page()
-    try:
-        page.goto(process.stdout.readline().split()[1])
+    with new_field_form(tmp_path / "hall") as (process, url):
+        page.goto(url)
         yield Form(page, process, tmp_path / "hall" / "hall.yaml")
-    finally:
         context.close()
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        process.wait(10)
-        process.stdout.close()
 
 
 def drawn(page: Any) -> str:

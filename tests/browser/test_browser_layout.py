@@ -3,69 +3,121 @@
 from typing import Any
 
 import pytest
-from fake_flight import TARGET
+from clipping import clipped, covered
+from fake_flight import DRONES, TARGET, FakeFlight
+from places import boxes, moved
 from seen_page import Seen
 from situations import SITUATIONS
 
-from groundstation.bus.messages import Severity
+from groundstation.bus.messages import RUN, Severity
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-FIXED = ("hold", "land-all", "cut-motors", "take-off", "track", "resume", "team", "map")
-# Elements whose content sticks out of them; inner_text returns what is cut off as well. Half a pixel is rounding.
-CUT_OFF = """() => [...document.querySelectorAll(
-    "button, dd, dt, .pill, .banner, .verdict, .brand, .stages li, h2, figcaption, .order, #team strong, .detail")]
-  .filter((node) => node.clientWidth > 0 &&
-    (node.scrollWidth > node.clientWidth + 1 || node.scrollHeight > node.clientHeight + 2))
-  .map((node) => `${node.className || node.tagName}: ${node.textContent}`)"""
-OUTSIDE = """() => [...document.querySelectorAll("#shell *")].filter((node) => {
-    const box = node.getBoundingClientRect();
-    return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1); })
-  .map((node) => node.outerHTML.slice(0, 80))"""
+SIZES = ((1440, 900), (1024, 768), (390, 844), (2560, 1440))
 
 
-def boxes(page: Seen) -> dict[str, dict[str, float]]:
-    return {name: page.there(name).bounding_box() for name in FIXED}
+def resize(page: Seen, size: tuple[int, int]) -> None:
+    page.page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.page.wait_for_timeout(300)  # until the page has written what fits there
 
 
-def test_nothing_moves_while_alarms_and_orders_come(stage: Any) -> None:
-    page = stage.open()
-    page.page.wait_for_timeout(500)
-    before = boxes(page)
+def ten_alarms(flight: FakeFlight) -> None:
     for number in range(10):
-        stage.flight.event(Severity.ERROR, f"trouble {number} that takes some words to tell", f"drone_{1 + number % 2}")
-    stage.flight.battery["drone_1"] = 0.03
+        flight.event(Severity.ERROR, f"trouble {number} that takes some words to tell", f"drone_{1 + number % 2}")
+    flight.battery["drone_1"], flight.link["drone_1"] = 0.03, 0.08
+    flight.battery["drone_2"] = 0.17
+    flight.braked.add("drone_2")
+    flight.detail["drone_2"] = "hovers: its sensors cannot be believed: its velocity is stuck at 0.27 m/s"
+    flight.lands_in_s["drone_1"] = 12.0
+    flight.detail["drone_1"] = "no camera has seen it for too long"
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_nothing_moves_while_alarms_and_orders_come(stage: Any, size: tuple[int, int]) -> None:
+    page = stage.open()
+    SITUATIONS["all_is_well"](stage.flight)
+    resize(page, size)
+    page.wait(lambda s: page.there("banner-none").is_visible() and page.there("drone_2-battery").inner_text() == "71 %")
+    before = boxes(page)
+    assert {"hold", "land-all", "cut-motors", "card-drone_1", "card-drone_2", "card-turtlebot"} <= set(before)
+    assert {f"{name}-{verb}" for name in DRONES for verb in ("takeoff", "hold", "land")} <= set(before)
+    ten_alarms(stage.flight)
+    page.wait(lambda s: page.there("drone_1-mode").inner_text() == "lands in 12 s")
+    assert moved(page, before) == {}
     stage.flight.frozen = True
     page.there("hold").click()
     page.there("drone_2-land").click()
     page.there("banner-tracker").wait_for(timeout=20_000)
     page.wait(lambda s: len(s["orders"]) == 2)
     page.page.wait_for_timeout(700)
-    assert boxes(page) == before
+    assert moved(page, before) == {}
+    assert clipped(page.page) == []
     page.there("more-alarms").click()
     assert page.page.locator(".banner:visible").count() > 1
-    assert boxes(page) == before
-    page.shot("alarms_open")
+    assert moved(page, before) == {}
+    page.shot(f"alarms_open_{size[0]}")
 
 
-@pytest.mark.parametrize("size", [(1440, 900), (2560, 1440), (1024, 768), (390, 844)])
-def test_nothing_is_cut_off(stage: Any, size: tuple[int, int]) -> None:
+def whole(page: Seen) -> list[str]:
+    """Return what is wrong with the page as it stands: cut off, covered, or wider than the window."""
+    wide = page.page.evaluate(
+        "() => document.documentElement.scrollWidth > innerWidth ? ['wider than the window'] : []"
+    )
+    return [*clipped(page.page), *covered(page.page), *wide]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_no_text_is_cut_off_from_the_flight_to_the_end_of_the_run(stage: Any, size: tuple[int, int]) -> None:
     page = stage.open()
-    page.page.set_viewport_size({"width": size[0], "height": size[1]})
-    stage.flight.battery["drone_1"] = 0.17
-    stage.flight.link["drone_1"] = 0.08
+    resize(page, size)
+    assert whole(page) == []
+    ten_alarms(stage.flight)
     stage.flight.modes["drone_2"] = "TAKING_OFF"
     page.there("hold").click()
     page.wait(lambda s: s["orders"])
     page.page.wait_for_timeout(800)
-    assert page.page.evaluate(CUT_OFF) == []
-    assert page.page.evaluate(OUTSIDE) == []
-    assert page.page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
+    assert whole(page) == []
     stage.flight.battery = {"drone_1": 0.9, "drone_2": None}
-    page.wait(lambda s: page.there("worst-battery").inner_text() == "unknown drone_2")
+    page.wait(lambda s: page.there("worst-battery").inner_text().split() == ["unknown", "drone_2"])
     assert page.there("battery-lasts").inner_text() == "others ≥ 90 %"
-    assert page.page.evaluate(CUT_OFF) == []
+    assert whole(page) == []
     page.shot(f"layout_{size[0]}")
+    stage.flight.event(Severity.WARNING, "run ended: not every drone reported a landing", RUN)
+    page.there("banner-ended").wait_for(timeout=20_000)
+    stage.console.terminate()
+    page.wait(lambda s: not s["connected"])
+    page.page.wait_for_timeout(500)
+    assert whole(page) == []
+
+
+def test_the_whole_team_is_in_sight(stage: Any) -> None:
+    """Its mode, its battery and its stops, without scrolling; on a phone above the stops of all."""
+    page = stage.open()
+    ten_alarms(stage.flight)
+    for size in SIZES:
+        resize(page, size)
+        phone = page.there("land-all").bounding_box()["y"] > size[1] / 2
+        edge = page.there("land-all").bounding_box()["y"] if phone else size[1]
+        for name in ("mode", "battery", "hold", "land"):
+            for drone in DRONES:
+                box = page.there(f"{drone}-{name}").bounding_box()
+                assert box["y"] + box["height"] <= edge, (size, drone, name)
+        target = page.there("card-turtlebot").bounding_box()
+        assert target["y"] + target["height"] <= edge, size
+
+
+def test_an_alarm_of_any_length_can_be_read(stage: Any) -> None:
+    page = stage.open()
+    SITUATIONS["all_is_well"](stage.flight)
+    resize(page, (390, 844))
+    page.wait(lambda s: page.there("banner-none").is_visible())
+    assert page.there("more-alarms").is_hidden()
+    stage.flight.event(Severity.ERROR, f"it is {'very, ' * 60}very wrong", "drone_2")
+    page.wait(lambda s: page.there("more-alarms").is_visible())
+    assert page.there("more-alarms").inner_text() == "whole text"
+    before = boxes(page)
+    page.there("more-alarms").click()
+    assert whole(page) == [] and moved(page, before) == {}
 
 
 @pytest.mark.exhaustive
@@ -166,20 +218,30 @@ TOLD = {
 }
 
 
-def test_every_situation_is_told_in_one_way_and_fits(stage: Any) -> None:
+def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> None:
     page = stage.open()
     places = [page.there(name) for name in ("banners", "verdict", "hold", "drone_1-mode", "drone_2-mode")]
 
     def told(name: str) -> bool:
         return all(words in place.inner_text() for words, place in zip(TOLD[name], places, strict=True))
 
+    SITUATIONS["all_is_well"](stage.flight)
+    page.wait(lambda s: told("all_is_well"))
+    stands = {}
+    for size in SIZES:
+        resize(page, size)
+        stands[size] = boxes(page)
     for name, arrange in SITUATIONS.items():
         SITUATIONS["all_is_well"](stage.flight)
         page.page.wait_for_timeout(300)  # until the page has it
         arrange(stage.flight)
         page.wait(lambda s, name=name: told(name))
         page.page.wait_for_timeout(700)  # until what was seen in the situation before counts no more
-        assert page.page.evaluate(CUT_OFF) == [], name
+        for size in SIZES:
+            resize(page, size)
+            assert whole(page) == [], (name, size)
+            assert moved(page, stands[size]) == {}, (name, size)
+        resize(page, SIZES[0])
         page.shot(f"situation_{name}")
 
 
@@ -209,5 +271,5 @@ def test_the_wall_is_read_from_three_metres(stage: Any) -> None:
              .map((of) => parseFloat(getComputedStyle(document.querySelector(of)).fontSize))"""
     )
     assert min(sizes) >= 45
-    assert page.page.evaluate(OUTSIDE) == []
+    assert whole(page) == []
     page.shot("wall")

@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from clipping import clipped
 from fake_flight import FakeFlight
 
 
@@ -174,12 +175,6 @@ def test_battery_colours_at_their_thresholds(stage: Any) -> None:
     page.wait(lambda s: "charge!" in page.there("drone_1-battery").inner_text())
 
 
-# Elements whose content sticks out of them; inner_text returns what is cut off as well.
-_CUT_OFF = """() => [...document.querySelectorAll("#team dd, #team .pill, #team strong")].filter((node) =>
-  node.scrollWidth > node.clientWidth && node.clientWidth > 0)
-  .map((node) => node.textContent)"""
-
-
 @pytest.mark.parametrize("width", [1440, 1180, 950, 390])
 def test_alarms_on_the_cards_are_never_cut_off(stage: Any, width: int) -> None:
     page = stage.open()
@@ -188,7 +183,7 @@ def test_alarms_on_the_cards_are_never_cut_off(stage: Any, width: int) -> None:
     stage.flight.link["drone_1"] = 0.08
     assert becomes(page, "drone_1-battery", "data-battery", "empty") == "empty"
     assert becomes(page, "drone_1-link", "data-link", "empty") == "empty"
-    assert page.page.evaluate(_CUT_OFF) == []
+    assert clipped(page.page) == []
     page.there("card-drone_1").screenshot(path=str(page.shots() / f"alarms_{width}.png"))
 
 
@@ -259,3 +254,14 @@ def test_a_slow_viewer_slows_nobody(stage: Any) -> None:
     assert after["frames"] - before["frames"] > 30
     caught_up = slow.wait(lambda s: s["connected"] and s["estimateAge"] < 2.0)
     assert caught_up["seeds"] == 1  # it was never thrown out
+
+
+def test_the_map_says_why_the_topology_is_as_it_is(stage: Any) -> None:
+    page = stage.open()
+    line = page.there("switch")
+    page.wait(lambda s: line.is_visible())
+    change = page.state()["sections"]["switch"]
+    assert change["reason"] == "expected uncertainty 15 % lower"  # the fake planner's: staying costs 1.18 times as much
+    assert line.inner_text().startswith("Switched ") and line.inner_text().endswith(f": {change['reason']}")
+    page.there("layer-graph").click()
+    assert line.is_hidden()

@@ -45,7 +45,7 @@ function showStages(now) {
 }
 
 export function startBar(resized) {
-  const wall = byId("wall"), more = byId("more");
+  const wall = byId("wall");
   const apply = (on) => { document.body.classList.toggle("wall", on); wall.setAttribute("aria-pressed", `${on}`); resized(); };
   const toggle = () => {
     const on = !document.body.classList.contains("wall");
@@ -54,24 +54,5 @@ export function startBar(resized) {
   };
   try { apply(Boolean(localStorage.getItem(WALL_KEY))); } catch { apply(false); }
   wall.onclick = toggle;
-  more.onclick = () => openAlarms(!byId("alarms").classList.contains("open"));
   return toggle;
-}
-
-function openAlarms(open) {
-  byId("alarms").classList.toggle("open", open);
-  byId("more").setAttribute("aria-expanded", `${open}`);
-}
-
-// All but the gravest alarm stand behind this button, so that none of them moves the page; it counts them by rank.
-export function showMore(ranks) {
-  const more = byId("more");
-  if (!ranks.length) openAlarms(false);
-  more.hidden = !ranks.length;
-  text(more, byId("alarms").classList.contains("open") ? "close" : `+ ${counted(ranks).join(", ")}`);
-}
-
-function counted(ranks) {
-  const counts = ["warning", "caution", "notice"].map((rank) => [rank, ranks.filter((one) => one === rank).length]);
-  return counts.filter(([, count]) => count).map(([rank, count]) => `${count} ${rank}${count > 1 ? "s" : ""}`);
 }

@@ -107,8 +107,8 @@ function draw(name, { canvas, bitmap, stamp }) {
 // Where words stand wholly within the picture and off the ring: right of it, left, else below or above.
 function besideRing(u, v, r, long, width, height) {
   const baseline = Math.min(Math.max(v + 5, LINE_PX), height - 6);
-  if (u + r + long <= width - 4) return [u + r, baseline];
-  if (u - r - long >= 4) return [u - r - long, baseline];
+  if (u + r + long <= width - 4) return [Math.max(u + r, 4), baseline];
+  if (u - r - long >= 4) return [Math.min(u - r, width - 4) - long, baseline];
   const left = Math.min(Math.max(u - long / 2, 4), width - long - 4);
   return [left, v + r + LINE_PX <= height - 6 ? v + r + LINE_PX : v - r];
 }

@@ -1,5 +1,6 @@
 // Puts the page together: what comes in marks what is to be drawn; drawing happens once per picture of the screen.
 
+import { startStrip } from "./alarm_strip.js";
 import { showBar, startBar } from "./bar.js";
 import { buildCameras, pictures, showCameras, showDetections, startCameras } from "./cameras.js";
 import { buildCharts, showSamples } from "./charts.js";
@@ -9,7 +10,7 @@ import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
 import { give, showControls, showOrders, startOrders } from "./commands.js";
 import { ink, nameRobots, startTheme } from "./palette.js";
-import { showPlan, showTimeline } from "./plan.js";
+import { showPlan, showSwitch, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";
@@ -63,7 +64,7 @@ on("notice", (notice) => { addNotice(notice); showBanners(); });
 on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
 
 function showAll() {
-  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showControls(); showOrders(); showPlayback();
+  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback();
   listen(); describe();
 }
 
@@ -99,7 +100,7 @@ function frame(at) {
 function buildLayers() {
   byId("layers").replaceChildren(...Object.keys(layers).filter((name) => name !== "truth" || store.scene.truth).map((name) => {
     const button = el("button", { "aria-pressed": `${layers[name]}`, data: { testid: `layer-${name}` } }, NAMES[name]);
-    button.onclick = () => { layers[name] = !layers[name]; button.setAttribute("aria-pressed", `${layers[name]}`); dirty = true; };
+    button.onclick = () => { layers[name] = !layers[name]; button.setAttribute("aria-pressed", `${layers[name]}`); showSwitch(); dirty = true; };
     return button;
   }));
 }
@@ -122,7 +123,7 @@ const toggleTheme = startTheme(() => {
   paint(); buildLegend(); buildCharts(); showPlan();
   dirty = true;
 });
-const toggleWall = startBar(() => view.resize()), toggleSound = startSounds();
+const toggleWall = startBar(() => view.resize()), toggleSound = startSounds(), toggleLog = startStrip();
 byId("theme").onclick = toggleTheme;
 byId("help").onclick = () => byId("about").showModal();
 
@@ -135,6 +136,7 @@ addEventListener("keydown", (event) => {
   else if (key === "t") toggleTheme();
   else if (key === "w") toggleWall();
   else if (key === "m") toggleSound();
+  else if (key === "a") toggleLog();
   else if (key === "p" && steerable()) for (const { name } of store.scene.targets) send("followpath", { target: name });
   else if (key === "?") byId("about").open ? byId("about").close() : byId("about").showModal();
 });

@@ -3,6 +3,7 @@
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { limitsOf } from "./duty.js";
 import { colourOf, ink } from "./palette.js";
+import { layers } from "./map.js";
 import { ageS, store } from "./store.js";
 
 const cost = (value) => (value >= 1e4 ? `${(value / 1e4).toFixed(2)} m²` : value >= 100 ? `${value.toFixed(0)} cm²` : `${value.toFixed(1)} cm²`);
@@ -26,6 +27,13 @@ export function showPlan() {
     el("div", { class: "options" }, option({ topology: plan.topology, cost_cm2: plan.cost_cm2 }, worst, plan, true), ...others.map((other) => option(other, worst, plan, false))),
     cuts(plan), el("div", { class: "timeline", id: "timeline" }));
   showTimeline();
+}
+
+// Below the sensing graph, for as long as that is drawn: since when it is as it is, and why.
+export function showSwitch() {
+  const change = store.s.switch, node = byId("switch");
+  node.hidden = !change || !layers.graph;
+  if (change) text(node, `Switched ${seconds(ageS(change.at))} ago from ${words(change.before)}: ${change.reason}`);
 }
 
 const words = (topology) => topology.split("/").map((level) => level.split(",").join(" + ")).join(" over ") || "nobody in the air";
@@ -55,7 +63,7 @@ function glyph(topology) {
   return root;
 }
 
-// Which topology was chosen when; letters and shades, since names are too long for short stays.
+// Which topology was chosen when, by letters and shades: names are too long for short stays, so they stand below.
 export function showTimeline() {
   const host = byId("timeline"), samples = store.samples.filter((sample) => sample.topology);
   if (!host || !samples.length) return;
@@ -64,15 +72,22 @@ export function showTimeline() {
     if (runs.at(-1)?.topology === topology) runs.at(-1).to = t_ms;
     else runs.push({ topology, from: t_ms, to: t_ms });
   }
-  const kinds = [...new Set(runs.map((run) => run.topology))];
+  const kinds = [...new Set(runs.map((run) => run.topology))].sort();
+  const letter = (topology) => el("b", {}, String.fromCharCode(65 + kinds.indexOf(topology)));
+  const shade = (topology) => `color-mix(in srgb, #0072b2 ${15 + (50 * kinds.indexOf(topology)) / kinds.length}%, transparent)`;
   const strip = el("div", { class: "strip" }, ...runs.map((run) => {
-    const piece = el("span", { title: `${words(run.topology)}, ${((run.to - run.from) / 1000).toFixed(0)} s` }, words(run.topology));
+    const piece = el("span", { title: `${words(run.topology)}, ${((run.to - run.from) / 1000).toFixed(0)} s` }, letter(run.topology));
     piece.style.flex = `${run.to - run.from + 500} 0 0`;
-    piece.style.background = `color-mix(in srgb, #0072b2 ${15 + (50 * kinds.indexOf(run.topology)) / kinds.length}%, transparent)`;
+    piece.style.background = shade(run.topology);
     return piece;
   }));
+  const keys = kinds.map((topology) => {
+    const key = letter(topology);
+    key.style.background = shade(topology);
+    return el("span", {}, key, words(topology));
+  });
   const span = (samples.at(-1).t_ms - samples[0].t_ms) / 1000, switches = runs.length - 1;
-  host.replaceChildren(el("div", { class: "title num" }, el("span", {}, `last ${span.toFixed(0)} s`), el("span", {}, `${switches} switch${switches === 1 ? "" : "es"}`)), strip);
+  host.replaceChildren(el("div", { class: "title num" }, el("span", {}, `last ${span.toFixed(0)} s`), el("span", {}, `${switches} switch${switches === 1 ? "" : "es"}`)), strip, el("div", { class: "keys" }, ...keys));
 }
 
 function cuts(plan) {

@@ -2,7 +2,7 @@
 
 import { byId, el, text } from "./dom.js";
 import { send } from "./link.js";
-import { store } from "./store.js";
+import { now, replaying, store } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20];
 const SEEK_EVERY_MS = 100, JUMP_MS = 5000;
@@ -58,6 +58,11 @@ function seekSoon(at_ms) {
 function clock(ms) {
   const tenths = Math.floor(Math.max(0, ms) / 100), minutes = Math.floor(tenths / 600);
   return `${minutes}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
+}
+
+// A moment of a flight: the time of day, in a replay the time in the recording.
+export function momentWords(atMs) {
+  return replaying() ? clock(atMs - replay().start_ms) : new Date(Date.now() - (now() - atMs)).toTimeString().slice(0, 8);
 }
 
 function showTime(ms) {

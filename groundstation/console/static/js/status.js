@@ -1,6 +1,6 @@
 // Is what you see true? Banners, the pills of the top bar, estimator health, events, processes.
 
-import { showMore } from "./bar.js";
+import { showLog, showMore } from "./alarm_strip.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { unheardStop } from "./effects.js";
 import { drawn } from "./map.js";
@@ -45,7 +45,16 @@ export function showBanners() {
     text(node.children[0], `${LEADS[rank(banner)] ?? ""}${title}`);
     text(node.children[1], more);
   });
-  showMore(banners.slice(1).map(rank));
+  showLog();
+  showMore(banners.slice(1).map(rank), !host.firstElementChild || fitted(host.firstElementChild));
+}
+
+// Fits an alarm into the strip's height, which is its least, in smaller letters if need be; returns whether it does.
+function fitted(banner) {
+  const fits = () => banner.offsetHeight <= Math.ceil(parseFloat(getComputedStyle(banner).minHeight));
+  banner.classList.remove("long");
+  if (!fits()) banner.classList.add("long");
+  return fits();
 }
 
 // As alerting systems have it, a warning needs an act, a caution attention; a notice answers a press.

@@ -21,7 +21,7 @@ export function startTeam() {
 export function buildTeam() {
   cards.clear();
   const { drones, targets } = store.scene;
-  const nodes = drones.map((drone) => card(drone.name, ["battery", "link", "heard", "seen", "rate", "speed", "by", "position", "ellipse"], true));
+  const nodes = drones.map((drone) => card(drone.name, ["battery", "link", "heard", "seen", "rate", "speed", "position", "ellipse", "by"], true));
   for (const target of targets) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
   byId("team").replaceChildren(...nodes);
 }
@@ -39,7 +39,7 @@ function card(name, fields, drone) {
   const detail = el("p", { class: "detail", data: { testid: `${name}-duty` } });
   const root = el("article", { class: drone ? "unit" : "unit target", "aria-label": name, data: { testid: `card-${name}` } },
     el("div", { class: "head" }, chip, el("strong", {}, name), mode), detail,
-    el("dl", {}, ...fields.map((field) => el("div", { class: [WIDE.has(field) && "wide", CHIEF.has(field) && "chief", FIRST[drone ? "drone" : "target"].has(field) && "first"].filter(Boolean).join(" ") }, el("dt", {}, TITLES[field]), values[field]))), drone ? actions(name) : null);
+    el("dl", {}, ...fields.map((field) => el("div", { class: [WIDE.has(field) && "wide", field === "by" && "names", CHIEF.has(field) && "chief", FIRST[drone ? "drone" : "target"].has(field) && "first"].filter(Boolean).join(" ") }, el("dt", {}, TITLES[field]), values[field]))), drone ? actions(name) : null);
   cards.set(name, { root, values, mode, chip, detail, drone });
   paint(name);
   return root;

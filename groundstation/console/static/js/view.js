@@ -20,7 +20,7 @@ export class View {
   }
 
   fit() {
-    this.scale = Math.min((this.width - 70) / this.room[0], (this.height - 96) / this.room[1]);
+    this.scale = Math.min((this.width - 70) / this.room[0], (this.height - 84) / this.room[1]);
     Object.assign(this, { x: 0, y: 0, fitted: true });
     this.changed();
   }

@@ -1,0 +1,67 @@
+// What stands behind the strip of alarms: the others that last, and those that are over. Both open over the page, one at a
+// time, so that nothing moves.
+
+import { byId, el, text } from "./dom.js";
+import { momentWords } from "./playback.js";
+import { store } from "./store.js";
+
+let shown = "";
+
+export function startStrip() {
+  const log = byId("log");
+  byId("more").onclick = () => openAlarms(!byId("alarms").classList.contains("open"));
+  log.onclick = toggleLog;
+  byId("alarms").addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    if (!byId("alarm-log").hidden) log.focus();
+    openAlarms(false);
+    openLog(false);
+  });
+  return toggleLog;
+}
+
+function openAlarms(open) {
+  if (open) openLog(false);
+  byId("alarms").classList.toggle("open", open);
+  byId("more").setAttribute("aria-expanded", `${open}`);
+}
+
+function openLog(open) {
+  if (open) openAlarms(false);
+  byId("alarm-log").hidden = !open;
+  byId("log").setAttribute("aria-expanded", `${open}`);
+}
+
+function toggleLog() {
+  openLog(byId("alarm-log").hidden);
+  showLog();
+  if (!byId("alarm-log").hidden) byId("alarm-log").focus();
+}
+
+// All but the gravest alarm stand behind this button, counted by rank; the gravest as well, where it is too long to stand
+// whole in its strip.
+export function showMore(ranks, whole) {
+  const more = byId("more");
+  more.hidden = !ranks.length && whole;
+  if (more.hidden) openAlarms(false);
+  text(more, byId("alarms").classList.contains("open") ? "close" : ranks.length ? `+ ${counted(ranks).join(", ")}` : "whole text");
+}
+
+function counted(ranks) {
+  const counts = ["warning", "caution", "notice"].map((rank) => [rank, ranks.filter((one) => one === rank).length]);
+  return counts.filter(([, count]) => count).map(([rank, count]) => `${count} ${rank}${count > 1 ? "s" : ""}`);
+}
+
+export function showLog() {
+  const past = store.s.past_alarms ?? [], button = byId("log"), host = byId("alarm-log"), key = JSON.stringify(past);
+  text(button, host.hidden ? `Past alarms ${past.length || ""}`.trim() : "close");
+  if (host.hidden || key === shown) return;
+  shown = key;
+  host.querySelector("ol").replaceChildren(...past.map(pastAlarm));
+}
+
+function pastAlarm({ text: words, grave, began, ended }) {
+  const lasted = ((ended - began) / 1000).toFixed(0), rank = grave ? "warning" : "caution";
+  return el("li", { data: { rank } }, el("span", { class: "num" }, `${momentWords(began)} – ${momentWords(ended)}, ${lasted} s`),
+    el("span", { class: "mark" }, rank), el("span", {}, words));
+}

@@ -1,0 +1,59 @@
+"""Text of a page that cannot be read whole, measured: no list of elements to look at, so none that is forgotten."""
+
+from typing import Any
+
+# Lists that scroll, with all that they hold in reach of wheel, finger and keyboard; wherever else text does not fit, it
+# is cut off. "Skip to the commands" waits outside of the page until it has the focus.
+SCROLLS = ("#orders", "#events", "#alarm-log")
+OUT_OF_SIGHT = (".skip", "option", "body.wall .brand", "#playback[hidden]")
+
+# Each line of each text against every ancestor that clips it, and against the page's width. Text needs less height than
+# its font's box, which is what is measured: a few pixels of that are no letter.
+_MEASURE = """([scrolls, hidden]) => {
+  const SIDE_PX = 1, FONT_BOX_PX = 3, found = new Set();
+  const clips = (node) => { const {overflowX, overflowY} = getComputedStyle(node);
+    return overflowX !== "visible" || overflowY !== "visible"; };
+  const inside = (line, box) => line.left >= box.left - SIDE_PX && line.right <= box.right + SIDE_PX
+    && line.top >= box.top - FONT_BOX_PX && line.bottom <= box.bottom + FONT_BOX_PX;
+  const page = {left: 0, right: document.documentElement.clientWidth, top: -Infinity, bottom: Infinity};
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const text = texts.currentNode, holder = text.parentElement;
+    if (!text.textContent.trim() || !holder.checkVisibility({visibilityProperty: true})) continue;
+    if (hidden.some((of) => holder.closest(of))) continue;
+    const range = document.createRange();
+    range.selectNodeContents(text);
+    const lines = [...range.getClientRects()].filter(({width}) => width > 0);
+    const tell = (where) => found.add(`${where}: ${text.textContent.trim()}`);
+    if (lines.some((line) => !inside(line, page))) tell("page");
+    for (let over = holder; over !== document.body; over = over.parentElement) {
+      if (scrolls.some((of) => over.matches(of))) break;
+      if (!clips(over)) continue;
+      const box = over.getBoundingClientRect(), name = over.id || over.className || over.tagName;
+      if (lines.some((line) => !inside(line, box))) { tell(name); break; }
+      if (over.scrollWidth > over.clientWidth + SIDE_PX || over.scrollHeight > over.clientHeight + FONT_BOX_PX) {
+        tell(`${name} scrolls`); break; }
+    }
+  }
+  return [...found]; }"""
+
+_COVERED = """() => { const found = [];
+  for (const part of ["#shell", "main .map", "#team"]) {
+    const pressed = document.querySelectorAll(`${part} :is(button, summary)`);
+    const buttons = [...pressed].filter((one) => one.checkVisibility());
+    buttons.forEach((one, index) => { const a = one.getBoundingClientRect();
+      for (const other of buttons.slice(index + 1)) { const b = other.getBoundingClientRect();
+        if (a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom)
+          found.push(`${one.textContent} covers ${other.textContent}`); } });
+  }
+  return found; }"""
+
+
+def clipped(page: Any) -> list[str]:
+    """Return each visible text that is not whole, after the name of what cuts it off."""
+    return list(page.evaluate(_MEASURE, [SCROLLS, OUT_OF_SIGHT]))
+
+
+def covered(page: Any) -> list[str]:
+    """Return the pairs of buttons of one part of the page that lie over each other."""
+    return list(page.evaluate(_COVERED))

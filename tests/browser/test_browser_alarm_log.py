@@ -1,0 +1,66 @@
+"""Alarms that are over: they are read behind the strip, by keyboard, and nothing moves."""
+
+import re
+from typing import Any
+
+import pytest
+from accessibility import violations
+from clipping import clipped
+from places import boxes, moved
+from situations import SITUATIONS
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+
+def weak_links(state: dict[str, Any]) -> list[str]:
+    """Return the words of those past alarms that these tests raise; a busy machine may add others."""
+    return [past["text"] for past in state["sections"]["past_alarms"] if "weak link" in past["text"]]
+
+
+def in_focus(page: Any) -> str:
+    return str(page.page.evaluate("() => document.activeElement.id"))
+
+
+def test_past_alarms_are_read_behind_the_strip_by_keyboard(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    button, log = page.there("past-alarms"), page.there("alarm-log")
+    page.wait(lambda s: page.there("banner-none").is_visible() and button.inner_text().startswith("Past alarms"))
+    before = boxes(page)
+    stage.flight.link["drone_1"] = 0.08
+    page.wait(lambda s: "weak link, 8%" in page.there("banners").inner_text())
+    assert weak_links(page.state()) == []  # it lasts
+    stage.flight.link.clear()
+    page.wait(weak_links)
+    page.wait(lambda s: button.inner_text() == f"Past alarms {len(s['sections']['past_alarms'])}")
+    button.focus()
+    page.page.keyboard.press("Enter")
+    clock = r"\d\d:\d\d:\d\d"
+    assert re.search(rf"{clock} – {clock}, \d+ s\s+warning\s+drone_1: weak link, 8% arrives", log.inner_text())
+    assert in_focus(page) == "alarm-log" and button.get_attribute("aria-expanded") == "true"
+    assert "Alarms that are over" in log.get_attribute("aria-label")
+    assert moved(page, before) == {} and clipped(page.page) == []
+    assert violations(page.page) == []
+    page.shot("past_alarms")
+    page.page.keyboard.press("Escape")
+    assert log.is_hidden() and in_focus(page) == "log"
+    page.page.keyboard.press("a")
+    assert log.is_visible()
+    page.page.keyboard.press("a")
+    assert log.is_hidden() and moved(page, before) == {}
+
+
+def test_past_alarms_outlive_a_reload_and_give_way_to_those_that_last(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.flight.link["drone_1"] = 0.08
+    page.wait(lambda s: "weak link, 8%" in page.there("banners").inner_text())
+    stage.flight.link.clear()
+    page.wait(weak_links)
+    page.page.reload()
+    page.wait(lambda s: s["frames"] > 2 and weak_links(s))
+    page.there("past-alarms").click()
+    stage.flight.link = {"drone_1": 0.08, "drone_2": 0.08}
+    page.wait(lambda s: page.there("more-alarms").is_visible())
+    page.there("more-alarms").click()
+    assert page.there("alarm-log").is_hidden() and page.page.locator(".banner:visible").count() >= 2

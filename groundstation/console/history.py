@@ -5,6 +5,8 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+from groundstation.appearance.cost import cost_cm2
+from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import Estimate, Plan, TruthState
 from groundstation.geometry.ellipse import semi_axes_95
 
@@ -85,7 +87,8 @@ class History:
         axis = round(max(axes), 4) if axes else None
         error = round(max(errors), 4) if errors else None
         # A plan of nobody costs nothing, which is no figure for a curve.
-        cost = None if plan is None or not plan.topology else round(plan.cost * 1e4, 2)
-        topology = "" if plan is None else plan.topology
+        flown = plan if plan is not None and plan.topology else None
+        cost = None if flown is None else round(cost_cm2(flown.cost), 2)
+        topology = "" if flown is None else topology_words(flown.topology)
         figures = {"axis_m": axis, "error_m": error, "cost_cm2": cost, "nis": nis, "topology": topology}
         return {"t_ms": now_ns / 1e6, **figures}

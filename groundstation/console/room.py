@@ -1,10 +1,12 @@
 """What does not move: the room, who is in it, and how each camera looks, in the form that the page draws."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
 import numpy as np
 
+from groundstation.appearance.colours import FENCE_COLOUR, colours_of
 from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone, camera_name
 from groundstation.field.resolved import ResolvedField
@@ -29,6 +31,7 @@ def scene_from_field(field: ResolvedField, truth: bool) -> Json:
         "cameras": [_world_camera(name, camera) for name, camera in field.cameras.items()],
         "volumes": [_volume(name, box, name in field.truth.values()) for name, box in field.volumes.items()],
         "targets": [{"name": name, "height_m": target.marker.height_m} for name, target in field.tracked.items()],
+        **_colours(field.drones, field.tracked),
         "horizon": {"steps": planner.horizon_steps, "step_s": planner.step_s},
         "hysteresis": planner.hysteresis,
         "planned_range_m": planner.planned_range_m,
@@ -46,10 +49,18 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
         "cameras": [],
         "volumes": [],
         "targets": [],
+        **_colours(drones, ()),
         "horizon": {"steps": 10, "step_s": 0.3},
         "hysteresis": 0.0,
         "planned_range_m": 2.0,
         "lost_after_s": 3.0,
+    }
+
+
+def _colours(drones: Iterable[str], targets: Iterable[str]) -> Json:
+    return {
+        "colours": msgspec.to_builtins(colours_of(drones, targets)),
+        "fence_colour": msgspec.to_builtins(FENCE_COLOUR),
     }
 
 

@@ -5,6 +5,8 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any
 
+from groundstation.appearance.cost import cost_cm2, cost_text
+from groundstation.appearance.topology import topology_words
 from groundstation.bus import messages as m
 from groundstation.bus.api import Received
 from groundstation.console.alarm_log import AlarmLog
@@ -240,7 +242,16 @@ def _event(seen: StampedMessage[m.Event]) -> dict[str, Any]:
 def _switch(switch: Switch | None) -> dict[str, Any] | None:
     if switch is None:
         return None
-    return {"at": switch.time_s * 1e3, "before": switch.before, "reason": switch.reason}
+    return {"at": switch.time_s * 1e3, "before": topology_words(switch.before), "reason": switch.reason}
+
+
+def _option(topology: str, cost_m2: float) -> dict[str, Any]:
+    return {
+        "topology": topology,
+        "words": topology_words(topology),
+        "cost_cm2": round(cost_cm2(cost_m2), 2),
+        "cost": cost_text(cost_m2),
+    }
 
 
 def _plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:
@@ -250,8 +261,7 @@ def _plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:
     others = sorted(plan.alternatives, key=lambda alternative: alternative.cost)[:_ALTERNATIVES]
     return {
         "at": _ms(seen),
-        "topology": plan.topology,
-        "cost_cm2": round(plan.cost * 1e4, 2),
+        **_option(plan.topology, plan.cost),
         "mode": plan.mode,
         "controls": [
             {
@@ -263,9 +273,7 @@ def _plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:
             for c in plan.controls
         ],
         "edges": [[e.observer, e.subject, round(e.information, 3)] for e in plan.edges],
-        "alternatives": [
-            {"topology": a.topology, "cost_cm2": round(a.cost * 1e4, 2), "bound_only": a.bound_only} for a in others
-        ],
+        "alternatives": [{**_option(other.topology, other.cost), "bound_only": other.bound_only} for other in others],
         "solver": {
             "status": plan.solver.status,
             "ms": round(plan.solver.seconds * 1e3, 1),

@@ -9,7 +9,7 @@ from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_
 from groundstation.errors import MessageError, OperatorMistake
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.capture import Capture, Entry
-from groundstation.recording.derived import ViewerChannels, camera_frames, lenses
+from groundstation.recording.derived import ViewerChannels
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.viewers import SCENE_CHANNEL
 
@@ -26,7 +26,7 @@ class FoxgloveView:
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
         self._capture = Capture(timeline)
-        self._viewers = ViewerChannels(camera_frames(field), lenses(field)) if field else ViewerChannels()
+        self._viewers = ViewerChannels(field)
         self._scene = FoxgloveScene(field)
         self._scene_channel = foxglove.Channel(
             SCENE_CHANNEL, schema=scene_schema(), message_encoding="protobuf", context=self._context

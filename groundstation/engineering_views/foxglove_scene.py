@@ -8,14 +8,14 @@ import numpy as np
 from foxglove import Schema
 from foxglove import messages as fm
 
+from groundstation.appearance.colours import Rgb
 from groundstation.arrays import Array
 from groundstation.bus import messages as m
 from groundstation.engineering_views.scene import (
+    FENCE,
     LINK_COLOUR,
-    TARGET_COLOUR,
     VOLUME_COLOUR,
     Body,
-    Rgb,
     SearchCell,
     SensingLink,
     ViewScene,
@@ -28,7 +28,6 @@ _PERIOD_NS = NS_PER_S // 10
 _FRAME = "world"
 _HALF_BODY_M = 0.25
 _ROOM_COLOUR: Rgb = (120, 120, 120)
-_FENCE_COLOUR: Rgb = (213, 94, 0)
 
 
 def scene_schema() -> Schema:
@@ -75,7 +74,7 @@ class FoxgloveScene:
         links = [_line([link.begin_m, link.end_m], LINK_COLOUR, 2 * link.half_width_m) for link in self._links]
         arrows = [_arrow(*arrow, self._scene.colour(name)) for name, arrow in self._arrows.items()]
         drawn = [self._body(entity, body) for body in bodies]
-        cells = [_cell(cell) for name in searched for cell in self._searched.get(name, ())]
+        cells = [_cell(cell, self._scene.colour(name)) for name in searched for cell in self._searched.get(name, ())]
         parts = [entity("room", lines=self._static), *drawn, entity("links", lines=links)]
         parts.append(entity("searched", cubes=cells))
         update: bytes = fm.SceneUpdate(entities=[*parts, entity("commanded", arrows=arrows)]).encode()
@@ -102,7 +101,7 @@ def _static(field: ResolvedField | None) -> list[fm.LinePrimitive]:
     (x, y, z), own = field.room.size_m, field.room.fence
     fence = [own.x_m, own.y_m, own.z_m]
     whole = [(-x / 2, x / 2), (-y / 2, y / 2), (0.0, z)]
-    return [*_box(whole, _ROOM_COLOUR), *_box(fence, _FENCE_COLOUR)]
+    return [*_box(whole, _ROOM_COLOUR), *_box(fence, FENCE)]
 
 
 def _box(sides: Iterable[tuple[float, float]], colour: Rgb) -> list[fm.LinePrimitive]:
@@ -112,9 +111,9 @@ def _box(sides: Iterable[tuple[float, float]], colour: Rgb) -> list[fm.LinePrimi
     return [*rings, *(_line([(x, y, z0), (x, y, z1)], colour, 0.01) for x, y in corners[:4])]
 
 
-def _cell(cell: SearchCell) -> fm.CubePrimitive:
+def _cell(cell: SearchCell, own: Rgb) -> fm.CubePrimitive:
     size = fm.Vector3(x=cell.side_m, y=cell.side_m, z=0.02)
-    red, green, blue = (part / 255 for part in TARGET_COLOUR)
+    red, green, blue = (part / 255 for part in own)
     colour = fm.Color(r=red, g=green, b=blue, a=0.7 * cell.share)
     return fm.CubePrimitive(pose=_pose(cell.centre_m, 0.0, 0.0), size=size, color=colour)
 

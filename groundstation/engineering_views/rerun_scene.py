@@ -11,9 +11,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.appearance.colours import Rgb
+from groundstation.appearance.cost import COST_UNIT, cost_cm2
+from groundstation.appearance.topology import topology_words
 from groundstation.bus import messages as m
 from groundstation.bus.topics import Topic
-from groundstation.engineering_views.scene import LINK_COLOUR, TARGET_COLOUR, VOLUME_COLOUR, Body, Rgb, Sides, ViewScene
+from groundstation.engineering_views.scene import FENCE, LINK_COLOUR, VOLUME_COLOUR, Body, Sides, ViewScene
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Room
 from groundstation.geometry.angles import quaternion_from_euler
@@ -99,7 +102,7 @@ class RerunScene:
     def _log_room(self, room: Room) -> None:
         x, y, z = room.size_m
         self._log_box("world/room", ((-x / 2, x / 2), (-y / 2, y / 2), (0.0, z)), (90, 90, 90))
-        self._log_box("world/fence", (room.fence.x_m, room.fence.y_m, room.fence.z_m), TARGET_COLOUR)
+        self._log_box("world/fence", (room.fence.x_m, room.fence.y_m, room.fence.z_m), FENCE)
 
     def _log_box(self, path: str, sides: Sides, colour: Rgb, label: str = "") -> None:
         low, high = np.array(sides).T
@@ -143,11 +146,11 @@ class RerunScene:
         self._log(f"world/ellipse_95/{body.name}", rr.LineStrips3D([body.ring_m], radii=[0.008], colors=[colour]))
 
     def _search_map(self, message: m.SearchMap) -> None:
-        cells = self._scene.cells(message)
+        cells, colour = self._scene.cells(message), self._scene.colour(message.header.entity)
         shown = rr.Boxes3D(
             centers=[cell.centre_m for cell in cells],
             half_sizes=[[cell.side_m / 2, cell.side_m / 2, 0.01] for cell in cells],
-            colors=[[*TARGET_COLOUR, round(180 * cell.share)] for cell in cells],
+            colors=[[*colour, round(180 * cell.share)] for cell in cells],
             fill_mode=rr.components.FillMode.Solid,
         )
         self._log(f"world/searched/{message.header.entity}", shown)
@@ -163,12 +166,12 @@ class RerunScene:
             show_labels=False,
         )
         self._log("world/links", strips)
-        self._log("plots/cost/chosen", rr.Scalars(message.cost))
+        self._log("plots/cost/chosen", rr.Scalars(cost_cm2(message.cost)))
         for other in message.alternatives:
-            self._log(["plots", "cost", other.topology], rr.Scalars(other.cost))
+            self._log(["plots", "cost", topology_words(other.topology)], rr.Scalars(cost_cm2(other.cost)))
         if message.topology != self._topology:
             self._topology = message.topology
-            self._log("log/topology", rr.TextLog(f"{message.topology} ({message.mode})", level="INFO"))
+            self._log("log/topology", rr.TextLog(f"{topology_words(message.topology)} ({message.mode})", level="INFO"))
 
     def _setpoint(self, message: m.VelocitySetpoint) -> None:
         arrow = self._scene.arrow(message)
@@ -209,7 +212,7 @@ def blueprint(field: ResolvedField | None) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin=f"plots/{name}", name=title)
         for name, title in (
             ("std", "standard deviation [m]"),
-            ("cost", "cost of topologies [m^2]"),
+            ("cost", f"cost of topologies [{COST_UNIT}]"),
             ("nis", "normalised innovation squared"),
             ("battery", "battery"),
             ("cpu", "cores used"),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.appearance.colours import FENCE_COLOUR, NEUTRAL_COLOUR, Rgb, colours_of, rgb
 from groundstation.arrays import Array
 from groundstation.bus import messages as m
 from groundstation.field.resolved import ResolvedField
@@ -12,16 +13,13 @@ from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.recording.derived import camera_frames
 from groundstation.recording.viewers import Transform
 
-Rgb = tuple[int, int, int]
 Sides = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 _RING_POINTS = 40
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
-# Safe for colour-blind people (Okabe and Ito, 2008): robots in turn, then all targets.
-ROBOT_COLOURS: tuple[Rgb, ...] = ((0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233))
-TARGET_COLOUR: Rgb = (213, 94, 0)
 LINK_COLOUR: Rgb = (130, 130, 130)
 VOLUME_COLOUR: Rgb = (140, 150, 110)
+FENCE: Rgb = rgb(FENCE_COLOUR.dark)
 _LIKELY_AT_ALL = 0.03
 # An arrow is as long as the way in this time.
 ARROW_S = 2.0
@@ -68,17 +66,15 @@ class ViewScene:
         self.cameras: tuple[Transform, ...] = camera_frames(field) if field else ()
         targets = field.tracked if field else {}
         self._target_heights_m = {name: target.marker.height_m for name, target in targets.items()}
-        self._names = sorted(field.drones) if field else []
+        self._colours = colours_of(field.drones, targets) if field else {}
         self.volumes: dict[str, Sides] = _volumes(field) if field else {}
         self._places = {one.child: one.position_m for one in self.cameras if one.parent == "world"}
         self._places |= {name: (sum(x) / 2, sum(y) / 2, z[1]) for name, (x, y, z) in self.volumes.items()}
         self.bodies: dict[str, Body] = {}
 
     def colour(self, name: str) -> Rgb:
-        """Return the colour of a robot or a target."""
-        if name not in self._names:
-            return TARGET_COLOUR
-        return ROBOT_COLOURS[self._names.index(name) % len(ROBOT_COLOURS)]
+        """Return the colour of a robot or a target: its shade for dark ground, which these viewers have by default."""
+        return rgb(self._colours.get(name, NEUTRAL_COLOUR).dark)
 
     def take_estimate(self, message: m.Estimate) -> list[Body]:
         """Return the bodies of an estimate, and remember them."""

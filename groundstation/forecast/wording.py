@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from groundstation.appearance.topology import topology_words
 from groundstation.forecast.endurance import Endurance
 from groundstation.forecast.failures import Failure
 from groundstation.forecast.floor import PlaceForecast, Spread, spread_of
@@ -111,7 +112,7 @@ def _told(one: Observability) -> tuple[str, str, str, str]:
     place, yaw = one.worst_m, one.worst_yaw
     turned = "-" if yaw is None else f"{math.degrees(yaw.std):.1f} deg"
     where = "-" if place is None else f"{_deviation(place)} {_parts(place)}"
-    return str(one.topology), f"{one.rank} of {len(one.entries)}", where, turned
+    return topology_words(str(one.topology)), f"{one.rank} of {len(one.entries)}", where, turned
 
 
 def _deviation(place: Direction) -> str:
@@ -129,7 +130,7 @@ def _size(direction: Direction | None) -> float:
 def _missing(seen: Iterable[Observability]) -> Iterator[str]:
     for one in seen:
         if one.missing:
-            yield f"{one.topology}: nothing tells where {' and '.join(one.missing)} would be"
+            yield f"{topology_words(str(one.topology))}: nothing tells where {' and '.join(one.missing)} would be"
 
 
 def _by_labels(entries: Sequence[str]) -> Iterator[str]:

@@ -7,6 +7,7 @@ from typing import Self
 from rich.console import Console
 from rich.live import Live
 
+from groundstation.appearance.topology import topology_words
 from groundstation.bus.api import Bus, Subscription
 from groundstation.bus.topics import (
     CAMERA_STATUS,
@@ -85,7 +86,7 @@ class Screen:
 def line(state: MonitorState, now_ns: int) -> str:
     """Return the state in one line, for logs and pipes."""
     vehicles = [f"{name} {seen.message.mode}" for name, seen in state.vehicles.items()]
-    plan = [f"topology {state.plan.message.topology}"] if state.plan else []
+    plan = [f"topology {topology_words(state.plan.message.topology)}"] if state.plan else []
     alarms = [f"! {alarm.text}" for alarm in alarms_of(state, now_ns)]
     seconds = (now_ns - state.started_ns) / 1e9
     return f"{seconds:5.0f} s  " + "; ".join([*vehicles, *plan, *alarms])

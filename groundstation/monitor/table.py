@@ -7,6 +7,8 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.table import Table
 from rich.text import Text
 
+from groundstation.appearance.cost import cost_text
+from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.monitor.alarms import alarms_of
@@ -181,16 +183,15 @@ def _plan(state: MonitorState, now_ns: int) -> Text:
     plan = state.plan.message
     stale = state.plan.age_s(now_ns) > 1.0
     text = Text("topology ", style="dim")
-    text.append(plan.topology.replace("/", " / ") or "none", style="dim" if stale else "bold magenta")
-    text.append(f"   cost {_cost(plan.cost)}   planner {plan.solver.seconds * 1000:.0f} ms ({plan.solver.status})")
+    text.append(topology_words(plan.topology), style="dim" if stale else "bold magenta")
+    text.append(f"   cost {cost_text(plan.cost)}   planner {plan.solver.seconds * 1000:.0f} ms ({plan.solver.status})")
     others = sorted((a for a in plan.alternatives if a.topology != plan.topology), key=lambda a: a.cost)[:3]
     if others:
-        text.append("   instead of " + ", ".join(f"{a.topology} {_cost(a.cost)}" for a in others), style="dim")
+        text.append(
+            "   instead of " + ", ".join(f"{topology_words(a.topology)} {cost_text(a.cost)}" for a in others),
+            style="dim",
+        )
     return text
-
-
-def _cost(square_metres: float) -> str:
-    return f"{square_metres * 1e4:.0f} cm2" if square_metres < 1 else f"{square_metres:.2f} m2"
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Text:

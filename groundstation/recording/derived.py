@@ -1,16 +1,16 @@
 """Derived channels for viewers: frames (`/tf`), events as log lines (`/log`), lenses and marks in pictures."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import msgspec
 
+from groundstation.appearance.colours import colours_of
 from groundstation.bus.messages import Header, Severity
 from groundstation.bus.messages.base import Vector3
 from groundstation.bus.topics import CAMERA_STATUS, ESTIMATE, EVENT, OBSERVATION
 from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
-from groundstation.field.room import LensCalibration
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import (
     base_from_tilted_optical,
@@ -71,19 +71,13 @@ def camera_frames(field: ResolvedField) -> tuple[Transform, ...]:
     return (*fixed, *carried)
 
 
-def lenses(field: ResolvedField) -> dict[str, LensCalibration]:
-    """Return the lens of every camera of a resolved field, by its name on the bus."""
-    carried = {camera_name(name): drone.camera.calibration for name, drone in field.drones.items()}
-    return {name: camera.calibration for name, camera in field.cameras.items()} | carried
-
-
 class ViewerChannels:
     """Makes the entries of viewers' channels from entries that are recorded anyway."""
 
-    def __init__(
-        self, cameras: tuple[Transform, ...] = (), by_camera: Mapping[str, LensCalibration] | None = None
-    ) -> None:
-        self._cameras, self._lenses = cameras, by_camera or {}
+    def __init__(self, field: ResolvedField | None = None) -> None:
+        self._cameras = camera_frames(field) if field else ()
+        self._lenses = field.calibrations if field else {}
+        self._colours = colours_of(field.drones, field.tracked) if field else {}
         # Of the newest picture of each camera: its time, and the places of what it shows.
         self._seen: dict[str, tuple[int, dict[str, Vector3]]] = {}
         self._next_ns = 0
@@ -136,7 +130,7 @@ class ViewerChannels:
             seen = {}
         seen[sighting.subject] = sighting.position_m
         self._seen[sighting.camera] = (sighting.header.stamp_ns, seen)
-        data = annotations(stamp(entry.log_time_ns), lens, seen)
+        data = annotations(stamp(entry.log_time_ns), lens, seen, self._colours)
         return self._entry(entry, ANNOTATIONS_PREFIX + sighting.camera, "ImageAnnotations", data)
 
     def _entry(self, source: Entry, channel: str, kind: str, data: bytes) -> Entry:

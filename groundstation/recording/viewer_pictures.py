@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from groundstation.appearance.colours import NEUTRAL_COLOUR, Colour, rgb
 from groundstation.bus.messages.base import Vector3
 from groundstation.geometry.lens import LensFigures, intrinsics_of
 from groundstation.recording.protobuf import Kind, ProtobufField, Type, blob, double, fixed32
@@ -15,7 +16,6 @@ CALIBRATION_PREFIX, ANNOTATIONS_PREFIX = "/calibration/", "/annotations/"
 PICTURE_PREFIXES = (CALIBRATION_PREFIX, ANNOTATIONS_PREFIX)
 _STAMP = ".google.protobuf.Timestamp"
 _DIAMETER_PX, _LINE_PX, _FONT_PX = 24.0, 3.0, 16.0
-_COLOUR = (0.9, 0.62, 0.0, 1.0)
 
 
 def _fields(*names: str, kind: Kind, first: int = 1, repeated: bool = False, of: str = "") -> tuple[ProtobufField, ...]:
@@ -86,22 +86,30 @@ def calibration(stamp: bytes, camera: str, lens: LensFigures) -> bytes:
     return blob(1, stamp) + size + blob(4, b"plumb_bob") + numbers + blob(9, camera.encode())
 
 
-def annotations(stamp: bytes, lens: LensFigures, seen: Mapping[str, Vector3]) -> bytes:
-    """Return ImageAnnotations with a circle and the name of each body; seen: places of markers [m; optical]."""
+def annotations(stamp: bytes, lens: LensFigures, seen: Mapping[str, Vector3], colours: Mapping[str, Colour]) -> bytes:
+    """Return ImageAnnotations with a circle and the name of each body in its colour.
+
+    seen: places of markers [m; optical].
+    """
     lens_model = intrinsics_of(lens)
     pixels = {name: lens_model.project(np.array(place)) for name, place in seen.items()}
     shown = {name: pixel for name, pixel in pixels.items() if np.isfinite(pixel).all()}
-    colour = b"".join(double(number, value) for number, value in enumerate(_COLOUR, 1))
+    shades = {name: _shade(colours.get(name, NEUTRAL_COLOUR)) for name in shown}
     circles = (
-        blob(1, blob(1, stamp) + _point(pixel) + double(3, _DIAMETER_PX) + double(4, _LINE_PX) + blob(6, colour))
-        for pixel in shown.values()
+        blob(1, blob(1, stamp) + _point(pixel) + double(3, _DIAMETER_PX) + double(4, _LINE_PX) + blob(6, shades[name]))
+        for name, pixel in shown.items()
     )
     texts = (
         blob(3, blob(1, stamp) + _point(pixel + _DIAMETER_PX) + blob(3, name.encode()) + double(4, _FONT_PX)
-             + blob(5, colour))
+             + blob(5, shades[name]))
         for name, pixel in shown.items()
     )  # fmt: skip
     return b"".join((*circles, *texts, blob(5, stamp)))
+
+
+def _shade(colour: Colour) -> bytes:
+    red, green, blue = rgb(colour.dark)
+    return b"".join(double(number, value / 255) for number, value in enumerate((red, green, blue, 255), 1))
 
 
 def _point(pixel: Iterable[float]) -> bytes:

@@ -6,7 +6,7 @@ from pathlib import Path
 from groundstation.bus.api import Sample
 from groundstation.field.resolved import field_from_json
 from groundstation.recording.capture import Capture
-from groundstation.recording.derived import ViewerChannels, camera_frames, lenses
+from groundstation.recording.derived import ViewerChannels
 from groundstation.recording.file_topics import RAW, STATE
 from groundstation.recording.preamble import preamble_of_run
 from groundstation.recording.rotating_file import NO_ROTATION, FileSeries, Rotation
@@ -29,8 +29,7 @@ class RunWriter:
         rotation: Rotation = NO_ROTATION,
     ) -> None:
         preamble = preamble_of_run(field, epoch, timeline, folder)
-        self._capture, resolved = Capture(timeline), field_from_json(field)
-        self._viewers = ViewerChannels(camera_frames(resolved), lenses(resolved))
+        self._capture, self._viewers = Capture(timeline), ViewerChannels(field_from_json(field))
         self.state, self.raw = (
             FileSeries(folder, stem, preamble, has_room=has_room, rotation=rotation) for stem in (STATE, RAW)
         )

@@ -12,6 +12,7 @@ from groundstation.report.accuracy import time_grid
 from groundstation.report.metrics import RunFigures, figures_of
 from groundstation.report.topology_use import segments
 from groundstation.report.tracks import RunData
+from groundstation.report.wording import title
 
 _STALE_S = 0.5
 _LISTED = 20
@@ -56,7 +57,9 @@ def _figures(figures: RunFigures) -> dict[str, float | None]:
         rows[f"{name} anees (1 is honest)"] = accuracy.anees
     rows |= {f"nis {edge} (1 is honest)": value for edge, value in figures.mean_nis.items()}
     rows |= {f"observations {verdict}": float(count) for verdict, count in sorted(figures.verdicts.items())}
-    rows |= {f"topology {name} [s]": value for name, value in sorted(figures.topology_seconds.items())}
+    rows |= {
+        f"{title(f'topology_seconds.{name}')} [s]": value for name, value in sorted(figures.topology_seconds.items())
+    }
     return rows
 
 

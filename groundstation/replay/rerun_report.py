@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from groundstation.appearance.topology import topology_words
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.reader import RecordingError
 from groundstation.replay import counterfactual, versions
@@ -135,7 +136,8 @@ class Again:
             yield f"{name}: estimates at most {where['m']:.3f} m apart, at {where['at_s']:.1f} s"
         yield f"another topology chosen for {self._parted.topology_other_s:.1f} s"
         for begin, end, before, after in self._parted.topologies[:_SHOWN]:
-            yield f"  {begin:.1f} to {end:.1f} s: {before} before, {after} with it"
+            was, now = topology_words(before), topology_words(after)
+            yield f"  {begin:.1f} to {end:.1f} s: {was} before, {now} with it"
 
     def as_json(self, result: Comparison) -> bytes:
         """Return all of it for programs."""

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from groundstation.appearance.topology import topology_words
 from groundstation.arrays import Array, BoolArray
 from groundstation.report.accuracy import LOST_ERROR_M, errors_at, time_grid
 from groundstation.report.criteria import MAX_TARGET_RMSE_M
@@ -15,9 +16,12 @@ from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_style import INK, KIND_COLORS, MUTED, STYLE, color_of
 from groundstation.report.topology_use import kind_of, merged, segments
 from groundstation.report.tracks import RunData
+from groundstation.report.wording import KIND_WORDS
 
 _SIZE_IN = (11.4, 13.0)
 _DPI = 110
+# Of the width of the axes, for one letter of a topology.
+_LETTER_SHARE = 0.007
 
 
 def draw(data: RunData, title: str, path: Path) -> None:
@@ -54,7 +58,7 @@ def _draw_errors(axes: Axes, data: RunData) -> None:
         distance = np.linalg.norm(errors, axis=1)
         if not is_target:
             distance[~truth.airborne_at(grid)] = np.nan
-        axes.plot(grid, distance, color=color_of(name, data), lw=1.8 if is_target else 0.9, zorder=3, label=name)
+        axes.plot(grid, distance, color=color_of(name, data).light, lw=1.8 if is_target else 0.9, zorder=3, label=name)
         if is_target:
             _mark_missing(axes, grid, ~np.isfinite(distance))
         if np.isfinite(distance).any():
@@ -81,7 +85,7 @@ def _draw_heights(axes: Axes, data: RunData) -> None:
         axes.axhline(height, color=MUTED, lw=0.8, ls=(0, (1, 3)), zorder=1)
     for name in data.drones:
         truth, estimate = data.truth.get(name), data.estimates.get(name)
-        color = color_of(name, data)
+        color = color_of(name, data).light
         if truth is not None:
             inside = (truth.time_s >= start) & (truth.time_s <= end)
             axes.plot(truth.time_s[inside], truth.position_m[inside, 2], color=color, lw=1.4)
@@ -96,10 +100,10 @@ def _draw_topology(axes: Axes, data: RunData) -> None:
     start, end = _interval(data)
     for begin, finish, text in merged(segments(data, start, end)):
         axes.broken_barh([(begin, finish - begin)], (0, 1), facecolors=KIND_COLORS[kind_of(text)], lw=0)
-        if finish - begin > 0.06 * (end - start):
-            axes.text((begin + finish) / 2, 0.5, text.replace("_", " "), ha="center", va="center", fontsize=8,
-                      color="white", clip_on=True)  # fmt: skip
-    handles = [axes.barh([0], [0], color=color, label=kind) for kind, color in KIND_COLORS.items()]
+        words = topology_words(text)
+        if finish - begin > _LETTER_SHARE * len(words) * (end - start):
+            axes.text((begin + finish) / 2, 0.5, words, ha="center", va="center", fontsize=8, color=INK)
+    handles = [axes.barh([0], [0], color=color, label=KIND_WORDS[kind]) for kind, color in KIND_COLORS.items()]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=3, borderpad=0.1)
     axes.set_xlim(start, end)
     axes.set_ylim(0, 1)

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
+from groundstation.appearance.colours import FENCE_COLOUR
 from groundstation.field.room import WorldCamera
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report.accuracy import STALE_S
@@ -40,7 +41,9 @@ def _draw_room(axes: Axes, data: RunData) -> None:
     axes.add_patch(Rectangle((-width / 2, -depth / 2), width, depth, fill=False, ec=INK, lw=1.6, zorder=2))
     (x_low, x_high), (y_low, y_high) = data.resolved.room.fence.x_m, data.resolved.room.fence.y_m
     if x_high - x_low < 1e6:
-        fence = Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fill=False, ec="#b03a2e", lw=1.0, ls="--")
+        fence = Rectangle(
+            (x_low, y_low), x_high - x_low, y_high - y_low, fill=False, ec=FENCE_COLOUR.light, lw=1.0, ls="--"
+        )
         axes.add_patch(fence)
     for camera in data.resolved.cameras.values():
         for index, height in enumerate(data.heights_m):
@@ -70,7 +73,7 @@ def _footprint_half_m(camera: WorldCamera, height_m: float) -> tuple[float, floa
 
 
 def _draw_entity(axes: Axes, data: RunData, name: str, start: float, end: float) -> None:
-    color = color_of(name, data)
+    color = color_of(name, data).light
     truth, estimate = data.truth.get(name), data.estimates.get(name)
     if truth is not None:
         inside = (truth.time_s >= start) & (truth.time_s <= end)
@@ -101,7 +104,7 @@ def _draw_estimate(axes: Axes, estimate: EstimateTrack, color: str, start: float
 
 def _legend(data: RunData) -> list[Line2D | Patch]:
     entities: list[Line2D | Patch] = [
-        Line2D([], [], color=color_of(name, data), lw=2.4, label=name) for name in (*data.drones, *data.tracked)
+        Line2D([], [], color=color_of(name, data).light, lw=2.4, label=name) for name in (*data.drones, *data.tracked)
     ]
     return [
         *entities,
@@ -110,7 +113,7 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
         Patch(fc="#dfe5ea", ec=MUTED, lw=0.8, label="95 % ellipse"),
         Line2D([], [], color=MUTED, marker="o", mfc="white", lw=0, label="start of tracking"),
         Line2D([], [], color=MUTED, marker="s", lw=0, label="end"),
-        Line2D([], [], color="#b03a2e", lw=1.0, ls="--", label="fence"),
+        Line2D([], [], color=FENCE_COLOUR.light, lw=1.0, ls="--", label="fence"),
         Patch(fc="#eef2e4", ec=_CAMERA, ls=":", lw=0.7, label=_world_view(data)),
     ]
 

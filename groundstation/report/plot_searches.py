@@ -31,7 +31,7 @@ def draw_searches(data: RunData, found: list[Search]) -> Figure:
 def _draw(axes: Axes, data: RunData, search: Search, one: TimedMessage[SearchMap]) -> None:
     since_s = one.time_s - search.begin_s
     axes.set_title(f"{search.target}, {one.time_s:.1f} s" + (f" (+{since_s:.1f} s)" if since_s else ""), fontsize=10)
-    _draw_chances(axes, one.message, color_of(search.target, data))
+    _draw_chances(axes, one.message, color_of(search.target, data).light)
     width, depth, _ = data.resolved.room.size_m
     axes.add_patch(Rectangle((-width / 2, -depth / 2), width, depth, fill=False, ec=INK, lw=1.2))
     at = np.array([one.time_s])
@@ -40,9 +40,10 @@ def _draw(axes: Axes, data: RunData, search: Search, one: TimedMessage[SearchMap
         index = -1 if track is None or not len(track.time_s) else int(track.latest_at(at, STALE_S)[0])
         if track is not None and index >= 0:
             x, y, _, yaw = track.mean[index, :4].tolist()
-            axes.plot(x, y, "o", ms=6, color=color_of(name, data))
+            color = color_of(name, data).light
+            axes.plot(x, y, "o", ms=6, color=color)
             ahead = (x + _HEADING_M * np.cos(yaw), y + _HEADING_M * np.sin(yaw))
-            axes.plot((x, ahead[0]), (y, ahead[1]), color=color_of(name, data), lw=1.4)
+            axes.plot((x, ahead[0]), (y, ahead[1]), color=color, lw=1.4)
     truth = data.truth.get(search.target)
     if truth is not None:
         where = truth.position_m[max(0, int(np.searchsorted(truth.time_s, one.time_s, side="right")) - 1)]

@@ -1,14 +1,15 @@
-"""Colours that colour-blind people distinguish (Okabe and Ito), and the look of all plots."""
+"""The look of all plots and charts; who has which colour is said in `groundstation.appearance`."""
 
 from typing import Any
 
+from groundstation.appearance.colours import NEUTRAL_COLOUR, ROBOT_COLOURS, Colour, colours_of
 from groundstation.report.tracks import RunData
 
 INK = "#1b2733"
 MUTED = "#8795a1"
-TARGET_COLOR = "#d55e00"
-TARGET_COLORS = (TARGET_COLOR, "#7a3400", "#f2a26b")
-DRONE_COLORS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5d4fa2")
+MUTED_CURVE = Colour(MUTED, MUTED)
+# Lines that stand for no robot and no target, such as runs and processes.
+SERIES_COLORS = ROBOT_COLOURS
 KIND_COLORS = {"flat": "#56a3d9", "string": "#e08a1e", "other": "#aab4bd"}
 
 STYLE: Any = {
@@ -32,9 +33,6 @@ STYLE: Any = {
 }
 
 
-def color_of(name: str, data: RunData) -> str:
+def color_of(name: str, data: RunData) -> Colour:
     """Return the colour of a drone or a target."""
-    if name in data.drones:
-        return DRONE_COLORS[data.drones.index(name) % len(DRONE_COLORS)]
-    number = data.tracked.index(name) if name in data.tracked else 0
-    return TARGET_COLORS[number % len(TARGET_COLORS)]
+    return colours_of(data.drones, data.tracked).get(name, NEUTRAL_COLOUR)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import msgspec
 
+from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import FlightState, Severity
 from groundstation.report.decisions import switches
 from groundstation.report.happenings import happenings
@@ -60,7 +61,7 @@ def _tracking(data: RunData) -> Iterator[Moment]:
 
 def _topologies(data: RunData) -> Iterator[Moment]:
     for item in switches(data):
-        yield Moment(item.time_s, "topology", f"topology {item.after or 'nobody'}: {item.reason}")
+        yield Moment(item.time_s, "topology", f"topology {topology_words(item.after)}: {item.reason}")
 
 
 def _reactions(data: RunData) -> Iterator[Moment]:

@@ -4,12 +4,13 @@ from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from groundstation.appearance.topology import topology_words
 from groundstation.report.build import HTML_NAME, PLOT_NAME
 from groundstation.report.compare import differences, labels
 from groundstation.report.criteria import Criterion
 from groundstation.report.happenings import Happening
 from groundstation.report.judge import JSON_NAME, RunReport
-from groundstation.report.wording import bound, missed, quantity, title
+from groundstation.report.wording import KIND_WORDS, bound, missed, quantity, title
 
 _HAPPENINGS_SHOWN = 12
 _DOUBTS_SHOWN = 3
@@ -79,7 +80,9 @@ def _criteria(criteria: tuple[Criterion, ...]) -> Table:
 def _details(report: RunReport) -> Text:
     figures = report.figures
     seconds = ", ".join(
-        f"{text} {value:.0f} s" for text, value in figures.topology_seconds.items() if "_" in text and value >= 0.5
+        f"{topology_words(text)} {value:.0f} s"
+        for text, value in figures.topology_seconds.items()
+        if text not in KIND_WORDS and value >= 0.5
     )
     busiest = sorted(figures.cpu_cores.items(), key=lambda item: -item[1])[:4]
     cores = ", ".join(f"{name} {share:.0%}" for name, share in busiest)

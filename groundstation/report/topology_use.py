@@ -8,7 +8,7 @@ from groundstation.report.tracks import RunData
 # A plan is in force until the next one, but not for longer than this: then the planner was silent.
 _HOLDS_S = 0.5
 _GAP_S = 0.05  # segments nearer than this are one
-FLAT, STRING, OTHER = "flat", "string", "other"
+FLAT, STRING, OTHER, NONE = "flat", "string", "other", "(none)"
 
 
 def kind_of(text: str) -> str:
@@ -49,7 +49,7 @@ def topology_seconds(data: RunData, start_s: float, end_s: float) -> dict[str, f
     seconds: defaultdict[str, float] = defaultdict(float, {FLAT: 0.0, STRING: 0.0, OTHER: 0.0})
     for begin, finish, text in segments(data, start_s, end_s):
         seconds[kind_of(text)] += finish - begin
-        seconds[text or "(none)"] += finish - begin
+        seconds[text or NONE] += finish - begin
     return {name: round(value, 3) for name, value in seconds.items()}
 
 

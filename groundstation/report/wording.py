@@ -1,6 +1,8 @@
 """Figures and criteria of a run in words and units: terminal, page and comparison say the same."""
 
+from groundstation.appearance.topology import NOBODY, topology_words
 from groundstation.report.criteria import Criterion, Value
+from groundstation.report.topology_use import FLAT, NONE, OTHER, STRING
 
 _BOUNDS = {"<=": "at most", "<": "below", ">=": "at least", ">": "more than"}
 # Name of a figure in report.json: what it is called, and its unit.
@@ -19,20 +21,29 @@ _TITLES = {
     "tracker_rate_hz": ("tracker's rate", "Hz"),
     "mean_cpu_cores": ("processor used", "cores"),
     "sim_overrun_percent": ("simulator's ticks or pictures late", "%"),
-    "topology_seconds.flat": ("time in a flat topology", "s"),
-    "topology_seconds.string": ("time in a string topology", "s"),
     "topology_switches": ("switches of topology", ""),
 }
+KIND_WORDS = {
+    FLAT: "all drones on one level",
+    STRING: "each drone on a level of its own",
+    OTHER: "another topology",
+    NONE: NOBODY,
+}
+"""What the kinds of topologies are called."""
+_SECONDS_OF = "topology_seconds."
 
 
 def title(name: str) -> str:
     """Return what a figure of report.json is called; its own name where it has no other."""
+    topology = name.removeprefix(_SECONDS_OF)
+    if topology != name:
+        return f"time with {KIND_WORDS.get(topology) or topology_words(topology)}"
     return _TITLES.get(name, (name, ""))[0]
 
 
 def unit(name: str) -> str:
     """Return the unit of a figure, "" where it has none."""
-    return _TITLES.get(name, (name, ""))[1]
+    return "s" if name.startswith(_SECONDS_OF) else _TITLES.get(name, (name, ""))[1]
 
 
 def quantity(name: str, value: Value) -> str:

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.appearance.colours import Rgb
 from groundstation.arrays import Array
 from groundstation.engineering_views.ros2.codec import Ros2Codec
 from groundstation.engineering_views.ros2.geometry import Builder
-from groundstation.engineering_views.scene import LINK_COLOUR, Body, Rgb, SensingLink
+from groundstation.engineering_views.scene import LINK_COLOUR, Body, SensingLink
 
 # WIRE (docs/reference/ros2.md 3): visualization_msgs/msg/Marker.
 _ARROW, _LINE_STRIP, _TEXT = 0, 4, 9

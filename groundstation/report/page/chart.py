@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
+from groundstation.appearance.colours import Colour
 from groundstation.arrays import Array
 
 _MOST_POINTS = 3000
@@ -14,7 +15,7 @@ class Curve(msgspec.Struct, frozen=True):
     """One line of a chart; `values` has a None where there is nothing to draw."""
 
     label: str
-    color: str
+    color: Colour
     values: list[float | None]
     dashed: bool = False
 

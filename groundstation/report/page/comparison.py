@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from groundstation.appearance.cost import COST_UNIT, cost_cm2
 from groundstation.arrays import Array
 from groundstation.report.accuracy import errors_at, time_grid
 from groundstation.report.compare import differences, labels
@@ -14,7 +15,7 @@ from groundstation.report.page.chart import Chart, Curve, held, points, thin, ti
 from groundstation.report.page.document import holders, page, rerun_note
 from groundstation.report.page.flight_charts import semi_axis_m
 from groundstation.report.page.tables import number, table
-from groundstation.report.plot_style import DRONE_COLORS
+from groundstation.report.plot_style import SERIES_COLORS
 from groundstation.report.tracks import RunData
 from groundstation.report.wording import title
 
@@ -51,7 +52,7 @@ def _grids(runs: tuple[tuple[RunData, RunReport], ...]) -> tuple[Array, list[flo
 def _errors(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:
     grid, starts = _grids(runs)
     curves = []
-    for color, label, start, (data, _) in zip(DRONE_COLORS, called, starts, runs, strict=False):
+    for color, label, start, (data, _) in zip(SERIES_COLORS, called, starts, runs, strict=False):
         for rank, name in enumerate(data.tracked):
             truth = data.truth.get(name)
             if truth is not None:
@@ -74,7 +75,7 @@ def _beliefs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str
             points(semi_axis_m(data.estimates[name], grid + start)),
             dashed=rank > 0,
         )
-        for color, label, start, (data, _) in zip(DRONE_COLORS, called, starts, runs, strict=False)
+        for color, label, start, (data, _) in zip(SERIES_COLORS, called, starts, runs, strict=False)
         for rank, name in enumerate(data.tracked)
         if name in data.estimates
     ]
@@ -85,7 +86,7 @@ def _beliefs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str
 def _costs(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:
     grid, starts = _grids(runs)
     curves = []
-    for color, label, start, (data, _) in zip(DRONE_COLORS, called, starts, runs, strict=False):
-        own, cost = [plan.time_s for plan in data.plans], [plan.message.cost for plan in data.plans]
-        curves.append(Curve(label, color, points(held(grid + start, own, cost, _PLAN_HOLDS_S), 6)))
-    return Chart("Plan cost", "m²", "of the chosen topology", times(grid), curves)
+    for color, label, start, (data, _) in zip(SERIES_COLORS, called, starts, runs, strict=False):
+        own, cost = [plan.time_s for plan in data.plans], [cost_cm2(plan.message.cost) for plan in data.plans]
+        curves.append(Curve(label, color, points(held(grid + start, own, cost, _PLAN_HOLDS_S), 2)))
+    return Chart("Plan cost", COST_UNIT, "of the chosen topology", times(grid), curves)

@@ -2,11 +2,14 @@
 
 import numpy as np
 
+from groundstation.appearance.colours import NEUTRAL_COLOUR
+from groundstation.appearance.cost import COST_UNIT, cost_cm2
+from groundstation.appearance.topology import topology_words
 from groundstation.arrays import Array
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report.accuracy import STALE_S, errors_at, time_grid
 from groundstation.report.page.chart import Chart, Curve, Span, held, points, thin, times
-from groundstation.report.plot_style import KIND_COLORS, MUTED, TARGET_COLOR, color_of
+from groundstation.report.plot_style import KIND_COLORS, MUTED_CURVE, color_of
 from groundstation.report.topology_use import kind_of, merged, segments
 from groundstation.report.tracks import EstimateTrack, RunData
 
@@ -24,7 +27,8 @@ def flight_charts(data: RunData, start_s: float, end_s: float) -> list[Chart]:
 def _spans(data: RunData, grid: Array) -> list[Span]:
     parts = merged(segments(data, float(grid[0]), float(grid[-1])))
     return [
-        Span(round(begin, 2), round(end, 2), KIND_COLORS[kind_of(text)], text or "nobody") for begin, end, text in parts
+        Span(round(begin, 2), round(end, 2), KIND_COLORS[kind_of(text)], topology_words(text))
+        for begin, end, text in parts
     ]
 
 
@@ -67,20 +71,25 @@ def semi_axis_m(estimate: EstimateTrack, grid: Array) -> Array:
 
 def _cost(data: RunData, grid: Array) -> Chart:
     own = [plan.time_s for plan in data.plans]
-    chosen = [plan.message.cost for plan in data.plans]
+    chosen = [cost_cm2(plan.message.cost) for plan in data.plans]
     others = [
         min(
-            (other.cost for other in plan.message.alternatives if other.topology != plan.message.topology),
+            (cost_cm2(other.cost) for other in plan.message.alternatives if other.topology != plan.message.topology),
             default=np.nan,
         )
         for plan in data.plans
     ]
     curves = [
-        Curve("chosen topology", TARGET_COLOR, points(held(grid, own, chosen, _PLAN_HOLDS_S), 6)),
-        Curve("best alternative (or its bound)", MUTED, points(held(grid, own, others, _PLAN_HOLDS_S), 6), dashed=True),
+        Curve("chosen topology", NEUTRAL_COLOUR, points(held(grid, own, chosen, _PLAN_HOLDS_S), 2)),
+        Curve(
+            "best alternative (or its bound)",
+            MUTED_CURVE,
+            points(held(grid, own, others, _PLAN_HOLDS_S), 2),
+            dashed=True,
+        ),
     ]
     note = "expected uncertainty over the horizon, as the planner weighed it"
-    return Chart("Plan cost", "m²", note, times(grid), curves, _spans(data, grid))
+    return Chart("Plan cost", COST_UNIT, note, times(grid), curves, _spans(data, grid))
 
 
 def _heights(data: RunData, grid: Array) -> Chart:

@@ -4,12 +4,13 @@ from itertools import cycle
 
 import numpy as np
 
+from groundstation.appearance.colours import NEUTRAL_COLOUR
 from groundstation.arrays import Array
 from groundstation.bus.messages import VehicleStatus
 from groundstation.report.accuracy import time_grid
 from groundstation.report.consistency import bounds, nees_per_dof, windowed_nis
 from groundstation.report.page.chart import Chart, Curve, held, points, thin, times
-from groundstation.report.plot_style import DRONE_COLORS, MUTED, TARGET_COLOR, color_of
+from groundstation.report.plot_style import MUTED_CURVE, SERIES_COLORS, color_of
 from groundstation.report.tracks import RunData
 
 _STATUS_HOLDS_S = 1.5
@@ -29,9 +30,9 @@ def health_charts(data: RunData, start_s: float, end_s: float) -> list[Chart]:
 def _nis(data: RunData, start_s: float, end_s: float) -> Chart:
     middles, nis, low, high = windowed_nis(data.innovations, start_s, end_s)
     curves = [
-        Curve("all observations", TARGET_COLOR, points(nis)),
-        Curve("95 % bounds", MUTED, points(low), dashed=True),
-        Curve("", MUTED, points(high), dashed=True),
+        Curve("all observations", NEUTRAL_COLOUR, points(nis)),
+        Curve("95 % bounds", MUTED_CURVE, points(low), dashed=True),
+        Curve("", MUTED_CURVE, points(high), dashed=True),
     ]
     note = "per degree of freedom in windows of 1 s; 1 is consistent, above the bounds the filter is overconfident"
     return Chart("NIS", "", note, times(middles), curves)
@@ -47,7 +48,7 @@ def _nees(data: RunData, grid: Array) -> Chart:
                 values[~truth.airborne_at(grid)] = np.nan
             curves.append(Curve(name, color_of(name, data), points(np.maximum(values, 1e-3))))
     low, high = bounds(4)
-    limits = [Curve(f"{text} bound of one robot", MUTED, [value] * len(grid), dashed=True)
+    limits = [Curve(f"{text} bound of one robot", MUTED_CURVE, [value] * len(grid), dashed=True)
               for text, value in ((f"95 % {low:.2f}", low), (f"{high:.2f}", high))]  # fmt: skip
     note = "error against the truth in units of the estimated covariance, per degree of freedom; 1 is consistent"
     return Chart("NEES", "", note, times(grid), curves and [*curves, *limits], log=True)
@@ -58,7 +59,9 @@ def _latency(data: RunData, start_s: float, end_s: float) -> Chart:
     middles = edges[:-1] + 0.5
     curves = []
     observers = sorted({item.message.observer for item in data.innovations})
-    for color, observer in zip(cycle(DRONE_COLORS), observers, strict=False):
+    fixed = cycle((NEUTRAL_COLOUR, MUTED_CURVE))
+    for observer in observers:
+        color = color_of(observer, data) if observer in data.drones else next(fixed)
         own = [(item.time_s, item.message.latency_ms) for item in data.innovations if item.message.observer == observer]
         table = np.array(own)
         window = np.searchsorted(edges, table[:, 0], side="right") - 1
@@ -98,6 +101,6 @@ def _processor(data: RunData, grid: Array) -> Chart:
     busiest = sorted(data.processes.items(), key=lambda item: -float(item[1].cpu.mean()))[:_PROCESSES_SHOWN]
     curves = [
         Curve(name, color, points(held(grid, track.time_s.tolist(), track.cpu.tolist(), 2.5)))
-        for color, (name, track) in zip(DRONE_COLORS, busiest, strict=False)
+        for color, (name, track) in zip(SERIES_COLORS, busiest, strict=False)
     ]
     return Chart("Processor", "cores", f"the {_PROCESSES_SHOWN} busiest processes", times(grid), curves)

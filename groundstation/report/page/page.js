@@ -4,6 +4,7 @@
 (() => {
   const charts = JSON.parse(document.getElementById("charts").textContent);
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const shade = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
   const HEIGHT = 170;
   const plots = [];
 
@@ -16,7 +17,7 @@
       axes: [{ ...axis, size: 24, values: (_plot, ticks) => ticks.map((tick) => (chart.axis ? `${tick} ${chart.axis}` : Number.isInteger(tick) ? `${tick}` : "")) }, { ...axis, size: 56 }],
       series: [
         { label: chart.axis ? "time" : "run", value: (_plot, value) => (value === null ? "–" : chart.axis ? `${value.toFixed(1)} ${chart.axis}` : `${value}`) },
-        ...chart.curves.map((curve) => ({ label: curve.label || "upper", stroke: curve.color, width: curve.dashed ? 1.2 : 1.8, dash: curve.dashed ? [5, 4] : undefined, points: { show: !chart.axis }, value: (_plot, value) => shown(value), spanGaps: false })),
+        ...chart.curves.map((curve) => ({ label: curve.label || "upper", stroke: curve.color[shade], width: curve.dashed ? 1.2 : 1.8, dash: curve.dashed ? [5, 4] : undefined, points: { show: !chart.axis }, value: (_plot, value) => shown(value), spanGaps: false })),
       ],
       hooks: { drawClear: [(plot) => drawSpans(plot, chart.spans)], setScale: [follow] },
     };

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 
+from groundstation.appearance.cost import COST_UNIT, cost_figure
+from groundstation.appearance.topology import topology_words
 from groundstation.report.criteria import Value
 from groundstation.report.findings import Findings
 from groundstation.report.judge import RunReport
@@ -74,11 +76,11 @@ def edges_table(findings: Findings) -> str:
 def switches_table(findings: Findings) -> str:
     """Return each change of topology with the costs of both sides."""
     rows = [
-        (f"{item.time_s:.1f}", item.before or "nobody", item.after or "nobody", number(item.cost, 5),
-         number(item.stay_cost, 5), item.reason)
+        (f"{item.time_s:.1f}", topology_words(item.before), topology_words(item.after), cost_figure(item.cost),
+         "–" if item.stay_cost is None else cost_figure(item.stay_cost), item.reason)
         for item in findings.switches
     ]  # fmt: skip
-    head = ("time [s]", "from", "to", "cost [m²]", "cost of staying [m²]", "reason")
+    head = ("time [s]", "from", "to", f"cost [{COST_UNIT}]", f"cost of staying [{COST_UNIT}]", "reason")
     return table(head, rows, "The topology never changed.")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from groundstation.report.page.chart import Chart, Curve
 from groundstation.report.page.document import holders, page
 from groundstation.report.page.tables import table
-from groundstation.report.plot_style import DRONE_COLORS
+from groundstation.report.plot_style import SERIES_COLORS
 from groundstation.report.trend import FIGURES, JudgedRun
 from groundstation.report.wording import missed, quantity, title, unit
 
@@ -25,7 +25,7 @@ def write_trend(runs: Sequence[JudgedRun], damage: Sequence[str], path: Path) ->
 
 def _chart(figure: str, runs: Sequence[JudgedRun]) -> Chart:
     numbers = [float(number) for number in range(1, len(runs) + 1)]
-    curve = Curve(title(figure), DRONE_COLORS[0], [run.figures[figure] for run in runs])
+    curve = Curve(title(figure), SERIES_COLORS[0], [run.figures[figure] for run in runs])
     return Chart(title(figure).capitalize(), unit(figure), "by number of the run", numbers, [curve], axis="")
 
 

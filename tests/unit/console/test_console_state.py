@@ -135,6 +135,7 @@ def test_sections_say_what_came() -> None:
     said = json.loads(board.since(-1))
     assert [entity["name"] for entity in said["estimate"]["entities"]] == ["drone_1", "turtlebot"]
     assert said["estimate"]["entities"][0]["cov"] == [0.04, 0.01, 0.02]
+    assert (said["plan"]["cost"], said["plan"]["words"]) == ("100 cm²", "drone_1")
     assert said["plan"]["cost_cm2"] == 100.0 and said["plan"]["controls"][0]["wanted"] == [0.5, 0, 0]
     assert said["setpoints"]["drone_1"]["at"] == 1000.0
     assert said["truth"]["turtlebot"]["yaw"] == 1.0

@@ -145,14 +145,14 @@ def test_a_pipe_gets_everything(world: World, capsys: pytest.CaptureFixture[str]
     printed = capsys.readouterr().out
     assert "vehicle" in printed and "seen by" in printed and "…" not in printed
     (row,) = (row for row in printed.splitlines() if row.startswith("topology"))
-    assert row.endswith("instead of drone_1,drone_2 150 cm2")
+    assert row.endswith("instead of drone_1 + drone_2 150 cm²")
 
 
 def test_the_plan_is_shown_beside_its_alternatives(world: World) -> None:
     world.say(t.PLAN, plan(world))
     text = world.text()
-    assert "drone_1 / drone_2" in text and "123 cm2" in text and "12 ms" in text
-    assert "instead of drone_1,drone_2 150 cm2" in text
+    assert "drone_1 over drone_2" in text and "123 cm²" in text and "12 ms" in text
+    assert "instead of drone_1 + drone_2 150 cm²" in text
 
 
 def test_a_command_is_not_confirmed_until_each_drone_has_answered(world: World) -> None:

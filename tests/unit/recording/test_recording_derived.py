@@ -17,7 +17,7 @@ from groundstation.cli.bench import bench
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.recording.capture import Entry
-from groundstation.recording.derived import ViewerChannels, camera_frames, lenses
+from groundstation.recording.derived import ViewerChannels, camera_frames
 from groundstation.recording.protobuf import fields
 from groundstation.recording.schemas import description_of
 from groundstation.recording.synthetic import write_run
@@ -84,7 +84,7 @@ def test_every_frame_has_its_place_ten_times_a_second(field: bytes, tmp_path: Pa
 
 
 def test_pictures_have_their_lens_and_a_mark_for_each_body(lab_field: ResolvedField) -> None:
-    channels = ViewerChannels(camera_frames(lab_field), lenses(lab_field))
+    channels = ViewerChannels(lab_field)
     lens = lab_field.cameras["ceiling"].calibration
     header = m.Header(5_000, "here", "ceiling", "ceiling", 0)
 

@@ -2,8 +2,8 @@
 
 import { byId, el, seconds, text } from "./dom.js";
 import { on, watch } from "./link.js";
-import { colourOf } from "./palette.js";
-import { ageS, isTarget, store } from "./store.js";
+import { colourInPicture } from "./palette.js";
+import { ageS, store } from "./store.js";
 
 const LINE_PX = 22; // of words in a picture
 const STALE_S = 1.5;
@@ -81,8 +81,7 @@ function draw(name, { canvas, bitmap, stamp }) {
   // Marks are in pixels of the calibration, which need not be those of the picture.
   const zoom = width / found.width, written = [];
   for (const mark of found.marks) {
-    const [u, v, r] = [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)], colour = colourOf(mark.subject);
-    const tint = isTarget(mark.subject) ? "#ffe14d" : colour;
+    const [u, v, r] = [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)], tint = colourInPicture(mark.subject);
     for (const [style, line] of [["#000", 5], [tint, 2.5]]) {
       g.strokeStyle = style;
       g.lineWidth = line;

@@ -1,16 +1,16 @@
 // Curves over the last two minutes, drawn by uPlot.
 
 import { byId, el, text } from "./dom.js";
-import { ink, theme } from "./palette.js";
+import { colourOf, ink } from "./palette.js";
 import { store } from "./store.js";
 
 /* global uPlot */
-const BLUE = { light: "#0072b2", dark: "#56b4e9" }, VIOLET = { light: "#7a1fa2", dark: "#d9a3f0" }, ORANGE = { light: "#c05a00", dark: "#f0a030" }, GREEN = { light: "#00694d", dark: "#57d3a6" };
+const ofTarget = () => colourOf(store.scene.targets[0]?.name);
 const HEIGHT = 118;
 const CHARTS = [
-  { title: "Target", unit: "m", curves: [["axis_m", "95 % semi-axis", BLUE], ["error_m", "true error", VIOLET]], digits: 2 },
-  { title: "Cost", unit: "cm²", curves: [["cost_cm2", "chosen topology", ORANGE]], digits: 0 },
-  { title: "NIS per degree of freedom", unit: "", curves: [["nis", "1 is honest", GREEN]], digits: 2, band: true },
+  { title: "Target", unit: "m", curves: [["axis_m", "95 % semi-axis", ofTarget], ["error_m", "true error", () => ink().truth]], digits: 2 },
+  { title: "Cost", unit: "cm²", curves: [["cost_cm2", "chosen topology", () => ink().text]], digits: 0 },
+  { title: "NIS per degree of freedom", unit: "", curves: [["nis", "1 is honest", () => ink().band]], digits: 2, band: true },
 ];
 let made = [];
 
@@ -25,7 +25,7 @@ export function buildCharts() {
 function build(chart, host) {
   const values = chart.curves.map(([, name, colour]) => {
     const swatch = el("i"), value = el("b", { class: "num" });
-    swatch.style.background = colour[theme()];
+    swatch.style.background = colour();
     return { value, node: el("span", {}, swatch, `${name} `, value) };
   });
   const root = el("div", { class: "chart" }, el("div", { class: "title" }, el("b", {}, chart.title), ...values.map(({ node }) => node)));
@@ -35,7 +35,7 @@ function build(chart, host) {
     width: Math.max(200, root.clientWidth), height: HEIGHT, legend: { show: false }, cursor: { points: { show: false } }, padding: [6, 18, 0, 0],
     scales: { x: { time: false, range: (_plot, low) => [Math.min(low ?? 0, -30), 0] }, y: { range: (_plot, _low, high) => [0, Math.max(high * 1.15, chart.band ? 2 : 1e-3)] } },
     axes: [{ ...axis, size: 20, values: (_plot, ticks) => ticks.map((tick) => (tick === 0 ? "now" : `${tick} s`)) }, { ...axis, size: 44 }],
-    series: [{}, ...chart.curves.map(([, name, colour]) => ({ label: name, stroke: colour[theme()], width: 2, points: { show: false } }))],
+    series: [{}, ...chart.curves.map(([, name, colour]) => ({ label: name, stroke: colour(), width: 2, points: { show: false } }))],
     hooks: chart.band ? { drawClear: [drawBand] } : {},
   }, [[], ...chart.curves.map(() => [])], root);
   new ResizeObserver(() => plot.setSize({ width: Math.max(200, root.clientWidth), height: HEIGHT })).observe(root);

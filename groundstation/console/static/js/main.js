@@ -9,13 +9,13 @@ import { drawHeights } from "./heights.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
 import { give, showControls, showOrders, startOrders } from "./commands.js";
-import { ink, nameRobots, startTheme } from "./palette.js";
+import { colourOf, fenceColour, ink, startTheme, takeColours } from "./palette.js";
 import { showPlan, showSwitch, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";
 import { ghostPoint, startSteering } from "./steer.js";
-import { droneNames, entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
+import { entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
 import { buildTeam, paint, showTeam, startTeam } from "./team.js";
 import { View } from "./view.js";
 
@@ -37,7 +37,7 @@ on("seed", () => {
 });
 
 function build(scene) {
-  nameRobots(droneNames());
+  takeColours(scene);
   document.title = `${scene.replay ? `REPLAY ${scene.replay.name}` : scene.site} · Skein`;
   document.body.classList.toggle("replay", replaying());
   byId("site").textContent = scene.site;
@@ -111,8 +111,8 @@ function buildLegend() {
     ["link: expected precision; dashed: unseen", svg("path", { d: "M1 7 H16", stroke: c.link, "stroke-width": 5 }), svg("path", { d: "M18 7 H30", stroke: c.link, "stroke-width": 2, "stroke-dasharray": "4 3" })],
     [`camera footprint at ${targetHeight().toFixed(1)} m`, svg("path", { d: "M4 12 L26 12 L29 2 L1 2 Z", fill: c.dim, "fill-opacity": 0.2, stroke: c.dim })],
     ["velocity × 1.5 s", svg("path", { d: "M2 7 H22 M18 3 L25 7 L18 11", stroke: c.text, "stroke-width": 2.5, fill: "none" })],
-    ["target's prediction", svg("path", { d: "M2 7 H28", stroke: c.target, "stroke-width": 2, "stroke-dasharray": "2 4" })],
-    ["fence", svg("path", { d: "M2 7 H28", stroke: c.fence, "stroke-width": 2, "stroke-dasharray": "7 4" })],
+    ["target's prediction", svg("path", { d: "M2 7 H28", stroke: colourOf(store.scene.targets[0]?.name), "stroke-width": 2, "stroke-dasharray": "2 4" })],
+    ["fence", svg("path", { d: "M2 7 H28", stroke: fenceColour(), "stroke-width": 2, "stroke-dasharray": "7 4" })],
   ];
   if (store.scene.truth) rows.push(["truth (simulation)", svg("path", { d: "M10 2 L20 12 M20 2 L10 12", stroke: c.truth, "stroke-width": 2 })]);
   byId("legend").replaceChildren(...rows.map(([words, ...shapes]) => el("li", {}, svg("svg", { viewBox: "0 0 30 14" }, ...shapes), words)));

@@ -40,7 +40,7 @@ function drawPredictionOf(g, view, target) {
   const { steps, step_s: step } = store.scene.horizon, [vx, vy] = target.velocity, [x, y] = target.mean;
   const points = [];
   for (let k = 0; k <= steps; k++) points.push([x + vx * step * k, y + vy * step * k]);
-  g.strokeStyle = g.fillStyle = ink().target;
+  g.strokeStyle = g.fillStyle = colourOf(target.name);
   g.setLineDash([3, 4]);
   g.lineWidth = 1.5;
   path(g, view, points);
@@ -77,11 +77,11 @@ export function drawBodies(g, view, stale) {
     g.globalAlpha = alpha * fade(body);
     const [x, y] = view.point(body.mean[0], body.mean[1]);
     if (body.kind === "robot") drawDrone(g, x, y, body.mean[3], Math.max(13, 0.27 * view.scale), colourOf(body.name));
-    else drawTarget(g, x, y, body.velocity, Math.max(9, 0.18 * view.scale), ink().target);
+    else drawTarget(g, x, y, body.velocity, Math.max(9, 0.18 * view.scale), colourOf(body.name));
     const age = estimateAge() + body.age_s;
     const suffix = stale || age > 1 ? ` ${age.toFixed(1)} s old` : "";
     keepClear(x, y, bodyRadius(view) / 2);
-    note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 13), body.kind === "robot" ? colourOf(body.name) : ink().text, 13, 700);
+    note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 13), colourOf(body.name), 13, 700);
   }
   g.globalAlpha = alpha;
 }

@@ -1,6 +1,6 @@
 // What does not move: floor, grid, fence, pads.
 
-import { ink } from "./palette.js";
+import { fenceColour, ink } from "./palette.js";
 import { label, path } from "./canvas.js";
 import { store } from "./store.js";
 
@@ -19,7 +19,7 @@ export function drawRoom(g, view) {
   g.lineWidth = 1.5;
   g.strokeRect(left, top, w * view.scale, h * view.scale);
   drawTicks(g, view, w, h, colours);
-  drawFence(g, view, colours);
+  drawFence(g, view);
   drawPads(g, view, colours);
 }
 
@@ -30,13 +30,13 @@ function drawTicks(g, view, w, h, colours) {
   label(g, "x, y [m]", px, py + 30, colours.dim, 11, 400, "right");
 }
 
-function drawFence(g, view, colours) {
+function drawFence(g, view) {
   const fence = store.scene.room.fence;
   if (!fence) return;
   const [x0, x1] = fence.x_m, [y0, y1] = fence.y_m;
   g.setLineDash([7, 5]);
   g.lineWidth = 1.5;
-  g.strokeStyle = colours.fence;
+  g.strokeStyle = fenceColour();
   path(g, view, [[x0, y0], [x1, y0], [x1, y1], [x0, y1]], true);
   g.stroke();
   g.setLineDash([]);

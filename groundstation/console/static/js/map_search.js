@@ -1,14 +1,14 @@
 // Where a target may be that is searched for: the darker a cell, the likelier.
 
-import { ink } from "./palette.js";
+import { colourOf } from "./palette.js";
 import { store } from "./store.js";
 
 const MOST = 0.55, LEAST = 8;
 
 export function drawSearchMaps(g, view) {
   const alpha = g.globalAlpha;
-  g.fillStyle = ink().search;
-  for (const { first, cell, columns, chances } of Object.values(store.s.search_maps ?? {})) {
+  for (const [name, { first, cell, columns, chances }] of Object.entries(store.s.search_maps ?? {})) {
+    g.fillStyle = colourOf(name);
     const side = cell * view.scale;
     chances.forEach((chance, index) => {
       if (chance < LEAST) return;

@@ -6,7 +6,6 @@ import { colourOf, ink } from "./palette.js";
 import { layers } from "./map.js";
 import { ageS, store } from "./store.js";
 
-const cost = (value) => (value >= 1e4 ? `${(value / 1e4).toFixed(2)} m²` : value >= 100 ? `${value.toFixed(0)} cm²` : `${value.toFixed(1)} cm²`);
 let shown = "";
 
 export function showPlan() {
@@ -21,10 +20,10 @@ export function showPlan() {
   const worst = Math.max(plan.cost_cm2, ...others.map((option) => option.cost_cm2), 1e-9);
   const { solver } = plan;
   node.replaceChildren(
-    el("div", { class: "chosen" }, glyph(plan.topology),
-      el("p", {}, el("span", { class: "cost num", data: { testid: "cost" } }, cost(plan.cost_cm2)), el("br"), el("strong", { data: { testid: "topology" } }, words(plan.topology)), el("br"),
+    el("div", { class: "chosen" }, glyph(plan),
+      el("p", {}, el("span", { class: "cost num", data: { testid: "cost" } }, plan.cost), el("br"), el("strong", { data: { testid: "topology" } }, plan.words), el("br"),
         el("span", { class: "dim num" }, `${solver.ms.toFixed(0)} ms, ${solver.evaluations} evaluations, ${solver.topologies} topologies, ${solver.status.toLowerCase()}`))),
-    el("div", { class: "options" }, option({ topology: plan.topology, cost_cm2: plan.cost_cm2 }, worst, plan, true), ...others.map((other) => option(other, worst, plan, false))),
+    el("div", { class: "options" }, option(plan, worst, plan, true), ...others.map((other) => option(other, worst, plan, false))),
     cuts(plan), el("div", { class: "timeline", id: "timeline" }));
   showTimeline();
 }
@@ -33,33 +32,31 @@ export function showPlan() {
 export function showSwitch() {
   const change = store.s.switch, node = byId("switch");
   node.hidden = !change || !layers.graph;
-  if (change) text(node, `Switched ${seconds(ageS(change.at))} ago from ${words(change.before)}: ${change.reason}`);
+  if (change) text(node, `Switched ${seconds(ageS(change.at))} ago from ${change.before}: ${change.reason}`);
 }
-
-const words = (topology) => topology.split("/").map((level) => level.split(",").join(" + ")).join(" over ") || "nobody in the air";
 
 function option(item, worst, plan, now) {
   const bar = el("i");
   bar.style.width = `${Math.max(2, (100 * item.cost_cm2) / worst)}%`;
-  const more = now ? "chosen" : `${item.bound_only ? "at least " : ""}${cost(item.cost_cm2)} (${item.cost_cm2 >= plan.cost_cm2 ? "+" : "−"}${Math.abs((100 * item.cost_cm2) / plan.cost_cm2 - 100).toFixed(0)} %)`;
-  return el("div", { class: `option${now ? " now" : ""}${item.bound_only ? " bound" : ""}` }, glyph(item.topology),
-    el("div", {}, el("div", { class: "name num" }, el("span", {}, words(item.topology)), el("span", {}, more)), el("div", { class: "bar" }, bar)));
+  const more = now ? "chosen" : `${item.bound_only ? "at least " : ""}${item.cost} (${item.cost_cm2 >= plan.cost_cm2 ? "+" : "−"}${Math.abs((100 * item.cost_cm2) / plan.cost_cm2 - 100).toFixed(0)} %)`;
+  return el("div", { class: `option${now ? " now" : ""}${item.bound_only ? " bound" : ""}` }, glyph(item),
+    el("div", {}, el("div", { class: "name num" }, el("span", {}, item.words), el("span", {}, more)), el("div", { class: "bar" }, bar)));
 }
 
 // Root: the fixed cameras; then the levels; leaf: the target.
-function glyph(topology) {
+function glyph({ topology, words }) {
   const levels = topology ? topology.split("/").map((level) => level.split(",")) : [];
   const width = 96, height = 78, rows = levels.length + 1, y = (row) => 9 + (row * (height - 18)) / rows;
   const x = (index, count) => (width * (index + 1)) / (count + 1);
   const nodes = [[[width / 2, y(0), null]], ...levels.map((level, row) => level.map((name, index) => [x(index, level.length), y(row + 1), name])), [[width / 2, y(rows), null]]];
-  const root = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: "glyph", role: "img", "aria-label": words(topology) });
+  const root = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: "glyph", role: "img", "aria-label": words });
   for (let row = 1; row < nodes.length; row++) for (const [ax, ay] of nodes[row - 1]) for (const [bx, by] of nodes[row]) {
     root.append(svg("line", { x1: ax, y1: ay, x2: bx, y2: by, stroke: ink().dim, "stroke-width": 2 }));
   }
   // A drone also sees the target itself if it is on the last level only: the edges above are the permitted ones.
   root.append(svg("rect", { x: width / 2 - 8, y: y(0) - 5, width: 16, height: 10, rx: 2, fill: ink().link }));
   for (const level of nodes.slice(1, -1)) for (const [cx, cy, name] of level) root.append(svg("circle", { cx, cy, r: 8, fill: colourOf(name) }));
-  root.append(svg("circle", { cx: width / 2, cy: y(rows), r: 6, fill: ink().floor, stroke: ink().target, "stroke-width": 3 }));
+  root.append(svg("circle", { cx: width / 2, cy: y(rows), r: 6, fill: ink().floor, stroke: ink().text, "stroke-width": 3 }));
   return root;
 }
 
@@ -76,7 +73,7 @@ export function showTimeline() {
   const letter = (topology) => el("b", {}, String.fromCharCode(65 + kinds.indexOf(topology)));
   const shade = (topology) => `color-mix(in srgb, #0072b2 ${15 + (50 * kinds.indexOf(topology)) / kinds.length}%, transparent)`;
   const strip = el("div", { class: "strip" }, ...runs.map((run) => {
-    const piece = el("span", { title: `${words(run.topology)}, ${((run.to - run.from) / 1000).toFixed(0)} s` }, letter(run.topology));
+    const piece = el("span", { title: `${run.topology}, ${((run.to - run.from) / 1000).toFixed(0)} s` }, letter(run.topology));
     piece.style.flex = `${run.to - run.from + 500} 0 0`;
     piece.style.background = shade(run.topology);
     return piece;
@@ -84,7 +81,7 @@ export function showTimeline() {
   const keys = kinds.map((topology) => {
     const key = letter(topology);
     key.style.background = shade(topology);
-    return el("span", {}, key, words(topology));
+    return el("span", {}, key, topology);
   });
   const span = (samples.at(-1).t_ms - samples[0].t_ms) / 1000, switches = runs.length - 1;
   host.replaceChildren(el("div", { class: "title num" }, el("span", {}, `last ${span.toFixed(0)} s`), el("span", {}, `${switches} switch${switches === 1 ? "" : "es"}`)), strip, el("div", { class: "keys" }, ...keys));

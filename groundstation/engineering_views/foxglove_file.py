@@ -10,6 +10,7 @@ from groundstation.engineering_views.field import field_of
 from groundstation.errors import MessageError
 from groundstation.recording.copies import Copied, CopyWriter, messages_of, new_copy, preamble_copy
 from groundstation.recording.reader import decode, open_recording
+from groundstation.recording.rerun import rerun_of
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.viewers import SCENE_CHANNEL
 
@@ -40,7 +41,8 @@ def _add_scenes(run: RecordedRun, writer: CopyWriter, unread: dict[str, None]) -
     described = scene_schema()
     schema = Schema(1, described.data, described.encoding, described.name)
     channel = Channel(1, SCENE_CHANNEL, "protobuf", {"derived": "for viewers"}, 1)
-    scene = FoxgloveScene(field_of(run.attachments))
+    rerun = rerun_of(run.metadata)
+    scene = FoxgloveScene(field_of(run.attachments), rerun.mark if rerun else "")
     for raw in run.records_from(run.start_ns, _DRAWN.__contains__):
         try:
             update = scene.take(raw.log_time_ns, decode(raw).message)

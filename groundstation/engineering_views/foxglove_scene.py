@@ -8,7 +8,7 @@ import numpy as np
 from foxglove import Schema
 from foxglove import messages as fm
 
-from groundstation.appearance.colours import Rgb
+from groundstation.appearance.colours import NEUTRAL_COLOUR, Rgb, rgb
 from groundstation.arrays import Array
 from groundstation.bus import messages as m
 from groundstation.engineering_views.scene import (
@@ -27,6 +27,7 @@ from groundstation.time_units import NS_PER_S
 _PERIOD_NS = NS_PER_S // 10
 _FRAME = "world"
 _HALF_BODY_M = 0.25
+_NAME_M, _MARK_M = 0.15, 0.4
 _ROOM_COLOUR: Rgb = (120, 120, 120)
 
 
@@ -36,10 +37,11 @@ def scene_schema() -> Schema:
 
 
 class FoxgloveScene:
-    """Follows the messages and gives a new scene at most ten times a second."""
+    """Follows the messages and gives a new scene at most ten times a second; mark: what stands over the room."""
 
-    def __init__(self, field: ResolvedField | None) -> None:
+    def __init__(self, field: ResolvedField | None, mark: str = "") -> None:
         self._scene = ViewScene(field)
+        self._mark = [_text(mark, self._scene.top_m, _MARK_M, rgb(NEUTRAL_COLOUR.dark))] if mark else []
         volumes = [_box(sides, VOLUME_COLOUR) for sides in self._scene.volumes.values()]
         self._static = [*_static(field), *(line for box in volumes for line in box)]
         self._links: list[SensingLink] = []
@@ -75,7 +77,7 @@ class FoxgloveScene:
         arrows = [_arrow(*arrow, self._scene.colour(name)) for name, arrow in self._arrows.items()]
         drawn = [self._body(entity, body) for body in bodies]
         cells = [_cell(cell, self._scene.colour(name)) for name in searched for cell in self._searched.get(name, ())]
-        parts = [entity("room", lines=self._static), *drawn, entity("links", lines=links)]
+        parts = [entity("room", lines=self._static, texts=self._mark), *drawn, entity("links", lines=links)]
         parts.append(entity("searched", cubes=cells))
         update: bytes = fm.SceneUpdate(entities=[*parts, entity("commanded", arrows=arrows)]).encode()
         return update
@@ -83,9 +85,7 @@ class FoxgloveScene:
     def _body(self, entity: Callable[..., fm.SceneEntity], body: Body) -> fm.SceneEntity:
         colour = self._scene.colour(body.name)
         x, y, z = body.position_m
-        label = fm.TextPrimitive(
-            pose=_pose((x, y, z + 0.3), 0.0, 0.0), billboard=True, font_size=0.15, color=_colour(colour), text=body.name
-        )
+        label = _text(body.name, (x, y, z + 0.3), _NAME_M, colour)
         cube = fm.CubePrimitive(
             pose=_pose(body.position_m, 0.0, body.yaw_rad),
             size=fm.Vector3(x=2 * _HALF_BODY_M, y=2 * _HALF_BODY_M, z=0.1),
@@ -116,6 +116,11 @@ def _cell(cell: SearchCell, own: Rgb) -> fm.CubePrimitive:
     red, green, blue = (part / 255 for part in own)
     colour = fm.Color(r=red, g=green, b=blue, a=0.7 * cell.share)
     return fm.CubePrimitive(pose=_pose(cell.centre_m, 0.0, 0.0), size=size, color=colour)
+
+
+def _text(text: str, position_m: tuple[float, float, float], height_m: float, colour: Rgb) -> fm.TextPrimitive:
+    pose = _pose(position_m, 0.0, 0.0)
+    return fm.TextPrimitive(pose=pose, billboard=True, font_size=height_m, color=_colour(colour), text=text)
 
 
 def _line(points: Iterable[Iterable[float]], colour: Rgb, thickness_m: float) -> fm.LinePrimitive:

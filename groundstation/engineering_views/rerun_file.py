@@ -8,6 +8,7 @@ from groundstation.errors import MessageError
 from groundstation.recording.file_topics import is_picture
 from groundstation.recording.outputs import OutputError, new_file
 from groundstation.recording.reader import decode, payload
+from groundstation.recording.rerun import rerun_of
 from groundstation.recording.run import RecordedRun
 
 APPLICATION = "skein"
@@ -34,7 +35,9 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     count = 0
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.paths[0].parent.name}-{run.start_ns}")
     stream.save(path, default_blueprint=blueprint(field))
-    scene = RerunScene(stream, field, run.start_ns)
+    name, rerun = run.paths[0].parent.name, rerun_of(run.metadata)
+    stream.send_recording_name(f"{name}: {rerun.mark}" if rerun else name)
+    scene = RerunScene(stream, field, run.start_ns, rerun.mark if rerun else "")
     for raw in run.records_from(run.start_ns, lambda topic: topic.type is not None or is_picture(topic)):
         try:
             if raw.key.topic.type is None:

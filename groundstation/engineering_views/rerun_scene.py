@@ -31,9 +31,9 @@ _LEVELS = {"INFO": "INFO", "WARNING": "WARN", "ERROR": "ERROR"}
 
 
 class RerunScene:
-    """Feeds one recording stream, message by message, in order of time."""
+    """Feeds one recording stream, message by message, in order of time; mark: what stands over the room."""
 
-    def __init__(self, stream: rr.RecordingStream, field: ResolvedField | None, start_ns: int) -> None:
+    def __init__(self, stream: rr.RecordingStream, field: ResolvedField | None, start_ns: int, mark: str = "") -> None:
         self._stream = stream
         self._scene = ViewScene(field)
         self._start_ns = start_ns
@@ -53,6 +53,8 @@ class RerunScene:
             m.Event: self._event,
         }
         self._log_static()
+        if mark:
+            self._log("world/mark", rr.Points3D([self._scene.top_m], labels=[mark], show_labels=True), static=True)
 
     def take(self, time_ns: int, message: m.Message) -> None:
         """Show a message; kinds that are not drawn are passed over."""

@@ -21,6 +21,7 @@ LINK_COLOUR: Rgb = (130, 130, 130)
 VOLUME_COLOUR: Rgb = (140, 150, 110)
 FENCE: Rgb = rgb(FENCE_COLOUR.dark)
 _LIKELY_AT_ALL = 0.03
+_USUAL_HEIGHT_M = 4.0
 # An arrow is as long as the way in this time.
 ARROW_S = 2.0
 
@@ -58,11 +59,12 @@ class SearchCell:
 
 class ViewScene:
     """Where everything is, as far as the messages so far say; volumes: the boxes of motion capture and ranging
-    systems [m; world].
+    systems [m; world]; top_m: where words about the whole scene stand.
     """
 
     def __init__(self, field: ResolvedField | None) -> None:
         self.field = field
+        self.top_m = (0.0, 0.0, field.room.size_m[2] if field else _USUAL_HEIGHT_M)
         self.cameras: tuple[Transform, ...] = camera_frames(field) if field else ()
         targets = field.tracked if field else {}
         self._target_heights_m = {name: target.marker.height_m for name, target in targets.items()}

@@ -52,7 +52,9 @@ class Show:
 
     def _about(self) -> dict[str, Any]:
         start, end = (self.playback.boot_ns(at) / _MS for at in (self._reel.start_ns, self._reel.end_ns))
-        return {"name": self.playback.source.name, "start_ms": start, "end_ms": end, "marks": self._marks()}
+        name, rerun = self.playback.source.name, self.playback.source.rerun
+        what, note = (rerun.mark, f"{rerun.subject}; the vehicles moved as recorded") if rerun else ("REPLAY", "")
+        return {"name": name, "what": what, "note": note, "start_ms": start, "end_ms": end, "marks": self._marks()}
 
     def _marks(self) -> list[dict[str, Any]]:
         """Return what happened when: events, and the first saying of each command."""

@@ -11,12 +11,12 @@ from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import FIELD_NAME, Preamble
 from groundstation.recording.reader import RawRecord, RecordingError, open_recording
+from groundstation.recording.rerun import Rerun
 from groundstation.recording.timeline import Timeline
 from groundstation.replay import versions
 from groundstation.replay.source import Source
 from groundstation.replay.tick_log import OUTPUTS
 from groundstation.replay.verify import Lived, Repetition
-from groundstation.report.rerun import Rerun
 
 _FACTS = "run.json"
 _REPLACED = frozenset((topic.plane, topic.name) for topic in (*OUTPUTS, JOURNAL))

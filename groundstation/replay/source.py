@@ -11,6 +11,7 @@ from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.file_topics import RAW, STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
+from groundstation.recording.rerun import Rerun, rerun_of
 
 _TYPICAL = "a run folder holds state.mcap"
 
@@ -21,7 +22,8 @@ class Source:
 
     state, raw: files in order of time, of the state those that can be read; field: the resolved field as JSON;
     run, versions: what the recorder noted of the run and of the programs; began_ns: UNIX time of the first message;
-    unix_offset_ns: UNIX time minus the run's boot clock; damage: which state files are no recording at all, and why.
+    unix_offset_ns: UNIX time minus the run's boot clock; damage: which state files are no recording at all, and why;
+    rerun: what it repeats, where it is no recorded flight.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Source:
     began_ns: int = 0
     unix_offset_ns: int = 0
     damage: tuple[str, ...] = ()
+    rerun: Rerun | None = None
 
     @property
     def resolved(self) -> ResolvedField:
@@ -82,7 +85,8 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     versions = first.metadata.get("versions", {})
     began_ns = next((record.log_time_ns for path in files for record in open_recording(path).raw_records()), 0)
     damage = tuple(f"{path.name}: {why}" for path, why in unread.items())
-    return Source(name, files, tuple(raw), first.attachments[FIELD_NAME], run, versions, began_ns, offset_ns, damage)
+    rerun, field = rerun_of(first.metadata), first.attachments[FIELD_NAME]
+    return Source(name, files, tuple(raw), field, run, versions, began_ns, offset_ns, damage, rerun)
 
 
 def _created_ns(recording: Recording) -> int:

@@ -13,9 +13,9 @@ from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Record, RecordingError, open_parts, parts
+from groundstation.recording.rerun import rerun_of
 from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
-from groundstation.report.rerun import rerun_of
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
 
 _WANTED = frozenset(

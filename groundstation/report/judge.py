@@ -6,10 +6,10 @@ from typing import Any
 
 import msgspec
 
+from groundstation.recording.rerun import Rerun
 from groundstation.report.criteria import Criterion, criteria_of, is_valid
 from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
-from groundstation.report.rerun import Rerun
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import RunData
 

@@ -12,7 +12,7 @@ from groundstation.field.behaviour import PlannerValues, SafetyValues
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Fence, Room
 from groundstation.field.targets import SingleTarget, TargetMarker
-from groundstation.report.rerun import Rerun
+from groundstation.recording.rerun import Rerun
 from groundstation.report.run_facts import RunFacts
 
 T = TypeVar("T")

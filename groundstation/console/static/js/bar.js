@@ -27,7 +27,7 @@ export function showBar() {
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
-  text(byId("verdict"), replaying() ? "" : verdict());
+  text(byId("verdict"), replaying() ? store.scene.replay.note : verdict());
   showStages(stage());
 }
 

@@ -38,7 +38,7 @@ on("seed", () => {
 
 function build(scene) {
   takeColours(scene);
-  document.title = `${scene.replay ? `REPLAY ${scene.replay.name}` : scene.site} · Skein`;
+  document.title = `${scene.replay ? `${scene.replay.what} ${scene.replay.name}` : scene.site} · Skein`;
   document.body.classList.toggle("replay", replaying());
   byId("site").textContent = scene.site;
   byId("sim").hidden = !scene.truth;

@@ -16,7 +16,8 @@ export function startPlayback() {
   const bar = byId("playback");
   bar.hidden = !replay();
   if (!replay()) return;
-  const { start_ms: start, end_ms: end, name, marks } = replay();
+  const { start_ms: start, end_ms: end, name, what, marks } = replay();
+  text(byId("replay-badge"), what);
   text(byId("replay-name"), name);
   const reel = byId("reel");
   Object.assign(reel, { min: 0, max: Math.ceil(end - start), step: 10 });

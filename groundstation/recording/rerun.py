@@ -19,11 +19,21 @@ class Rerun(msgspec.Struct, frozen=True):
         return "what-if" if self.changes else "re-run"
 
     @property
+    def mark(self) -> str:
+        """Return what stands over every view of it."""
+        return f"{self.kind.upper()}, not flown"
+
+    @property
+    def subject(self) -> str:
+        """Return what it repeats and how."""
+        how = f"with {self.changes}" if self.changes else "with its own settings"
+        return f"{self.kind} of {self.of} {how}"
+
+    @property
     def sentence(self) -> str:
         """Return what it is and what its figures are worth."""
-        how = f"with {self.changes}" if self.changes else "with its own settings"
         return (
-            f"{self.kind} of {self.of} {how}: no flight, so nothing is judged; estimates and plans were computed, "
+            f"{self.subject}: no flight, so nothing is judged; estimates and plans were computed, "
             "vehicles, safety and processes are those of the recorded flight"
         )
 

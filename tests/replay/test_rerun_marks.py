@@ -1,0 +1,83 @@
+"""A re-run is marked as not flown in the replay's page, in Rerun's file and in Foxglove's scene; a flight is not."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+from groundstation.engineering_views.foxglove_file import write_with_scene
+from groundstation.engineering_views.rerun_file import write_rrd
+from groundstation.recording.copies import messages_of, new_copy, preamble_copy
+from groundstation.recording.reader import open_recording
+from groundstation.recording.rerun import Rerun
+from groundstation.recording.run import open_run
+from groundstation.recording.synthetic import write_run
+from groundstation.recording.viewers import SCENE_CHANNEL
+from groundstation.replay.playback import Playback
+from groundstation.replay.playback_server import Show
+from groundstation.replay.source import open_source
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+
+KINDS = {"re-run": Rerun("a flight"), "what-if": Rerun("a flight", "planner.horizon_steps=3"), "flight": None}
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("marks") / "flight"
+    folder.mkdir()
+    write_run(folder, load_field(find_field("lab"), ()).model_dump_json().encode(), 0.5)
+    return folder
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def folder(kind: str, flight: Path, tmp_path: Path) -> Path:
+    """Return the folder of a recording that says which re-run it is, as `replay --output` writes it."""
+    rerun = KINDS[kind]
+    note = rerun.as_metadata() if rerun else {}
+    with new_copy(tmp_path / "state.mcap", preamble_copy(open_recording(flight / "state.mcap"), note)) as writer:
+        for index in open_run(flight / "state.mcap").indexes:
+            for message in messages_of(index):
+                writer.write(message)
+    return tmp_path
+
+
+def mark(kind: str) -> bytes:
+    return f"{kind.upper()}, not flown".encode()
+
+
+def test_the_page(kind: str, folder: Path) -> None:
+    server = Show(Playback(open_source([folder])), 38910).server
+    server._listener.close()
+    said: dict[str, Any] = json.loads(server._seed(0))["scene"]["replay"]
+    if kind == "flight":
+        assert (said["what"], said["note"]) == ("REPLAY", "")
+        return
+    assert said["what"].encode() == mark(kind)
+    assert said["note"].startswith(f"{kind} of a flight with ")
+    assert ("horizon_steps" in said["note"]) == (kind == "what-if")
+
+
+def test_the_file_for_rerun(kind: str, folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    write_rrd(open_run(folder), tmp_path / "flight.rrd")
+    # The recording's name, and the words over the room.
+    assert (tmp_path / "flight.rrd").read_bytes().count(mark(kind)) == (0 if kind == "flight" else 2)
+
+
+def test_the_scene_for_foxglove(kind: str, folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("foxglove")
+    write_with_scene(open_run(folder), tmp_path / "scene.mcap")
+    with (tmp_path / "scene.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        scenes = [message.data for _, _, message in reader.iter_messages(topics=[SCENE_CHANNEL])]
+        records = {record.name: record.metadata for record in reader.iter_metadata()}
+    assert scenes and all((mark(kind) in scene) == (kind != "flight") for scene in scenes)
+    assert ("replay" in records) == (kind != "flight"), "the copy keeps what it repeats"

@@ -54,8 +54,7 @@ class FoxgloveView:
         if entry is None:
             return
         self._say(entry)
-        derived = self._viewers.derived(entry)
-        if derived is not None:
+        for derived in self._viewers.derived(entry):
             self._say(derived)
         if entry.facts["topic"] in _DRAWN:
             self._draw(entry)

@@ -1,4 +1,4 @@
-"""Derived channels for viewers: frames (`/tf`), events as log lines (`/log`), lenses and marks in pictures."""
+"""Derived channels for viewers: frames, trajectories, events as log lines, lenses and marks in pictures."""
 
 import math
 from collections.abc import Callable
@@ -19,8 +19,18 @@ from groundstation.geometry.rotations import (
 )
 from groundstation.recording.capture import Entry
 from groundstation.recording.schemas import well_known
+from groundstation.recording.trajectories import Trajectories
 from groundstation.recording.viewer_pictures import ANNOTATIONS_PREFIX, CALIBRATION_PREFIX, annotations, calibration
-from groundstation.recording.viewers import LOG_CHANNEL, TF_CHANNEL, Transform, frame_transforms, log_line, stamp
+from groundstation.recording.viewers import (
+    LOG_CHANNEL,
+    TF_CHANNEL,
+    TRAJECTORY_PREFIX,
+    Transform,
+    frame_transforms,
+    log_line,
+    poses_in_frame,
+    stamp,
+)
 from groundstation.time_units import NS_PER_MS
 
 WORLD = "world"
@@ -81,57 +91,65 @@ class ViewerChannels:
         # Of the newest picture of each camera: its time, and the places of what it shows.
         self._seen: dict[str, tuple[int, dict[str, Vector3]]] = {}
         self._next_ns = 0
-        self._makers: dict[str, Callable[[Entry], Entry | None]] = {
-            ESTIMATE.name: self._transforms,
+        self._trajectories = Trajectories()
+        self._makers: dict[str, Callable[[Entry], tuple[Entry, ...]]] = {
+            ESTIMATE.name: self._places,
             EVENT.name: self._log,
             CAMERA_STATUS.name: self._calibration,
             OBSERVATION.name: self._annotations,
         }
 
-    def derived(self, entry: Entry) -> Entry | None:
-        """Return the viewers' extra message for an entry; None where there is nothing to add, or nothing readable."""
+    def derived(self, entry: Entry) -> tuple[Entry, ...]:
+        """Return the viewers' extra messages for an entry; none where there is nothing to add, or nothing readable."""
         make = self._makers.get(entry.facts["topic"])
         if make is None:
-            return None
+            return ()
         try:
             return make(entry)
         except (msgspec.DecodeError, ValueError, RecursionError):
-            return None  # malformed inside; the entry itself is recorded as it came
+            return ()  # malformed inside; the entry itself is recorded as it came
 
-    def _transforms(self, entry: Entry) -> Entry | None:
+    def _places(self, entry: Entry) -> tuple[Entry, ...]:
         now_ns = entry.publish_time_ns
         if self._next_ns - _TF_PERIOD_NS <= now_ns < self._next_ns:
-            return None
+            return ()
         self._next_ns = now_ns + _TF_PERIOD_NS
         bodies = tuple(_body(one) for one in _estimate.decode(entry.data).entities)
-        return self._entry(entry, TF_CHANNEL, "FrameTransforms", frame_transforms(now_ns, bodies + self._cameras))
+        frames = frame_transforms(now_ns, bodies + self._cameras)
+        return (
+            self._entry(entry, TF_CHANNEL, "FrameTransforms", frames),
+            *(
+                self._entry(entry, TRAJECTORY_PREFIX + name, "PosesInFrame", poses_in_frame(now_ns, WORLD, poses))
+                for name, poses in self._trajectories.take(now_ns, bodies).items()
+            ),
+        )
 
-    def _log(self, entry: Entry) -> Entry:
+    def _log(self, entry: Entry) -> tuple[Entry, ...]:
         event = _event.decode(entry.data)
         text = f"{event.text} ({event.remedy})" if event.remedy else event.text
         line = log_line(entry.publish_time_ns, event.severity, entry.facts["entity"], text)
-        return self._entry(entry, LOG_CHANNEL, "Log", line)
+        return (self._entry(entry, LOG_CHANNEL, "Log", line),)
 
-    def _calibration(self, entry: Entry) -> Entry | None:
+    def _calibration(self, entry: Entry) -> tuple[Entry, ...]:
         camera = entry.facts["entity"]
         lens = self._lenses.get(camera)
         if lens is None:
-            return None
+            return ()
         data = calibration(stamp(entry.log_time_ns), camera, lens)
-        return self._entry(entry, CALIBRATION_PREFIX + camera, "CameraCalibration", data)
+        return (self._entry(entry, CALIBRATION_PREFIX + camera, "CameraCalibration", data),)
 
-    def _annotations(self, entry: Entry) -> Entry | None:
+    def _annotations(self, entry: Entry) -> tuple[Entry, ...]:
         sighting = _sighting.decode(entry.data)
         lens = self._lenses.get(sighting.camera)
         if lens is None:
-            return None
+            return ()
         taken_ns, seen = self._seen.get(sighting.camera, (0, {}))
         if taken_ns != sighting.header.stamp_ns:
             seen = {}
         seen[sighting.subject] = sighting.position_m
         self._seen[sighting.camera] = (sighting.header.stamp_ns, seen)
         data = annotations(stamp(entry.log_time_ns), lens, seen, self._colours)
-        return self._entry(entry, ANNOTATIONS_PREFIX + sighting.camera, "ImageAnnotations", data)
+        return (self._entry(entry, ANNOTATIONS_PREFIX + sighting.camera, "ImageAnnotations", data),)
 
     def _entry(self, source: Entry, channel: str, kind: str, data: bytes) -> Entry:
         times = source.log_time_ns, source.publish_time_ns

@@ -3,6 +3,7 @@
 WIRE (foxglove/schemas, proto): names and numbers of the fields below. Pictures carry our header in a field of our own.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import starmap
@@ -14,6 +15,7 @@ from groundstation.time_units import NS_PER_S
 TF_CHANNEL = "/tf"
 LOG_CHANNEL = "/log"
 SCENE_CHANNEL = "/scene"
+TRAJECTORY_PREFIX = "/trajectory/"
 # Derived from messages that are recorded on their own channels too; our reader passes them over.
 _CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL, SCENE_CHANNEL))
 
@@ -70,19 +72,32 @@ _TRANSFORMS = Type(
     "FrameTransforms",
     (ProtobufField("transforms", 1, Kind.MESSAGE, ".foxglove.FrameTransform", repeated=True),),
 )
+_POSE = Type(
+    "foxglove",
+    "Pose",
+    (
+        ProtobufField("position", 1, Kind.MESSAGE, ".foxglove.Vector3"),
+        ProtobufField("orientation", 2, Kind.MESSAGE, ".foxglove.Quaternion"),
+    ),
+)
+_POSES = Type(
+    "foxglove",
+    "PosesInFrame",
+    (
+        ProtobufField("timestamp", 1, Kind.MESSAGE, _STAMP),
+        ProtobufField("frame_id", 2, Kind.STRING),
+        ProtobufField("poses", 3, Kind.MESSAGE, ".foxglove.Pose", repeated=True),
+    ),
+)
+_VECTORS = (_doubles("Vector3", "xyz"), _doubles("Quaternion", "xyzw"))
 _TYPES: dict[str, tuple[Type, ...]] = {
     "foxglove.CameraCalibration": (_TIMESTAMP, *CALIBRATION),
     "foxglove.ImageAnnotations": (_TIMESTAMP, *ANNOTATIONS),
     "foxglove.CompressedImage": (_TIMESTAMP, _IMAGE),
     "foxglove.CompressedVideo": (_TIMESTAMP, _VIDEO),
     "foxglove.Log": (_TIMESTAMP, _LOG),
-    "foxglove.FrameTransforms": (
-        _TIMESTAMP,
-        _doubles("Vector3", "xyz"),
-        _doubles("Quaternion", "xyzw"),
-        _TRANSFORM,
-        _TRANSFORMS,
-    ),
+    "foxglove.FrameTransforms": (_TIMESTAMP, *_VECTORS, _TRANSFORM, _TRANSFORMS),
+    "foxglove.PosesInFrame": (_TIMESTAMP, *_VECTORS, _POSE, _POSES),
 }
 
 
@@ -98,7 +113,7 @@ class Transform:
 
 def is_for_viewers(channel: str) -> bool:
     """Return whether a channel says for viewers what another one says already."""
-    return channel in _CHANNELS or channel.startswith(PICTURE_PREFIXES)
+    return channel in _CHANNELS or channel.startswith((*PICTURE_PREFIXES, TRAJECTORY_PREFIX))
 
 
 @cache
@@ -146,9 +161,22 @@ def frame_transforms(time_ns: int, transforms: tuple[Transform, ...]) -> bytes:
     return b"".join(blob(1, when + _transform(one)) for one in transforms)
 
 
+def poses_in_frame(time_ns: int, frame: str, poses: Iterable[Transform]) -> bytes:
+    """Return PosesInFrame: poses of one body in one frame, oldest first; time_ns: of the newest."""
+    front = blob(1, stamp(time_ns)) + blob(2, frame.encode())
+    return front + b"".join(blob(3, blob(1, place) + blob(2, turn)) for place, turn in map(_pose, poses))
+
+
 def _transform(one: Transform) -> bytes:
-    x, y, z = one.position_m
+    place, turn = _pose(one)
+    return blob(2, one.parent.encode()) + blob(3, one.child.encode()) + blob(4, place) + blob(5, turn)
+
+
+def _pose(one: Transform) -> tuple[bytes, bytes]:
+    """Return a Vector3 and a Quaternion."""
     w, *vector = one.rotation_wxyz
-    rotation = b"".join(double(number + 1, value) for number, value in enumerate((*vector, w)))
-    place = double(1, x) + double(2, y) + double(3, z)
-    return blob(2, one.parent.encode()) + blob(3, one.child.encode()) + blob(4, place) + blob(5, rotation)
+    place, turn = (
+        b"".join(double(number, value) for number, value in enumerate(values, 1))
+        for values in (one.position_m, (*vector, w))
+    )
+    return place, turn

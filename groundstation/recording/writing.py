@@ -47,8 +47,7 @@ class RunWriter:
             if entry is None:
                 continue
             write(entry, now_ns)
-            for_viewers = derived(entry)
-            if for_viewers is not None:
+            for for_viewers in derived(entry):
                 write(for_viewers, now_ns)
 
     def tick(self, now_ns: int) -> None:

@@ -41,7 +41,7 @@ def _tree(data: bytes, inner: tuple[int, ...]) -> dict[int, Any]:
     }
 
 
-@pytest.mark.parametrize("name", ["CompressedImage", "CompressedVideo", "Log", "FrameTransforms"])
+@pytest.mark.parametrize("name", ["CompressedImage", "CompressedVideo", "Log", "FrameTransforms", "PosesInFrame"])
 def test_descriptors_agree(name: str) -> None:
     ours = _types(viewer_descriptor(f"foxglove.{name}"))
     theirs = _types(getattr(fm, name).get_schema().data)
@@ -81,3 +81,20 @@ def test_transforms_agree() -> None:
     rotation = {number: value for number, value in fields(_named(mine, 5)[0]) if value != bytes(8)}
     assert rotation == dict(fields(_named(other, 5)[0]))  # theirs leaves zeros out
     assert _tree(mine, (1, 4)) | {5: None} == _tree(other, (1, 4)) | {5: None}
+
+
+def test_poses_agree() -> None:
+    poses = [Transform("world", "drone_1", (float(x), -2.0, 1.5), (0.8, 0.1, 0.1, 0.6)) for x in (1, 2)]
+    theirs = fm.PosesInFrame(
+        timestamp=STAMP,
+        frame_id="world",
+        poses=[
+            fm.Pose(
+                position=fm.Vector3(x=float(x), y=-2.0, z=1.5), orientation=fm.Quaternion(x=0.1, y=0.1, z=0.6, w=0.8)
+            )
+            for x in (1, 2)
+        ],
+    )
+    ours = viewers.poses_in_frame(TIME_NS, "world", poses)
+    assert _tree(ours, (1,)) == _tree(theirs.encode(), (1,))
+    assert [_tree(one, (1, 2)) for one in _named(ours, 3)] == [_tree(one, (1, 2)) for one in _named(theirs.encode(), 3)]

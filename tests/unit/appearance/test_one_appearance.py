@@ -92,8 +92,8 @@ def test_names_in_pictures(field: ResolvedField, expected: dict[str, Colour]) ->
         )  # fmt: skip
         facts = {"topic": OBSERVATION.name, "entity": "ceiling"}
         data, described = msgspec.json.encode(sighting), description_of(OBSERVATION)
-        made = channels.derived(Entry("gs/x", 7, 7, 0, data, described, facts))
-        assert made is not None and shade_of(inner(made.data, 1, 6)) == rgb(expected[name].dark)
+        (made,) = channels.derived(Entry("gs/x", 7, 7, 0, data, described, facts))
+        assert shade_of(inner(made.data, 1, 6)) == rgb(expected[name].dark)
 
 
 def test_foxglove(field: ResolvedField, expected: dict[str, Colour]) -> None:

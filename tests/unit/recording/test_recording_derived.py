@@ -94,8 +94,8 @@ def test_pictures_have_their_lens_and_a_mark_for_each_body(lab_field: ResolvedFi
             camera="ceiling", position_m=place, yaw_rad=None, covariance=(0.0,) * 9,
         )  # fmt: skip
         entry = entry_of(OBSERVATION, msgspec.json.encode(message))
-        found = channels.derived(entry)
-        assert found is not None and (found.channel, found.derived) == ("/annotations/ceiling", True)
+        (found,) = channels.derived(entry)
+        assert (found.channel, found.derived) == ("/annotations/ceiling", True)
         circles = [dict(fields(body)) for number, body in fields(found.data) if number == 1 and isinstance(body, bytes)]
         return [value for circle in circles for value in _numbers(circle, 2)]
 
@@ -106,8 +106,8 @@ def test_pictures_have_their_lens_and_a_mark_for_each_body(lab_field: ResolvedFi
     assert len(sighting("drone_2", (0.5, 0.0, 3.0), 1)) == 4, "two bodies of one picture"
     assert len(sighting("drone_2", (0.5, 0.0, 3.0), 2)) == 2, "another picture"
     assert sighting("drone_2", (0.5, 0.0, -3.0), 3) == [], "behind the camera"
-    found = channels.derived(entry_of(CAMERA_STATUS, b"{}"))
-    assert found is not None and found.channel == "/calibration/ceiling"
+    (found,) = channels.derived(entry_of(CAMERA_STATUS, b"{}"))
+    assert found.channel == "/calibration/ceiling"
     by_number: dict[int, list[float]] = {}
     for number, value in fields(found.data):
         if number in (5, 6, 8) and isinstance(value, bytes):
@@ -131,7 +131,7 @@ def test_a_message_that_is_malformed_inside_costs_the_viewers_line_only(topic: s
 
     described = description_of(ESTIMATE if topic == "estimate" else EVENT)
     entry = Entry("gs/x", 1, 1, 0, data, described, {"topic": topic, "entity": "team"})
-    assert ViewerChannels().derived(entry) is None
+    assert ViewerChannels().derived(entry) == ()
 
 
 def test_a_field_without_cameras_has_no_camera_frames(lab_field: ResolvedField) -> None:

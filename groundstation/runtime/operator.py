@@ -203,7 +203,8 @@ class Operator:
         if not self._is_partial(stop):
             self._end_starts(stop, now_ns)
             if self.phase is not TeamPhase.LANDING:
-                self.phase = TeamPhase.HELD if stop.verb is Verb.HOLD else TeamPhase.LANDING
+                if self.phase is not TeamPhase.GROUND or not self.landed(now_ns):
+                    self.phase = TeamPhase.HELD if stop.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{stop.verb} by {stop.issuer}")
         elif self._sequence is not None:
             for name in stop.scope:

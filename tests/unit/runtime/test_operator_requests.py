@@ -228,3 +228,16 @@ def test_a_stop_that_no_driver_obeys_changes_nothing(run, age_s, phase):
     desk.turn()
     assert desk.operator.phase is phase
     assert bool(desk.said) is (phase is TeamPhase.LANDING)
+
+
+@pytest.mark.parametrize("verb", [Verb.LAND, Verb.HOLD, Verb.CUT_MOTORS])
+def test_a_stop_before_the_take_off_leaves_the_team_on_the_ground(verb):
+    desk = Desk(drone_1=DOWN)
+    desk.send(desk.command(verb, identity="x"))
+    desk.turn()
+    assert desk.operator.phase is TeamPhase.GROUND and f"{verb} by cli_1" in desk.said
+    desk.drones["drone_1"] = (desk.drones["drone_1"][0], UP)  # its pilot took off by remote control
+    desk.turn()
+    desk.send(desk.command(verb, identity="y"))
+    desk.turn()
+    assert desk.operator.phase is (TeamPhase.HELD if verb is Verb.HOLD else TeamPhase.LANDING)

@@ -1,0 +1,76 @@
+"""A flight that waits for Enter: what else is pressed meanwhile does not take the prompt away."""
+
+import os
+import time
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.flight import loop
+from groundstation.flight.flight_plan import FlightPlan
+from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.supervisor.start import Start
+from groundstation.supervisor.supervisor import Supervisor
+from groundstation.supervisor.terminal import Terminal
+
+_LONGEST_S = 5.0
+
+
+class Waiting:
+    """A run whose drone stands; a page presses HOLD at the first turn, the keyboard Enter at the fifth."""
+
+    def __init__(self, keyboard: int) -> None:
+        exchange = MemoryExchange()
+        self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
+        self._page = MemoryBus(exchange, "lab", "console")
+        self._orders = self._drone.subscribe([t.COMMAND])
+        self.run = SimpleNamespace(drones=("drone_1",))
+        self.interrupts = SimpleNamespace(stop_requested=False, hurry=False)
+        self.failure, self.unwell = "", list[str]()
+        self.said: list[str] = []
+        self.heard: list[m.Verb] = []
+        self._keyboard, self._turns, self._began = keyboard, 0, time.monotonic()
+
+    def step(self) -> None:
+        self._turns += 1
+        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=m.FlightState.LANDED, mode="LANDED")
+        self._drone.publish(t.VEHICLE_STATUS, status)
+        self.heard += [r.message.verb for r in self._orders.drain() if isinstance(r.message, m.Command)]
+        if self._turns == 1:
+            header = self._page.header("team")
+            hold = m.Command(header=header, id="page-1", verb=m.Verb.HOLD, scope=(), issuer="console")
+            self._page.publish(t.COMMAND, hold)
+        if self._turns == 5:
+            os.write(self._keyboard, b"\n")
+        late = time.monotonic() - self._began > _LONGEST_S
+        self.interrupts.stop_requested = late or m.Verb.TAKEOFF in self.heard
+        time.sleep(0.002)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    read, write = os.pipe()
+    monkeypatch.setattr(loop, "_STDIN", read)
+    yield write
+    os.close(read)
+    os.close(write)
+
+
+def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_none(keyboard: int) -> None:
+    waiting = Waiting(keyboard)
+    terminal = cast(Terminal, SimpleNamespace(say=waiting.said.append, unmute=lambda: None))
+    plan = FlightPlan(None, asks=True, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
+    flight = loop.Flight(cast(Supervisor, waiting), plan, terminal)
+    flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
+    flight.run()
+    assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after HOLD as before it"
+    assert any("HOLD by console" in line for line in waiting.said)
+    assert not any("landed by themselves" in line for line in waiting.said)

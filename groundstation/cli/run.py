@@ -17,6 +17,7 @@ from groundstation.cli.numbers import FiniteRange
 if TYPE_CHECKING:
     from groundstation.flight.composition import Simulation
     from groundstation.flight.flight_plan import FlightPlan
+    from groundstation.flight.loop import FlightOutcome
     from groundstation.report.judge import RunReport
     from groundstation.report.run_facts import RunFacts
     from groundstation.settings.schema import Field
@@ -210,19 +211,27 @@ def _run(
         terminal.say(f"recording.keep_gb {field.recording.keep_gb:g}: removed {names} ({size:.1f} GB)")
     real = tuple(simulation.real.drones) if simulation else tuple(field.drones)
     run = Run(field.site, str(path), endpoint, run_dir, tuple(field.drones), real, field.bus.listen)
-    outcome = Flight(Supervisor(run, table, terminal), plan, terminal).run()
-    terminal.flush()
-    if plan.look_only:
-        require_outcome(outcome)
-        return ExitCode.FAILED if outcome.forbidden else ExitCode.OK
-    passed = _judge(run_dir, report) if field.recording.enabled else None
+    supervisor = Supervisor(run, table, terminal)
+    try:
+        outcome = Flight(supervisor, plan, terminal).run()
+        terminal.flush()
+        judged = field.recording.enabled and not plan.look_only
+        passed = _judge(run_dir, report) if judged else None
+    finally:
+        supervisor.close()  # the page has shown by then what the run came to
     require_outcome(outcome)
-    if passed is None:
-        return ExitCode.OK if outcome.landed else ExitCode.FAILED
-    if outcome.interrupted and plan.duration_s is not None:
+    return _exit_code(outcome, plan, passed, judged_by_landing=facts.mode == "fly")
+
+
+def _exit_code(
+    outcome: "FlightOutcome", plan: "FlightPlan", passed: bool | None, *, judged_by_landing: bool
+) -> ExitCode:
+    if plan.look_only:
+        return ExitCode.FAILED if outcome.forbidden else ExitCode.OK
+    if passed is not None and outcome.interrupted and plan.duration_s is not None:
         return ExitCode.INTERRUPTED
-    if facts.mode == "fly" or plan.duration_s is None:
-        return ExitCode.OK if outcome.landed else ExitCode.FAILED
+    if passed is None or judged_by_landing or plan.duration_s is None:
+        passed = outcome.landed
     return ExitCode.OK if passed else ExitCode.FAILED
 
 
@@ -241,8 +250,7 @@ def _build(run_dir: Path) -> "RunReport":
 def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
     """Write and print the report; None when there is nothing to judge. Never lets a closed terminal hide it."""
     from groundstation.errors import GroundStationError
-    from groundstation.report.build import HTML_NAME, PLOT_NAME
-    from groundstation.report.judge import JSON_NAME
+    from groundstation.report.file_names import HTML_NAME, JSON_NAME, PLOT_NAME
 
     try:
         built = _build(run_dir)

@@ -10,10 +10,14 @@ from urllib.parse import parse_qs, urlsplit
 from groundstation.console.cookies import cookie_of
 from groundstation.console.devices import DeviceRole, Devices
 from groundstation.process.ports import user_of
+from groundstation.report.page import inline
 
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
 ROLE = "skein.role"
+# Pages keep the report of their run, and show it under the policy of the console.
+_SCRIPTS = f"'self' {inline.source_of(inline.script())}"
+_STYLES = f"'self' {inline.source_of(inline.style())}"
 Asgi = Callable[[Any, Any, Any], Awaitable[None]]
 
 
@@ -43,7 +47,7 @@ def _hostname(url: str) -> str:
 def security_headers(host: str) -> list[tuple[bytes, bytes]]:
     """Return the headers of every answer: nothing from elsewhere, no framing, no guessing of types, no copies kept."""
     policy = (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+        f"default-src 'none'; script-src {_SCRIPTS}; style-src {_STYLES}; img-src 'self' blob: data:; "
         f"connect-src 'self' ws://{host} wss://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
     return [

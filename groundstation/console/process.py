@@ -1,6 +1,7 @@
 """The console process of a run. Started as `groundstation.console.process:run`; `groundstation console` serves too."""
 
 import asyncio
+from pathlib import Path
 
 import msgspec
 
@@ -9,6 +10,7 @@ from groundstation.bus.messages import Severity
 from groundstation.console.devices import Devices
 from groundstation.console.network import Network
 from groundstation.console.room import scene_from_field
+from groundstation.console.run_end import read_end
 from groundstation.console.section import ConsoleSection, devices_of, run_id
 from groundstation.console.server import HOST, ConsoleServer, claim_port
 from groundstation.errors import GroundStationError
@@ -48,6 +50,7 @@ def run(child: Child) -> int:
     def go_on(turns: int, late: int) -> bool:
         nonlocal leaves_ns
         child.beat()
+        server.closed = child.run_ends
         child.tick_status(turns, late, server.overflowed)
         if refused := intrusions.news(now_ns(), server.refused):
             child.event(Severity.WARNING, f"the console refused {refused}")
@@ -56,7 +59,7 @@ def run(child: Child) -> int:
         leaves_ns = leaves_ns or now_ns() + _OVERTAKEN_NS
         return not server.ended and now_ns() < leaves_ns
 
-    asyncio.run(server.serve(go_on))
+    asyncio.run(server.serve(go_on, lambda: read_end(Path(section.run_dir))))
     return 0
 
 

@@ -53,6 +53,10 @@ class FramesHandled(FromPage, frozen=True, tag="seen"):
     seq: int
 
 
+class EndKept(FromPage, frozen=True, tag="kept"):
+    """The page holds all that it shows of a run that is over."""
+
+
 class Watch(FromPage, frozen=True):
     """The cameras whose pictures are wanted."""
 
@@ -106,7 +110,8 @@ class StepReplay(FromPage, frozen=True, tag="step"):
 
 
 Playing = Play | Speed | Seek | StepReplay
-PageMessage = Hello | CommandRequest | TakeOver | Release | FramesHandled | Watch | Drive | Place | FollowPath | Playing
+Steering = Drive | Place | FollowPath
+PageMessage = Hello | CommandRequest | TakeOver | Release | FramesHandled | EndKept | Watch | Steering | Playing
 _decoder: msgspec.json.Decoder[PageMessage] = msgspec.json.Decoder(PageMessage)
 
 

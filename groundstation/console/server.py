@@ -39,6 +39,7 @@ from groundstation.console.pages import load_pages
 from groundstation.console.pictures import PictureDesk
 from groundstation.console.player import Player
 from groundstation.console.room import lenses_of
+from groundstation.console.run_end import REPORT_PATH, RunEnd
 from groundstation.console.session import Sessions
 from groundstation.console.snapshot import Snapshot
 from groundstation.console.state import NO_CAMERAS, ConsoleState
@@ -51,6 +52,8 @@ RATE_HZ = 20
 HOST = "127.0.0.1"
 _PORTS_TRIED = 10
 _FAREWELL_S = 0.5
+# For devices behind a slow radio; pages on this host hold a report within a tenth of a second.
+_KEEPING_S = 3.0
 # Small, so that frames wait here, where the newest wins, and not in the kernel.
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
@@ -114,12 +117,21 @@ class ConsoleServer:
         self.half_open, self.peers = HalfOpen(), PeerLimit()
         self._code = CodeFile(listener.getsockname()[1])
         door = Door(self._code.code, str(self._code.path))
-        pages = load_pages(token, run)
+        self._pages = load_pages(token, run)
         self.app = ConsoleApp(
-            pages, token, self.board, self.sessions, self._seed, self._now_ns, door, network.door if network else None
+            self._pages,
+            token,
+            self.board,
+            self.sessions,
+            self._seed,
+            self._now_ns,
+            door,
+            network.door if network else None,
         )
         self._run = run
         self._end: Event | None = None
+        self._result: RunEnd | None = None
+        self.closed = False
         less_often = (*_LESS_OFTEN, TRUTH) if scene["truth"] else _LESS_OFTEN
         self._newest = bus.subscribe(_NEWEST, newest=True)
         self._less_often = bus.subscribe(less_often, newest=True)
@@ -143,8 +155,8 @@ class ConsoleServer:
         """Messages that came faster than they were taken."""
         return self._each.overflowed
 
-    async def serve(self, go_on: Callable[[int, int], bool]) -> None:
-        """Serve until `go_on(turns, late turns)`, asked in each turn, says no."""
+    async def serve(self, go_on: Callable[[int, int], bool], end: Callable[[], RunEnd | None] = lambda: None) -> None:
+        """Serve until `go_on(turns, late turns)`, asked in each turn, says no; then show `end` to the open pages."""
         servers = [serve(self.app.asgi, self._listener, protocol(self.half_open))]
         if self._network is not None and self.app.network is not None:
             http = protocol(self.half_open, self.peers)
@@ -152,7 +164,7 @@ class ConsoleServer:
         try:
             with self._code:
                 await self._turns(go_on, servers[0][1])
-                await self._say_farewell()
+                await self._say_farewell(end())
         finally:
             for server, _ in servers:
                 server.should_exit = True
@@ -170,13 +182,19 @@ class ConsoleServer:
                 due_s = loop.time()
             await asyncio.sleep(due_s - loop.time())
 
-    async def _say_farewell(self) -> None:
-        """Let the viewers know how the run ended before their connections close."""
+    async def _say_farewell(self, end: RunEnd | None) -> None:
+        """Let the viewers know how the run ended, and keep its report, before their connections close."""
+        self._result = end
+        if end is not None and end.report is not None:
+            self._pages[REPORT_PATH] = end.report
         self.turn(self._now_ns())
-        loop, viewers = asyncio.get_running_loop(), self.sessions.viewers
-        give_up_s = loop.time() + _FAREWELL_S
-        while self.ended and loop.time() < give_up_s and any(viewer.is_behind for viewer in viewers.values()):
+        loop = asyncio.get_running_loop()
+        give_up_s = loop.time() + (_FAREWELL_S if end is None else _KEEPING_S)
+        while self.ended and loop.time() < give_up_s and self._is_anybody_behind(end is not None):
             await asyncio.sleep(0.01)
+
+    def _is_anybody_behind(self, judged: bool) -> bool:
+        return any(viewer.is_behind or (judged and not viewer.keeps_end) for viewer in self.sessions.viewers.values())
 
     def turn(self, now_ns: int) -> None:
         """Take in new messages and update the viewers."""
@@ -234,7 +252,11 @@ class ConsoleServer:
         self.board.put("orders", self.sessions.desk.summary())
         self.board.put("session", self.sessions.summary(now_ns))
         if self._end is not None:
-            self.board.put("ended", {"text": self._end.text, "severity": self._end.severity})
+            at_ms = self._end.header.stamp_ns / 1e6
+            ended = {"text": self._end.text, "severity": self._end.severity, "at": at_ms, "closed": self.closed}
+            self.board.put("ended", ended)
+        if self._result is not None:
+            self.board.put("result", self._result.section())
         if self._player is not None:
             self.board.put("playback", self._player.section())
             self.board.put("passed", self.state.history.take_passed())

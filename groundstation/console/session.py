@@ -18,6 +18,7 @@ from groundstation.console.player import Player
 from groundstation.console.protocol import (
     CommandRequest,
     Drive,
+    EndKept,
     FollowPath,
     FramesHandled,
     Hello,
@@ -28,6 +29,7 @@ from groundstation.console.protocol import (
     Release,
     Seek,
     Speed,
+    Steering,
     StepReplay,
     TakeOver,
     Watch,
@@ -108,6 +110,8 @@ class Sessions:
         match message:
             case FramesHandled(seq=seq):
                 viewer.saw(seq)
+            case EndKept():
+                viewer.keeps_end = True
             case Watch(cameras=cameras):
                 self._watch(viewer, frozenset(cameras))
             case Hello():
@@ -187,7 +191,7 @@ class Sessions:
             if replaced and other is not viewer:
                 other.say(encoded("notice", text=text, grave=False, ref=""))
 
-    def _steer(self, viewer: PageConnection, message: Drive | Place | FollowPath) -> None:
+    def _steer(self, viewer: PageConnection, message: Steering) -> None:
         if not self._targets:
             self._refuse(viewer, "not_simulated", "the target is real: it cannot be steered from here")
             return

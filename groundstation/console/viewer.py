@@ -35,7 +35,7 @@ class PageConnection:
         self.client = ""
         self.trusted = False
         self.role = DeviceRole.COMMAND
-        self.too_slow = False
+        self.too_slow = self.keeps_end = False
         self.watched: frozenset[str] = frozenset()
         self.skipped = 0
         self._board = board

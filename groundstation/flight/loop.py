@@ -49,13 +49,13 @@ class Flight:
         self._forbidden = False
 
     def run(self) -> FlightOutcome:
-        """Start, fly, land, stop. Raises GroundStationError when the start failed; everything is stopped then too."""
+        """Start, fly, land, end the run. Raises GroundStationError when the start failed; the run is ended then too."""
         try:
             outcome = self._start_and_fly()
             self._announce(*end_of(outcome))
             return outcome
         finally:
-            self._supervisor.close()
+            self._supervisor.end_run()
             self._terminal.unmute()
 
     def _start_and_fly(self) -> FlightOutcome:

@@ -2,13 +2,15 @@
 
 import logging
 import os
+import shlex
+import sys
 import time
 from datetime import UTC, datetime
 from pathlib import Path
 
 import msgspec
 
-from groundstation.errors import GroundStationError, OperatorMistake
+from groundstation.errors import GroundStationError, OperatorMistake, without_passwords
 from groundstation.process.log import DiscreetFormatter
 from groundstation.report import run_facts
 from groundstation.supervisor import kernels
@@ -49,7 +51,9 @@ def _free_bytes(path: Path) -> int:
 def write_facts(run_dir: Path, facts: run_facts.RunFacts) -> None:
     """Write how the run was asked for, and when this process was started: the operator waits from then on."""
     command_ns, lacked = time.time_ns() - _age_ns(), not kernels.are_compiled()
-    run_facts.write(run_dir, msgspec.structs.replace(facts, command_unix_ns=command_ns, kernels_lacked=lacked))
+    typed = without_passwords(shlex.join(["groundstation", *sys.argv[1:]]))
+    known = msgspec.structs.replace(facts, command_unix_ns=command_ns, kernels_lacked=lacked, command=typed)
+    run_facts.write(run_dir, known)
 
 
 def _age_ns() -> int:

@@ -137,6 +137,11 @@ class Child:
         return self._block.age_ns(SUPERVISOR_SLOT, time.monotonic_ns()) < _SUPERVISOR_STALE_NS
 
     @property
+    def run_ends(self) -> bool:
+        """Whether the supervisor stops the processes of the run, so that no order reaches a drone any more."""
+        return self._block is not None and self._block.state(SUPERVISOR_SLOT) is SlotState.STOPPING
+
+    @property
     def spoken_for_ns(self) -> int:
         """For how long others have been speaking in this process's place [ns], 0: nobody does."""
         since_ns = self.spec.spoken_since_ns

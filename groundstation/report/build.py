@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
+from groundstation.report.file_names import HTML_NAME, JSON_NAME, PLOT_NAME
 from groundstation.report.gather import gather
-from groundstation.report.judge import JSON_NAME, RunReport, judge
-
-HTML_NAME = "report.html"
-PLOT_NAME = "trajectories.png"
+from groundstation.report.judge import RunReport, judge
 
 
 def build_report(run_dir: Path, *, plot: bool = True) -> RunReport:

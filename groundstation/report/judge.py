@@ -12,9 +12,9 @@ from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import RunData
+from groundstation.report.wording import missed
 
 SCHEMA_VERSION = 1
-JSON_NAME = "report.json"
 _DAMAGE_LINES = 20
 
 
@@ -39,6 +39,15 @@ class RunReport:
         return self.valid and all(criterion.ok for criterion in self.criteria)
 
     @property
+    def reasons(self) -> tuple[str, ...]:
+        """Return why it did not pass, in words; nothing where it did, or where there is nothing to judge."""
+        if self.passed is not False:
+            return ()
+        if not self.valid:
+            return ("the simulator did not keep real time",)
+        return tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
+
+    @property
     def verdict(self) -> str:
         """Return passed, failed or invalid; re-run or what-if where there is nothing to judge."""
         if self.rerun is not None:
@@ -50,6 +59,8 @@ class RunReport:
         content: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
             "passed": self.passed,
+            "verdict": self.verdict,
+            "reasons": self.reasons,
             "valid": self.valid,
             "rerun": self.rerun,
             "criteria": self.criteria,

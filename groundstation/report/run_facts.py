@@ -12,7 +12,7 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
 
     mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
     tracking asked for; kernels_lacked: whether they had to be compiled first, once per version; real: what of a
-    simulated run was not emulated.
+    simulated run was not emulated; command: what was typed, without passwords.
     """
 
     mode: str = ""
@@ -23,6 +23,7 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     tracking_s: float | None = None
     kernels_lacked: bool = False
     real: tuple[str, ...] = ()
+    command: str = ""
 
 
 def write(run_dir: Path, facts: RunFacts) -> None:

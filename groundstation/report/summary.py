@@ -5,12 +5,12 @@ from rich.table import Table
 from rich.text import Text
 
 from groundstation.appearance.topology import topology_words
-from groundstation.report.build import HTML_NAME, PLOT_NAME
 from groundstation.report.compare import differences, labels
 from groundstation.report.criteria import Criterion
+from groundstation.report.file_names import HTML_NAME, JSON_NAME, PLOT_NAME
 from groundstation.report.happenings import Happening
-from groundstation.report.judge import JSON_NAME, RunReport
-from groundstation.report.wording import KIND_WORDS, bound, missed, quantity, title
+from groundstation.report.judge import RunReport
+from groundstation.report.wording import KIND_WORDS, bound, quantity, title
 
 _HAPPENINGS_SHOWN = 12
 _DOUBTS_SHOWN = 3
@@ -61,9 +61,8 @@ def _verdict(report: RunReport) -> Text:
         return Text("PASSED", style="bold green")
     if not report.valid:
         remedy = "close other programs, see what `groundstation doctor` says of this computer, and repeat"
-        return Text(f"INVALID: the simulator did not keep real time; {remedy}", style="bold red")
-    failed = [criterion for criterion in report.criteria if not criterion.ok]
-    return Text(f"FAILED: {'; '.join(missed(one) for one in failed)}", style="bold red")
+        return Text(f"INVALID: {'; '.join(report.reasons)}; {remedy}", style="bold red")
+    return Text(f"FAILED: {'; '.join(report.reasons)}", style="bold red")
 
 
 def _criteria(criteria: tuple[Criterion, ...]) -> Table:

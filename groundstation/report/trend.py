@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 
 from groundstation.report.criteria import Criterion
-from groundstation.report.judge import JSON_NAME
+from groundstation.report.file_names import JSON_NAME
 from groundstation.report.run_facts import RunFacts
 
 # Figures that a lab watches from flight to flight, in the order of the page.

@@ -57,7 +57,7 @@ class ProcessSpec:
     READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it.
     on_terminal: it writes to the operator's terminal. entities: the vehicles or the camera that a device speaks of.
     kernels: it computes with compiled kernels, which are made before anything starts. nice: its share of the processor,
-    beside that of others (docs/decisions/0137).
+    beside that of others (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152).
     """
 
     name: str
@@ -81,6 +81,7 @@ class ProcessSpec:
     entities: tuple[str, ...] = ()
     kernels: bool = False
     nice: int = 0
+    shows_end: bool = False
 
     @property
     def is_router(self) -> bool:

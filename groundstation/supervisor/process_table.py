@@ -93,7 +93,8 @@ CONSOLE = ProcessSpec(
     nice=_NEEDED,  # a stop that is clicked goes through it
     silence_limit_s=5.0,
     hang_limit_s=5.0,
-    stop_order=StopOrder.DRIVES,
+    shows_end=True,
+    stop_limit_s=6.0,  # open pages fetch the report
 )
 MONITOR = ProcessSpec(
     name="monitor",

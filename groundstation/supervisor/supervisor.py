@@ -83,8 +83,7 @@ class Supervisor:
         """Open the transports of fail-safe datagrams; a link whose driver cannot use it either fails its start."""
         for process in self.processes:
             words = process.spec.failsafe_datagrams
-            why = "" if words is None else self._last_words.prepare(process.spec.name, words)
-            if why:
+            if words is not None and (why := self._last_words.prepare(process.spec.name, words)):
                 _log.error("nobody could speak for %s: %s", process.spec.name, why)
 
     def _make_identities(self) -> None:
@@ -256,9 +255,8 @@ class Supervisor:
         delay_s = process.schedule_restart(now_ns)
         process.ready_ns = 0
         severity = Severity.ERROR if process.storms else Severity.WARNING
-        self.events.event(
-            severity, process, f"{why}; restarting" + (f" in {delay_s:.1f} s" if delay_s else ""), "see its log"
-        )
+        soon = f" in {delay_s:.1f} s" if delay_s else ""
+        self.events.event(severity, process, f"{why}; restarting{soon}", "see its log")
 
     def fail(self, process: ManagedProcess, why: str) -> None:
         """End the run: a process that it needs has failed."""
@@ -269,12 +267,12 @@ class Supervisor:
     # --- stop ----------------------------------------------------------------------------------------------------
 
     def stop(self) -> None:
-        """Stop everything in order, each with its deadline; a hurrying operator gets all of it at once."""
+        """Stop all but what shows the end, in order, each with its deadline; a hurrying operator gets all at once."""
         self._stopping = True
         self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian speaks for who dies
         for order in StopOrder:
             running = [p for p in self.processes if p.running]
-            group = [p for p in running if p.spec.stop_order is order]
+            group = [p for p in running if p.spec.stop_order is order and not p.spec.shows_end]
             if self.interrupts.hurry and order is not StopOrder.GUARDS:
                 group = [p for p in running if p.spec.stop_order is not StopOrder.GUARDS]
             self._stop_group(group)
@@ -301,8 +299,8 @@ class Supervisor:
             process.abandon()
             self.events.event(Severity.ERROR, process, f"cannot be killed (pid {process.pid}): left behind")
 
-    def close(self) -> None:
-        """Leave nothing behind: bus, runtime file, heartbeat block, log files; idempotent."""
+    def end_run(self) -> None:
+        """Stop all but what shows the end, and leave the bus: the run can be judged; idempotent."""
         self.stop()
         if self.bus is not None:
             self.bus.close()
@@ -310,8 +308,13 @@ class Supervisor:
         if self._record is not None:
             runtime_file.remove(self._record)
             self._record = None
+        go_back()
+
+    def close(self) -> None:
+        """Leave nothing behind: processes, heartbeat block, log files; idempotent."""
+        self.end_run()
+        self._stop_group([p for p in self.processes if p.running])
         if self._identities is not None:
             shutil.rmtree(self._identities, ignore_errors=True)
         self._launcher.close()
         self._block.path.unlink(missing_ok=True)
-        go_back()

@@ -1,11 +1,18 @@
 """What the page says when a run has ended, and that it is the next run's page afterwards."""
 
+import json
+import time
+from pathlib import Path
 from typing import Any
 
 import pytest
 from seen_page import Seen, eventually
 
 from groundstation.bus.messages import RUN, Severity
+from groundstation.report import run_facts
+from groundstation.report.file_names import HTML_NAME, JSON_NAME
+from groundstation.report.page.chart import Chart, Curve
+from groundstation.report.page.document import holders, page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -81,3 +88,45 @@ def test_a_console_that_dies_is_no_end_of_the_run(stage: Any) -> None:
     assert "no connection" in page.there("hold").inner_text()
     assert "groundstation land" in page.there("banner-link").inner_text()
     assert all(stop.is_enabled() for stop in stops(page))
+
+
+def judged_run(folder: Path) -> None:
+    """Write what a run leaves that failed, as the command writes it."""
+    folder.mkdir(exist_ok=True)
+    run_facts.write(folder, run_facts.RunFacts(command="groundstation demo --duration 15"))
+    judged = {"verdict": "failed", "reasons": ["target error (rms) 0.3 m, asked for at most 0.2 m"]}
+    (folder / JSON_NAME).write_text(json.dumps(judged))
+    chart = Chart("Error", "m", "", [0.0, 1.0, 2.0], [Curve("error", "#0072b2", [0.1, 0.2, 0.3])])
+    room = '<svg viewBox="0 0 9 9"><rect id="wall" width="9" height="9" fill="#ff0000"/></svg>'
+    (folder / HTML_NAME).write_text(page("the run", "", [("Room", room), ("Flight", holders([chart], 0))], [chart]))
+
+
+def test_the_page_tells_what_the_run_came_to_long_after_the_console_has_gone(stage: Any, tmp_path: Path) -> None:
+    stage.console.terminate()
+    stage.console.wait(10)
+    stage.start_console(run=str(tmp_path))
+    seen: Seen = stage.open()
+    judged_run(tmp_path)
+    began = time.monotonic()
+    end_run(stage, Severity.INFO, "all drones are on the ground")
+    assert time.monotonic() - began < 6.0, "the console goes once the page has what it shows"
+    seen.wait(lambda s: not s["connected"])
+    seen.page.wait_for_timeout(1500)
+    strip = seen.there("banner-ended")
+    assert "FAILED" in strip.inner_text() and "calm" in strip.get_attribute("class")
+    assert "FAILED" in seen.there("result").inner_text()
+    assert "asked for at most 0.2 m" in seen.there("reasons").inner_text()
+    assert seen.there("fly-again").inner_text() == "groundstation demo --duration 15"
+    assert str(tmp_path) in seen.there("ending").inner_text()
+    seen.shot("run_judged")
+    with seen.page.context.expect_page() as opened:
+        seen.there("report-link").click()
+    report = opened.value
+    report.wait_for_selector(".uplot")  # its script ran
+    assert report.locator("h1").inner_text() == "the run"
+    assert report.evaluate("() => getComputedStyle(document.querySelector('#wall')).fill") == "rgb(255, 0, 0)"
+    assert report.evaluate("() => getComputedStyle(document.querySelector('section')).borderRadius") == "10px"
+
+    stage.start_console(run="run-2")
+    seen.wait(lambda s: s["connected"] and s["run"] != "")
+    seen.there("ending").wait_for(state="hidden", timeout=5000)

@@ -1,7 +1,7 @@
 """report.html: verdict, room, charts and tables of one run in one file that needs nothing else, not even a network."""
 
+import re
 from html import escape
-from importlib.resources import files
 from io import StringIO
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from groundstation.report.page import tables
 from groundstation.report.page.chart import Chart
 from groundstation.report.page.flight_charts import flight_charts
 from groundstation.report.page.health_charts import health_charts
+from groundstation.report.page.inline import script, style
 from groundstation.report.page.trust_section import trust_section
 from groundstation.report.plot_map import draw_map
 from groundstation.report.plot_searches import draw_searches
@@ -55,10 +56,6 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
 
 def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Chart]) -> str:
     """Return a whole page; `lead` and the sections are HTML, charts fill the holders that name their number."""
-    here = files("groundstation.report.page")
-    vendor = files("groundstation.console") / "static" / "vendor"
-    style = (vendor / "uPlot.min.css").read_text("utf-8") + (here / "page.css").read_text("utf-8")
-    script = (vendor / "uPlot.min.js").read_text("utf-8") + (here / "page.js").read_text("utf-8")
     # Inside a script element only this sequence can end it.
     data = msgspec.json.encode(charts).decode().replace("</", "<\\/")
     links = "".join(f'<a href="#s{index}">{escape(name)}</a>' for index, (name, _) in enumerate(sections))
@@ -68,9 +65,9 @@ def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Ch
     )
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}</style></head>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style()}</style></head>'
         f"<body><header><h1>{escape(title)}</h1>{lead}<nav>{links}</nav></header><main>{body}</main>"
-        f'<script type="application/json" id="charts">{data}</script><script>{script}</script></body></html>\n'
+        f'<script type="application/json" id="charts">{data}</script><script>{script()}</script></body></html>\n'
     )
 
 
@@ -147,4 +144,16 @@ def _svg(figure: Figure) -> str:
     text = StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
-    return svg[svg.index("<svg") :]
+    return _without_styles(svg[svg.index("<svg") :])
+
+
+def _without_styles(svg: str) -> str:
+    """Return a drawing whose styles are attributes: the console, which shows reports, permits no other inline style."""
+    svg = re.sub(r"<style[^>]*>.*?</style>", "", svg, flags=re.DOTALL)
+    svg = svg.replace("<svg ", '<svg stroke-linejoin="round" stroke-linecap="butt" ', 1)  # as that style had it
+    return re.sub(r' style="([^"]*)"', lambda found: _attributes(found[1]), svg)
+
+
+def _attributes(style_of: str) -> str:
+    pairs = (part.split(":", 1) for part in style_of.split(";") if part.strip())
+    return "".join(f' {name.strip()}="{value.strip()}"' for name, value in pairs)

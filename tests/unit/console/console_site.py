@@ -15,6 +15,7 @@ from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.console.network import Network
 from groundstation.console.room import bare_scene
+from groundstation.console.run_end import RunEnd
 from groundstation.console.server import ConsoleServer, claim_port
 from groundstation.monitor.state import Cast
 
@@ -39,6 +40,7 @@ class Site:
         self.server = ConsoleServer(self.bus, cast, scene, None, claim_port(38765), RUN, network=network)
         self.port = int(self.server.url.rsplit(":", 1)[1].strip("/"))
         self.over = False
+        self.end: RunEnd | None = None
 
     async def request(self, raw_path: str, method: str = "GET", **headers: str) -> tuple[int, str, bytes]:
         """Speak HTTP by hand: a library would tidy the path up before it is sent."""
@@ -70,7 +72,7 @@ class Site:
 def run(test: Test, network: Network | None = None) -> None:
     async def main() -> None:
         site = Site(network)
-        serving = asyncio.create_task(site.server.serve(lambda _turns, _late: not site.over))
+        serving = asyncio.create_task(site.server.serve(lambda _turns, _late: not site.over, lambda: site.end))
         try:
             await asyncio.sleep(0.05)
             await asyncio.wait_for(test(site), 20)

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import socket
+from pathlib import Path
 
 import pytest
 from console_site import RUN, Site, land, run, until
@@ -10,11 +11,14 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
+from groundstation.console import server
 from groundstation.console.access import refusal
 from groundstation.console.pages import load_pages
+from groundstation.console.run_end import read_end
 from groundstation.console.server import claim_port
 from groundstation.console.snapshot import Snapshot
 from groundstation.console.viewer import WINDOW, PageConnection
+from groundstation.report import run_facts
 
 
 def test_pages_and_their_headers() -> None:
@@ -107,9 +111,49 @@ def test_viewers_hear_how_the_run_ended_before_they_are_cut_off() -> None:
                 async with asyncio.timeout(5):
                     while True:
                         heard.append(json.loads(await page.recv()))
-            assert heard[-1]["s"]["ended"] == {"text": "run ended: all is well", "severity": "INFO"}
+            at_ms = end.header.stamp_ns / 1e6
+            ended = {"text": "run ended: all is well", "severity": "INFO", "at": at_ms, "closed": False}
+            assert heard[-1]["s"]["ended"] == ended
 
     run(test)
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_the_result_is_shown_until_the_page_keeps_it_or_it_took_too_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keeps: bool
+) -> None:
+    monkeypatch.setattr(server, "_KEEPING_S", 20.0 if keeps else 0.3)
+    run_facts.write(tmp_path, run_facts.RunFacts(command="groundstation fly lab.yaml"))
+    (tmp_path / "report.json").write_text('{"verdict": "failed", "reasons": ["too late"], "figures": 1}')
+    (tmp_path / "report.html").write_text("<p>the report</p>")
+
+    async def test(site: Site) -> None:
+        async with site.connect() as page:
+            await page.recv()
+            assert (await site.request("/report.html"))[0] == 404, "it is not judged yet"
+            end = m.Event(header=site.drone.header(m.RUN), severity=m.Severity.INFO, text="run ended: all is well")
+            site.drone.publish(t.EVENT, end)
+            site.over, site.end = True, read_end(tmp_path)
+            while "result" not in (frame := json.loads(await page.recv()))["s"]:
+                pass
+            result = frame["s"]["result"]
+            assert (result["verdict"], result["reasons"]) == ("failed", ["too late"])
+            assert (result["command"], result["folder"]) == ("groundstation fly lab.yaml", str(tmp_path))
+            assert (await site.request(result["report"]))[2] == b"<p>the report</p>"
+            if keeps:
+                await page.send(json.dumps({"type": "kept"}))
+            assert (await site.closed(page))[0] == 1012  # the server goes
+
+    run(test)
+
+
+def test_a_folder_that_says_nothing_has_no_end(tmp_path: Path) -> None:
+    assert read_end(tmp_path / "none") is None
+    (tmp_path / "report.json").write_text("torn")
+    assert read_end(tmp_path) is None
+    run_facts.write(tmp_path, run_facts.RunFacts(command="groundstation demo"))
+    unjudged = read_end(tmp_path)
+    assert unjudged is not None and (unjudged.verdict, unjudged.section()["report"]) == ("", "")
 
 
 def test_an_order_reaches_the_bus_with_the_token_only() -> None:

@@ -43,7 +43,7 @@ class Stage:
         self._drone.publish(t.VEHICLE_STATUS, status)
         time.sleep(0.01)
 
-    def close(self) -> None:
+    def end_run(self) -> None:
         self.ends = [r.message for r in self.heard.drain() if isinstance(r.message, m.Event)]
 
     def fly(self) -> m.Event:

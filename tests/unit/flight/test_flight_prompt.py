@@ -51,7 +51,7 @@ class Waiting:
         self.interrupts.stop_requested = late or m.Verb.TAKEOFF in self.heard
         time.sleep(0.002)
 
-    def close(self) -> None:
+    def end_run(self) -> None:
         pass
 
 

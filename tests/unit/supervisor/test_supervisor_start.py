@@ -41,6 +41,22 @@ def test_starts_router_first_and_stops_in_order(make: Callable[..., Supervisor])
     assert ended == ["drone_1", "recorder", "router"]
 
 
+@pytest.mark.parametrize("hurry", [False, True])
+def test_what_shows_the_end_stays_until_the_run_is_judged_unless_somebody_hurries(
+    make: Callable[..., Supervisor], hurry: bool
+) -> None:
+    supervisor = make(spec("drone_1", "obedient"), spec("console", "obedient", shows_end=True))
+    start(supervisor)
+    router, driver, console = supervisor.processes
+    supervisor.interrupts.hurry = hurry
+    supervisor.end_run()
+    assert (router.running, driver.running, console.running) == (False, False, not hurry)
+    assert supervisor.bus is None and not runtime_file.live_records()
+    supervisor.close()
+    assert not console.running
+    assert runtime_file.start_time(console.pid) is None, "an orphan remains"
+
+
 def test_its_loop_goes_first_while_it_watches_and_nothing_that_it_started(make: Callable[..., Supervisor]) -> None:
     supervisor = make(spec("drone_1", "obedient", nice=-5), spec("recorder", "obedient"))
     start(supervisor)

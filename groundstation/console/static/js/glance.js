@@ -56,11 +56,8 @@ export function stage() {
 // NaN once the run is over: nothing gets older any more.
 export const oldestS = () => runOver() ? NaN : Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));
 
-// Nobody is heard of once the run is over: then what counts is how long the recorder was silent before the others were.
-function recorderSilentS(recorder) {
-  if (!runOver()) return ageS(recorder.at);
-  return (Math.max(...Object.values(store.s.processes).map((one) => one.at)) - recorder.at) / 1000;
-}
+// It ends with the run: then what counts is how long it had been silent.
+const recorderSilentS = (recorder) => (runOver() ? (store.s.ended.at - recorder.at) / 1000 : ageS(recorder.at));
 
 export function recording() {
   const recorder = store.s.processes?.recorder;

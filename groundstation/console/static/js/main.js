@@ -5,6 +5,7 @@ import { showBar, startBar } from "./bar.js";
 import { buildCameras, pictures, showCameras, showDetections, startCameras } from "./cameras.js";
 import { buildCharts, showSamples } from "./charts.js";
 import { byId, el, svg } from "./dom.js";
+import { keepEnd, showEnd } from "./ending.js";
 import { drawHeights } from "./heights.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
@@ -31,6 +32,7 @@ on("seed", () => {
   if (built !== builtFor) build(scene);
   else showSamples();
   builtFor = built;
+  keepEnd();
   undrawnStamp = null;
   showAll();
   dirty = true;
@@ -54,6 +56,7 @@ on("delta", (sections, sampled) => {
   if (sections.estimate) undrawnStamp = sections.estimate.at;
   if (sections.orders || sections.session) { showOrders(); showControls(); }
   if (sections.playback) showPlayback();
+  if (sections.result) keepEnd();
   if (sections.plan) showPlan();
   if (sections.detections) showDetections();
   if (sampled) { showSamples(); showTimeline(); }
@@ -64,7 +67,7 @@ on("notice", (notice) => { addNotice(notice); showBanners(); });
 on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
 
 function showAll() {
-  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback();
+  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback(); showEnd();
   listen(); describe();
 }
 

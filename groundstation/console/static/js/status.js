@@ -3,6 +3,7 @@
 import { showLog, showMore } from "./alarm_strip.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { unheardStop } from "./effects.js";
+import { resultWords } from "./ending.js";
 import { drawn } from "./map.js";
 import { ageS, estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 import { calm } from "./verdict.js";
@@ -20,7 +21,7 @@ export function showBanners() {
   const banners = [];
   const age = estimateAge(), ageWords = Number.isFinite(age) ? `What you see is ${seconds(age)} old.` : "";
   const ended = store.s.ended;
-  if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", ended.text[0].toUpperCase() + ended.text.slice(1), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
+  if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", [ended.text[0].toUpperCase() + ended.text.slice(1), resultWords()].filter(Boolean).join(". "), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
   else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
   else if (trackerSilent()) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover, and land 3 s after its last word; LAND ALL works without it."]);

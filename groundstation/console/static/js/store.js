@@ -24,8 +24,8 @@ function noteClock(serverMs) {
 }
 
 export const replaying = () => Boolean(store.scene?.replay);
-// Announced by the run itself; while drones may still be in the air, buttons stay for as long as the console does.
-export const runOver = () => Boolean(store.s.ended) && (store.s.ended.severity === "INFO" || !store.connected);
+// Announced by the run itself; while drones may still be in the air, buttons stay for as long as somebody can obey them.
+export const runOver = () => Boolean(store.s.ended) && (store.s.ended.severity === "INFO" || store.s.ended.closed || !store.connected);
 export const steerable = () => Boolean(store.scene?.truth) && !replaying();
 // A replay's time stands still, runs and jumps: it is what the newest frame says.
 export const now = () => (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));

@@ -48,7 +48,7 @@ function start() {
 
 export function verdict() {
   if (!modes().length) return "Nothing is heard of the drones yet.";
-  if (stage() === "over") return "The run is over: nothing flies.";
+  if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
   if (!aloft()) return `Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;
   return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");
 }

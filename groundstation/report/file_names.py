@@ -1,0 +1,5 @@
+"""What a report's files in a run folder are called."""
+
+HTML_NAME = "report.html"
+JSON_NAME = "report.json"
+PLOT_NAME = "trajectories.png"

@@ -2,7 +2,7 @@
 
 import { teamLastsWords, worstBattery } from "./batteries.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { oldestS, recording, STAGES, stage, teamMode } from "./glance.js";
+import { oldestS, recording, STAGES, stage, stageWord, teamMode } from "./glance.js";
 import { ageS, droneNames, replaying, store } from "./store.js";
 import { verdict } from "./verdict.js";
 
@@ -28,7 +28,7 @@ export function showBar() {
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
   text(byId("verdict"), replaying() ? store.scene.replay.note : verdict());
-  showStages(stage());
+  showStages();
 }
 
 // What stands under the worst battery: when it lands its drone, or the least of those that are known.
@@ -37,11 +37,12 @@ function batteryLabel(battery) {
   return (battery && teamLastsWords(battery.name)) || "worst battery";
 }
 
-function showStages(now) {
-  const host = byId("stages");
-  if (host.dataset.now === now) return;
-  host.dataset.now = now;
-  host.replaceChildren(...STAGES.map((name) => el("li", { "aria-current": name === now ? "step" : null }, name)));
+// A stage that is done, the one now, and those to come; where there is no room, only the one now has its name.
+function showStages() {
+  const host = byId("stages"), now = STAGES.indexOf(stage()), words = STAGES.map(stageWord), key = `${now} ${words}`;
+  if (host.dataset.key === key) return;
+  host.dataset.key = key;
+  host.replaceChildren(...words.map((word, index) => el("li", { class: index < now ? "done" : "", "aria-current": index === now ? "step" : null }, el("span", {}, word))));
 }
 
 export function startBar(resized) {

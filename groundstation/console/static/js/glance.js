@@ -5,7 +5,7 @@ import { ageS, droneNames, estimateAge, isTarget, entities, runOver, store, trac
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
 export const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
-export const STAGES = ["pre-flight", "take-off", "track", "land", "over"];
+export const STAGES = ["pre-flight", "take-off", "form", "track", "land", "over"];
 
 const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filter(Boolean);
 // Its mode; HOVER as well while a failsafe keeps it from following the plan in TRACK.
@@ -45,13 +45,18 @@ function some(names) {
   return names.length > FEW ? `${names.length} of ${all} drones` : names.join(", ");
 }
 
+// Who is up forms the team until TRACK begins the task; one that still stands is about to follow.
 export function stage() {
   const all = modes();
   if (runOver()) return "over";
   if (all.includes("LANDING")) return "land";
-  if (all.includes("TAKING_OFF") || (all.includes("HOVER") && !all.includes("TRACK"))) return "take-off";
+  if (all.includes("TAKING_OFF")) return "take-off";
+  if (all.includes("HOVER") && !all.includes("TRACK")) return all.includes("LANDED") ? "take-off" : "form";
   return aloft() ? "track" : store.s.flight?.flown ? "land" : "pre-flight";
 }
+
+// What a stage is called now: who has lost the target searches for it.
+export const stageWord = (name) => (name === "track" && stage() === "track" && doing("TRACK").length && lostTarget() ? "search" : name);
 
 // NaN once the run is over: nothing gets older any more.
 export const oldestS = () => runOver() ? NaN : Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));

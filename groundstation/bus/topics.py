@@ -97,6 +97,8 @@ EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)
 """Every process and the supervisor: lifecycle, CPU, deadlines."""
+PREFLIGHT = Topic("preflight", m.Preflight, 0.3, Quality.STATE, _SUPERVISOR)
+"""Operator: what the checks before a take-off find, while nobody flies."""
 CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE, _HOST)
 """Another host: offset of its clock to that of the run."""
 HOST_ORDER = Topic("host_order", m.HostOrder, 0, Quality.STATE, _LIAISON)
@@ -144,6 +146,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         INNOVATION,
         EVENT,
         PROCESS_STATUS,
+        PREFLIGHT,
         CLOCK,
         HOST_ORDER,
         HOST_REPORT,

@@ -20,7 +20,7 @@ from groundstation.bus.roles import Role
 from groundstation.bus.topics import COMMAND_ACK
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.stop import choose_run
-from groundstation.console.commands import CommandDesk
+from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.supervisor.joining import join
@@ -114,7 +114,7 @@ def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_
             asked, leaves = handle.feel(man, now_ns)
             verb = asked or man.step(now_ns)
             if verb is not None:
-                desk.give(verb, (), _ME, 0.0, "", now_ns)
+                desk.give(verb, (), Given(_ME), now_ns)
             left_ns = now_ns if leaves else 0
         for received in answers.drain():
             if isinstance(received.message, CommandAck):

@@ -32,6 +32,16 @@ class Followed:
     closed: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Given:
+    """How a page gave a command: which viewer, how long ago, its own id of it, and whether against the checks."""
+
+    by: str
+    age_ms: float = 0.0
+    ref: str = ""
+    anyway: bool = False
+
+
 class CommandDesk:
     """Gives commands and follows these and everybody else's.
 
@@ -55,14 +65,15 @@ class CommandDesk:
         """Return who holds a live operator lease, or ""."""
         return self._lease.holder if self._lease is not None and self._lease.expires_ns > now_ns else ""
 
-    def give(self, verb: Verb, drones: tuple[str, ...], by: str, age_ms: float, ref: str, now_ns: int) -> str:
-        """Send a command that was given `age_ms` ago; returns "" or why it was not sent."""
+    def give(self, verb: Verb, drones: tuple[str, ...], given: Given, now_ns: int) -> str:
+        """Send a command; returns "" or why it was not sent."""
         strangers = [name for name in drones if name not in self._drones]
         if strangers:
             return f"there is no drone {', '.join(strangers)}"
         stop = verb.stops
-        if age_ms > (_STOP_LIVES_MS if stop else _START_LIVES_MS):
-            return f"{verb} came too late ({age_ms / 1e3:.1f} s) and was dropped: give it again if it is still wanted"
+        if given.age_ms > (_STOP_LIVES_MS if stop else _START_LIVES_MS):
+            late = f"{verb} came too late ({given.age_ms / 1e3:.1f} s) and was dropped"
+            return f"{late}: give it again if it is still wanted"
         if not stop and not self.lease_holder(now_ns):
             return "nobody holds the operator lease: is the ground station's main process alive?"
         self._count += 1
@@ -75,11 +86,12 @@ class CommandDesk:
             id=identity,
             verb=verb,
             scope=scope,
-            issuer=self._bus.source,
+            issuer=f"{self._bus.source} ({given.by})" if given.anyway else self._bus.source,
             expires_ns=expires_ns,
             run=self._bus.run,
+            anyway=given.anyway,
         )
-        self._keep(Followed(self._book(command), now_ns, now_ns, by, ref))
+        self._keep(Followed(self._book(command), now_ns, now_ns, given.by, given.ref))
         self._bus.publish(COMMAND, command)
         return ""
 

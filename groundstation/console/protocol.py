@@ -28,7 +28,7 @@ class CommandRequest(FromPage, frozen=True, tag="order"):
     """A command to the drones named (none: all), given for the run that the page then showed.
 
     at_ms: the server's time when it was given, as the page reckons it; age_ms: for how long the page has kept it;
-    ref: the page's own id.
+    ref: the page's own id; anyway: of TAKEOFF, although the checks before it forbid it.
     """
 
     verb: Verb
@@ -37,6 +37,7 @@ class CommandRequest(FromPage, frozen=True, tag="order"):
     at_ms: float
     age_ms: Annotated[float, msgspec.Meta(ge=0)]
     ref: Annotated[str, msgspec.Meta(max_length=40)] = ""
+    anyway: bool = False
 
 
 class TakeOver(FromPage, frozen=True):

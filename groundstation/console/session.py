@@ -11,7 +11,7 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import SimCommand
 from groundstation.bus.topics import SIM_COMMAND
-from groundstation.console.commands import CommandDesk
+from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.devices import DeviceRole
 from groundstation.console.operator_lock import OperatorLock
 from groundstation.console.player import Player
@@ -180,7 +180,8 @@ class Sessions:
         now_ns = clock.now_ns()
         # A page that slept may reckon the server's time wrongly, and cannot know how long an order waited here.
         age_ms = max(order.age_ms, now_ns / NS_PER_MS - order.at_ms)
-        problem = self.desk.give(order.verb, order.drones, viewer.name, age_ms, order.ref, now_ns)
+        given = Given(viewer.name, age_ms, order.ref, order.anyway)
+        problem = self.desk.give(order.verb, order.drones, given, now_ns)
         if problem:
             self._refuse(viewer, "order", problem, order.ref)
 

@@ -40,6 +40,7 @@ class ConsoleState:
         self.setpoints: dict[str, StampedMessage[m.VelocitySetpoint]] = {}
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self.search_maps: dict[str, m.SearchMap] = {}
+        self.preflight: StampedMessage[m.Preflight] | None = None
         self._sample: dict[str, Any] | None = None
         self._airborne_since_ns: int | None = None
         self._flown = False
@@ -54,6 +55,8 @@ class ConsoleState:
                     self.truth[item.header.entity] = StampedMessage(item.header.stamp_ns, truth)
                 case m.SearchMap() as search_map:
                     self.search_maps[item.header.entity] = search_map
+                case m.Preflight() as preflight:
+                    self.preflight = StampedMessage(item.header.stamp_ns, preflight)
                 case m.Innovation() as innovation:
                     self.health.take(innovation)
                 case m.RelativeObservation() as sighting:
@@ -139,6 +142,8 @@ class ConsoleState:
         board.put("alarms", [asdict(alarm) for alarm in alarms])
         board.put("past_alarms", self.alarm_log.as_json())
         board.put("health", self.health.summary())
+        if self.preflight is not None:
+            board.put("preflight", {"at": _ms(self.preflight), "findings": self.preflight.message.findings})
 
 
 def _ms(seen: StampedMessage[Any]) -> float:

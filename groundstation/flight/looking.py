@@ -17,6 +17,7 @@ class Looking:
     def __init__(self, checks: BeforeTakeOff, now_ns: int) -> None:
         self._checks, self._began_ns, self._next_ns = checks, now_ns, now_ns
         self._findings: list[Finding] = []
+        self._found_ns = now_ns
         self.forbidden = False
 
     def finished(self, now_ns: int) -> bool:
@@ -26,13 +27,13 @@ class Looking:
         self._next_ns = now_ns + _AGAIN_NS
         if not self._checks.complete(now_ns) and now_ns - self._began_ns < _LONGEST_NS:
             return False
-        self._findings = self._checks.findings(now_ns)
+        self._found_ns, self._findings = now_ns, self._checks.findings(now_ns)
         self.forbidden = any(one.level is Level.MUST for one in self._findings)
         return True
 
     def tell(self, *, whole: bool) -> Iterator[str]:
         """Publish what was found and return it as lines; whole: also what is well."""
-        self._checks.publish(self._findings)
+        self._checks.publish(self._findings, self._found_ns)
         yield from lines(one for one in self._findings if whole or one.level is not Level.OK)
         musts = sum(one.level is Level.MUST for one in self._findings)
         yield f"before take-off: {musts or 'nothing'} must be mended"

@@ -7,25 +7,30 @@ from groundstation.bus.messages import (
     CameraStatus,
     Event,
     FlightState,
+    Preflight,
+    PreflightFinding,
     RangeObservation,
     RelativeObservation,
     Severity,
     VehicleStatus,
 )
-from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, RANGE, VEHICLE_STATUS
+from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, PREFLIGHT, RANGE, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.judge import judge, open_musts
 from groundstation.preflight.pad_record import PadRecord
 
 _STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+_ON_GROUND = _STANDS | {FlightState.UNKNOWN, FlightState.LOST}
+_AGAIN_NS = 3_000_000_000
 _SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
 
 
 class BeforeTakeOff:
     """Call `update` often; `findings` takes up to a tenth of a second with a team of two.
 
-    A drone that flew once in this run may stand anywhere: its pad says nothing of it any more.
+    Once `publish` has told the list, `update` tells it again every 3 s while nobody flies. A drone that flew once in
+    this run may stand anywhere: its pad says nothing of it any more.
     """
 
     def __init__(self, bus: Bus, field: ResolvedField) -> None:
@@ -35,6 +40,7 @@ class BeforeTakeOff:
         self._cameras: dict[str, CameraStatus] = {}
         self._flew: set[str] = set()
         self._record = PadRecord(field.world_sensors)
+        self._next_ns: int | None = None
 
     def update(self, now_ns: int) -> None:
         """Take in what has arrived."""
@@ -46,11 +52,16 @@ class BeforeTakeOff:
                     self._cameras[status.header.entity] = status
                 case VehicleStatus() as status:
                     self._hear(status)
+        if self._next_ns is not None and now_ns >= self._next_ns and not self._anybody_flies():
+            self._tell(self.findings(now_ns), now_ns)
+
+    def _anybody_flies(self) -> bool:
+        return any(status.flight_state not in _ON_GROUND for status in self._vehicles.values())
 
     def _hear(self, status: VehicleStatus) -> None:
         name = status.header.entity
         self._vehicles[name] = status
-        if status.flight_state not in _STANDS and status.flight_state not in (FlightState.UNKNOWN, FlightState.LOST):
+        if status.flight_state not in _ON_GROUND:
             self._flew.add(name)
             self._record.forget(name)
 
@@ -69,8 +80,9 @@ class BeforeTakeOff:
         """Return what forbids a take-off of the given drones (none: all)."""
         return open_musts(self.findings(now_ns), drones, self._field.drones)
 
-    def publish(self, findings: Collection[Finding]) -> None:
-        """Tell the console and the recording what is not well."""
+    def publish(self, findings: Collection[Finding], now_ns: int) -> None:
+        """Tell the console and the recording everything, and what is not well as events."""
+        self._tell(findings, now_ns)
         for one in findings:
             if one.level in _SEVERITIES:
                 entity = one.subject if one.subject in self._field.drones else "team"
@@ -78,6 +90,11 @@ class BeforeTakeOff:
                 header = self._bus.header(entity)
                 event = Event(header=header, severity=_SEVERITIES[one.level], text=text, remedy=one.remedy)
                 self._bus.publish(EVENT, event)
+
+    def _tell(self, findings: Collection[Finding], now_ns: int) -> None:
+        self._next_ns = now_ns + _AGAIN_NS
+        rows = tuple(PreflightFinding(one.level, one.subject, one.found, one.remedy) for one in findings)
+        self._bus.publish(PREFLIGHT, Preflight(header=self._bus.header("team"), findings=rows))
 
     def record_override(self, who: str, findings: Collection[Finding]) -> None:
         """Tell everybody, and the recording, that somebody takes off although it was forbidden."""

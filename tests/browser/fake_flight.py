@@ -39,6 +39,7 @@ class FakeFlight(threading.Thread):
         self.unseen_s: dict[str, float] = {}  # for how long nobody has seen it
         self.deaf: set[str] = set()
         self.frozen = False
+        self.findings: tuple[m.PreflightFinding, ...] = ()  # of the checks before a take-off
         self.distance_m = 1.3  # of the drones from the target
         self.lease = True
         self.commands: list[m.Command] = []
@@ -234,8 +235,10 @@ class FakeFlight(threading.Thread):
             bus.publish(t.VEHICLE_STATUS, status)
 
     def _say_slow(self, s: float, tick: int) -> None:
+        bus = self.bus("supervisor")
+        if self.findings:
+            bus.publish(t.PREFLIGHT, m.Preflight(header=bus.header("team"), findings=self.findings))
         if self.lease:
-            bus = self.bus("supervisor")
             header = bus.header("team")
             bus.publish(t.LEASE, m.Lease(header=header, holder="operator", expires_ns=header.stamp_ns + 1_500_000_000))
         for name in ("tracker", "recorder", *self.drones, *self.cameras, "sim_bridge"):

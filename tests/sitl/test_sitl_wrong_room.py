@@ -1,11 +1,18 @@
 """A room that is not as the field says: nobody takes off, unless a person insists."""
 
+import operator
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from groundstation.bus.messages import Event
+from groundstation.bus.topics import EVENT
+from groundstation.recording.file_topics import STATE
+from groundstation.recording.reader import open_parts, parts
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(240)]
 ASIDE = "cameras.ceiling.position_m=[0.2,0.0,4.2]"
@@ -30,5 +37,11 @@ def test_a_wrong_room_is_refused_on_the_floor(sitl: Callable[..., Any], changes:
 def test_who_insists_flies_in_a_wrong_room_and_it_is_recorded(sitl: Callable[..., Any]) -> None:
     run = sitl("--duration", "10", "--anyway", program=room(ASIDE))
     run.wait(150)
-    assert "takes off although it must not" in run.text or "insists" in run.text, run.text
+    assert "operator insists" in run.text, run.text
+    recorded, _ = open_parts(parts(run.run_dir, STATE))
+    told = [r.message for part in recorded for r in part.records(partial(operator.is_, EVENT))]
+    events = [message for message in told if isinstance(message, Event)]
+    (override,) = [event for event in events if "although it must not" in event.text]
+    assert override.text.startswith("operator takes off") and "ceiling hangs" in override.text
+    assert override.severity == "WARNING" and override.header.source == "supervisor"
     assert max(state.position_m[2] for _, state in run.truth("drone_1")) > 0.5

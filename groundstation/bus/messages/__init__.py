@@ -29,6 +29,7 @@ from groundstation.bus.messages.flight import (
 )
 from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
+from groundstation.bus.messages.preflight import Preflight, PreflightFinding
 from groundstation.bus.messages.process import RUN, Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.messages.sensing import (
     BodyPose,
@@ -75,6 +76,8 @@ __all__ = [
     "Odometry",
     "Plan",
     "PoseHypothesis",
+    "Preflight",
+    "PreflightFinding",
     "ProcessStatus",
     "Quaternion",
     "RangeObservation",

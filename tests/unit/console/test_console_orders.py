@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from groundstation.bus import clock
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.console.commands import CommandDesk
+from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.operator_lock import OperatorLock
 from groundstation.console.protocol import (
     CommandRequest,
@@ -68,7 +69,7 @@ class Room:
         return " ".join(viewer._urgent)
 
     def give(self, verb: m.Verb, drones: tuple[str, ...] = (), late_ms: float = 0.0) -> str:
-        return self.desk.give(verb, drones, "viewer 1", late_ms, "r", self.now_ns)
+        return self.desk.give(verb, drones, Given("viewer 1", late_ms, "r"), self.now_ns)
 
 
 def order(verb: m.Verb, run: str = RUN, late_ms: float = 0.0, age_ms: float = 0.0, ref: str = "") -> CommandRequest:
@@ -94,6 +95,18 @@ def test_starts_go_to_the_lease_holder_fresh_or_not_at_all() -> None:
     assert room.give(m.Verb.TAKEOFF, ("drone_2",)) == ""
     (command,) = room.commands()
     assert command.scope == ("operator", "drone_2") and command.expires_ns > 0
+
+
+def test_who_takes_off_against_the_checks_is_named_in_the_order() -> None:
+    room = Room()
+    room.lease()
+    page = room.viewer(1)
+    plain = order(m.Verb.TAKEOFF)
+    room.sessions.handle(page, plain)
+    room.sessions.handle(page, structs.replace(plain, anyway=True))
+    first, second = room.commands()
+    assert (first.anyway, first.issuer) == (False, "console")
+    assert (second.anyway, second.issuer) == (True, "console (viewer 1)")
 
 
 @pytest.mark.parametrize("verb", [m.Verb.HOLD, m.Verb.LAND, m.Verb.CUT_MOTORS])

@@ -12,11 +12,12 @@ from groundstation.bus.messages import (
     Event,
     FlightState,
     Header,
+    Preflight,
     RelativeObservation,
     VehicleStatus,
     Verb,
 )
-from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT, OBSERVATION, VEHICLE_STATUS
+from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT, OBSERVATION, PREFLIGHT, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.flight.looking import Looking
@@ -130,6 +131,22 @@ def test_who_insists_takes_off_and_is_named_on_the_record(lab_field: ResolvedFie
     assert lab.operator.phase is TeamPhase.TAKING_OFF
     (override,) = [event for event in lab.events if "although it must not" in event.text]
     assert override.text.startswith("console takes off") and "ceiling" in override.text
+
+
+def test_the_list_is_told_again_while_nobody_flies(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field, higher_m=0.3)
+    lists = lab.page.subscribe([PREFLIGHT])
+    lab.turn(60)
+    assert lists.drain() == [], "what is not all seen yet is no list"
+    lab.checks.publish(lab.checks.findings(lab.now_ns), lab.now_ns)
+    lab.turn(100)  # 6.6 s
+    told = [received.message for received in lists.drain()]
+    assert len(told) == 3
+    assert isinstance(told[0], Preflight) and told[0].findings == told[-1].findings  # type: ignore[union-attr]
+    assert [one.level for one in told[0].findings[:2]] == ["MUST", "OK"] and told[0].findings[0].remedy
+    lab.states = dict.fromkeys(lab.states, FlightState.TAKING_OFF)
+    lab.turn(100)
+    assert lists.drain() == []
 
 
 def test_who_flew_in_this_run_may_stand_anywhere(lab_field: ResolvedField) -> None:

@@ -5,6 +5,7 @@ import { byId, el, seconds, text } from "./dom.js";
 import { effectOf, holding, isIdle, refusalOf, STOPS } from "./effects.js";
 import { aloft, modes } from "./glance.js";
 import { me, on, send } from "./link.js";
+import { forbidden } from "./preflight.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
 const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000, STOP_LIVES_MS = 5000;
@@ -17,10 +18,11 @@ const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ don
 // Orders that the server has not shown yet, so that nothing is silently lost on the way there.
 let own = [], count = 0;
 
-// run: the one that the operator meant, which while a button is held may have given way to the next.
-export function give(verb, drones = [], run = store.run) {
+// run: the one that the operator meant, which while a button is held may have given way to the next. anyway: against
+// the checks before a take-off.
+export function give(verb, drones = [], run = store.run, anyway = false) {
   if (replaying()) return; // the server would refuse it as well
-  const order = { ref: `${me.client}-${++count}`, verb, drones, run, given: moment(), given_ms: now() };
+  const order = { ref: `${me.client}-${++count}`, verb, drones, run, anyway, given: moment(), given_ms: now() };
   own.push(order);
   if (!mayGive(verb)) { put(order, "refused", roleText()); return showOrders(); }
   put(order, "unsent", `no connection: goes out if it is back within ${STOP_LIVES_MS / 1000} s. Now: ${inShell(verb)}`);
@@ -36,9 +38,9 @@ const roleText = () => `this device may ${me.role} only`;
 const inShell = (verb) => `groundstation ${verb.toLowerCase().replace("_", "-")} in a shell`;
 const put = (order, state, note = "") => Object.assign(order, { state, note, since: moment() });
 
-function transmit({ verb, drones, run, ref, given }) {
+function transmit({ verb, drones, run, anyway, ref, given }) {
   const age_ms = sinceMs(given);
-  return me.greeted && send("order", { verb, drones, run, ref, age_ms, at_ms: serverNow() - age_ms });
+  return me.greeted && send("order", { verb, drones, run, anyway, ref, age_ms, at_ms: serverNow() - age_ms });
 }
 
 // A stop that did not get out is good for the run that it was given for, and for so long only.
@@ -63,6 +65,7 @@ export function startOrders() {
   byId("resume").onclick = () => give("RESUME");
   byId("takeover").onclick = () => send("takeover");
   holdToPress(byId("cut"), (run) => give("CUT_MOTORS", [], run));
+  holdToPress(byId("anyway"), (run) => give("TAKEOFF", [], run, true));
   on("welcome", sendUnsent);
   on("notice", ({ ref, text: reason }) => {
     const order = own.find((candidate) => ref && candidate.ref === ref);
@@ -141,13 +144,16 @@ function barred(session) {
 
 function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
-    const button = byId(id), reason = why ?? twice(refusalOf(verb)), caption = button.querySelector("small");
+    const button = byId(id), reason = why ?? startRefusal(verb), caption = button.querySelector("small");
     caption.dataset.caption ??= caption.textContent;
     text(caption, reason?.[0] ?? caption.dataset.caption);
     enable(button, reason);
   }
-  for (const node of document.querySelectorAll("[data-takeoff]")) enable(node, why ?? twice(refusalOf("TAKEOFF", [node.dataset.takeoff])));
+  for (const node of document.querySelectorAll("[data-takeoff]")) enable(node, why ?? startRefusal("TAKEOFF", [node.dataset.takeoff]));
+  enable(byId("anyway"), why ?? twice(refusalOf("TAKEOFF")));
 }
+
+const startRefusal = (verb, names = droneNames()) => twice(refusalOf(verb, names)) ?? (verb === "TAKEOFF" ? forbidden(names) : null);
 
 const twice = (words) => (words ? [words, words] : null);
 

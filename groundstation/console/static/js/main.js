@@ -13,6 +13,7 @@ import { give, showControls, showOrders, startOrders } from "./commands.js";
 import { colourOf, fenceColour, ink, startTheme, takeColours } from "./palette.js";
 import { showPlan, showSwitch, showTimeline } from "./plan.js";
 import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
+import { showPreflight } from "./preflight.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";
 import { ghostPoint, startSteering } from "./steer.js";
@@ -67,7 +68,7 @@ on("notice", (notice) => { addNotice(notice); showBanners(); });
 on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
 
 function showAll() {
-  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback(); showEnd();
+  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback(); showPreflight(); showEnd();
   listen(); describe();
 }
 

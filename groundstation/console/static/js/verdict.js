@@ -5,6 +5,7 @@ import { joined } from "./dom.js";
 import { landsIn } from "./duty.js";
 import { refusalOf } from "./effects.js";
 import { aloft, doing, lostTarget, modes, stage, teamMode } from "./glance.js";
+import { mustWords, openMusts } from "./preflight.js";
 import { droneNames, entity, estimateAge, store, trackerSilent } from "./store.js";
 
 const FRESH_S = 1, NAMED = 4; // more drones than this are counted
@@ -46,10 +47,17 @@ function start() {
   return refusalOf("TRACK") ? "" : "TRACK begins the task.";
 }
 
+// What a take-off waits for, or what it would be.
+function takeOff() {
+  const [first] = openMusts();
+  if (first) return `TAKE OFF waits: ${mustWords(first)}.`;
+  return store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight.";
+}
+
 export function verdict() {
   if (!modes().length) return "Nothing is heard of the drones yet.";
   if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
-  if (!aloft()) return `Nobody flies. ${store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight."}`;
+  if (!aloft()) return `Nobody flies. ${takeOff()}`;
   return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");
 }
 

@@ -1,0 +1,43 @@
+// What the checks before a take-off find, graded, with its remedy; and what of it forbids a take-off.
+
+import { byId, el, text } from "./dom.js";
+import { aloft } from "./glance.js";
+import { ageS, droneNames, replaying, runOver, store } from "./store.js";
+
+const OLD_S = 10; // told again every 3 s
+const SHORT = 12; // letters of a name that has room on a button
+
+const findings = () => store.s.preflight?.findings ?? [];
+const isTold = () => !runOver() && !aloft() && (replaying() || ageS(store.s.preflight?.at) < OLD_S);
+const graded = (level) => findings().filter((one) => one.level === level);
+
+// What forbids a take-off of these drones: what concerns only others does not.
+export function openMusts(names = droneNames()) {
+  const others = droneNames().filter((name) => !names.includes(name));
+  return isTold() ? graded("MUST").filter(({ subject }) => !others.includes(subject)) : [];
+}
+
+// Why these may not take off: [in few words, in more]; null if they may.
+export function forbidden(names) {
+  const [first] = openMusts(names);
+  if (!first) return null;
+  return [`must: ${first.subject.length > SHORT ? "see list" : first.subject}`, `${mustWords(first)} → ${first.remedy}`];
+}
+
+export const mustWords = ({ subject, found }) => `${subject}: ${found}`;
+
+const line = ({ level, subject, found, remedy }) => el("li", { class: level },
+  el("b", { class: "level" }, level.toLowerCase()), el("span", {}, el("b", {}, subject), ` ${found}`, remedy ? el("small", {}, `→ ${remedy}`) : null));
+
+export function showPreflight() {
+  byId("preflight").hidden = !findings().length || !isTold();
+  byId("anyway").hidden = replaying() || !openMusts().length;
+  const musts = graded("MUST"), should = graded("SHOULD"), well = graded("OK"), key = JSON.stringify(findings());
+  const host = byId("findings");
+  if (host.dataset.key === key) return;
+  host.dataset.key = key;
+  text(byId("findings-sum"), `Before take-off: ${musts.length || "nothing"} must be mended, ${should.length || "nothing"} should`);
+  host.replaceChildren(...[...musts, ...should].map(line));
+  text(byId("well-sum"), `${well.length} ok`);
+  byId("well").replaceChildren(...well.map(line));
+}

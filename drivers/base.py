@@ -17,13 +17,17 @@ _Settings = TypeVar("_Settings", bound=BaseModel)
 
 @dataclass(frozen=True, slots=True)
 class LinkHealth:
-    """State of a driver's link; rejected: datagrams dropped, by reason; clock: None where no time is told."""
+    """State of a driver's link; rejected: datagrams dropped, by reason; clock: None where no time is told.
+
+    firmware: of the vehicle, with its version; "": not known.
+    """
 
     link_quality: float | None = None
     rate_hz: float = 0.0
     rejected: dict[str, int] = field(default_factory=dict)
     detail: str = ""
     clock: ClockFigures | None = None
+    firmware: str = ""
 
 
 class Vehicle(Protocol):

@@ -141,10 +141,8 @@ class VehicleHost:
         state, mode = self.watchdog.vehicle, self.watchdog.mode
         if mode in (DriverMode.CONNECTING, DriverMode.LANDED):
             return True
-        cut = (
-            mode is DriverMode.CUT and state.fresh and state.flight_state in (FlightState.EMERGENCY, FlightState.LANDED)
-        )
-        return cut or now_ns - self._heard_ns > _GIVE_UP_NS
+        still = state.fresh and state.flight_state in (FlightState.EMERGENCY, FlightState.LANDED)
+        return (mode is DriverMode.CUT and still) or now_ns - self._heard_ns > _GIVE_UP_NS
 
     def publish_status(self, now_ns: int) -> None:
         """Publish the VehicleStatus now, and report refused messages from outside of the run."""
@@ -160,6 +158,8 @@ class VehicleHost:
             rate_hz=health.rate_hz,
             rejected=health.rejected | self._ignored | self._refused(),
             detail=health.detail or self.watchdog.explanation,
+            not_ready=view.not_ready,
+            firmware=health.firmware,
             braked=self.watchdog.braked,
             lands_in_s=self.watchdog.lands_in_s,
             clock_drift_ppm=None if health.clock is None else health.clock.drift_ppm,

@@ -244,7 +244,8 @@ class ArDrone:
         heights = Counter({"height_jump": self._publisher.heights.refused})
         rejected = dict(self._link.rejected + self._refused + heights)
         detail = "its commands do not arrive" if self._uplink.cut else self._session.detail
-        return LinkHealth(quality, rate_hz, rejected, detail, self._plausibility.clock.figures)
+        clock, firmware = self._plausibility.clock.figures, self._session.identity.firmware
+        return LinkHealth(quality, rate_hz, rejected, detail, clock, firmware)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

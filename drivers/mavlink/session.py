@@ -147,6 +147,14 @@ class MavlinkSession:
             self.notes.append(f"{text}; those that it does not have are not checked")
         self._version = version
 
+    @property
+    def firmware(self) -> str:
+        """Return whose firmware it runs and its version, "" while it has not said."""
+        if self._version is None:
+            return ""
+        name = "PX4" if self._flavour is Flavour.PX4 else "ArduPilot"
+        return f"{name} {'.'.join(map(str, self._version))}"
+
     def hear_origin(self) -> None:
         """Note that the origin is set."""
         self._has_origin = True

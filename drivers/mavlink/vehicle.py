@@ -303,7 +303,7 @@ class MavlinkVehicle:
         lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
         detail = lost or self._session.detail(self._requests)
         rejected = dict(self._link.rejected + self._refused)
-        return LinkHealth(quality, rate_hz, rejected, detail, self._plausibility.clock.figures)
+        return LinkHealth(quality, rate_hz, rejected, detail, self._plausibility.clock.figures, self._session.firmware)
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

@@ -8,6 +8,8 @@ from groundstation.doctor.finding import Finding, Level
 from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
 
+# Drivers write the command that mends what they found behind it.
+_COMMAND = ": groundstation "
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
 _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
@@ -28,12 +30,23 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
             continue
         if status.flight_state is FlightState.EMERGENCY:
             yield Finding(Level.SHOULD, name, "its motors are cut off", "set it upright and start it again")
+        yield from _readiness(name, status)
         yield _battery(name, status, drone.limits.battery_min)
         if status.rate_hz < _TELEMETRY_HZ or (status.link_quality or 1.0) < _LINK_SHARE:
             heard = "" if status.link_quality is None else f", {status.link_quality:.0%} of it arrives"
             found = f"telemetry {status.rate_hz:.0f} Hz{heard}"
             yield Finding(Level.SHOULD, name, found, "bring it nearer, or choose another radio channel")
         yield from _clock(name, status)
+
+
+def _readiness(name: str, status: VehicleStatus) -> Iterator[Finding]:
+    """Yield why a drone would refuse to take off, which leaves it out and stops nobody else; and its firmware."""
+    if status.not_ready:
+        found, _, command = status.not_ready.partition(_COMMAND)
+        remedy = f"groundstation {command}" if command else "mend what it says; until then it is left out"
+        yield Finding(Level.SHOULD, name, f"it refuses to take off: {found}", remedy)
+    if status.firmware:
+        yield Finding(Level.OK, name, f"firmware {status.firmware}")
 
 
 def _clock(name: str, status: VehicleStatus) -> Iterator[Finding]:

@@ -47,6 +47,10 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     """Datagrams, setpoints and commands that were dropped, by reason."""
     detail: str = ""
     """What the operator should know, in words."""
+    not_ready: str = ""
+    """Why it may not take off now, by its own report and its driver's preparation, in words; empty: it may."""
+    firmware: str = ""
+    """Its firmware with the version; empty: unknown."""
     braked: bool = False
     """In TRACK: a failsafe keeps it hovering for now; it follows setpoints again once that is over."""
     lands_in_s: float | None = None

@@ -57,3 +57,27 @@ def test_clocks_are_graded_by_how_fast_they_go_and_how_late_they_are_heard(lab_f
     assert (fast.level, fast.found) == (Level.SHOULD, "its clock goes 1001 ppm fast") and fast.remedy
     assert (late.level, late.found) == (Level.SHOULD, "its telemetry comes up to 151 ms late") and late.remedy
     assert [one.level for one in clock_findings(lab_field, -1001.0, None)] == [Level.SHOULD]
+
+
+@pytest.mark.parametrize(
+    ("not_ready", "found", "remedy"),
+    [
+        (
+            "parameter EKF2_EV_CTRL: is 0, should be 15: groundstation mavlink setup --apply",
+            "it refuses to take off: parameter EKF2_EV_CTRL: is 0, should be 15",
+            "groundstation mavlink setup --apply",
+        ),
+        ("it has no position yet", "it refuses to take off: it has no position yet", "mend what it says"),
+    ],
+)
+def test_a_standing_drone_that_is_not_ready_says_why_with_its_remedy(
+    lab_field: ResolvedField, not_ready: str, found: str, remedy: str
+) -> None:
+    header = Header(0, "c", "drone_1", "drone_1", 1)
+    status = VehicleStatus(
+        header=header, flight_state=FlightState.LANDED, mode="LANDED", battery=0.9, rate_hz=200.0,
+        not_ready=not_ready, firmware="PX4 1.15",
+    )  # fmt: skip
+    first, second, *_ = [one for one in drone_findings(lab_field, {"drone_1": status}) if one.subject == "drone_1"]
+    assert (first.level, first.found) == (Level.SHOULD, found) and first.remedy.startswith(remedy)
+    assert (second.level, second.found) == (Level.OK, "firmware PX4 1.15")

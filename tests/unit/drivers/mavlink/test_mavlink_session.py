@@ -73,7 +73,9 @@ def test_an_older_or_newer_name_counts_as_well() -> None:
 def test_another_version_is_flown_and_what_was_not_checked_is_said() -> None:
     session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
     session.hear_origin()
+    assert session.firmware == ""
     session.hear_version(0x04080000)
+    assert session.firmware == "ArduPilot 4.8"
     values = {n.name: n.value for n in needed(Flavour.ARDUPILOT, 255) if n.name != "FS_EKF_ACTION"}
     for turn in range(1500):
         for message in session.step(10_000 * MS + turn * 10 * MS, 0, requests):

@@ -10,6 +10,7 @@ from groundstation.cli.exits import ExitCode
 
 if TYPE_CHECKING:
     from groundstation.doctor.finding import Finding
+    from groundstation.settings.schema import Field
 
 
 @click.command(epilog="\b\nExamples:\n  groundstation doctor\n  groundstation doctor my_lab/lab.yaml --json")
@@ -34,6 +35,16 @@ def doctor(field: str, as_json: bool) -> int:
     return ExitCode.FAILED if any(finding.level is Level.MUST for finding in findings) else ExitCode.OK
 
 
+def _awaited(field: "Field") -> dict[str, tuple[str, int]]:
+    """Return at which UDP ports drivers of this host wait for their vehicles to call, by the drivers' names."""
+    from groundstation.settings.sections import driver_sections
+
+    links = {one.name: json.loads(one.section).get("link") for one in driver_sections(field) if not one.host}
+    targets = {name: link.get("target", "").split(":") for name, link in links.items() if isinstance(link, dict)}
+    calls = {name: parts for name, parts in targets.items() if len(parts) == 3}
+    return {n: (host.partition("%")[0], int(at)) for n, (way, host, at) in calls.items() if way == "udpin"}
+
+
 def _examine(name: str) -> "list[Finding]":
     from groundstation.doctor import network, processor, storage
     from groundstation.doctor.plug_ins import plug_in_findings
@@ -52,6 +63,8 @@ def _examine(name: str) -> "list[Finding]":
         storage.room(folder),
         storage.speed(folder),
         network.port(field.console.port, "console"),
+        network.port(field.bus.port, "router"),
+        *(network.datagram_port(place, name) for name, place in _awaited(field).items()),
         *network.power_saving(),
         *plug_in_findings(),
     ]

@@ -124,6 +124,7 @@ ELSEWHERE = {
 
 RENAMED = {
     "replay": {"--headless": "--until-end"},
+    "view": {"--save": "--output"},
     "bench estimator": {"--duration": "--flight-ms"},
     "experiment faults": {"--seconds": "--duration"},
     "experiment scenarios": {"--seconds": "--duration"},

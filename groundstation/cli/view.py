@@ -25,7 +25,7 @@ _PORT = click.IntRange(1024, 65535)
 @click.command(
     epilog="\b\nExamples:\n  groundstation view --foxglove          then open ws://127.0.0.1:8766 in Foxglove\n"
     "  groundstation view --rerun             then open the page that it names\n"
-    "  groundstation view --rerun --save flight.rrd\n"
+    "  groundstation view --rerun -o flight.rrd\n"
     "  groundstation view --ros2              then ros2 topic list, rviz2 ... (rmw_zenoh)"
 )
 @click.option("--rerun", "viewer", flag_value="rerun", help="Serve Rerun's web viewer; extra [rerun].")
@@ -34,7 +34,7 @@ _PORT = click.IntRange(1024, 65535)
 @click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
 @click.option("--port", type=_PORT, help=f"Port to serve on (Foxglove: {_FOXGLOVE_PORT}, Rerun: {_RERUN_PORT}).")
 @click.option("--page-port", type=_PORT, default=_RERUN_PAGE_PORT, show_default=True, help="Rerun's page.")
-@click.option("--save", type=click.Path(path_type=Path), help="Rerun: write to this new file instead of serving.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Rerun: new file to write instead of serving.")
 @click.option("--router", default=_ROS_ROUTER, show_default=True, metavar="ENDPOINT", help="ROS 2: its Zenoh router.")
 @click.option("--domain", type=click.IntRange(0, 232), default=0, show_default=True, help="ROS 2: its domain.")
 @click.option(
@@ -45,7 +45,7 @@ def view(  # click hands each option over as a parameter
     name: str | None,
     port: int | None,
     page_port: int,
-    save: Path | None,
+    output: Path | None,
     router: str,
     domain: int,
     distro: str,
@@ -57,8 +57,8 @@ def view(  # click hands each option over as a parameter
 
     if viewer is None:
         raise click.UsageError("say which viewer: --rerun, --foxglove or --ros2")
-    if save is not None and viewer != "rerun":
-        raise click.UsageError("--save goes with --rerun; a recording opens in Foxglove as it is")
+    if output is not None and viewer != "rerun":
+        raise click.UsageError("--output goes with --rerun; a recording opens in Foxglove as it is")
     _require(viewer)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
     record = choose(name)
@@ -66,7 +66,7 @@ def view(  # click hands each option over as a parameter
     shown: LiveView | None = None
     try:
         opened = _open_ros2(record, router, domain, distro) if viewer == "ros2" else None
-        shown = opened or _open(viewer, record, port, page_port, save)
+        shown = opened or _open(viewer, record, port, page_port, output)
         dropped = watch(bus, shown, lambda: record.alive)
         click.echo("the run has ended" if shown.alive else "the viewer's server has ended", err=True)
         if dropped:
@@ -86,7 +86,7 @@ def _require(viewer: str) -> None:
     {"rerun": require_rerun, "foxglove": require_foxglove, "ros2": require_ros2}[viewer]()
 
 
-def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int, save: Path | None) -> "LiveView":
+def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int, output: Path | None) -> "LiveView":
     from groundstation.bus import clock
     from groundstation.recording.timeline import Timeline
 
@@ -100,12 +100,12 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
     from groundstation.engineering_views.rerun_live import RerunServer, RerunView
     from groundstation.recording.outputs import require_absent
 
-    if save is not None:
-        require_absent(save)
-    server = None if save is not None else RerunServer(port or _RERUN_PORT, page_port)
-    click.echo(f"{record.name} {f'to {save}' if server is None else f'at {server.page}'} (Ctrl-C leaves it)")
+    if output is not None:
+        require_absent(output)
+    server = None if output is not None else RerunServer(port or _RERUN_PORT, page_port)
+    click.echo(f"{record.name} {f'to {output}' if server is None else f'at {server.page}'} (Ctrl-C leaves it)")
     now_ns = clock.now_ns() + timeline.unix_offset_ns
-    return RerunView(record.name, field, timeline, now_ns, server, save)
+    return RerunView(record.name, field, timeline, now_ns, server, output)
 
 
 def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str) -> "LiveView":

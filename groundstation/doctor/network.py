@@ -11,15 +11,26 @@ _NETWORKS = Path("/sys/class/net")
 
 
 def port(number: int, purpose: str) -> Finding:
-    """Return whether the port is free on loopback."""
+    """Return whether a TCP port is free on loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", number))
-        except OSError as error:
-            found, remedy = f"{number}: {error.strerror}", f"ss -ltnp 'sport = :{number}' names the program"
-            return Finding(Level.SHOULD, f"port of the {purpose}", found, remedy)
-    return Finding(Level.OK, f"port of the {purpose}", f"{number} is free")
+        return _bound(probe, ("127.0.0.1", number), f"port of the {purpose}", "ltnp")
+
+
+def datagram_port(place: tuple[str, int], purpose: str) -> Finding:
+    """Return whether a UDP port at which a driver waits for its vehicle is free."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        return _bound(probe, place, f"port of {purpose}", "lunp")
+
+
+def _bound(probe: socket.socket, place: tuple[str, int], subject: str, listed: str) -> Finding:
+    number = place[1]
+    try:
+        probe.bind(place)
+    except OSError as error:
+        remedy = f"ss -{listed} 'sport = :{number}' names the program"
+        return Finding(Level.SHOULD, subject, f"{number}: {error.strerror}", remedy)
+    return Finding(Level.OK, subject, f"{number} is free")
 
 
 def power_saving(networks: Path = _NETWORKS, program: str = "iw") -> list[Finding]:

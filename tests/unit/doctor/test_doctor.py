@@ -11,6 +11,8 @@ from groundstation.cli.doctor import doctor
 from groundstation.doctor import network, processor, storage
 from groundstation.doctor.finding import Level
 
+CONFIG = Path(__file__).parents[3] / "config"
+
 
 def test_one_core_is_too_few_and_two_are_few(monkeypatch: pytest.MonkeyPatch) -> None:
     for count, level in ((1, Level.MUST), (2, Level.SHOULD), (8, Level.OK)):
@@ -83,3 +85,25 @@ def test_the_command_prints_findings_and_fails_on_a_must(monkeypatch: pytest.Mon
     result = CliRunner().invoke(doctor, ["lab", "--json"], standalone_mode=False)
     found = {entry["subject"]: entry for entry in json.loads(result.output)}
     assert result.return_value == 1 and found["disk"]["level"] == "MUST" and found["disk"]["remedy"]
+
+
+def test_ports_at_which_drivers_wait_for_their_vehicles_are_tried(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        place = taken.getsockname()
+        held = network.datagram_port(place, "drone_2")
+        assert held.level is Level.SHOULD and held.subject == "port of drone_2" and "ss -lunp" in held.remedy
+    assert network.datagram_port(place, "drone_2").level is Level.OK
+
+
+def test_router_and_waiting_drivers_of_the_field_are_listed(tmp_path: Path) -> None:
+    text = (CONFIG / "mixed-team.yaml").read_text()
+    waits = text.replace(
+        "{flavour: ardupilot,", "{flavour: ardupilot, listen: true, local_address: 127.0.0.1, port: 14559,"
+    )
+    (tmp_path / "team.yaml").write_text(waits)
+    (tmp_path / "cameras").symlink_to(CONFIG / "cameras")
+    answer = CliRunner().invoke(doctor, [str(tmp_path / "team.yaml"), "--json"])
+    told = {one["subject"]: one["found"] for one in json.loads(answer.output)}
+    assert "is free" in told["port of drone_3"] and told["port of drone_3"].startswith("14559")
+    assert "port of the router" in told and "port of drone_2" not in told

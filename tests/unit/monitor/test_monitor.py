@@ -1,6 +1,9 @@
 """The monitor's picture of a given state."""
 
 import io
+import re
+from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +19,7 @@ from groundstation.monitor.screen import DRAW_PERIOD_NS, Screen, line
 from groundstation.monitor.state import Cast, MonitorState, cast_from_field
 from groundstation.monitor.table import render
 
+DOCS = Path(__file__).parents[3] / "docs"
 S = 1_000_000_000
 NOW = 100 * S
 CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",))
@@ -134,6 +138,24 @@ def test_names_are_whole_in_any_terminal(world: World, width: int) -> None:
     assert all(any(row.startswith(name) for row in rows) for name in ("drone_1", "drone_2", "turtlebot"))
     assert not any("…" in row for row in rows)
     assert any("mode" in row and "position [m]" in row for row in rows) == (width >= 60)  # where there is room
+
+
+def test_columns_give_way_in_the_order_that_the_page_says(world: World) -> None:
+    page = " ".join((DOCS / "tutorials" / "first-demo.md").read_text("utf-8").split())
+    listed = re.search(r"goes without ([^.]*?), in this order", page)
+    assert listed is not None
+    order = re.split(r", | and ", listed[1])
+    world.vehicle("drone_1")
+    seen = set()
+    for width in range(160, 20, -2):
+        console = Console(record=True, width=width, file=io.StringIO())
+        console.print(render(world.state, NOW))
+        rows = console.export_text().splitlines()
+        heads = " ".join(takewhile(lambda row: not row.startswith("drone_1"), rows))
+        spared = [name for name in order if name not in heads]
+        assert spared == order[: len(spared)], (width, heads)
+        seen.add(len(spared))
+    assert max(seen) >= 5, "no width was narrow enough to tell the order"
 
 
 def test_a_pipe_gets_everything(world: World, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,7 @@
 """Deterministic starts for the local search: the cost has several minima and is flat where nothing is seen."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -10,12 +10,14 @@ from groundstation.geometry.angles import difference
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.problem import PlanningScene
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS
-from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.models import Rectangle, SensorSuite
 from groundstation.sensing.topology import Topology
 
 Point = tuple[float, float, float]
 SMALL_TEAM = 4
 """Up to so many robots, all of them may start towards other places at once."""
+
+_INSET_M = 0.2  # inside the edge of a world-fixed view
 
 
 class Starts:
@@ -74,9 +76,8 @@ class Starts:
                 if name in robots:
                     px, py = _stand(pose, middle, height, name, sensors)
                     above = height + sensors.marker_height_m[name]
-                    views = sensors.root_views(above) if level == 0 and keep_root else ()
-                    if views:
-                        px, py = views[0].shrunk(0.2).nearest(px, py)
+                    if level == 0 and keep_root:
+                        px, py = _in_root_view((px, py), sensors.root_views(above))
                     self._steer(x, self._index[name], (px, py, math.atan2(middle[1] - py, middle[0] - px)))
                     x[ROBOT_CONTROLS * self._index[name] + HEIGHT] = self.height(self._index[name], height)
                 subjects.append((px, py, height + sensors.marker_height_m[name]))
@@ -94,6 +95,12 @@ class Starts:
         body = np.array([c * vx + s * vy, c * vy - s * vx]) / scale[:2]
         x[at : at + 2] = body / max(1.0, float(np.abs(body).max()))
         x[at + 2] = rate
+
+
+def _in_root_view(stand: tuple[float, float], views: Sequence[Rectangle]) -> tuple[float, float]:
+    """Return the point in a world-fixed view that is nearest to a stand; the stand itself without a view."""
+    points = (view.shrunk(_INSET_M).nearest(*stand) for view in views)
+    return min(points, key=lambda point: math.dist(point, stand), default=stand)
 
 
 def _stand(pose: Array, subject: list[float], height: float, name: str, sensors: SensorSuite) -> tuple[float, float]:

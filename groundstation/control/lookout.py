@@ -10,6 +10,7 @@ from groundstation.control.parameters import ControlParameters
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.control.target_search import Search, SearchMode, SearchState
+from groundstation.control.unseen_targets import UnseenTargets
 from groundstation.control.view import velocity_error_m_s
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.room_map import RoomMap
@@ -33,6 +34,7 @@ class Lookout:
         self._robots = MissingRobots(sensors, robots)
         self._names = tuple(robots)
         self._modes: dict[str, str] = {}
+        self._unseen = UnseenTargets()
         self._told = dict.fromkeys(targets, SearchMode.SEARCH)
         self._notices: list[Notice] = []
 
@@ -82,6 +84,7 @@ class Lookout:
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))
         gone = self._search.advance(belief, {name: age_s for name, age_s in ages_s.items() if name in self.targets})
         self._tell()
+        self._notices += self._unseen.advance(belief, self._unseen_s(belief.stamp_ns, ages_s))
         return gone
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
@@ -110,6 +113,11 @@ class Lookout:
     def _obeyed(self) -> bool:
         """Whether any robot flies where the search wants it: not while all hold or land."""
         return _OBEYS in self._modes.values()
+
+    def _unseen_s(self, now_ns: int, ages_s: Mapping[str, float]) -> Mapping[str, float]:
+        """Return since when no picture has shown each target that the team tracks."""
+        tracked = [name for name in self.targets if not self._search.is_missing(name)] if self._obeyed else []
+        return {name: min(ages_s[name], self._search.shown_s(name, now_ns)) for name in tracked}
 
     def _tell(self) -> None:
         """Say of each target that a search for it began, ended, or became hopeless, once there is one who searches."""

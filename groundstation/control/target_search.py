@@ -1,5 +1,6 @@
 """What is known of targets that are not seen, and where the team looks for them: maps in place of Gaussians."""
 
+import math
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
 _HISTORY = 50  # beliefs that pictures may be as old as: a second at 50 Hz
-_SHOWN_NS = 1_500_000_000  # pictures are searched all over twice a second
+_SHOWN_S = 1.5  # pictures are searched all over twice a second
 _STEP_NS = 100_000_000  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
 _TIPPED_M = 0.08  # what a robot's picture is off at the distance of a target, since it is not level as it is believed
@@ -98,6 +99,11 @@ class Search:
         """Return whether a target is searched for."""
         return self.targets[name].mode is not SearchMode.TRACK
 
+    def shown_s(self, name: str, now_ns: int) -> float:
+        """Return since when no picture that was searched all over has shown a target; infinite: none ever did."""
+        stamp_ns = self._shown_ns.get(name)
+        return math.inf if stamp_ns is None else (now_ns - stamp_ns) / NS_PER_S
+
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
         """Bring the maps to a belief; returns the targets that are not where the belief has them any more.
 
@@ -145,7 +151,7 @@ class Search:
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
         p, now_ns = self.parameters, belief.stamp_ns
         # A picture that shows it elsewhere than it was predicted is the filter's business, not a reason to search.
-        shown = now_ns - self._shown_ns.get(name, -_SHOWN_NS) < _SHOWN_NS and name in belief.layout
+        shown = self.shown_s(name, now_ns) < _SHOWN_S and name in belief.layout
         if age_s <= p.begin_after_s or shown:
             return (
                 state

@@ -10,8 +10,9 @@ from rich.text import Text
 from groundstation.appearance.cost import cost_text
 from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
+from groundstation.control.unseen_targets import TELL_AFTER_S, unseen_words
 from groundstation.geometry.ellipse import semi_axes_95
-from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.alarms import TARGET_LOST_S, alarms_of
 from groundstation.monitor.state import MonitorState, StampedMessage
 
 _SEEN_S = 0.6
@@ -46,7 +47,14 @@ def render(state: MonitorState, now_ns: int) -> RenderableType:
     parts: list[RenderableType] = [_title(state, now_ns)]
     for alarm in alarms_of(state, now_ns)[:_ALARMS]:
         parts.append(Text(f" {alarm.text} ", style="bold white on red" if alarm.grave else "black on yellow"))
-    parts += [Text(), _Entities(state, now_ns), *_searches(state), Text(), _plan(state, now_ns)]
+    parts += [
+        Text(),
+        _Entities(state, now_ns),
+        *_searches(state),
+        *_unseen(state, now_ns),
+        Text(),
+        _plan(state, now_ns),
+    ]
     if state.cameras:
         parts.append(_cameras(state, now_ns))
     if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
@@ -121,6 +129,18 @@ def _searches(state: MonitorState) -> Iterator[Text]:
     for search in state.estimate.message.searches if state.estimate else ():
         style = "bold red" if search.mode == "LOST" else "yellow"
         yield Text(f"{search.target} {search.mode}: {search.text}", style=style)
+
+
+def _unseen(state: MonitorState, now_ns: int) -> Iterator[Text]:
+    """Say where each target is expected that is unseen, until it is searched for or an alarm says so."""
+    searched = {search.target for search in state.estimate.message.searches} if state.estimate else set()
+    for name in state.cast.targets:
+        target = state.entity(name)
+        if target is None or state.estimate is None or name in searched:
+            continue
+        age_s = target.age_s + state.estimate.age_s(now_ns)
+        if TELL_AFTER_S < age_s <= TARGET_LOST_S:
+            yield Text(unseen_words(name, age_s, target.mean[:2]), style="yellow")
 
 
 def _vehicle(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Text, Text]:

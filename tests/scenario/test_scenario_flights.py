@@ -1,32 +1,37 @@
 """Flights of scenario files: the target is found and held, and what a strategy does not change stays the same."""
 
 import json
+import math
+import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
+from groundstation.arrays import Array
 from groundstation.settings.files import find_field, find_scenario
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
 from groundstation.settings.sections import CAMERA, driver_sections
 from sim_bridge.scenario import parse_scenario
+from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
 
 pytestmark = [pytest.mark.slow, pytest.mark.study]
 
 
-def fly(name: str, strategy: str, seconds: float = 8.0) -> dict[str, Any]:
+def order(name: str) -> tuple[Drawn, list[Section]]:
+    """Return what a flight of a scenario in the lab begins with, seed 1."""
     path = find_field("lab")
     scenario = parse_scenario(json.dumps(load_scenario(find_scenario(name, path))))
     field = load_field(path, ("recording.raw_datagrams=false",))
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
-    drawn = as_drawn(msgspec.to_builtins(resolved_field(field)), scenario, 1)
-    return ScenarioFlight(drawn, sections, seconds, strategy).fly()
+    return as_drawn(msgspec.to_builtins(resolved_field(field)), scenario, 1), sections
 
 
 # Along the walls the target was found after 20 s, not 15.
@@ -58,10 +63,33 @@ def test_scenarios_end_as_their_files_expect(tmp_path: Path, names: tuple[str, .
 
 @pytest.mark.parametrize("strategy", ["ours", "string", "relay", "chase"])
 def test_a_target_that_wanders_is_found_and_held(strategy: str) -> None:
-    flown = fly("random-walk", strategy)
+    flown = ScenarioFlight(*order("random-walk"), 8.0, strategy).fly()
     assert flown["flown"]
     assert flown["found_s"] is not None
     assert flown["lost_s"] == 0.0
     assert (flown["landings"], flown["violations"]) == (0, [])
     if strategy == "string":
         assert flown["switches"] <= 1
+
+
+class WatchedFlight(ScenarioFlight):
+    """Notes when the target is carried away."""
+
+    carried_s: float | None = None
+    _was: Array | None = None
+
+    def watch(self) -> None:
+        super().watch()
+        place = np.array(dict(zip(self.world.bodies, self.world.states(), strict=True))["turtlebot"][:2])
+        if self._was is not None and math.dist(place, self._was) > 1.0:
+            self.carried_s = self.world.time_s
+        self._was = place
+
+
+def test_a_loss_is_told_within_a_second_with_where_the_target_may_be() -> None:
+    kidnap = WatchedFlight(*order("kidnap-2m"), 22.0, "ours")
+    assert kidnap.fly()["flown"]
+    assert kidnap.carried_s is not None
+    told = [(when_s, text) for when_s, text in kidnap.events if when_s >= kidnap.carried_s and "turtlebot" in text]
+    assert told[0][0] - kidnap.carried_s <= 1.0
+    assert re.search(r"is not seen for 0\.\d s: it may be hidden near \(-?\d\.\d, -?\d\.\d\)", told[0][1])

@@ -54,7 +54,9 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     lookout.take_notices()
     assert lookout.searches(0) == ()
     look_in_vain(lookout)
-    (notice,) = lookout.take_notices()
+    unseen, notice = lookout.take_notices()
+    assert unseen.text == "turtlebot is not seen for 0.6 s: it may be hidden near (1.0, 0.0)"
+    assert (unseen.severity, unseen.entity) == (Severity.WARNING, "turtlebot")
     assert notice.severity is Severity.WARNING
     assert notice.entity == "turtlebot"
     assert "searches around" in notice.text
@@ -70,6 +72,29 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     assert lookout.searches(round(2.9e9)) == ()
     assert lookout.maps() == {}
+
+
+def test_a_target_that_comes_into_view_again_is_said_to_be_seen() -> None:
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    told = []
+    for tick, unseen_s in enumerate((0.1, 0.59, 0.61, 0.9, 0.1, 0.2), 1):
+        lookout.advance(belief(0.02 * tick), {"drone_1": 0.1, "turtlebot": unseen_s}, {"drone_1": 0.1})
+        told.append([notice.text for notice in lookout.take_notices()])
+    hidden = "turtlebot is not seen for 0.6 s: it may be hidden near (1.0, 0.0)"
+    assert told == [["turtlebot is found"], [], [hidden], [], ["turtlebot is seen again"], []]
+
+
+def test_a_picture_that_shows_a_target_elsewhere_hides_it_from_nobody() -> None:
+    """The filter may refuse the sighting; it is seen all the same."""
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
+    lookout.take_notices()
+    header = Header(round(0.5e9), "c", "drone_1", "drone_1_camera", 1)
+    lookout.take(SearchedPicture(header=header, observer="drone_1", camera="drone_1_camera", found=("turtlebot",)))
+    lookout.advance(belief(0.9), {"drone_1": 0.1, "turtlebot": 0.8}, {"drone_1": 0.1})
+    assert lookout.take_notices() == []
 
 
 def test_nobody_is_said_to_search_who_lands_or_holds() -> None:

@@ -124,6 +124,17 @@ def test_a_search_is_shown_with_its_place(world: World) -> None:
     assert "turtlebot SEARCH: now around (1.2, -0.5)" in world.text()
 
 
+@pytest.mark.parametrize(("unseen_s", "told"), [(0.4, False), (0.8, True), (3.5, False)])
+def test_a_target_that_may_be_hidden_is_shown_with_its_place_until_an_alarm_tells_of_it(
+    world: World, unseen_s: float, told: bool
+) -> None:
+    world.estimate(unseen_s)
+    sentence = f"turtlebot is not seen for {unseen_s} s: it may be hidden near (0.8, 0.2)"
+    assert (sentence in world.text()) == told
+    world.estimate(unseen_s, 0.0, m.TargetSearch("turtlebot", "SEARCH", 4.0, (1.2, -0.5), 0.3, 9.0, "searched"))
+    assert "may be hidden" not in world.text()
+
+
 @pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 140])
 def test_names_are_whole_in_any_terminal(world: World, width: int) -> None:
     world.vehicle("drone_1", mode="TAKING_OFF")

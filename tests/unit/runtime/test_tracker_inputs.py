@@ -252,7 +252,7 @@ def test_a_kidnapped_robot_is_found_again_alone(tracking: Flight) -> None:
     t.run(1.0, onboard=False)
     np.testing.assert_allclose(t.tracker.belief.mean_of("drone_1")[:3], t.places["drone_1"], atol=0.04)
     np.testing.assert_allclose(t.tracker.belief.mean_of("drone_2")[:3], PLACES["drone_2"], atol=0.04)
-    assert {n.entity for n in t.notices if n.severity is Severity.WARNING} == {"drone_1"}
+    assert {n.entity for n in t.notices if n.severity is Severity.WARNING} == {"drone_1", "turtlebot"}  # both unseen
 
 
 def test_a_heading_jump_with_reset_does_not_turn_the_robot(tracking: Flight) -> None:

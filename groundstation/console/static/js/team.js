@@ -122,11 +122,13 @@ function showBattery(node, name, value) {
   node.replaceChildren(el("span", { class: "battery" }, fill), words);
 }
 
+const UNSEEN_S = 0.6; // a target may then be hidden, or be elsewhere
+
 function beliefWords(body, age, lost) {
   if (trackerSilent()) return "Where it is now nobody knows: the tracker is silent.";
   if (!body) return "";
   if (lost) return doing("TRACK").length ? "Nobody sees it: the team looks for it." : "Nobody sees it.";
-  if (age > 1) return `Not seen for ${seconds(age)}: expected where it is drawn.`;
+  if (age > UNSEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
   return doing("TRACK").length ? "Seen: the team tracks it." : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
 
@@ -139,8 +141,8 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? ["unknown"] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : doing("TRACK").length ? "tracked" : "seen"));
-    mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > 1 ? "warn" : "good";
+    text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
+    mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > UNSEEN_S ? "warn" : "good";
     text(detail, words ?? beliefWords(body, age, lost));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }

@@ -1,0 +1,36 @@
+"""Targets that no picture has shown for a moment: told at once, before it is known whether they are hidden or gone."""
+
+from collections.abc import Iterable, Mapping
+
+from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
+from groundstation.estimation.belief import JointBelief
+
+TELL_AFTER_S = 0.6
+"""Unseen for so long, a target may be hidden, or be elsewhere."""
+
+
+def unseen_words(name: str, unseen_s: float, place_m: Iterable[float]) -> str:
+    """Return what is said of a target that is unseen for so long, and expected there [x, y in m; world]."""
+    x, y = place_m
+    return f"{name} is not seen for {unseen_s:.1f} s: it may be hidden near ({x:.1f}, {y:.1f})"
+
+
+class UnseenTargets:
+    """Says once of each target that it is unseen, and once that it is seen again."""
+
+    def __init__(self) -> None:
+        self._told: frozenset[str] = frozenset()
+
+    def advance(self, belief: JointBelief, unseen_s: Mapping[str, float]) -> list[Notice]:
+        """Return what is new; unseen_s: since when no picture has shown each target that is not searched for."""
+        unseen = {name: age_s for name, age_s in unseen_s.items() if age_s > TELL_AFTER_S and name in belief.layout}
+        told, self._told = self._told, frozenset(unseen)
+        new = [
+            (name, unseen_words(name, unseen[name], belief.mean_of(name)[:2])) for name in sorted(unseen.keys() - told)
+        ]
+        seen = sorted((told - unseen.keys()) & unseen_s.keys())
+        return [
+            *(Notice(Severity.WARNING, text, "", name) for name, text in new),
+            *(Notice(Severity.INFO, f"{name} is seen again", "", name) for name in seen),
+        ]

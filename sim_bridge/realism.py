@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sim_bridge.scenario import Scenario
-from sim_bridge.target_paths import Path, Standstill
+from sim_bridge.target_paths import Anywhere, Path, Standstill
 
 # A weaker value in the default scenario would make a simulated run look better than a flight.
 _REALISTIC: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
@@ -49,7 +49,7 @@ def _at_least(interval: tuple[float, float], low: float, high: float) -> bool:
 
 
 def _is_realistic_path(path: Path) -> bool:
-    return not isinstance(path, Standstill) and path.speed_m_s >= 0.2
+    return not isinstance(path, Standstill | Anywhere) and path.speed_m_s >= 0.2
 
 
 def weaker_than_reality(scenario: Scenario) -> list[str]:

@@ -19,6 +19,7 @@ from sim_bridge.section import Section
 from sim_bridge.surroundings import FloorZone, LinkBursts, Obstacle, ScenarioExpectation
 from sim_bridge.target_paths import (
     AlongWalls,
+    Anywhere,
     FigureEight,
     Kidnap,
     Path,
@@ -61,10 +62,11 @@ def _beside(scenario: TargetScenario, rank: int) -> TargetScenario:
     """Return the scenario of the rank-th target (0: the first) where one is told for all, so that none meet.
 
     On an eight each is some way ahead of the one before (half a turn ahead, they would meet where the path crosses
-    itself); those that wait or walk at random start 1 m apart; along walls each starts in a corner of its own.
+    itself); those that wait or walk at random start 1 m apart; along walls each starts in a corner of its own, and
+    anywhere each has a place of its own.
     """
     path = scenario.path
-    moved: dict[str, object]
+    moved: dict[str, object] = {}
     match path:
         case FigureEight():
             moved = {"start_phase": math.fmod(path.start_phase + rank * _APART_TURNS, 1.0)}
@@ -74,6 +76,8 @@ def _beside(scenario: TargetScenario, rank: int) -> TargetScenario:
             moved = {"start_m": (path.start_m[0] + rank * _APART_M, path.start_m[1])}
         case AlongWalls():
             moved = {"start_corner": (path.start_corner + rank) % 4}
+        case Anywhere():
+            pass
         case Waypoints():
             moved = {"points_m": tuple((x, y + rank * _APART_M) for x, y in path.points_m)}
         case other:

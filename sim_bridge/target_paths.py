@@ -51,6 +51,15 @@ class Standstill(Section):
     """Its heading [deg; world], counter-clockwise."""
 
 
+class Anywhere(Section):
+    """A target that stands still somewhere on the floor: where, and which way it looks, is drawn from the seed."""
+
+    shape: Literal["anywhere"] = "anywhere"
+    """Form of the path."""
+    clear_m: Annotated[float, Field(ge=0, le=10)] = 0.5
+    """Least distance of its centre from walls, pads and obstacles that stand [m]."""
+
+
 class Waypoints(Section):
     """From point to point in straight lines, turning on the spot at each."""
 
@@ -140,4 +149,4 @@ class Kidnap(Section):
     """How far where `to_m` is not told [m]; never beyond 0.5 m from a wall."""
 
 
-Path = FigureEight | Standstill | Waypoints | RandomWalk | Sprint | AlongWalls
+Path = FigureEight | Standstill | Anywhere | Waypoints | RandomWalk | Sprint | AlongWalls

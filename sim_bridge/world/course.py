@@ -5,7 +5,7 @@ from typing import Protocol, assert_never
 
 import numpy as np
 
-from sim_bridge.target_paths import AlongWalls, FigureEight, Path, RandomWalk, Sprint, Standstill, Waypoints
+from sim_bridge.target_paths import AlongWalls, Anywhere, FigureEight, Path, RandomWalk, Sprint, Standstill, Waypoints
 from sim_bridge.world.legs import GoalCourse, Pose, corner_goals, sprint_goals, waypoint_goals
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 from sim_bridge.world.path import EightPath
@@ -33,7 +33,7 @@ class Course(Protocol):
 def course_of(path: Path, tick_s: float, half_room_m: tuple[float, float], rng: np.random.Generator) -> Course | None:
     """Return who drives along a path; None for a target that stands still."""
     match path:
-        case Standstill():
+        case Standstill() | Anywhere():
             return None
         case FigureEight():
             return EightCourse(path, tick_s)

@@ -11,6 +11,7 @@ from sim_bridge.site import SimulatedObstacle
 from sim_bridge.surroundings import Obstacle
 from sim_bridge.target_paths import Standstill
 from sim_bridge.world.noise import generator_of
+from sim_bridge.world.places import Footprint, settled
 from sim_bridge.world.unicycle import BASES, Unicycle
 
 _PARALLEL = 1e-12
@@ -23,11 +24,16 @@ class Box:
         self, obstacle: Obstacle, tick_s: float, rng: np.random.Generator, half_room: tuple[float, float]
     ) -> None:
         most = BASES[obstacle.base].speed_m_s
-        driven = TargetScenario(
-            path=obstacle.path, base=obstacle.base, departs_after_team_s=None, max_speed_m_s=most, slip=0.0
-        )
+        path = settled(obstacle.path, half_room, (), rng)
+        driven = TargetScenario(path=path, base=obstacle.base, departs_after_team_s=None, max_speed_m_s=most, slip=0.0)
         self.body = Unicycle(driven, tick_s, rng, half_room)
         self.size_m = obstacle.size_m
+        self.stands = isinstance(path, Standstill)
+
+    @property
+    def footprint(self) -> Footprint:
+        """Return where it is on the floor."""
+        return Footprint(self.body.x, self.body.y, *self.size_m[:2])
 
     def step(self) -> None:
         """Move on by one tick."""

@@ -14,6 +14,7 @@ from sim_bridge.truth import WIDTH
 from sim_bridge.world.emulation import Around, Body, KeepsSensors, emulation_of, senses_of
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.obstacles import all_obstacles, boxes_of, floor_below
+from sim_bridge.world.places import Footprint, settled
 from sim_bridge.world.puppet import Puppet
 from sim_bridge.world.unicycle import Unicycle
 
@@ -56,11 +57,15 @@ class World:
                 self.drones[name] = self._drone(name, drone, scenario, seed)
         paths = {name: path for name, path in scenario.of_targets(site.tracked).items() if name not in real}
         half_floor = (site.room.size_m[0] / 2, site.room.size_m[1] / 2)
-        self.targets = {
-            name: Unicycle(path, TICK_S, generator_of(seed, name), half_floor) for name, path in paths.items()
-        }
         about = all_obstacles(scenario.obstacles, site.room.obstacles.values())
         self.obstacles = boxes_of(about, TICK_S, seed, half_floor)
+        standing = [box.footprint for box in self.obstacles if box.stands]
+        standing += [Footprint(*drone.pad_m) for drone in site.drones.values()]
+        self.targets = {}
+        for name, path in paths.items():
+            place = settled(path.path, half_floor, standing, generator_of(seed, f"{name}/place"))
+            there = path.model_copy(update={"path": place})
+            self.targets[name] = Unicycle(there, TICK_S, generator_of(seed, name), half_floor)
         self._zones = scenario.floor_zones
         self._echoes = scenario.drones.echoes_of_bodies
         self._target_tops = {name: one.marker.height_m for name, one in site.tracked.items()}

@@ -212,8 +212,8 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     with pytest.raises(SettingsError) as caught:
         load_scenario(path)
     assert caught.value.problems == [
-        f"{path}:3: target.path: shape must be one of 'figure_eight', 'none', 'waypoints', 'random_walk', 'sprint',"
-        " 'along_walls' (got \"figure_eigth\"), did you mean figure_eight?"
+        f"{path}:3: target.path: shape must be one of 'figure_eight', 'none', 'anywhere', 'waypoints', 'random_walk',"
+        " 'sprint', 'along_walls' (got \"figure_eigth\"), did you mean figure_eight?"
     ]
 
 

@@ -1,6 +1,7 @@
 """What stands about in the room: hidden markers, misled sensors, bursts of radio, cameras that hang a little off."""
 
 import json
+import math
 from typing import Any
 
 import msgspec
@@ -78,6 +79,21 @@ def test_the_room_of_the_simulation_has_the_obstacles_of_the_field(lab_field: Re
     assert cupboard.size_m == (0.6, 0.4, 1.2)
     eye = np.array([1.0, -2.0, 1.5])
     assert cupboard.hides(eye, np.array([1.0, 0.5, 0.4])) and not cupboard.hides(eye, np.array([2.0, 0.5, 0.4]))
+
+
+def test_a_target_that_stands_anywhere_stands_clear_of_obstacles_and_pads(lab_field: ResolvedField) -> None:
+    values = msgspec.to_builtins(lab_field)
+    values["room"]["obstacles"] = {"table": {"centre_m": [1.0, 0.0], "size_m": [3.0, 3.0, 0.8]}}
+    told = scenario(target={"path": {"shape": "anywhere"}, "departs_after_team_s": None})
+    places = set()
+    for seed in range(1, 21):
+        world = World(parse_site(values), told, seed)
+        (target,) = world.targets.values()
+        world.step()
+        assert all(box.footprint.distance_m(target.x, target.y) >= 0.5 for box in world.obstacles)
+        assert all(math.dist((target.x, target.y), drone.pad_m) >= 0.5 for drone in parse_site(values).drones.values())
+        places.add((target.x, target.y))
+    assert len(places) == 20
 
 
 def test_a_floor_zone_misleads_the_flow_of_those_above_it(site: Site) -> None:

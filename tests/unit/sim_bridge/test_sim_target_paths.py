@@ -6,9 +6,11 @@ import math
 import numpy as np
 import pytest
 
+from groundstation.errors import SettingsError
 from sim_bridge.scenario import TargetScenario, parse_scenario
-from sim_bridge.target_paths import AlongWalls, Kidnap, Path, RandomWalk, Sprint, Standstill, Waypoints
+from sim_bridge.target_paths import AlongWalls, Anywhere, Kidnap, Path, RandomWalk, Sprint, Standstill, Waypoints
 from sim_bridge.world.noise import generator_of
+from sim_bridge.world.places import Footprint, settled
 from sim_bridge.world.unicycle import BASES, Unicycle
 from sim_bridge.world.world import TICK_S
 
@@ -96,6 +98,29 @@ def test_a_kidnapped_target_is_elsewhere_from_one_tick_to_the_next(path: Path) -
     assert [round((k + 2) * TICK_S, 2) for k in jumps] == [2.0, 4.0]
     assert 1.9 < steps[jumps[0]] < 2.1
     assert rows[jumps[1] + 1, :2] == pytest.approx((1.0, -1.0), abs=0.01)
+
+
+def test_a_place_anywhere_is_clear_of_walls_and_what_stands_and_covers_the_floor() -> None:
+    table, pad = Footprint(1.0, 0.0, 1.2, 0.6), Footprint(-2.0, 1.0)
+    places = []
+    for seed in range(300):
+        place = settled(Anywhere(clear_m=0.5), HALF_ROOM, (table, pad), generator_of(seed, "place"))
+        assert isinstance(place, Standstill)
+        places.append(place.position_m)
+    x, y = np.array(places).T
+    assert 3.4 < np.abs(x).max() <= 3.5
+    assert 2.4 < np.abs(y).max() <= 2.5
+    assert min(table.distance_m(*at) for at in places) >= 0.5
+    assert min(math.dist(at, (-2.0, 1.0)) for at in places) >= 0.5
+    quarters, _, _ = np.histogram2d(x, y, bins=2, range=((-3.5, 3.5), (-2.5, 2.5)))
+    assert quarters.min() > 50
+
+
+def test_a_floor_without_room_is_refused() -> None:
+    with pytest.raises(SettingsError, match=r"no place is 0\.5 m clear"):
+        settled(Anywhere(), HALF_ROOM, (Footprint(0.0, 0.0, 8.0, 6.0),), generator_of(1, "place"))
+    with pytest.raises(SettingsError, match="no place is 9 m clear"):
+        settled(Anywhere(clear_m=9.0), HALF_ROOM, (), generator_of(1, "place"))
 
 
 def test_a_person_is_faster_than_a_turtlebot() -> None:

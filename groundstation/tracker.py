@@ -17,7 +17,7 @@ from groundstation.control.parameters import ControlParameters, SafetyParameters
 from groundstation.control.root_watch import RootWatch
 from groundstation.control.search_parameters import SearchParameters, search_from_field
 from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
-from groundstation.control.view import is_localised, spread_m
+from groundstation.control.view import Localisation, spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
 from groundstation.estimation.attitude_intake import Lean
@@ -83,6 +83,7 @@ class Tracker:
         self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
         self._mounts = MountWatch(parameters.estimator)
         self._joinings = Joinings()
+        self._localisation = Localisation(parameters.safety)
         self._topology = Topology(())
         self._plan_stale = False
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
@@ -180,7 +181,7 @@ class Tracker:
             return False
         if self._joinings.is_unsettled(name):
             return False
-        return is_localised(self._belief, name, self.filter.age_s(name), self.parameters.safety)
+        return self._localisation.holds(self._belief, name, self.filter.age_s(name))
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""
@@ -248,10 +249,9 @@ class Tracker:
         self._topology = self._topology_now()
 
     def plan(
-        self, now_ns: int, should_stop: Callable[[], bool] = lambda: False, max_evaluations: int | None = None
+        self, should_stop: Callable[[], bool] = lambda: False, max_evaluations: int | None = None
     ) -> PlanResult | None:
-        """Advance, plan on the belief and adopt the plan; None when planning failed and the last plan stays."""
-        self.advance(now_ns)
+        """Plan on the belief and adopt the plan; None when planning failed and the last plan stays."""
         request = self.request()
         try:
             plan = self.planner.plan(request.belief, request.topology, request.warm_start, should_stop, max_evaluations)

@@ -64,6 +64,24 @@ def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: Sa
     return bool(max(P[0, 0], P[1, 1]) <= parameters.max_position_std_m**2)
 
 
+class Localisation:
+    """`is_localised`, judged once for each belief and name: the answer is wanted many times a tick."""
+
+    def __init__(self, parameters: SafetyParameters) -> None:
+        self._parameters = parameters
+        self._belief: JointBelief | None = None
+        self._judged: dict[tuple[str, float], bool] = {}
+
+    def holds(self, belief: JointBelief, name: str, unseen_s: float) -> bool:
+        """Return whether an entity is known well enough to fly on."""
+        if belief is not self._belief:
+            self._belief, self._judged = belief, {}
+        asked = name, unseen_s
+        if asked not in self._judged:
+            self._judged[asked] = is_localised(belief, name, unseen_s, self._parameters)
+        return self._judged[asked]
+
+
 def way_back_m(places: Array, view: Rectangle) -> Array:
     """Return how far it is from places (..., 2) towards the middle of a view until they are inside; 0 inside."""
     apart = np.asarray(places) - view.center

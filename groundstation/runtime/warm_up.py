@@ -25,7 +25,7 @@ def warm_up(field: ResolvedField) -> None:
             for target in field.tracked:
                 tracker.ingest(f"{robot}/{target}", _sighting(header, target, (0.0, 0.0, 1.2)), now_ns)
         tracker.advance(now_ns)
-    tracker.plan(now_ns)
+    tracker.plan()
     tracker.setpoints(now_ns)
     tracker.estimates()
 

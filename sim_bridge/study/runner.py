@@ -221,7 +221,7 @@ class Study:
             return
         mark = time.perf_counter()
         if self.world.ticks % self._plan_every == 0:
-            tracker.plan(now_ns)
+            tracker.plan()
         self.spent_s["planner"] += time.perf_counter() - mark
         mark = time.perf_counter()
         for name, limited in tracker.setpoints(now_ns).items():

@@ -295,7 +295,7 @@ def test_a_broken_covariance_means_hold_hover_and_a_new_epoch(tracking: Flight) 
 
 
 def test_plan_and_setpoints_follow_from_the_belief(tracking: Flight) -> None:
-    plan = tracking.tracker.plan(tracking.now)
+    plan = tracking.tracker.plan()
     assert plan is not None
     assert plan.topology.robots == {"drone_1", "drone_2"}
     limited = tracking.tracker.setpoints(tracking.now)

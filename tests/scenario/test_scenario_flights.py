@@ -34,31 +34,16 @@ def order(name: str) -> tuple[Drawn, list[Section]]:
     return as_drawn(msgspec.to_builtins(resolved_field(field)), scenario, 1), sections
 
 
-# Along the walls the target was found after 20 s, not 15.
-KNOWN_MISSES = {"along-walls"}
-
-
-# One of each kind: a drifting drone, a carried target, people in the way, a team with two tasks, unkind emulators.
-SAMPLE = ("flow-bias", "kidnap-2m", "occluder", "two-targets", "unkind")
-
-
 @pytest.mark.timeout(3000)
-@pytest.mark.parametrize(
-    ("names", "least"),
-    [pytest.param(SAMPLE, len(SAMPLE), id="sample"), pytest.param((), 20, id="all", marks=pytest.mark.exhaustive)],
-)
-def test_scenarios_end_as_their_files_expect(tmp_path: Path, names: tuple[str, ...], least: int) -> None:
-    """One seed each: found in time, held, nobody lands."""
-    command = [sys.executable, "-m", "groundstation", "experiment", "scenarios", *names]
-    flown = subprocess.run(
-        [*command, "--scheduler", "none", "-o", str(tmp_path)], capture_output=True, text=True, check=False
-    )
+def test_scenarios_end_as_their_files_expect(tmp_path: Path) -> None:
+    """One seed of each: found in time, held, nobody lands."""
+    command = [sys.executable, "-m", "groundstation", "experiment", "scenarios", "--scheduler", "none"]
+    flown = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=False)
     results = tmp_path / "scenarios.json"
     assert results.exists(), flown.stderr
     rows = json.loads(results.read_text())["rows"]
-    assert len(rows) >= least
-    missed = {row["scenario"]: row["missed"] for row in rows if row["as_expected"] < row["flights"]}
-    assert missed.keys() <= KNOWN_MISSES, missed
+    assert len(rows) >= 20
+    assert not {row["scenario"]: row["missed"] for row in rows if row["missed"]}
 
 
 @pytest.mark.parametrize("strategy", ["ours", "string", "relay", "chase"])

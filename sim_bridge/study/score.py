@@ -101,6 +101,7 @@ class FlightScore:
             **{f"target_{key}": value for key, value in worst.items()},
             **({"targets": targets} if len(targets) > 1 else {}),
             "robot_rmse_m": {k: round(math.sqrt(float(np.mean(v))), 4) for k, v in self.squares.items()},
+            "robot_max_m": {k: round(math.sqrt(max(v)), 3) for k, v in self.squares.items() if k not in self.errors},
             "topology_seconds": {"flat": round(flat, 1), "string": round(string, 1)},
             "topology_switches": self.switches,
             "longest_unseen_s": round(self.unseen_s, 1),

@@ -53,6 +53,7 @@ def summary(reports: Sequence[Mapping[str, Any]], field: ResolvedField) -> dict[
     values = {
         "target_rmse_m": [report["target_rmse_m"] for report in reports],
         "target_lost_s": [report["target_lost_s"] for report in reports],
+        "robot_max_m": [max(report["robot_max_m"].values(), default=math.nan) for report in reports],
         "anees robots": [anees(report, robots) for report in reports],
         "anees robots xy": [anees(report, robots, " xy") for report in reports],
         "anees target": [anees(report, targets) for report in reports],

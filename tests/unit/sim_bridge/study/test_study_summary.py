@@ -22,6 +22,7 @@ def report(a: float, t: float | None) -> dict:
     return {
         "target_rmse_m": 0.1,
         "target_lost_s": 0.0,
+        "robot_max_m": {"a": 0.1 * a, "b": 0.2 * a},
         "anees": {"a": a, "a xy": a, "b": a + 1.0, "b xy": a + 1.0, **target},
         "nis": {"sky>a": 0.8, "sky>b": 1.2, "a>t": 2.0},
     }
@@ -42,6 +43,7 @@ def test_a_flight_is_one_sample_whatever_it_saw(lab_field: ResolvedField) -> Non
     assert math.isnan(anees(report(1.0, None), ("t",)))
     assert nis(report(1.0, 1.0), ("sky",)) == pytest.approx(1.0)
     found = summary([report(1.0, 0.9), report(1.2, None), report(0.8, 1.1)], field_of(lab_field))
+    assert found["robot_max_m"].mean == pytest.approx(0.2), "the worst robot of each flight"
     assert found["anees robots"].mean == pytest.approx(1.5)
     assert found["anees target"].mean == pytest.approx(1.0)
     assert found["anees target"].flights == 2

@@ -66,7 +66,7 @@ slow-studies: $(STAMP)-test-slow
 test-exhaustive: $(STAMP)-test-slow
 	$(PYTEST) -m "exhaustive and not firmware" --timeout 3000 tests
 
-# Hardware in the loop: stand-ins on loopback, and the SITL binaries that $$SKEIN_PX4 and $$SKEIN_ARDUCOPTER name.
+# Real firmware: the SITL binaries that $$SKEIN_PX4 and $$SKEIN_ARDUCOPTER name. Stand-ins for them fly in test-slow.
 test-firmware: $(STAMP)-test-slow
 	$(PYTEST) -m firmware --timeout 900 tests
 

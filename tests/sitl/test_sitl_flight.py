@@ -66,6 +66,7 @@ def test_other_shells_hold_resume_and_land_a_run_that_had_to_take_other_ports(si
 
 
 @FAULTS
+@pytest.mark.exhaustive
 def test_ctrl_c_lands_first(sitl: Start) -> None:
     run = sitl()
     run.until_tracking()

@@ -22,6 +22,8 @@ from sim_bridge.wrong_values import WrongValues
 _MG = 1000.0 / 9.80665
 _NO_CELL = _UNKNOWN = 65535
 _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
+_POSITION_VARIANCE = 0.01  # as an autopilot states it [m^2]
+_SMALL_RATIO = 0.05
 
 
 class Speaker:
@@ -49,7 +51,7 @@ class Speaker:
             GlobalPositionInt: self.global_position,
         }
         if firmware.flavour is Flavour.PX4:
-            self.builders[OdometryMessage] = self.odometry
+            self.builders |= {OdometryMessage: self.odometry, t.EstimatorStatus: self.estimator_status}
         else:
             self.builders[t.EkfStatusReport] = self.ekf
 
@@ -167,7 +169,7 @@ class Speaker:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
         # As confident as a real one, whatever it errs by (docs/reference/mavlink.md 2.1): 0.3 degrees, 0.05 m/s.
-        pose = _diagonal(0.01, 0.01, 0.01, 2.7e-5, 2.7e-5, 0.003)
+        pose = _diagonal(*(_POSITION_VARIANCE,) * 3, 2.7e-5, 2.7e-5, 0.003)
         velocity = _diagonal(0.0025, 0.0025, 0.0025, 0.0, 0.0, 0.0)
         q = self._quaternion()
         return OdometryMessage(self.boot_us, 1, 1, x, -y, -z, q, vx, -vy, -vz, *self._rates(), pose, velocity, 0, 8, 0)
@@ -177,15 +179,23 @@ class Speaker:
         cells = (self._millivolts, *(_NO_CELL,) * 9)
         return t.BatteryStatus(0, 0, 3, 32767, cells, 500, -1, -1, self._percent)
 
-    def ekf(self) -> Message:
-        """Return the flags of its estimator (ArduPilot)."""
+    @property
+    def _solution(self) -> EkfFlag:
         flags = EkfFlag.ATTITUDE | EkfFlag.VELOCITY_VERT | EkfFlag.POS_VERT_ABS
-        if self._firmware.located:
-            flags |= EkfFlag.VELOCITY_HORIZ | EkfFlag.POS_HORIZ_REL | EkfFlag.POS_HORIZ_ABS
-            flags |= EkfFlag.PRED_POS_HORIZ_REL | EkfFlag.PRED_POS_HORIZ_ABS
-        else:
-            flags |= EkfFlag.CONST_POS_MODE
-        return t.EkfStatusReport(flags, 0.05, 0.05, 0.05, 0.0, 0.0)
+        if not self._firmware.located:
+            return flags | EkfFlag.CONST_POS_MODE
+        flags |= EkfFlag.VELOCITY_HORIZ | EkfFlag.POS_HORIZ_REL | EkfFlag.POS_HORIZ_ABS
+        return flags | EkfFlag.PRED_POS_HORIZ_REL | EkfFlag.PRED_POS_HORIZ_ABS
+
+    def ekf(self) -> Message:
+        """Return the flags and test ratios of its estimator (ArduPilot)."""
+        ratio = self._honest.test_ratio
+        return t.EkfStatusReport(self._solution, _SMALL_RATIO, ratio, ratio, 0.0, 0.0)
+
+    def estimator_status(self) -> Message:
+        """Return the flags, test ratios and accuracies of its estimator (PX4), which is fed no velocities."""
+        ratio, accuracy = self._honest.test_ratio, math.sqrt(_POSITION_VARIANCE)
+        return t.EstimatorStatus(self.boot_us, self._solution, 0.0, ratio, ratio, 0.0, 0.0, 0.0, accuracy, accuracy)
 
     def home(self) -> Message | None:
         """Return where it took off, once it has an origin."""

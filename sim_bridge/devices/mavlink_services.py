@@ -22,7 +22,7 @@ from sim_bridge.devices.mavlink_time import SenderClock
 TICK_HZ = 200.0
 _PX4_RATES: dict[type[Message], float] = {
     t.HighresImu: 50, t.LocalPositionNed: 30, f.OdometryMessage: 30, t.Attitude: 100, t.AttitudeQuaternion: 50,
-    t.SysStatus: 5, t.ExtendedSysState: 5, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
+    t.SysStatus: 5, t.ExtendedSysState: 5, t.EstimatorStatus: 1, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
 }  # fmt: skip
 _GLOBAL_RATES: dict[type[Message], float] = {GlobalPositionInt: 50, GpsRawInt: 8}
 _OLD_STREAMS: tuple[type[Message], ...] = (

@@ -26,7 +26,8 @@ _GYRO_NOISE_RAD_S, _ACCELEROMETER_NOISE_M_S2 = 0.006, 0.08
 
 class InertialEstimate:
     """Readings after each `step`: position, velocity [fed frame], yaw, roll, pitch [rad; FLU], gyros and
-    accelerometers [base]. aided_s: since the last pose that was used; poses: used in all; rejected: not used.
+    accelerometers [base]. aided_s: since the last pose that was used; poses: used in all; rejected: not used;
+    test_ratio: of the last pose, how far from the estimate it was as a share of the gate, beyond 1 refused.
     """
 
     def __init__(self, scenario: CopterScenario, tick_s: float, rng: np.random.Generator) -> None:
@@ -40,6 +41,7 @@ class InertialEstimate:
         self.accelerometers: Vector3 = (0.0, 0.0, GRAVITY_M_S2)
         self.aided_s = math.inf
         self.poses = self.rejected = 0
+        self.test_ratio = 0.0
         self._tick_s = tick_s
         self._tilt = (
             GaussMarkov(tilt, _TILT_CORRELATION_S, tick_s, draw),
@@ -104,9 +106,10 @@ class InertialEstimate:
         self._resets = resets
         error = _sum(position, self.position, -1.0)
         turn = math.remainder(yaw - self.yaw, math.tau)
+        self.test_ratio = 0.0 if jump or first else math.hypot(*error) / _GATE_M
         if jump or first:
             self.position, self.yaw = position, yaw
-        elif math.hypot(*error) > _GATE_M or abs(turn) > _GATE_RAD:
+        elif self.test_ratio > 1.0 or abs(turn) > _GATE_RAD:
             self.rejected += 1
             return False
         else:

@@ -4,6 +4,8 @@ import math
 
 import pytest
 
+from groundstation.bus.topics import ODOMETRY
+
 
 class Swaying:
     """A tilt error that changes sides: the estimator learns one that lasts. Its velocity is wrong by up to 0.5 m/s."""
@@ -54,3 +56,16 @@ def test_it_flies_the_velocity_that_is_asked_for(unlevel):
     x, y = (unlevel.body.x - x) / 10.0, (unlevel.body.y - y) / 10.0
     assert 0.3 < c * x + s * y < 0.45 and abs(c * y - s * x) < 0.05
     assert unlevel.mode == "TRACK"
+
+
+def test_the_velocity_of_an_estimator_that_hardly_fits_its_poses_is_published_as_worse(rig):
+    rig.take_off()
+    rig.run(4.0)
+    rig.messages(ODOMETRY)
+    rig.run(2.0)
+    least = rig.settings.vehicles[0].velocity_std_m_s
+    assert max(o.velocity_covariance[0] for o in rig.messages(ODOMETRY)) == pytest.approx(least**2)
+    rig.copter.estimate._tilt = (Swaying(0.0), Swaying(10.0, 20.0))
+    rig.run(5.0)
+    assert rig.copter.estimate.test_ratio > 0.6
+    assert max(o.velocity_covariance[0] for o in rig.messages(ODOMETRY)) > (least + 0.05) ** 2

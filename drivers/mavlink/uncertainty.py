@@ -13,6 +13,8 @@ from groundstation.time_units import NS_PER_S
 # WIRE (ESTIMATOR_STATUS): below 0.5 under normal operation, above 1 a measurement is refused.
 _NORMAL_RATIO = 0.5
 _REFUSED_STD_M_S = 0.5
+# WIRE (docs/reference/mavlink.md 2.1): 0.3 to 0.9 m/s after lift-off, whatever its covariances say.
+_LIFT_OFF_STD_M_S = 0.5
 # An estimator that is levelled by positions alone errs by g times its tilt against a bandwidth of some 1.6 rad/s.
 _TILT_PER_VELOCITY = 0.08
 _NOISE_M_S = 0.05
@@ -29,6 +31,7 @@ class StatedUncertainty:
     def __init__(self) -> None:
         self._velocity = self._attitude = self._ratio = 0.0
         self._stated_ns = self._ratio_ns = self._drift_ns = 0
+        self._floor_ns: int | None = None
         self._drift_m_s = 0.0
 
     def hear(self, now_ns: int, message: OdometryMessage | EstimatorStatus | EkfStatusReport) -> None:
@@ -48,6 +51,10 @@ class StatedUncertainty:
         self._ratio = max((r for r in ratios if math.isfinite(r)), default=0.0)
         self._ratio_ns = now_ns
 
+    def leave_floor(self, now_ns: int) -> None:
+        """Note that its motors turn and it has not lifted off yet."""
+        self._floor_ns = now_ns
+
     def see_drift(self, now_ns: int, drift_m_s: float) -> None:
         """Take the error of its velocity as measured by cameras [m/s]."""
         faded = self._drift_m_s * math.exp(-max(0, now_ns - self._drift_ns) / NS_PER_S / _FADES_S)
@@ -58,7 +65,9 @@ class StatedUncertainty:
         stated = self._velocity if now_ns - self._stated_ns <= _KEPT_NS else 0.0
         ratio = self._ratio if now_ns - self._ratio_ns <= _KEPT_NS else 0.0
         beyond = max(0.0, ratio - _NORMAL_RATIO) / _NORMAL_RATIO
-        return min(_MOST_M_S, max(stated, _REFUSED_STD_M_S * min(1.0, beyond)))
+        rises = self._floor_ns is not None and now_ns - self._floor_ns <= _KEPT_NS
+        lift_off = _LIFT_OFF_STD_M_S if rises else 0.0
+        return min(_MOST_M_S, max(stated, lift_off, _REFUSED_STD_M_S * min(1.0, beyond)))
 
     def attitude_std_rad(self, now_ns: int) -> float:
         """Return the deviation of roll and of pitch."""

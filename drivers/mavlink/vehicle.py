@@ -178,6 +178,8 @@ class MavlinkVehicle:
     def see(self, now_ns: int, estimate: Estimate) -> None:
         """Take the tracker's estimate."""
         good, known = self.vision.hear(now_ns, estimate), self.telemetry
+        if self.orders.starting and not self.orders.lift.lifted and known.base_mode & ARMED:
+            self._publisher.stated.leave_floor(now_ns)
         reported = known.velocity_m_s if now_ns - known.moved_ns < _FRESH_NS else None
         if good is not None and self.orders.see(now_ns, good, reported):
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)

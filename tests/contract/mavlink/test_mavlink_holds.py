@@ -69,3 +69,20 @@ def test_the_velocity_of_an_estimator_that_hardly_fits_its_poses_is_published_as
     rig.run(5.0)
     assert rig.copter.estimate.test_ratio > 0.6
     assert max(o.velocity_covariance[0] for o in rig.messages(ODOMETRY)) > (least + 0.05) ** 2
+
+
+def test_its_velocity_is_published_as_worse_from_the_turn_of_its_motors_until_it_has_lifted_off(rig):
+    def deviation():
+        return max(o.velocity_covariance[0] for o in rig.messages(ODOMETRY)) ** 0.5
+
+    rig.connect()
+    rig.messages(ODOMETRY)
+    rig.run(1.0)
+    least = rig.settings.vehicles[0].velocity_std_m_s
+    assert deviation() == pytest.approx(least)
+    rig.take_off()
+    assert deviation() == pytest.approx(0.5)
+    rig.run(4.0)
+    rig.messages(ODOMETRY)
+    rig.run(1.0)
+    assert deviation() == pytest.approx(least)

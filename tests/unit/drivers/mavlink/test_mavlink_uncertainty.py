@@ -50,3 +50,11 @@ def test_a_velocity_that_drifts_says_how_far_its_attitude_is_off():
     assert math.degrees(stated.attitude_std_rad(3 * S)) == pytest.approx(1.9, abs=0.2)
     stated.see_drift(63 * S, 0.0)
     assert math.degrees(stated.attitude_std_rad(63 * S)) < 0.1
+
+
+def test_its_velocity_is_doubted_while_it_lifts_off_and_for_three_seconds_after():
+    stated = StatedUncertainty()
+    assert stated.velocity_std_m_s(S) == 0.0
+    stated.leave_floor(5 * S)
+    assert stated.velocity_std_m_s(8 * S) == 0.5
+    assert stated.velocity_std_m_s(8 * S + 1) == 0.0

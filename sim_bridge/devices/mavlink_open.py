@@ -5,11 +5,12 @@ import math
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import VideoStreamInformation
 from sim_bridge.devices.camera_stream import PATH
-from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
+from sim_bridge.devices.mavlink import Address, LinkHabits, MavlinkEmulator
 from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.mavlink_scenario import CopterScenario
+from sim_bridge.scenario import Scenario
 from sim_bridge.site import Lens, SiteDrone
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.wrong_values import WrongValues
@@ -29,26 +30,28 @@ def announced(name: str, lens: Lens, fps: float, uri: str) -> VideoStreamInforma
 def open_vehicle(
     name: str, drone: SiteDrone, copter: MavlinkCopter, order: LaunchSpec, wrong: WrongValues | None = None
 ) -> MavlinkEmulator:
-    """Return the listening emulator of a MAVLink vehicle.
-
-    Where the field's driver waits for its vehicles (`listen`), the vehicle calls it.
-    """
-    identity = identity_of(drone)
-    flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
+    """Return the listening emulator of a MAVLink vehicle."""
     video = None
     if name in order.streams and drone.camera is not None:
         address, port = order.streams[name]
         uri = f"http://{address}:{port}{PATH}"
         video = announced(name, drone.camera.calibration, order.scenario.cameras.fps, uri)
-    vehicle = MavlinkEmulator(
-        name,
-        (order.addresses[name], identity.port),
-        Parameters(flavour, identity.system_id, order.scenario.of_kind("mavlink", CopterScenario).configured),
-        copter,
-        calls=(identity.local_address, identity.port) if identity.listen else None,
-        video=video,
-        wrong=wrong,
-    )
-    scenario = order.scenario.of_kind("mavlink", CopterScenario)
-    vehicle.habits = LinkHabits(scenario.one_partner, scenario.mavlink_1_until_greeted)
+    return open_at(order.addresses[name], name, drone, copter, order.scenario, video=video, wrong=wrong)
+
+
+def open_at(
+    address: str, name: str, drone: SiteDrone, copter: MavlinkCopter, scenario: Scenario, *,
+    calls: Address | None = None, video: VideoStreamInformation | None = None, wrong: WrongValues | None = None,
+) -> MavlinkEmulator:  # fmt: skip
+    """Return the emulator of a MAVLink vehicle that listens at an address, with what a scenario says of its kind.
+
+    calls: whom it speaks to unasked; None: the field's driver, where that one waits for its vehicles (`listen`).
+    """
+    identity, section = identity_of(drone), scenario.of_kind("mavlink", CopterScenario)
+    if calls is None and identity.listen:
+        calls = identity.local_address, identity.port
+    flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
+    parameters = Parameters(flavour, identity.system_id, section.configured)
+    vehicle = MavlinkEmulator(name, (address, identity.port), parameters, copter, calls=calls, video=video, wrong=wrong)
+    vehicle.habits = LinkHabits(section.one_partner, section.mavlink_1_until_greeted)
     return vehicle

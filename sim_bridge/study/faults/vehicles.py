@@ -10,14 +10,11 @@ from drivers.host import VehicleHost
 from drivers.mavlink.driver import RATE_HZ as MAVLINK_HZ
 from drivers.mavlink.driver import Fleet, hosts_of
 from drivers.mavlink.settings import MavlinkDriverSettings
-from drivers.mavlink.wire.names import Flavour
 from drivers.watchdog_types import WatchdogDecision
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Severity
 from sim_bridge.devices.mavlink import MavlinkEmulator
-from sim_bridge.devices.mavlink_identity import identity_of
-from sim_bridge.devices.mavlink_parameters import Parameters
-from sim_bridge.mavlink_scenario import CopterScenario
+from sim_bridge.devices.mavlink_open import open_at
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site
 from sim_bridge.study.faults.ardrone_device import MemoryArDrone
@@ -81,15 +78,8 @@ def devices_of(
         firmware = scenario.drones.firmware_of(name)
         devices[name] = MemoryArDrone(addresses[name], drone, world.onboard[name], firmware, wrong[name], network)
     for name, copter in world.of(MavlinkCopter).items():
-        identity = identity_of(site.drones[name])
-        flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
-        calls = (identity.local_address, identity.port) if identity.listen else None
-        place = (addresses[name], identity.port)
-        configured = scenario.of_kind("mavlink", CopterScenario).configured
-        devices[name] = MavlinkEmulator(
-            name, place, Parameters(flavour, identity.system_id, configured), copter,
-            calls=calls, wrong=wrong[name],
-        )  # fmt: skip
+        drone = site.drones[name]
+        devices[name] = open_at(addresses[name], name, drone, copter, scenario, wrong=wrong[name])
     return devices
 
 

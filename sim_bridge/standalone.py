@@ -3,7 +3,7 @@
 Each address gets a drone of its own with the ports of a real one (an AR.Drone, or `px4@`, `ardupilot@`: system ids from
 1 on, UDP port 14550), 2 m from the next in an empty room; no bus, no ground station. With `--truth`, a line of JSON
 every 0.1 s says where each really is and what it does. Exit codes: 0 stopped (Ctrl-C, SIGTERM, `--seconds`), 1 cannot
-run (the port that is taken is named), 2 wrong arguments.
+run (the port that is taken is named), 2 wrong arguments or scenario.
 """
 
 import argparse
@@ -16,18 +16,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from drivers.mavlink.wire.names import Flavour
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, SettingsError
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.ardrone import ArDroneEmulator
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_video import PORT
-from sim_bridge.devices.mavlink import MavlinkEmulator
-from sim_bridge.devices.mavlink_identity import identity_of
-from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_open import open_at
 from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.devices.mavlink_truth import TruthTeller
-from sim_bridge.scenario import DroneScenario, Scenario, TargetScenario
+from sim_bridge.mavlink_scenario import CopterScenario
+from sim_bridge.scenario import Scenario, TargetScenario
+from sim_bridge.settings_files import named_scenario
 from sim_bridge.site import Site
 from sim_bridge.stage import Stage
 from sim_bridge.target_paths import Standstill
@@ -90,11 +89,15 @@ class Hangar:
     """The drones and their ports; `close` releases them."""
 
     def __init__(
-        self, names: Sequence[str], firmware: ArdroneFirmware, seed: int = 1, mavlink: MavlinkChoice = MavlinkChoice()
-    ) -> None:
+        self, names: Sequence[str], firmware: ArdroneFirmware, seed: int = 1, mavlink: MavlinkChoice = MavlinkChoice(),
+        scenario: Scenario | None = None,
+    ) -> None:  # fmt: skip
+        scenario = scenario or Scenario()
         self._site, self._seed, self._mavlink = site_of(names), seed, mavlink
+        copters = scenario.of_kind("mavlink", CopterScenario).model_copy(update={"configured": mavlink.indoor})
+        drones = scenario.drones.model_copy(update={"firmware": firmware.name})
         parked = TargetScenario(path=Standstill(position_m=(6.0, 0.0)))
-        self._scenario = Scenario(drones=DroneScenario(firmware=firmware.name), target=parked)
+        self._scenario = scenario.model_copy(update={"mavlink": copters, "drones": drones, "target": parked})
         self.world = World(self._site, self._scenario, seed)
         self._stage = Stage(self.world)
         self._tellers: list[TruthTeller] = []
@@ -109,16 +112,14 @@ class Hangar:
             raise
 
     def _open_mavlink(self, name: str, copter: MavlinkCopter) -> None:
-        identity, choice = identity_of(self._site.drones[name]), self._mavlink
-        flavour, system = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT, identity.system_id
-        place = name.rpartition("@")[2], identity.port
-        parameters = Parameters(flavour, system, choice.indoor)
-        vehicle = MavlinkEmulator(name, place, parameters, copter, calls=choice.calls)
+        choice, address = self._mavlink, name.rpartition("@")[2]
+        vehicle = open_at(address, name, self._site.drones[name], copter, self._scenario, calls=choice.calls)
         self._stage.add(name, vehicle, vehicle.socket.fileno())
+        parameters = vehicle.firmware.parameters
         if not choice.indoor:
-            vehicle.equip(Satellites(self._seed + system))
+            vehicle.equip(Satellites(self._seed + parameters.system))
         if choice.truth is not None and not self._tellers:
-            self._tellers.append(TruthTeller(flavour, system, copter.airframe, choice.truth))
+            self._tellers.append(TruthTeller(parameters.flavour, parameters.system, copter.airframe, choice.truth))
 
     def open_video(self, should_stop: Callable[[], bool]) -> None:
         """Serve the pictures of all drones; returns when every port listens. Raises GroundStationError."""
@@ -217,6 +218,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--truth-to", type=_place, metavar="ADDRESS:PORT", help="where the first MAVLink vehicle sends its true state"
     )
+    parser.add_argument(
+        "--scenario",
+        help="scenario file, or a shipped one's name: errors and habits of the drones, without faults and targets",
+    )
     parser.add_argument("--seed", type=int, default=1, help="of noise and unrest (default: %(default)s)")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--truth", action="store_true", help="print the true states")
@@ -237,12 +242,16 @@ def main() -> int:
     hangar: Hangar | None = None
     try:
         mavlink = MavlinkChoice(arguments.indoor, arguments.call, arguments.truth_to)
-        hangar = Hangar(arguments.drones, firmware, arguments.seed, mavlink)
+        scenario = named_scenario(arguments.scenario) if arguments.scenario else Scenario()
+        hangar = Hangar(arguments.drones, firmware, arguments.seed, mavlink, scenario)
         # WIRE: an AR.Drone 1 sends its pictures over UDP in a coding of its own, which is not emulated.
         if hangar.world.of(Quadrotor) and not arguments.no_video and firmware.generation == 2:
             hangar.open_video(lambda: bool(stopped))
         print(f"serving {', '.join(arguments.drones)}", file=sys.stderr, flush=True)
         serve(hangar, arguments.seconds, arguments.truth, lambda: bool(stopped))
+    except SettingsError as error:
+        print(error, file=sys.stderr)
+        return 2
     except GroundStationError as error:
         print(f"hangar: {error}", file=sys.stderr)
         return 1

@@ -111,6 +111,16 @@ def show(field: str, options: tuple[str, ...], resolved: bool, as_json: bool) ->
         click.echo(yaml_of(settings) if resolved else summary_of(settings))
 
 
+@config.command(epilog="\b\nExample:\n  groundstation config scenario unkind-autopilots > unkind.json")
+@click.argument("scenario")
+def scenario(scenario: str) -> None:
+    """Check a scenario (a name or a path) and print it as JSON, as programs of the simulator take it."""
+    from groundstation.settings.files import find_scenario
+    from groundstation.settings.scenario import load_scenario
+
+    click.echo(json.dumps(load_scenario(find_scenario(scenario, Path())), indent=2))
+
+
 @config.command(
     epilog="\b\nExample:\n  groundstation config schema > field.schema.json\n"
     "  (then, as first line of lab.yaml: # yaml-language-server: $schema=field.schema.json)"

@@ -18,7 +18,7 @@ def find_scenario(name: str, field_file: Path) -> Path:
 
 
 def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
-    if "/" in name or name.endswith((".yaml", ".yml")):
+    if "/" in name or name.endswith((".yaml", ".yml", ".json")):
         path = Path(name)
         _refuse_folder(path, what)
         return path  # read() names a missing file and what was probably meant

@@ -2,46 +2,21 @@
 
 import argparse
 import json
-import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 from groundstation.errors import SettingsError
-from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.process import numba_cache
-from sim_bridge.scenario import Scenario, parse_scenario
+from sim_bridge.scenario import Scenario
+from sim_bridge.settings_files import named_scenario, resolved_field
 from sim_bridge.study.summary import summary
 
+_WRONG_SETTINGS = 2
 _EXAMPLES = """examples:
   python -m sim_bridge.study demo --seed 3 --duration 60
   python -m sim_bridge.study demo --seeds 10 --set planner.hysteresis=0.1 --json
   python -m sim_bridge.study demo --field my_lab.yaml --outliers 0.02
   python -m sim_bridge.study vision --help"""
-
-
-def resolved_field(name: str, overrides: list[str]) -> ResolvedField:
-    """Return a field (a path, or a shipped one's name) as the ground station's command line resolves it.
-
-    Nothing else here reads YAML.
-    """
-    command = [sys.executable, "-m", "groundstation", "config", "show", name, "--resolved", "--json"]
-    for override in overrides:
-        command += ["--set", override]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    if result.returncode != 0:
-        sys.stderr.write(result.stderr or result.stdout)
-        raise SystemExit(result.returncode)
-    return field_from_json(result.stdout.encode())
-
-
-def _scenario(path: str) -> Scenario:
-    """Return the scenario of a JSON file; it ends the program when there is none."""
-    try:
-        return parse_scenario(Path(path).read_bytes())
-    except (OSError, SettingsError) as error:
-        hint = f"`groundstation experiment scenarios {path}` flies shipped ones and YAML files"
-        raise SystemExit(f"--scenario {path}: {error}\n  {hint}") from error
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -50,7 +25,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("study", choices=["demo"], help="demo: all drones of the field track the target")
     parser.add_argument("--field", default="lab", help="field file, or a shipped one's name (default: %(default)s)")
-    parser.add_argument("--scenario", help="scenario as JSON file (default: the honest one)")
+    parser.add_argument("--scenario", help="scenario file, or a shipped one's name (default: the honest one)")
     parser.add_argument("--set", action="append", default=[], metavar="A.B=C", help="override one setting of the field")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seeds", type=int, default=1, metavar="N", help="run N seeds from --seed on")
@@ -77,8 +52,12 @@ def main() -> int:
 
         return scenarios()
     arguments = _parser().parse_args()
-    field = resolved_field(arguments.field, arguments.set)
-    scenario = _scenario(arguments.scenario) if arguments.scenario else Scenario()
+    try:
+        field = resolved_field(arguments.field, arguments.set)
+        scenario = named_scenario(arguments.scenario) if arguments.scenario else Scenario()
+    except SettingsError as error:
+        print(error, file=sys.stderr)
+        return _WRONG_SETTINGS
     if arguments.start_phase is not None:
         path = scenario.target.path.model_copy(update={"start_phase": arguments.start_phase})
         scenario = scenario.model_copy(update={"target": scenario.target.model_copy(update={"path": path})})

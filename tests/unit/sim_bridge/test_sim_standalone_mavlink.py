@@ -1,5 +1,8 @@
 """MAVLink vehicles that stand alone: found by satellites, taken off by command, asked for missions."""
 
+import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from itertools import count
 
@@ -11,7 +14,8 @@ from drivers.mavlink.wire.frames import Message, ReceivedFrame
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES
-from sim_bridge.devices.mavlink import MavlinkEmulator
+from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
+from sim_bridge.scenario import parse_scenario
 from sim_bridge.standalone import Hangar, MavlinkChoice
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS
@@ -90,3 +94,37 @@ def test_without_satellites_it_says_so_and_stays_on_the_floor() -> None:
         assert room.order(MavCmd.COMPONENT_ARM_DISARM, 1.0) != 0
     finally:
         room.hangar.close()
+
+
+def test_a_scenario_gives_it_errors_and_habits() -> None:
+    scenario = parse_scenario(b'{"schema_version": 1, "mavlink": {"velocity_gain": [0.5, 0.5], "one_partner": true}}')
+    name = f"ardupilot@127.93.4.{next(_net)}"
+    hangar = Hangar([name], FIRMWARES[DEFAULT], mavlink=MavlinkChoice(indoor=True), scenario=scenario)
+    try:
+        vehicle = hangar._stage.emulators[name]
+        assert isinstance(vehicle, MavlinkEmulator) and vehicle.habits == LinkHabits(one_partner=True)
+        assert vehicle.firmware.parameters.indoor and vehicle.firmware.copter._gain == 0.5
+    finally:
+        hangar.close()
+
+
+def test_a_program_finds_a_shipped_scenario_by_its_name() -> None:
+    """MAVLink 1 until it is greeted is a habit of this one."""
+    address = f"127.93.4.{next(_net)}"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as waiting:
+        waiting.bind(("127.0.0.1", 0))
+        waiting.settimeout(60.0)
+        call = "{}:{}".format(*waiting.getsockname())
+        command = [sys.executable, "-m", "sim_bridge.standalone", f"px4@{address}", "--call", call]
+        with subprocess.Popen([*command, "--scenario", "unkind-autopilots"]) as program:
+            try:
+                assert waiting.recv(512)[0] == 0xFE
+            finally:
+                program.terminate()
+
+
+def test_a_wrong_scenario_is_named_without_a_traceback() -> None:
+    command = [sys.executable, "-m", "sim_bridge.standalone", "px4@127.93.4.250", "--scenario", "unkind-autopilot"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert result.returncode == 2
+    assert "did you mean unkind-autopilots?" in result.stderr and "Traceback" not in result.stderr

@@ -93,10 +93,13 @@ class Programs:
         return self.python("pyardrone", script, *arguments)
 
     def python(self, package: str, script: str, *arguments: object) -> subprocess.Popen[str]:
-        python = INTEROP / package / "bin" / "python"
-        if not python.exists():
-            self._absent(f"PyPI {package} is not installed: run `make interop`")
+        python = self.environment(package) / "bin" / "python"
         return self._start([str(python), str(HERE / script), *map(str, arguments)], dict(os.environ))
+
+    def environment(self, package: str) -> Path:
+        if not (INTEROP / package / "bin" / "python").exists():
+            self._absent(f"PyPI {package} is not installed: run `make interop`")
+        return INTEROP / package
 
     def _start(self, command: list[str], environment: dict[str, str]) -> subprocess.Popen[str]:
         pipe = subprocess.PIPE

@@ -1,9 +1,21 @@
 """Programs of others fly the emulated MAVLink vehicles as they come: connect with defaults, take off, land."""
 
+import asyncio
 import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
 from typing import Any
 
 import pytest
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+from ground_station import GroundStation
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(150)]
 
@@ -33,3 +45,75 @@ def test_node_mavlink_flies_a_px4(hangar: Any, programs: Any) -> None:
     assert seen["disarmed"] and seen["acks"] == {"400": 0, "22": 0, "21": 0}
     flown = heights(drones)
     assert max(flown) == pytest.approx(2.5, abs=0.3) and flown[-1] < 0.1
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_traffic_like_qgroundcontrols_is_answered_and_flies(hangar: Any, kind: str) -> None:
+    drones = hangar(1, kind=kind)
+    station = GroundStation(drones.addresses[0], 14550)
+    try:
+        assert station.px4 == (kind == "px4")
+        assert station.version().flight_sw_version >> 24 == (1 if station.px4 else 4)
+        assert len(station.parameters()) > 20
+        assert station.files_are_refused()
+        assert station.mission_sizes() == [0, 0, 0]
+        station.take_off(2.5)
+        station.land()
+    finally:
+        station.close()
+    flown = heights(drones)
+    assert max(flown) == pytest.approx(2.5, abs=0.3) and flown[-1] < 0.1
+
+
+async def fly_with_mavsdk(port: int) -> list[Any]:
+    """Download the mission, take off and land, all by defaults; returns the mission's items."""
+    async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
+        system = await mavsdk.first_autopilot(timeout_s=20.0)
+        assert system is not None
+        telemetry, action = TelemetryAsync(system), ActionAsync(system)
+        items = await asyncio.wait_for(MissionRawAsync(system).download_mission(), 20.0)
+        deadline = time.monotonic() + 20.0
+        while not await telemetry.health_all_ok() and time.monotonic() < deadline:
+            await asyncio.sleep(0.2)
+        await action.arm()
+        await action.takeoff()
+        await asyncio.sleep(8.0)
+        await action.land()
+        while await telemetry.armed() and time.monotonic() < deadline + 40.0:
+            await asyncio.sleep(0.2)
+        return list(items)
+
+
+def test_mavsdk_finds_no_mission_and_flies_by_satellites(hangar: Any) -> None:
+    port = free_port()
+    drones = hangar(1, "--call", f"127.0.0.1:{port}", kind="px4")
+    assert asyncio.run(fly_with_mavsdk(port)) == []
+    flown = heights(drones)
+    assert max(flown) == pytest.approx(2.5, abs=0.3) and flown[-1] < 0.1
+
+
+def test_mavproxy_lists_no_mission_and_flies_by_satellites(hangar: Any, programs: Any, tmp_path: Path) -> None:
+    drones = hangar(1, kind="ardupilot")
+    script = programs.environment("mavproxy") / "bin" / "mavproxy.py"
+    command = [str(script.parent / "python"), str(script), f"--master=udpout:{drones.addresses[0]}:14550"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        [*command, "--state-basedir", str(tmp_path)], stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
+    ) as proxy:
+        assert proxy.stdin is not None
+        for seconds, line in [
+            (8, "wp list"),
+            (4, "mode GUIDED"),
+            (2, "arm throttle"),
+            (3, "takeoff 1.5"),
+            (10, "mode LAND"),
+        ]:
+            time.sleep(seconds)
+            print(line, file=proxy.stdin, flush=True)
+        time.sleep(12.0)
+        proxy.terminate()
+        said = proxy.communicate(timeout=10)[0]
+    assert "Requesting 0 waypoints" in said, said
+    flown = heights(drones)
+    assert max(flown) == pytest.approx(1.5, abs=0.2) and flown[-1] < 0.1, said

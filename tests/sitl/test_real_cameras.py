@@ -27,7 +27,8 @@ __all__ = ["stand_in", "started"]  # fixtures
 pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.exhaustive, pytest.mark.timeout(400)]
 FPS, DELAY_S = 6.0, 0.12
 FENCE_M = (3.7, 2.7)
-SMALL_TEAM = ("--set", "drones.drone_3=null")
+# The emulated partner stands where the emulated ceiling_east sees it.
+SMALL_TEAM = ("--set", "drones.drone_3=null", "--set", "drones.drone_1.pad_m=[0.6,0.5]")
 Row = np.ndarray
 
 

@@ -78,8 +78,8 @@ def devices_of(
         firmware = scenario.drones.firmware_of(name)
         devices[name] = MemoryArDrone(addresses[name], drone, world.onboard[name], firmware, wrong[name], network)
     for name, copter in world.of(MavlinkCopter).items():
-        drone = site.drones[name]
-        devices[name] = open_at(addresses[name], name, drone, copter, scenario, wrong=wrong[name])
+        placed = site.drones[name]
+        devices[name] = open_at(addresses[name], name, placed, copter, scenario, wrong=wrong[name])
     return devices
 
 

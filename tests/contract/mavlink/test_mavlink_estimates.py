@@ -1,0 +1,58 @@
+"""What the emulated autopilots say of their own estimates, and where those lead without cameras."""
+
+import math
+
+import pytest
+from mavlink_bench import Bench
+
+from drivers.mavlink.wire import telemetry as t
+
+
+@pytest.fixture
+def bench_of(hand):
+    return Bench
+
+
+def test_test_ratios_are_those_of_its_own_estimate(bench_of, flavour):
+    """PX4 sends them unasked, once a second; ArduPilot when asked to."""
+    bench = bench_of(flavour)
+    px4 = flavour == "px4"
+    if not px4:
+        assert bench.command(511, 193.0, 1_000_000.0) == 0
+    bench.run(4.0)
+
+    def ratios():
+        stated = [m.pos_horiz_ratio for m in bench.heard if isinstance(m, t.EstimatorStatus)]
+        return stated or [m.pos_horiz_variance for m in bench.heard if isinstance(m, t.EkfStatusReport)]
+
+    assert len(ratios()) == pytest.approx(4, abs=1) and ratios()[-1] == pytest.approx(0.0, abs=0.02)
+    bench.seen = False
+    bench.run(1.0)
+    body = bench.copter.airframe
+    assert not bench.copter.estimate.aid((body.x + 0.9, body.y, body.z), body.yaw, 0)
+    bench.run(1.0)
+    assert ratios()[-1] == pytest.approx(1.5, abs=0.05)
+
+
+class Leaning:
+    """An error of its level [rad]."""
+
+    def __init__(self, degrees):
+        self._error = math.radians(degrees)
+
+    def step(self):
+        return self._error
+
+
+def test_a_landing_without_cameras_goes_metres_astray_where_its_level_is_off_by_two_degrees(bench_of, flavour):
+    bench = bench_of(flavour).up()
+    bench.fly(down=-0.5)
+    bench.run(2.0)
+    bench.copter.estimate._tilt = (Leaning(0.0), Leaning(2.0))
+    bench.seen, bench.setpoint = False, None
+    body = bench.copter.airframe
+    x, y = body.x, body.y
+    assert bench.command(21) == 0
+    bench.run(10.0)
+    assert body.on_ground
+    assert 2.0 < math.hypot(body.x - x, body.y - y) < 6.0

@@ -80,7 +80,9 @@ class GroundStation:
         sizes = []
         for kind in range(3):
             self._mav.mission_request_list_send(self.system, 1, kind)
-            sizes.append(int(self.until("MISSION_COUNT", lambda count, kind=kind: count.mission_type == kind).count))
+            count = self.until("MISSION_COUNT")
+            assert count.mission_type == kind
+            sizes.append(int(count.count))
             self._mav.mission_ack_send(self.system, 1, 0, kind)
         return sizes
 

@@ -69,7 +69,7 @@ RANGE = Topic("range", m.RangeObservation, 10, Quality.SENSOR, _CAMERA)
 SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: a completely searched picture, and the owners of the markers in it."""
 BODY_POSES = Topic("body_poses", m.BodyPoses, 30, Quality.SENSOR, _CAMERA)
-"""Motion capture driver: where its system has each body."""
+"""Motion capture driver: where its system has each body, in each frame that it uses."""
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
 CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Iterable
 
 from groundstation.bus.messages import (
+    BodyPoses,
     Message,
     RangeObservation,
     RelativeObservation,
@@ -16,11 +17,11 @@ from groundstation.estimation.measurement import Correction
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _USED = (Verdict.ACCEPTED, Verdict.INFLATED)
-# Longer than a camera of 2 pictures a second, or one that is started again, is silent; of one that goes on repeating
-# itself, no longer than two of its pictures take.
+# Longer than a camera of 2 pictures a second, or one that is started again, is silent; of one that goes on with what
+# is refused, no longer than two of its pictures take.
 _SILENT_NS, _HANGS_NS = 1_500_000_000, 500_000_000
 _SILENCE = "no fixed sensor tells anything new of the room: drones hover, and land if none does"
-_REMEDY = "see to the cameras (frozen? unplugged?); the team goes on once one sees it"
+_REMEDY = "see to the cameras and motion capture (frozen? unplugged?); the team goes on once one sees it"
 
 
 class RootWatch:
@@ -34,14 +35,14 @@ class RootWatch:
         self._roots, self._carried = frozenset(roots), frozenset(carried)
         self._rooted_ns: dict[str, int] = {}
         self._heard_ns: dict[str, int] = {}
-        self._searching: set[str] = set()
+        self._telling: set[str] = set()
         self._hanging: set[str] = set()
         self._now_ns = 0
         self._told = False
 
     @property
     def is_silent(self) -> bool:
-        """Return whether no root has told anything new for 1.5 s, or 0.5 s where it goes on repeating itself.
+        """Return whether no root has told anything new for 1.5 s, or 0.5 s where all that it still tells is refused.
 
         One that never says that it sees nobody may just see nobody; it is judged only while it repeats itself.
         """
@@ -51,9 +52,12 @@ class RootWatch:
         """Take a message that was not refused."""
         match message:
             case SearchedPicture() if message.observer in self._roots:
-                self._searching.add(message.observer)
-                if not message.found or message.observer not in self._heard_ns:
-                    self._renew(message.observer, now_ns)
+                self._note(message.observer, now_ns, works=not message.found)
+            case BodyPoses() if message.header.entity in self._roots:
+                refused = bool(message.bodies) and len(message.refused) == len(message.bodies)
+                self._note(message.header.entity, now_ns, works=not refused)
+                if refused:
+                    self._hanging.add(message.header.entity)
             case RelativeObservation() | RangeObservation() if message.observer in self._roots:
                 self._renew(message.observer, now_ns)
 
@@ -75,12 +79,18 @@ class RootWatch:
         """Return how old the newest sighting by a root is that reached an entity, itself or by others; or infinity."""
         return (self._now_ns - self._rooted_ns[name]) / NS_PER_S if name in self._rooted_ns else math.inf
 
+    def _note(self, root: str, now_ns: int, *, works: bool) -> None:
+        """Take what a root says that also says when it sees nobody; with its first word it works."""
+        self._telling.add(root)
+        if works or root not in self._heard_ns:
+            self._renew(root, now_ns)
+
     def _renew(self, root: str, now_ns: int) -> None:
         self._heard_ns[root] = now_ns
         self._hanging.discard(root)
 
     def _says_nothing(self, root: str) -> bool:
-        if root not in self._hanging | self._searching:
+        if root not in self._hanging | self._telling:
             return False
         limit_ns = _HANGS_NS if root in self._hanging else _SILENT_NS
         return self._now_ns - self._heard_ns.get(root, self._now_ns) > limit_ns

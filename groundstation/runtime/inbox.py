@@ -6,10 +6,19 @@ from groundstation.bus import codec, keys
 from groundstation.bus.api import Bus
 from groundstation.bus.keys import Key
 from groundstation.bus.messages import Message
-from groundstation.bus.topics import CLOCK, IMU, OBSERVATION, ODOMETRY, RANGE, SEARCHED_PICTURE, VEHICLE_STATUS
+from groundstation.bus.topics import (
+    BODY_POSES,
+    CLOCK,
+    IMU,
+    OBSERVATION,
+    ODOMETRY,
+    RANGE,
+    SEARCHED_PICTURE,
+    VEHICLE_STATUS,
+)
 from groundstation.errors import MessageError
 
-TOPICS = (ODOMETRY, IMU, OBSERVATION, RANGE, SEARCHED_PICTURE, VEHICLE_STATUS, CLOCK)
+TOPICS = (ODOMETRY, IMU, OBSERVATION, RANGE, SEARCHED_PICTURE, BODY_POSES, VEHICLE_STATUS, CLOCK)
 CAPACITY = 8192  # at 200 Hz odometry and IMU of ten drones: two seconds of a stalled loop
 _MAX_PER_TICK = 4096
 

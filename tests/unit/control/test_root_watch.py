@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import Header, Message, RelativeObservation, SearchedPicture, Verdict
+from groundstation.bus.messages import (
+    BodyPose,
+    BodyPoses,
+    Header,
+    Message,
+    RelativeObservation,
+    SearchedPicture,
+    Verdict,
+)
 from groundstation.control.root_watch import RootWatch
 from groundstation.estimation.measurement import Correction
 
@@ -58,6 +66,13 @@ def picture(*found: str, observer: str = "ceiling") -> SearchedPicture:
     )
 
 
+def frame(*bodies: str, refused: tuple[str, ...] = (), observer: str = "mocap") -> BodyPoses:
+    poses = tuple(BodyPose(name, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)) for name in bodies)
+    return BodyPoses(
+        header=Header(1, "c", observer, observer, 1), bodies=poses, refused=dict.fromkeys(refused, "frozen")
+    )
+
+
 def sighting(observer: str = "ceiling") -> RelativeObservation:
     return RelativeObservation(
         header=Header(1, "c", observer, observer, 1), observer=observer, subject="drone_1", camera=observer,
@@ -69,7 +84,7 @@ def silent_after(message: Message | None, ticks: int, roots: tuple[str, ...] = (
     """Return what is told while roots that have worked say only this, each tick."""
     watch, told = RootWatch(roots, CARRIED), []
     for root in roots:
-        watch.hear(picture(observer=root), TICK_NS)
+        watch.hear(frame() if root == "mocap" else picture(observer=root), TICK_NS)
     for tick in range(1, ticks + 1):
         if message is not None:
             watch.hear(message, tick * TICK_NS)
@@ -144,9 +159,36 @@ def test_one_root_that_works_is_enough() -> None:
     assert silent_after(sighting("hall_2"), 60, ("hall_1", "hall_2")) == []
 
 
-def test_a_root_that_never_says_that_it_sees_nobody_is_not_judged() -> None:
+@pytest.mark.parametrize("message", [None, frame("drone_1", observer="truth"), picture("drone_1")])
+def test_motion_capture_that_sends_nothing_is_silent_after_a_while(message: Message | None) -> None:
+    assert silent_after(message, 16, ("mocap",)) == []
+    assert len(silent_after(message, 60, ("mocap",))) == 1
+
+
+def test_motion_capture_of_which_all_poses_are_refused_is_silent_sooner() -> None:
+    refused = frame("drone_1", "drone_2", refused=("drone_1", "drone_2"))
+    assert silent_after(refused, 6, ("mocap",)) == []
+    assert len(silent_after(refused, 7, ("mocap",))) == 1
+
+
+@pytest.mark.parametrize(
+    "message", [frame(), frame("drone_1"), frame("drone_1", "drone_2", refused=("drone_1",)), sighting("mocap")]
+)
+def test_motion_capture_works_that_tracks_nobody_or_anybody(message: Message) -> None:
+    assert silent_after(message, 60, ("mocap",)) == []
+    assert silent_after(message, 60, ("mocap", "ceiling")) == []
+
+
+def test_the_first_frame_counts_though_it_is_refused() -> None:
     watch = RootWatch(["mocap"], CARRIED)
-    watch.hear(sighting("mocap"), TICK_NS)
+    watch.hear(frame("drone_1", refused=("drone_1",)), TICK_NS)
+    watch.advance(6 * TICK_NS, [], flying=True)
+    assert not watch.is_silent
+
+
+def test_a_root_that_never_says_that_it_sees_nobody_is_not_judged() -> None:
+    watch = RootWatch(["uwb"], CARRIED)
+    watch.hear(sighting("uwb"), TICK_NS)
     assert watch.advance(100 * TICK_NS, [], flying=True) == []
     assert not watch.is_silent
 

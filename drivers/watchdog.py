@@ -205,9 +205,12 @@ class Watchdog:
         setpoint = self.gate.obeyed(now_ns) if self.mode is DriverMode.TRACK and self._braked_by is None else None
         acks = self._acks.effective(self.mode, self.vehicle, setpoint is not None)
         if setpoint is None:
-            return WatchdogDecision(self.mode, self._action(now_ns), reason=self.reason, acks=acks)
+            action = self._action(now_ns)
+            return WatchdogDecision(self.mode, action, reason=self.reason, acks=acks, entered_ns=self._entered_ns)
         velocity, turn, stamp_ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
-        return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns)
+        return WatchdogDecision(
+            self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns, entered_ns=self._entered_ns
+        )
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(

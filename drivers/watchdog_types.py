@@ -153,7 +153,7 @@ class WatchdogDecision:
 
     setpoint_ns: stamp of the setpoint obeyed, for vehicles that are told each setpoint once; 0 when none is. seen_m_s:
     velocity forward and left as cameras see it, for a vehicle that brakes without a velocity of its own; None if they
-    do not.
+    do not. entered_ns: when it came to the mode, or was ordered to once more; to TRACK only an operator's order leads.
     """
 
     mode: DriverMode
@@ -164,3 +164,4 @@ class WatchdogDecision:
     acks: tuple[Ack, ...] = ()
     setpoint_ns: int = 0
     seen_m_s: tuple[float, float] | None = None
+    entered_ns: int = 0

@@ -49,6 +49,7 @@ class Orders:
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
         self._taken_over = False
+        self._ordered_ns = -1
 
     def are_heeded(self, custom_mode: int) -> bool:
         """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
@@ -83,6 +84,8 @@ class Orders:
         action = decision.action
         if action is not self._action:
             self._enter(now_ns, action)
+        if action is Action.FLY and decision.entered_ns != self._ordered_ns:
+            self._take_back(now_ns, decision.entered_ns)
         self._watch_mode(now_ns, action, armed, guided, custom_mode)
         match action:
             case Action.TAKE_OFF:
@@ -136,10 +139,12 @@ class Orders:
             self.starting, self._climb_until_ns = False, now_ns + _CLIMB_LIMIT_NS
         if action in (Action.LAND, Action.CUT, Action.IDLE):
             self._requests.drop("arming", "guided mode", "take-off")
-        if action is Action.FLY:
-            self._taken_over = False  # an operator's TRACK or RESUME: ask for the mode once more
-            self._guided_ns, self._regain_until_ns = now_ns, now_ns + _REGAIN_NS
         self._action, self._since_ns = action, now_ns
+
+    def _take_back(self, now_ns: int, ordered_ns: int) -> None:
+        """Ask for the mode once more, by an operator's TRACK or RESUME; set-points that come again are no order."""
+        self._ordered_ns, self._taken_over = ordered_ns, False
+        self._guided_ns, self._regain_until_ns = now_ns, now_ns + _REGAIN_NS
 
     def _watch_mode(self, now_ns: int, action: Action, armed: bool, guided: bool, custom_mode: int) -> None:
         # A mode that we did not ask for is a pilot's or the autopilot's own: it is not fought over.

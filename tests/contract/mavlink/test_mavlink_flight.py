@@ -8,6 +8,7 @@ import pytest
 from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire.flight import CommandLong, OdometryMessage, SetPositionTargetLocalNed
+from drivers.mavlink.wire.names import CopterMode, Flavour, Px4Auto, Px4Main, px4_mode
 from drivers.mavlink.wire.service import SetGpsGlobalOrigin, Timesync
 from drivers.mavlink.wire.telemetry import Attitude, GpsGlobalOrigin, LocalPositionNed
 from groundstation.bus.messages import Verb
@@ -226,6 +227,23 @@ def test_pilots_mode_change_is_not_fought(rig):
     rig.order(Verb.RESUME)
     rig.run(1.0)
     assert rig.emulator.firmware.mode == rig.emulator.firmware.guided
+
+
+@pytest.mark.parametrize("verb", [Verb.RESUME, Verb.TRACK])
+def test_what_a_pilot_took_is_given_back_by_an_order_and_not_by_set_points_that_come_again(rig, verb):
+    """The tracker pauses for less than it takes to need a RESUME: that is no order to take the vehicle from a pilot."""
+    rig.track_on()
+    firmware = rig.emulator.firmware
+    firmware.enter(px4_mode(Px4Main.AUTO, Px4Auto.HOLD) if rig.flavour == Flavour.PX4 else CopterMode.BRAKE)
+    rig.run(3.0)
+    rig.tracking = False
+    rig.until(lambda: rig.host.watchdog.braked, 1.0)
+    rig.tracking = True
+    rig.run(3.0)
+    assert rig.mode == "TRACK" and firmware.mode != firmware.guided
+    rig.order(verb)
+    rig.run(1.0)
+    assert firmware.mode == firmware.guided
 
 
 def test_a_driver_that_comes_later_finds_the_origin_that_is_set(rig):

@@ -77,11 +77,12 @@ class ForwardedLink:
     """Another transport, shown to riders; a thread of its own listens to them.
 
     A rider's frames are judged by `riding_along.verdict`; what is refused or goes beyond 50 frames a second is counted
-    in `rejected` ("rider_...").
+    in `rejected` ("rider_..."). All its stops pass; of one that is repeated within a second only the first is told.
     """
 
     def __init__(self, transport: Transport, riders: Mapping[int, Rider], tell: Tell) -> None:
         self._transport, self._riders, self._tell = transport, riders, tell
+        self._stopped_ns: dict[str, int] = {}
         self._closing = threading.Event()
         self._listener = threading.Thread(target=self._listen, name="mavlink-riders", daemon=True)
         self._listener.start()
@@ -162,7 +163,7 @@ class ForwardedLink:
             case Verdict.STOP:
                 self._transport.send_raw(rider.system, raw)
                 assert message is not None
-                self._tell(f"{rider.name}: a second ground station stops it ({words_of(message)})")
+                self._tell_stop(f"{rider.name}: a second ground station stops it ({words_of(message)})")
             case Verdict.PASS if rider.allowance.take(clock.now_ns()):
                 self._transport.send_raw(rider.system, raw)
             case Verdict.PASS:
@@ -173,3 +174,9 @@ class ForwardedLink:
                     rider.refuse(frame, message.command)
             case Verdict.DROP:
                 pass
+
+    def _tell_stop(self, text: str) -> None:
+        now_ns = clock.now_ns()
+        last_ns, self._stopped_ns[text] = self._stopped_ns.get(text), now_ns
+        if last_ns is None or now_ns - last_ns > NS_PER_S:
+            self._tell(text)

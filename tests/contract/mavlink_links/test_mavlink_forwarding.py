@@ -108,6 +108,17 @@ def test_its_stop_reaches_the_vehicle_byte_for_byte_and_is_told(ground):
     assert ground.told == ["drone_2: a second ground station stops it (nav land)"]
 
 
+def test_of_stops_without_pause_all_pass_and_the_first_is_told(ground):
+    for _ in range(50):
+        ground.order(command(MavCmd.NAV_LAND), command(MavCmd.COMPONENT_ARM_DISARM))
+        assert message_of(ground.vehicle) == command(MavCmd.NAV_LAND)
+        assert message_of(ground.vehicle) == command(MavCmd.COMPONENT_ARM_DISARM)
+    assert len(ground.told) == 2
+    time.sleep(1.1)
+    ground.order(command(MavCmd.NAV_LAND))
+    assert eventually(lambda: ground.told[2:]) == ["drone_2: a second ground station stops it (nav land)"]
+
+
 def test_it_cannot_arm_and_is_told_so_by_an_answer(ground):
     ground.order(command(MavCmd.COMPONENT_ARM_DISARM, 1.0))
     answer = message_of(ground.station)

@@ -2,19 +2,20 @@
 
 import asyncio
 import importlib.util
+import itertools
+import math
 import os
 import subprocess
 import threading
 import time
+from collections import deque
 from pathlib import Path
 
 import pytest
+from mavlink_pilot import Pilot
+from spare_time import needing_processors
 
-from drivers.mavlink.links.forwarding import with_riders
-from drivers.mavlink.links.opening import open_link
-from drivers.mavlink.settings import LinkSettings, VehicleSettings
-from drivers.mavlink.wire.flight import CommandLong
-from drivers.mavlink.wire.names import MavCmd
+from groundstation.bus.messages import Verb
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
 _INTEROP = Path(__file__).parents[2] / ".interop"
@@ -25,6 +26,8 @@ assert _SPEC is not None and _SPEC.loader is not None
 _hangar = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(_hangar)
 hangar, port = _hangar.hangar, _hangar.port
+
+LOSS_PARAMETER = {"ardupilot": "GUID_TIMEOUT", "px4": "COM_OF_LOSS_T"}
 
 
 async def fly_with_mavsdk(port, ardupilot):
@@ -52,7 +55,7 @@ async def fly_with_mavsdk(port, ardupilot):
             await param.set_param_int(name, 245)
             await telemetry.set_rate_position_velocity_ned(20.0)
             await telemetry.set_rate_health(2.0)
-        await param.set_param_float("GUID_TIMEOUT" if ardupilot else "COM_OF_LOSS_T", 0.75)
+        await param.set_param_float(LOSS_PARAMETER["ardupilot" if ardupilot else "px4"], 0.75)
         await asyncio.sleep(1.5)
         if ardupilot:
             await action.set_takeoff_altitude(1.0)
@@ -87,7 +90,8 @@ async def fly_with_mavsdk(port, ardupilot):
     return facts
 
 
-@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.exhaustive)])
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
     facts = asyncio.run(fly_with_mavsdk(port, flavour == "ardupilot"))
@@ -96,7 +100,7 @@ def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
     assert facts["parameter"] == (255 if flavour == "ardupilot" else 5)
     assert 0.3 < facts["speed"] < 0.6 and facts["height"] > 0.5
     assert facts["armed"] is False and not copter.airborne
-    assert emulator.firmware.parameters["GUID_TIMEOUT" if flavour == "ardupilot" else "COM_OF_LOSS_T"] == 0.75
+    assert emulator.firmware.parameters[LOSS_PARAMETER[flavour]] == 0.75
 
 
 @pytest.fixture
@@ -149,6 +153,7 @@ def proxy_at(mavproxy, tmp_path):
         one.close()
 
 
+@pytest.mark.exhaustive
 def test_mavproxy_flies_our_ardupilot(proxy_at, hangar):
     emulator, copter, (address, port) = hangar.add("ardupilot", 5, aided=True)
     proxy = proxy_at(f"udpout:{address}:{port}")
@@ -166,44 +171,87 @@ def test_mavproxy_flies_our_ardupilot(proxy_at, hangar):
     assert until(lambda: not emulator.firmware.armed)
 
 
-def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port):
-    """Our link flies the vehicle; MAVProxy sees it, cannot change what it flies by, and lands it."""
-    emulator, copter, (address, own) = hangar.add("ardupilot", 5, aided=True)
-    told: list[str] = []
-    seen = VehicleSettings(name="drone", system_id=5, flavour="ardupilot", forward=f"udp:127.0.0.1:{port}")
-    link = open_link(
-        LinkSettings(target=f"udpout:{address}:{own}"), shown=lambda bare: with_riders(bare, {5: seen}, told.append)
-    )
-    ended = threading.Event()
-    reader = threading.Thread(target=lambda: [link.receive() for _ in iter(ended.is_set, True)])
-    reader.start()
+class Tracked:
+    """The real driver of one vehicle and its tracker's stand-in, turned by a thread of their own."""
 
-    def ask(done, number, *values):
+    def __init__(self, port, rider, flavour, copter):
+        def where(_):
+            body = copter.airframe
+            return (body.x, body.y, body.z), body.yaw
+
+        self._pilot = Pilot(port, "pymavlink", where, {5: flavour}, forward=f"udp:127.0.0.1:{rider}")
+        self._wishes, self._ended = deque(), threading.Event()
+        self.watchdog, self._copter = self._pilot.hosts[0].watchdog, copter
+        self._thread = threading.Thread(target=self._turn)
+        self._thread.start()
+
+    def _turn(self):
+        for turn in itertools.count():
+            if self._ended.is_set():
+                return
+            while self._wishes:
+                self._pilot.order(self._wishes.popleft(), self.watchdog.mode)
+            self._pilot.turn(turn)
+
+    @property
+    def texts(self):
+        return list(self._pilot.process.texts)
+
+    @property
+    def speed_m_s(self):
+        return math.hypot(*self._copter.airframe.velocity_stabilized())
+
+    def order(self, verb, done):
+        """Order something again and again, as a patient operator would."""
+
         def asked():
-            link.send(5, CommandLong(5, 1, number, 0, *values))
-            time.sleep(0.3)
-            return done()
+            self._wishes.append(verb)
+            return until(done, 2.0)
 
-        assert until(asked), number
+        assert until(asked), self.texts
 
+    def track(self):
+        """Take off, and fly by the stand-in's set-points."""
+        assert until(lambda: self.watchdog.mode == "LANDED" and not self.watchdog.vehicle.not_ready), self.texts
+        self.order(Verb.TAKEOFF, lambda: self.watchdog.mode == "HOVER" and self._copter.airframe.z > 0.6)
+        self.order(Verb.TRACK, lambda: self.speed_m_s > 0.25)
+
+    def close(self):
+        self._ended.set()
+        self._thread.join(3.0)
+        self._pilot.fleet.close()
+
+
+@needing_processors()
+@pytest.mark.parametrize(
+    ("flavour", "stop"), [("ardupilot", "BRAKE"), pytest.param("px4", "LOITER", marks=pytest.mark.exhaustive)]
+)
+def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour, stop):
+    """Our driver tracks; MAVProxy cannot change what it flies by, holds it until our RESUME, and lands it."""
+    emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
+    firmware, rider = emulator.firmware, _hangar.free_port()
+    tracked = Tracked(port, rider, flavour, copter)
     try:
-        time.sleep(2.0)
-        ask(lambda: emulator.firmware.mode == 4, MavCmd.DO_SET_MODE, 1.0, 4.0)
-        ask(lambda: emulator.firmware.armed, MavCmd.COMPONENT_ARM_DISARM, 1.0)
-        link.send(5, CommandLong(5, 1, MavCmd.NAV_TAKEOFF, 0, param7=1.0))
-        assert until(lambda: copter.airframe.z > 0.8)
-        proxy = proxy_at(f"udpin:127.0.0.1:{port}")
+        tracked.track()
+        proxy = proxy_at(f"udpin:127.0.0.1:{rider}")
         time.sleep(4.0)
+        before = dict(firmware.parameters.values)
         proxy.say("mode RTL")
-        proxy.say("param set GUID_TIMEOUT 0.75")
+        proxy.say(f"param set {LOSS_PARAMETER[flavour]} 0.75")
         time.sleep(2.0)
-        assert emulator.firmware.mode == 4
-        assert emulator.firmware.parameters["GUID_TIMEOUT"] != 0.75
-        assert not told
+        assert firmware.mode == firmware.guided and firmware.parameters.values == before
+        assert tracked.watchdog.mode == "TRACK" and tracked.speed_m_s > 0.25
+        assert not any("a second ground station" in text for text in tracked.texts)
+        proxy.say(f"mode {stop}")
+        assert until(lambda: firmware.mode != firmware.guided), tracked.texts
+        held = firmware.mode
+        assert until(lambda: tracked.speed_m_s < 0.1), "it brakes"
+        for _ in range(40):  # the tracker's set-points go on, and move nothing
+            time.sleep(0.1)
+            assert firmware.mode == held and tracked.speed_m_s < 0.2, tracked.texts
+        tracked.order(Verb.RESUME, lambda: firmware.mode == firmware.guided and tracked.speed_m_s > 0.25)
         proxy.say("mode LAND")
-        assert until(lambda: not emulator.firmware.armed)
-        assert until(lambda: told)
+        assert until(lambda: not firmware.armed), tracked.texts
+        assert sum("a second ground station stops it" in text for text in tracked.texts) == 2
     finally:
-        ended.set()
-        reader.join(3.0)
-        link.close()
+        tracked.close()

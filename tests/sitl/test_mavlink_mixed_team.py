@@ -8,18 +8,11 @@ from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
+from spare_time import ENOUGH, SpareTime
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.last, pytest.mark.timeout(420)]
 FIELD = Path(__file__).parents[2] / "config" / "mixed-team.yaml"
 FLOWN_S = 45
-# Where less than this share of all processors was idle, detectors wait for them, and drones land for want of pictures.
-SPARE = 0.15
-
-
-def processor_times() -> tuple[int, int]:
-    """Return the ticks for which the processors were idle, and all ticks, since the system's start."""
-    ticks = [int(text) for text in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
-    return ticks[3] + ticks[4], sum(ticks)
 
 
 def flown(folder):
@@ -45,9 +38,9 @@ def flown(folder):
 
 def test_mixed_team_tracks_and_lands(tmp_path):
     """PX4 over MAVSDK, ArduPilot over pymavlink, the AR.Drone with its own video."""
-    before = processor_times()
+    spare = SpareTime()
     report, run, said = flown(tmp_path)
-    idle, all_of_it = (after - then for after, then in zip(processor_times(), before, strict=True))
+    idle = spare.share
     if not report["valid"]:
         pytest.skip(
             f"the simulator did not keep real time ({report['sim_overrun_percent']:.0f} % late): nothing is shown"
@@ -55,10 +48,8 @@ def test_mixed_team_tracks_and_lands(tmp_path):
     assert report["landed"] is True, said
     assert report["max_fence_violation_m"] == 0.0, said
     tracked = report["target_rmse_m"] is not None and report["target_rmse_m"] <= 0.15
-    if not tracked and idle < SPARE * all_of_it:
-        pytest.skip(
-            f"the machine was full ({idle / all_of_it:.0%} idle), so pictures were searched late: nothing is shown"
-        )
+    if not tracked and idle < ENOUGH:
+        pytest.skip(f"the machine was full ({idle:.0%} idle), so pictures were searched late: nothing is shown")
     assert tracked, said
     assert said.count("in the air, localised") == 3, said
     assert not any(c["name"].startswith("topology") for c in report["criteria"]), "those belong to the demo"

@@ -5,14 +5,13 @@ import re
 import socket
 import struct
 import threading
-import time
 from collections import defaultdict
+
+from arrival_times import ANCILLARY, ArrivalTimes
 
 _AT_PORT = 5556
 _OUTGOING = 4  # PACKET_OUTGOING: the loopback interface shows each datagram twice
 _ATTACH_FILTER = 26  # SO_ATTACH_FILTER
-# SO_TIMESTAMPNS: the kernel says when a datagram came; this process may be late to read it.
-_TIMESTAMPS, _TIMESPEC = 35, struct.Struct("@ll")
 _MOTION = re.compile(rb"AT\*PCMD(?:_MAG)?=-?\d+,(\d+)")
 _REFERENCE = re.compile(rb"AT\*REF=-?\d+,(\d+)")
 # Classic BPF: IPv4, UDP, destination port 5556; everything else stays in the kernel.
@@ -34,8 +33,7 @@ class WireTap:
         self._program = ctypes.create_string_buffer(program, len(program))
         option = struct.pack("HL", len(_PROGRAM), ctypes.addressof(self._program))
         self._socket.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, option)
-        self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMPS, 1)
-        self._from_wall_clock_s = time.monotonic() - time.time()
+        self._times = ArrivalTimes(self._socket)
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
@@ -43,12 +41,11 @@ class WireTap:
     def _listen(self) -> None:
         while not self._closing.is_set():
             try:
-                frame, notes, _, source = self._socket.recvmsg(4096, socket.CMSG_SPACE(_TIMESPEC.size))
+                frame, notes, _, source = self._socket.recvmsg(4096, ANCILLARY)
             except TimeoutError:
                 continue
             if source[2] != _OUTGOING:
-                seconds, nanoseconds = _TIMESPEC.unpack(notes[0][2])
-                self._note(seconds + nanoseconds * 1e-9 + self._from_wall_clock_s, frame)
+                self._note(self._times.of(notes), frame)
 
     def _note(self, now: float, frame: bytes) -> None:
         motion, reference = _MOTION.search(frame), _REFERENCE.search(frame)

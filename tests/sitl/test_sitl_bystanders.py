@@ -97,6 +97,7 @@ def test_full_disk_stops_the_recording_but_neither_flight_nor_restarts(sitl: Sta
     run.until_gone(5)
 
 
+@pytest.mark.exhaustive
 def test_closed_terminal_lands_and_finishes_the_recording(sitl: Start) -> None:
     master, terminal = pty.openpty()
     closing = threading.Event()

@@ -77,6 +77,7 @@ def test_ctrl_c_lands_first(sitl: Start) -> None:
 
 
 @FAULTS
+@pytest.mark.exhaustive
 def test_second_ctrl_c_stops_at_once_but_for_the_guardian(sitl: Start) -> None:
     """Its drones still fly, without drivers: they are told to hover for 1 s and to land for 10 s."""
     run = sitl()
@@ -93,6 +94,7 @@ def test_second_ctrl_c_stops_at_once_but_for_the_guardian(sitl: Start) -> None:
 
 
 @FAULTS
+@pytest.mark.exhaustive
 def test_two_runs_at_once(sitl: Start) -> None:
     """One flies, the other has met its drones: two flights are more than two cores do in time."""
     flying = sitl()

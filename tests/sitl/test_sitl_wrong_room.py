@@ -25,7 +25,10 @@ def room(*changes: str) -> tuple[str, ...]:
 
 @pytest.mark.parametrize(
     ("changes", "words"),
-    [((ASIDE,), "ceiling hangs 0.2"), (CODES, "drone_1 stands on the pad of drone_2")],
+    [
+        ((ASIDE,), "ceiling hangs 0.2"),
+        pytest.param(CODES, "drone_1 stands on the pad of drone_2", marks=pytest.mark.exhaustive),
+    ],
 )
 def test_a_wrong_room_is_refused_on_the_floor(sitl: Callable[..., Any], changes: tuple[str, ...], words: str) -> None:
     run = sitl("--duration", "10", program=room(*changes))

@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,15 @@ import pytest
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(300)]
 
 PROGRAM = Path(__file__).with_name("two_hosts.py")
-ALONE = ["unshare", "--user", "--map-root-user", "--net"]
+# In a user's namespace nobody has real-time priority, and a busy machine flies badly there: root needs none.
+ALONE = ["unshare", *([] if os.geteuid() == 0 else ["--user", "--map-root-user"]), "--net"]
 AHEAD_S = 895
+LAND_S = 3.0  # safety.land_after_s of the demo
+LINK_S = 0.5  # 20 ms, a packet that is sent again, and 0.2 s without an answer: then the host's supervisor is silent
+AT_ONCE_S = 1.5  # a dead supervisor: brake for a second, then land
+FIRMWARE_S = 2.5  # an AR.Drone's own time-out: it hovers after 2 s, and the emulated one lands
+DOWN_S = 5.0  # from the order to the floor
+STOPPED_S = 2.0  # hover after 0.3 s, or 0.4 s where others speak for a driver; then it brakes
 
 
 def why_impossible() -> str:
@@ -41,26 +49,68 @@ def flown(folder: Path, **order: Any) -> dict[str, Any]:
 
 
 def test_all_drivers_and_cameras_on_another_host_behind_a_bad_link(tmp_path: Path) -> None:
-    told = flown(tmp_path, duration_s=5, delay_s=0.02, loss=0.01)
+    told = flown(tmp_path, duration_s=20, delay_s=0.02, loss=0.01)
     report = told["report"]
     assert told["host_code"] == 0, told["host_text"]
     assert report["landed"] and report["max_fence_violation_m"] == 0.0, told["text"]
     # Both ways have their packets late by the same thread: what is left is the scatter of two busy cores.
     assert told["offset_s"] == pytest.approx(-AHEAD_S, abs=0.005)
     assert 0.02 <= told["error_s"] < 0.03 and 0.005 < told["lost"] < 0.02
-    # Nobody has real-time priority in a user's namespace: on two cores the simulator is late there, and adds errors.
-    assert report["target_rmse_m"] <= (0.04 if report["valid"] else 0.2), told["text"]
+    if not report["valid"]:
+        pytest.skip(f"the simulator was late in {report['sim_overrun_percent']:.0f} % of its ticks: no figure counts")
+    assert report["target_rmse_m"] <= 0.04, told["text"]
 
 
-@pytest.mark.exhaustive
-@pytest.mark.parametrize("victim", ["host", "driver", "run", "supervisor", "link"])
-def test_every_end_of_a_host_ends_as_that_of_its_processes(tmp_path: Path, victim: str) -> None:
-    told = flown(tmp_path, duration_s=60, kill=victim)
-    landed = {"drone_1"} if victim == "driver" else {"drone_1", "drone_2"}
-    assert set(told["landed_s"]) == landed, told["events"]
-    assert max(told["landed_s"].values()) < 15.0
-    assert max(told["went_m"][name] for name in landed) < 1.0, "it hovers before it lands"
-    if victim in ("host", "supervisor"):
+Modes = frozenset[str]
+# A driver that ends with its landing has LANDING or LANDED as its last word.
+DOWN, TRACK, HOVER = frozenset({"LANDING", "LANDED"}), frozenset({"TRACK"}), frozenset({"HOVER"})
+
+
+@dataclass(frozen=True)
+class End:
+    """Something of a host that ends; landing_s: when its drones are told to land at the latest, None: never.
+
+    modes: of drone_1 and drone_2 at the end.
+    """
+
+    victim: str
+    landing_s: float | None
+    signal: str = "SIGKILL"
+    modes: tuple[Modes, Modes] = (DOWN, DOWN)
+    stopped_s: float = STOPPED_S
+
+
+SLOW = [
+    End("host", AT_ONCE_S),
+    End("driver", LAND_S, "SIGSTOP", (DOWN, TRACK)),
+]
+ON_DEMAND = [
+    End("host", LAND_S + LINK_S, "SIGSTOP"),
+    End("driver", LAND_S, modes=(DOWN, TRACK)),
+    End("supervisor", AT_ONCE_S + LINK_S),
+    End("run", LAND_S + LINK_S),
+    End("link", LAND_S + LINK_S, modes=(TRACK, TRACK)),  # nothing is heard of them any more
+    End("liaison", None, modes=(HOVER, HOVER)),
+    End("all", FIRMWARE_S, modes=(TRACK, TRACK), stopped_s=FIRMWARE_S + STOPPED_S),
+]
+ENDS = [*SLOW, *(pytest.param(end, marks=pytest.mark.exhaustive) for end in ON_DEMAND)]
+
+
+@pytest.mark.parametrize("end", ENDS, ids=lambda end: f"{end.victim}-{end.signal}")
+def test_every_end_of_a_host_ends_as_that_of_its_processes(tmp_path: Path, end: End) -> None:
+    told = flown(tmp_path, duration_s=60, kill=end.victim, signal=end.signal)
+    concerned = ["drone_1"] if end.victim == "driver" else ["drone_1", "drone_2"]
+    for name in concerned:
+        assert told["stopped_s"][name] < end.stopped_s, "it hovers before it lands"
+        assert told["went_m"][name] < 1.0
+    if end.landing_s is None:
+        assert told["landed_s"] == {}, told["events"]
+    else:
+        assert set(told["landed_s"]) == set(concerned), told["events"]
+        assert max(told["landed_s"].values()) < end.landing_s + DOWN_S, told["landed_s"]
+    for mode, allowed in zip(told["modes"].values(), end.modes, strict=True):
+        assert mode in allowed, told["events"]
+    if end.victim in ("host", "supervisor") and end.signal == "SIGKILL":
         assert told["left"] == [], "nothing of the host is left"
-    if victim in ("host", "link"):
+    if end.victim in ("host", "link", "all"):
         assert any("liaison_lab_pc_2: is silent" in event for event in told["events"])

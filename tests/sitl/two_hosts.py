@@ -27,6 +27,8 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import site
 
 AHEAD_S = 895
+# A drone that hovers drifts, and sways when it is told to stop.
+HOVERS_M_S = 0.3
 HERE, THERE = "10.77.0.1", "10.77.0.2"
 HOST = "lab_pc_2"
 DEVICES = ("drones.drone_1", "drones.drone_2", "cameras.ceiling")
@@ -106,7 +108,10 @@ def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
 
 
 def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
-    """Kill something in flight and return how long the drones stayed in the air, and how far each went [s, m]."""
+    """Break something in flight; return when the drones stood and how they had flown [s, m].
+
+    kill: the victim; signal: "SIGKILL", or "SIGSTOP" for one that freezes.
+    """
     host, run = two.start(order)
     victims = {"liaison": lambda: [run.pid(f"liaison_{HOST}")], "supervisor": lambda: [run.process.pid]}
     victims |= {"host": lambda: [host.pid], "driver": lambda: [named(host.pid)["drone_1"]]}
@@ -123,7 +128,7 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
             two.link.cut.set()
         else:
             for pid in victims[order["kill"]]():
-                os.kill(pid, signal.SIGKILL)
+                os.kill(pid, signal.Signals[order.get("signal", "SIGKILL")])
         killed_s, landed_s = time.monotonic(), dict[str, float]()
         while time.monotonic() - killed_s < order.get("watch_s", 25.0) and len(landed_s) < len(before):
             rest(run, 0.05)
@@ -135,7 +140,7 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
         return {
             "landed_s": landed_s,
             "went_m": {name: math.dist(before[name][:2], after[name][:2]) for name in before},
-            "speed_m_s": {name: run.speed_between(name, killed_s + 1.5, killed_s + 3.0) for name in before},
+            "stopped_s": {name: stopped_s(run, name, killed_s) for name in before},
             "modes": {name: run.mode(name) for name in before},
             "left": [name for name, pid in children.items() if Path(f"/proc/{pid}").exists()],
             "events": [event for event in run.events() if "INFO" not in event],
@@ -144,6 +149,12 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
         with suppress(AssertionError):
             run.close()
         end(host.pid)
+
+
+def stopped_s(run: SitlRun, drone: str, since: float) -> float:
+    """Return when a drone last flew faster than one that hovers [s after]; for judging only."""
+    flown = ((at - since, math.hypot(*m.velocity_m_s[:2])) for at, m in run.truth(drone) if at > since)
+    return max((after_s for after_s, speed_m_s in flown if speed_m_s > HOVERS_M_S), default=0.0)
 
 
 def bus_of(run: SitlRun) -> ZenohBus:

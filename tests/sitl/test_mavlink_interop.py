@@ -180,7 +180,8 @@ class Tracked:
             return (body.x, body.y, body.z), body.yaw
 
         self._pilot = Pilot(port, "pymavlink", where, {5: flavour}, forward=f"udp:127.0.0.1:{rider}")
-        self._wishes, self._ended = deque(), threading.Event()
+        self._wishes: deque[Verb] = deque()
+        self._ended = threading.Event()
         self.watchdog, self._copter = self._pilot.hosts[0].watchdog, copter
         self._thread = threading.Thread(target=self._turn)
         self._thread.start()

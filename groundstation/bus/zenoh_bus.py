@@ -8,8 +8,9 @@ benches of other things.
 import json
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import zenoh
@@ -43,6 +44,7 @@ REFUSED_BY = "zenoh_link_tls"
 # The crate that reports who was refused at the door; what the access list denies is told only with all that it allows.
 _LOGGED = f"error,{REFUSED_BY}=warn"
 _DENIED_BY = "zenoh::net::routing::interceptor::access_control"
+ALL: Mapping[str, float] = MappingProxyType({})
 
 
 def _configuration(mode: str, endpoint: str, also: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -87,6 +89,14 @@ def _secured(configuration: dict[str, Any], identity: Identity, end: str) -> dic
         },
     }
     return configuration
+
+
+def _thinned(at_most_hz: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return a rule for each key: those of one rule would share its rate."""
+    return [
+        {"id": key, "flows": ["ingress"], "messages": ["put"], "rules": [{"key_expr": key, "freq": rate_hz}]}
+        for key, rate_hz in at_most_hz.items()
+    ]
 
 
 def _opened(configuration: dict[str, Any]) -> Any:
@@ -176,13 +186,18 @@ def _enqueue_into(subscription: Subscription) -> Callable[[Any], None]:
 
 
 def open_bus(
-    endpoint: str, site: str, source: str, timeout_s: float = 10.0, identity: Identity | None = None
+    endpoint: str,
+    site: str,
+    source: str,
+    timeout_s: float = 10.0,
+    identity: Identity | None = None,
+    at_most_hz: Mapping[str, float] = ALL,
 ) -> ZenohBus:
     """Connect to the router, retrying until the time-out; raises GroundStationError naming the endpoint.
 
-    identity: what a guarded router asks for.
+    identity: what a guarded router asks for; at_most_hz: by key, how many samples a second are let in.
     """
-    configuration = _configuration("client", endpoint)
+    configuration = _configuration("client", endpoint) | {"downsampling": _thinned(at_most_hz)}
     if identity is not None:
         configuration = _secured(configuration, identity, "connect")
     deadline = time.monotonic() + timeout_s

@@ -15,6 +15,7 @@ BENCHES = {
     "recording": ("groundstation.cli.bench_recording:recording", "CPU of writing, opening and seeking recordings."),
     "bus": ("groundstation.cli.bench_bus:bus", "Time round trips over the bus, plain and guarded."),
     "console": ("groundstation.cli.bench_console:console", "CPU and delays of the operator's page."),
+    "ros2": ("groundstation.cli.bench_ros2:ros2", "CPU of showing a flight to ROS 2."),
     "study": ("groundstation.cli.bench_study:study", "CPU of flights at message level, by part."),
 }
 

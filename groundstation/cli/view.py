@@ -62,7 +62,7 @@ def view(  # click hands each option over as a parameter
     _require(viewer)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
     record = choose(name)
-    bus = join(record, "view", Role.VIEW)
+    bus = join(record, "view", Role.VIEW, at_most_hz=_enough_hz(record) if viewer == "ros2" else {})
     shown: LiveView | None = None
     try:
         opened = _open_ros2(record, router, domain, distro) if viewer == "ros2" else None
@@ -117,6 +117,12 @@ def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str) -
     bridge = Ros2View(router, domain, distro, _field_of(record), timeline)
     click.echo(f"{record.name} in ROS 2 domain {domain} by {router} (Ctrl-C leaves it; the flight goes on)")
     return bridge
+
+
+def _enough_hz(record: "RuntimeRecord") -> dict[str, float]:
+    from groundstation.engineering_views.ros2.live import enough_hz
+
+    return enough_hz(record.site, _field_of(record))
 
 
 def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":

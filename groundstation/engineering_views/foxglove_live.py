@@ -3,9 +3,10 @@
 import foxglove
 
 from groundstation.bus import codec, keys
-from groundstation.bus.api import Sample
+from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
 from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_schema
+from groundstation.engineering_views.watch import everything
 from groundstation.errors import MessageError, OperatorMistake
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.capture import Capture, Entry
@@ -47,6 +48,10 @@ class FoxgloveView:
     def alive(self) -> bool:
         """Return whether viewers can still connect."""
         return True
+
+    def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
+        """Return the queues of what it shows."""
+        return everything(bus)
 
     def take(self, sample: Sample, now_ns: int) -> None:
         """Say on what arrived at a boot-clock time."""

@@ -7,10 +7,11 @@ from pathlib import Path
 import rerun as rr
 
 from groundstation.bus import codec, keys
-from groundstation.bus.api import Sample
+from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.keys import Key
 from groundstation.engineering_views.rerun_file import APPLICATION
 from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
+from groundstation.engineering_views.watch import everything
 from groundstation.errors import GroundStationError, MessageError
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.file_topics import is_picture
@@ -82,6 +83,10 @@ class RerunView:
     def alive(self) -> bool:
         """Return whether somebody listens."""
         return self._server is None or self._server.alive
+
+    def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
+        """Return the queues of what it shows."""
+        return everything(bus)
 
     def take(self, sample: Sample, now_ns: int) -> None:
         """Show what arrived at a boot-clock time; what does not decode is passed over."""

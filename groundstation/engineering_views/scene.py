@@ -17,6 +17,7 @@ Sides = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 _RING_POINTS = 40
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
+_COS, _SIN = np.cos(_CIRCLE), np.sin(_CIRCLE)
 LINK_COLOUR: Rgb = (130, 130, 130)
 VOLUME_COLOUR: Rgb = (140, 150, 110)
 FENCE: Rgb = rgb(FENCE_COLOUR.dark)
@@ -28,14 +29,31 @@ ARROW_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A robot or a target: position [m; world], yaw [rad] (0 where there is none), ellipse ring (n, 3) [m; world]."""
+    """A robot or a target: position [m; world], yaw [rad] (0 where there is none), covariance of x and y (2, 2)."""
 
     name: str
     is_target: bool
     position_m: tuple[float, float, float]
     yaw_rad: float
-    ring_m: Array
-    std_m: float
+    covariance_m2: Array
+
+    @property
+    def std_m(self) -> float:
+        """Return the standard deviation of the place on the floor."""
+        return math.sqrt(max(0.0, float(np.trace(self.covariance_m2))))
+
+    @property
+    def semi_axes_95(self) -> tuple[float, float, float]:
+        """Return major and minor semi-axis [m] of the 95 % ellipse of x and y, and heading of the major one [rad]."""
+        (xx, xy), (_, yy) = self.covariance_m2.tolist()
+        return semi_axes_95(xx, xy, yy)
+
+    @property
+    def ring_m(self) -> Array:
+        """Return that ellipse around the position, at its height (n, 3) [m; world]."""
+        (x, y, z), (major, minor, turn) = self.position_m, self.semi_axes_95
+        along, across, c, s = major * _COS, minor * _SIN, math.cos(turn), math.sin(turn)
+        return np.column_stack((x + c * along - s * across, y + s * along + c * across, np.full(len(_COS), z)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +108,7 @@ class ViewScene:
         height = mean[2] if has_pose else self._target_heights_m.get(entity.name, 0.0)
         position = (mean[0], mean[1], height)
         covariance = np.asarray(entity.covariance).reshape(size, size)
-        ring = _ring(position, covariance)
-        std = math.sqrt(max(0.0, float(covariance[0, 0] + covariance[1, 1])))
-        return Body(entity.name, not has_pose, position, mean[3] if has_pose else 0.0, ring, std)
+        return Body(entity.name, not has_pose, position, mean[3] if has_pose else 0.0, covariance[:2, :2])
 
     def cells(self, message: m.SearchMap) -> list[SearchCell]:
         """Return the cells of a map that a target is likely in at all."""
@@ -132,12 +148,3 @@ class ViewScene:
 
 def _volumes(field: ResolvedField) -> dict[str, Sides]:
     return {name: (box.x_m, box.y_m, box.z_m) for name, box in field.volumes.items()}
-
-
-def _ring(position_m: tuple[float, float, float], covariance: Array) -> Array:
-    """Return the 95 % ellipse of x and y around a position, at its height (n, 3) [m; world]."""
-    major, minor, turn = semi_axes_95(float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1]))
-    along, across = major * np.cos(_CIRCLE), minor * np.sin(_CIRCLE)
-    x = position_m[0] + along * math.cos(turn) - across * math.sin(turn)
-    y = position_m[1] + along * math.sin(turn) + across * math.cos(turn)
-    return np.column_stack((x, y, np.full(len(x), position_m[2])))

@@ -2,14 +2,15 @@
 
 import socket
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 
 import pytest
 
-from groundstation.bus import topics, zenoh_bus
+from groundstation.bus import keys, topics, zenoh_bus
 from groundstation.bus.api import Subscription
-from groundstation.bus.messages import Event, Severity
+from groundstation.bus.messages import Estimate, Event, Severity
 from groundstation.errors import GroundStationError
 
 
@@ -87,6 +88,23 @@ def test_a_reader_that_never_drains_stalls_nobody(endpoint: str) -> None:
             texts += [item.message.text for item in reader.drain() if isinstance(item.message, Event)]
         assert [text for text in texts if text != "x"] == [str(number) for number in range(1000)]
         assert len(stalled.drain_samples()) == 10
+
+
+def test_who_wants_fewer_gets_fewer_of_each_key_and_all_of_others(endpoint: str) -> None:
+    thinned = {keys.expression("lab", topics.ESTIMATE, name): 10.0 for name in ("team_a", "team_b")}
+    with (
+        closing(zenoh_bus.open_bus(endpoint, "lab", "a")) as a,
+        closing(zenoh_bus.open_bus(endpoint, "lab", "b", at_most_hz=thinned)) as b,
+    ):
+        queue = b.subscribe([topics.ESTIMATE, topics.EVENT])
+        send_until_heard(a, queue)
+        for _ in range(50):
+            for name in ("team_a", "team_b", "team_c"):
+                a.publish(topics.ESTIMATE, Estimate(header=a.header(name), entities=(), epoch=1))
+            time.sleep(0.02)
+        queue.wait(0.5)
+        heard = Counter(received.header.entity for received in queue.drain() if isinstance(received.message, Estimate))
+    assert heard["team_c"] == 50 and 5 <= heard["team_a"] <= 25 and 5 <= heard["team_b"] <= 25, heard
 
 
 def test_an_absent_router_is_named() -> None:

@@ -5,10 +5,9 @@ from pathlib import Path
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from groundstation.bus.topics import IMAGE
 from groundstation.engineering_views.field import field_of
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
-from groundstation.engineering_views.ros2.scene import Ros2Scene
+from groundstation.engineering_views.ros2.scene import SHOWN, Ros2Scene
 from groundstation.errors import MessageError
 from groundstation.recording.outputs import errors_named, require_absent
 from groundstation.recording.reader import decode, payload
@@ -27,7 +26,7 @@ def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tu
     with errors_named(folder), Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         bag = _Bag(writer, codec)
         bag.write(run.start_ns, scene.static(run.start_ns))
-        for raw in run.records_from(run.start_ns, lambda topic: topic.type is not None or topic is IMAGE):
+        for raw in run.records_from(run.start_ns, lambda topic: topic in SHOWN):
             try:
                 if raw.key.topic.type is None:
                     found = scene.take_picture(raw.log_time_ns, raw.key.entity, payload(raw)[1])
@@ -54,5 +53,5 @@ class _Bag:
             connection = self._connections[message.topic] = self._writer.add_connection(
                 message.topic, message.type, typestore=self._codec.store
             )
-        self._writer.write(connection, stamp_ns, self._codec.encode(message))
+        self._writer.write(connection, stamp_ns, message.data)
         self.written += 1

@@ -10,11 +10,11 @@ _NO_HASH = "TypeHashNotSupported"
 
 
 class RosMessage(NamedTuple):
-    """A message for one topic (absolute, with its leading slash); `content`: an object of the type store's class."""
+    """A message for one topic (absolute, with its leading slash), as CDR bytes."""
 
     topic: str
     type: str
-    content: Any
+    data: bytes
 
 
 class Ros2Codec:
@@ -28,9 +28,9 @@ class Ros2Codec:
         """Return a message object of a type, such as std_msgs/msg/String, from its fields."""
         return self.store.types[kind](**fields)
 
-    def encode(self, message: RosMessage) -> bytes:
-        """Return the CDR bytes of a message."""
-        return bytes(self.store.serialize_cdr(message.content, message.type))
+    def message(self, topic: str, kind: str, **fields: Any) -> RosMessage:
+        """Return a message of a type from its fields."""
+        return RosMessage(topic, kind, bytes(self.store.serialize_cdr(self.make(kind, **fields), kind)))
 
     def hash_of(self, kind: str) -> str:
         """Return the type hash of a type, or what stands for it."""

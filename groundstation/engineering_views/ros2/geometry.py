@@ -3,26 +3,37 @@
 import math
 from typing import Any
 
-import numpy as np
-
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.engineering_views.ros2.codec import Ros2Codec
 from groundstation.time_units import NS_PER_S
 
 # Nobody says how sure the missing axes are: as large as to say nothing.
 _UNKNOWN = 1e6
-_PLANAR = (0, 1)
+_ALL_UNKNOWN = [_UNKNOWN if index % 7 == 0 else 0.0 for index in range(36)]
 _POSE = (0, 1, 2, 5)
+# By the size of a mean: where its covariance, row by row, stands in that of six axes.
+_PLACES = {size: [6 * row + column for row in _POSE[:size] for column in _POSE[:size]] for size in (2, 4)}
 
 
-def covariance_36(entity: EntityEstimate) -> "np.ndarray[Any, np.dtype[np.float64]]":
+def covariance_36(entity: EntityEstimate) -> list[float]:
     """Return a 6 x 6 covariance, row by row, from that of (x, y) or (x, y, z, yaw)."""
-    size = len(entity.mean)
-    axes = _POSE[:size] if size >= 4 else _PLANAR
-    full = np.diag([_UNKNOWN] * 6)
-    known = np.asarray(entity.covariance).reshape(size, size)
-    full[np.ix_(axes, axes)] = known[: len(axes), : len(axes)]
-    return np.ascontiguousarray(full.reshape(36))
+    full = _ALL_UNKNOWN.copy()
+    for place, value in zip(_PLACES[len(entity.mean)], entity.covariance, strict=True):
+        full[place] = value
+    return full
+
+
+def heading_xyzw(yaw_rad: float) -> tuple[float, float, float, float]:
+    """Return the quaternion (x, y, z, w) of a heading."""
+    return 0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)
+
+
+def velocity_ahead(entity: EntityEstimate) -> Vector3:
+    """Return an entity's velocity [m/s] along its own heading (x where it has none), to the left, and up."""
+    vx, vy, *up = entity.velocity_m_s
+    yaw_rad = entity.mean[3] if len(entity.mean) > 3 else 0.0
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    return c * vx + s * vy, c * vy - s * vx, up[0] if up else 0.0
 
 
 class Builder:
@@ -52,13 +63,11 @@ class Builder:
         w, x, y, z = map(float, wxyz)
         return self.make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
 
-    def heading(self, yaw_rad: float) -> Any:
-        """Return the quaternion of a heading."""
-        return self.quaternion((math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2)))
-
     def pose(self, position_m: Vector3, yaw_rad: float) -> Any:
         """Return a pose from a position and a heading."""
-        return self.make("geometry_msgs/msg/Pose", position=self.point(position_m), orientation=self.heading(yaw_rad))
+        x, y, z, w = heading_xyzw(yaw_rad)
+        turn = self.quaternion((w, x, y, z))
+        return self.make("geometry_msgs/msg/Pose", position=self.point(position_m), orientation=turn)
 
     def twist(self, velocity_m_s: Vector3, yaw_rate_rad_s: float = 0.0) -> Any:
         """Return a twist."""

@@ -1,7 +1,6 @@
 """Vehicles, cameras, processes and events as ROS 2 tools show them: batteries, diagnostics, /rosout."""
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ class HealthMaker:
     """Makes the messages that say how somebody is."""
 
     def __init__(self, codec: Ros2Codec) -> None:
-        self._build, self._make = Builder(codec), codec.make
+        self._codec, self._build, self._make = codec, Builder(codec), codec.make
 
     def vehicle(self, stamp_ns: int, status: m.VehicleStatus) -> list[RosMessage]:
         """Return battery and diagnostics of a vehicle."""
@@ -49,7 +48,8 @@ class HealthMaker:
 
     def event(self, stamp_ns: int, event: m.Event) -> RosMessage:
         """Return a line of the log."""
-        log = self._make(
+        return self._codec.message(
+            "/rosout",
             "rcl_interfaces/msg/Log",
             stamp=self._build.time(stamp_ns),
             level=_LOG_LEVEL[event.severity],
@@ -59,13 +59,13 @@ class HealthMaker:
             function="",
             line=0,
         )
-        return RosMessage("/rosout", "rcl_interfaces/msg/Log", log)
 
     def _battery(self, stamp_ns: int, name: str, share: float | None) -> RosMessage:
         unmeasured = dict.fromkeys(
             ("voltage", "temperature", "current", "charge", "capacity", "design_capacity"), math.nan
         )
-        battery = self._make(
+        return self._codec.message(
+            f"/{name}/battery",
             "sensor_msgs/msg/BatteryState",
             header=self._build.header(stamp_ns, name),
             **unmeasured,
@@ -79,7 +79,6 @@ class HealthMaker:
             location="",
             serial_number="",
         )
-        return RosMessage(f"/{name}/battery", "sensor_msgs/msg/BatteryState", battery)
 
     def _diagnostics(self, stamp_ns: int, name: str, level: int, text: str, facts: dict[str, str]) -> RosMessage:
         status = self._make(
@@ -90,7 +89,5 @@ class HealthMaker:
             hardware_id=name,
             values=[self._make("diagnostic_msgs/msg/KeyValue", key=key, value=str(v)) for key, v in facts.items()],
         )
-        array: Any = self._make(
-            "diagnostic_msgs/msg/DiagnosticArray", header=self._build.header(stamp_ns), status=[status]
-        )
-        return RosMessage("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", array)
+        kind = "diagnostic_msgs/msg/DiagnosticArray"
+        return self._codec.message("/diagnostics", kind, header=self._build.header(stamp_ns), status=[status])

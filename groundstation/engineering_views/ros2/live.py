@@ -10,11 +10,11 @@ import zenoh
 from drivers.rmw_zenoh.wire import graph
 from groundstation.bus import codec as bus_codec
 from groundstation.bus import keys
-from groundstation.bus.api import Sample
+from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.keys import Key
-from groundstation.bus.topics import IMAGE
+from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, SETPOINT, TRUTH
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
-from groundstation.engineering_views.ros2.scene import Ros2Scene
+from groundstation.engineering_views.ros2.scene import STATES, Ros2Scene
 from groundstation.errors import MessageError, OperatorMistake
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.timeline import Timeline
@@ -22,6 +22,18 @@ from groundstation.time_units import NS_PER_S
 
 _STATIC_NS = NS_PER_S
 _NODE = "skein"
+
+
+def enough_hz(site: str, field: ResolvedField | None) -> dict[str, float]:
+    """Return how many samples a second are enough, by the keys of what comes more often.
+
+    Estimates: every second one, for the turns of the view are 20 a second.
+    """
+    if field is None:
+        return {}
+    drones = tuple(field.drones)
+    often = [(ESTIMATE, ("*",), 25.0), (SETPOINT, drones, 10.0), (TRUTH, (*drones, *field.tracked), 10.0)]
+    return {keys.expression(site, topic, name): rate_hz for topic, names, rate_hz in often for name in names}
 
 
 class Ros2View:
@@ -56,6 +68,10 @@ class Ros2View:
         """Return whether it still can publish."""
         return not self._session.is_closed()
 
+    def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
+        """Return the queues of what it shows: each turn the newest state and picture, and all events."""
+        return bus.subscribe((*STATES, IMAGE), newest=True), bus.subscribe((EVENT,))
+
     def take(self, sample: Sample, now_ns: int) -> None:
         """Say on what arrived at a boot-clock time; what does not decode is passed over."""
         if now_ns >= self._next_static_ns:
@@ -74,8 +90,6 @@ class Ros2View:
             header = bus_codec.decode_header(key, sample.attachment)
             stamp_ns, _ = self._timeline.times(header.stamp_ns, header.clock, now_ns)
             return self._scene.take_picture(stamp_ns, key.entity, sample.payload)
-        if key.topic.type is None:
-            return []
         message = bus_codec.decode(key, sample.payload)
         stamp_ns, _ = self._timeline.times(message.header.stamp_ns, message.header.clock, now_ns)
         return self._scene.take(stamp_ns, message)
@@ -83,7 +97,7 @@ class Ros2View:
     def _publish(self, message: RosMessage) -> None:
         publisher, identity, count = self._publishers.get(message.topic) or self._declare(message)
         self._publishers[message.topic] = publisher, identity, count + 1
-        publisher.put(self._codec.encode(message), attachment=graph.attachment(count + 1, time.time_ns(), identity))
+        publisher.put(message.data, attachment=graph.attachment(count + 1, time.time_ns(), identity))
 
     def _declare(self, message: RosMessage) -> tuple[Any, bytes, int]:
         type_hash = self._codec.hash_of(message.type)

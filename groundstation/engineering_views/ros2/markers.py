@@ -1,77 +1,104 @@
-"""Ellipses, links and arrows of the scene as RViz markers."""
+"""Ellipses, links and commanded velocities of the scene as RViz markers, ten times a second."""
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from groundstation.appearance.colours import Rgb
-from groundstation.arrays import Array
-from groundstation.engineering_views.ros2.codec import Ros2Codec
+from groundstation.bus import messages as m
+from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.geometry import Builder
-from groundstation.engineering_views.scene import LINK_COLOUR, Body, SensingLink
+from groundstation.engineering_views.scene import LINK_COLOUR, Body, SensingLink, ViewScene
+from groundstation.time_units import NS_PER_S
 
+_PERIOD_NS = NS_PER_S // 10
 # WIRE (docs/reference/ros2.md 3): visualization_msgs/msg/Marker.
-_ARROW, _LINE_STRIP, _TEXT = 0, 4, 9
+_ARROW, _DISC, _LINE_STRIP, _TEXT = 0, 3, 4, 9
 _LIFETIME_S = 1
-_LINE_M, _TEXT_M, _SHAFT_M, _HEAD_M = 0.02, 0.18, 0.03, 0.07
+_DISC_M, _TEXT_M, _SHAFT_M, _HEAD_M = 0.01, 0.18, 0.03, 0.07
+_FAINT = 0.35
 
 
-class MarkerMaker:
-    """Makes markers that vanish after a second, so that nothing old is left standing."""
+class MarkerScene:
+    """Collects what there is to draw; each marker vanishes after a second, so that nothing old is left standing."""
 
-    def __init__(self, codec: Ros2Codec) -> None:
-        self._build, self._make = Builder(codec), codec.make
+    def __init__(self, codec: Ros2Codec, view: ViewScene) -> None:
+        self._codec, self._build, self._view = codec, Builder(codec), view
+        self._blank = _blank(self._build)
         self._numbers: dict[str, int] = {}
+        self._plan: m.Plan | None = None
+        self._setpoints: dict[str, m.VelocitySetpoint] = {}
+        self._next_ns = 0
 
-    def body(self, stamp_ns: int, body: Body, colour: Rgb) -> list[Any]:
-        """Return the 95 % ellipse and the name of a body."""
-        ring = self._marker(stamp_ns, f"ellipse {body.name}", _LINE_STRIP, (_LINE_M, 0.0, 0.0), colour)
-        ring.points = self._points(body.ring_m)
-        x, y, z = body.position_m
-        name = self._marker(stamp_ns, f"name {body.name}", _TEXT, (0.0, 0.0, _TEXT_M), colour)
-        name.pose, name.text = self._build.pose((x, y, z + _TEXT_M), 0.0), body.name
-        return [ring, name]
+    def take(self, message: m.Plan | m.VelocitySetpoint) -> None:
+        """Keep what the next picture shows."""
+        if isinstance(message, m.Plan):
+            self._plan = message
+        else:
+            self._setpoints[message.header.entity] = message
 
-    def link(self, stamp_ns: int, link: SensingLink) -> Any:
-        """Return a link of the sensing topology; its width grows with its information."""
-        line = self._marker(stamp_ns, link.name, _LINE_STRIP, (2 * link.half_width_m, 0.0, 0.0), LINK_COLOUR)
-        line.points = self._points(np.array([link.begin_m, link.end_m]))
-        return line
+    def drawn(self, stamp_ns: int, bodies: Iterable[Body]) -> list[RosMessage]:
+        """Return a picture of the bodies and of what came since the last one, or nothing while that one is young."""
+        if self._next_ns - _PERIOD_NS <= stamp_ns < self._next_ns:
+            return []
+        self._next_ns = stamp_ns + _PERIOD_NS
+        markers = [*self._bodies(stamp_ns, bodies), *self._links(stamp_ns), *self._arrows(stamp_ns)]
+        self._plan, self._setpoints = None, {}
+        return [self._codec.message("/skein/markers", "visualization_msgs/msg/MarkerArray", markers=markers)]
 
-    def arrow(self, stamp_ns: int, name: str, begin_m: Array, vector_m: Array, colour: Rgb) -> Any:
-        """Return a commanded velocity."""
-        arrow = self._marker(stamp_ns, f"setpoint {name}", _ARROW, (_SHAFT_M, _HEAD_M, 0.0), colour)
-        arrow.points = self._points(np.array([begin_m, begin_m + vector_m]))
-        return arrow
+    def _bodies(self, stamp_ns: int, bodies: Iterable[Body]) -> Iterator[Any]:
+        for body in bodies:
+            colour, (x, y, z), (major, minor, turn) = self._view.colour(body.name), body.position_m, body.semi_axes_95
+            size, place = self._build.vector((2 * major, 2 * minor, _DISC_M)), self._build.pose((x, y, z), turn)
+            yield self._marker(stamp_ns, f"ellipse {body.name}", colour, _FAINT, type=_DISC, scale=size, pose=place)
+            size, place = self._build.vector((0.0, 0.0, _TEXT_M)), self._build.pose((x, y, z + _TEXT_M), 0.0)
+            said = {"type": _TEXT, "scale": size, "pose": place, "text": body.name}
+            yield self._marker(stamp_ns, f"name {body.name}", colour, **said)
 
-    def _points(self, xyz: Array) -> list[Any]:
-        return [self._build.point((row[0], row[1], row[2])) for row in xyz]
+    def _links(self, stamp_ns: int) -> Iterator[Any]:
+        links: list[SensingLink] = [] if self._plan is None else self._view.links(self._plan)
+        for link in links:
+            size = self._build.vector((2 * link.half_width_m, 0.0, 0.0))
+            points = [self._build.point(end_m) for end_m in (link.begin_m, link.end_m)]
+            yield self._marker(stamp_ns, link.name, LINK_COLOUR, type=_LINE_STRIP, scale=size, points=points)
 
-    def _marker(self, stamp_ns: int, name: str, kind: int, scale: tuple[float, float, float], colour: Rgb) -> Any:
-        make, build = self._make, self._build
+    def _arrows(self, stamp_ns: int) -> Iterator[Any]:
+        size = self._build.vector((_SHAFT_M, _HEAD_M, 0.0))
+        for name, setpoint in self._setpoints.items():
+            found = self._view.arrow(setpoint)
+            if found is not None:
+                begin_m, vector_m = found
+                points = [self._build.point(tuple(end_m)) for end_m in (begin_m, begin_m + vector_m)]
+                colour = self._view.colour(name)
+                yield self._marker(stamp_ns, f"setpoint {name}", colour, type=_ARROW, scale=size, points=points)
+
+    def _marker(self, stamp_ns: int, name: str, colour: Rgb, opacity: float = 1.0, **shown: Any) -> Any:
         red, green, blue = (part / 255.0 for part in colour)
-        empty = make(
-            "sensor_msgs/msg/CompressedImage", header=build.header(0, ""), format="", data=np.zeros(0, np.uint8)
-        )
-        return make(
-            "visualization_msgs/msg/Marker",
-            header=build.header(stamp_ns),
-            ns=name.partition(" ")[0],
-            id=self._numbers.setdefault(name, len(self._numbers)),
-            type=kind,
-            action=0,
-            pose=build.pose((0.0, 0.0, 0.0), 0.0),
-            scale=build.vector(scale),
-            color=make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=1.0),
-            lifetime=make("builtin_interfaces/msg/Duration", sec=_LIFETIME_S, nanosec=0),
-            frame_locked=False,
-            points=[],
-            colors=[],
-            texture_resource="",
-            texture=empty,
-            uv_coordinates=[],
-            text="",
-            mesh_resource="",
-            mesh_file=make("visualization_msgs/msg/MeshFile", filename="", data=np.zeros(0, np.uint8)),
-            mesh_use_embedded_materials=False,
-        )
+        said = {
+            "header": self._build.header(stamp_ns),
+            "ns": name.partition(" ")[0],
+            "id": self._numbers.setdefault(name, len(self._numbers)),
+            "color": self._build.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=opacity),
+        }
+        return self._build.make("visualization_msgs/msg/Marker", **(self._blank | said | shown))
+
+
+def _blank(build: Builder) -> dict[str, Any]:
+    """Return what most markers do not say, and all of them share."""
+    make, nothing = build.make, np.zeros(0, np.uint8)
+    return {
+        "action": 0,
+        "pose": build.pose((0.0, 0.0, 0.0), 0.0),
+        "lifetime": make("builtin_interfaces/msg/Duration", sec=_LIFETIME_S, nanosec=0),
+        "frame_locked": False,
+        "points": [],
+        "colors": [],
+        "texture_resource": "",
+        "texture": make("sensor_msgs/msg/CompressedImage", header=build.header(0, ""), format="", data=nothing),
+        "uv_coordinates": [],
+        "text": "",
+        "mesh_resource": "",
+        "mesh_file": make("visualization_msgs/msg/MeshFile", filename="", data=nothing),
+        "mesh_use_embedded_materials": False,
+    }

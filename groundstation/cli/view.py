@@ -110,12 +110,14 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
 
 def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str) -> "LiveView":
     from groundstation.bus import clock
+    from groundstation.engineering_views.ros2 import LAYOUTS
     from groundstation.engineering_views.ros2.live import Ros2View
     from groundstation.recording.timeline import Timeline
 
     timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
     bridge = Ros2View(router, domain, distro, _field_of(record), timeline)
     click.echo(f"{record.name} in ROS 2 domain {domain} by {router} (Ctrl-C leaves it; the flight goes on)")
+    click.echo(f"layouts for RViz and Foxglove: {LAYOUTS}")
     return bridge
 
 

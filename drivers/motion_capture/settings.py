@@ -21,14 +21,16 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PoseProtocol:
-    """What poses come by: its usual port (0: none), what reads it, and whether its address may have a path and a query.
+    """What poses come by: its usual port (0: none), what reads it, and what its address may have beside a host.
 
-    reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`.
+    reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`; paths: a path and a
+    query; any_port: another port than the usual one.
     """
 
     port: int
     reader: str
     paths: bool = False
+    any_port: bool = True
 
 
 _NATNET = "natnet"
@@ -36,9 +38,10 @@ _SOURCES = "drivers.motion_capture.sources"
 # Those of other packages are entry points `skein.world_sensors`: the name is the scheme, the object the reader itself.
 OURS: Mapping[str, PoseProtocol] = {
     _NATNET: PoseProtocol(1510, f"{_SOURCES}:NatnetSource"),
-    "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource"),
+    # The library takes another port for Qualisys only.
+    "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource", any_port=False),
     "qualisys": PoseProtocol(22222, f"{_SOURCES}:LibrarySource"),
-    "vrpn": PoseProtocol(3883, f"{_SOURCES}:LibrarySource"),
+    "vrpn": PoseProtocol(3883, f"{_SOURCES}:LibrarySource", any_port=False),
     "ros2": PoseProtocol(ROUTER_PORT, "drivers.motion_capture.ros2_source:Ros2Source", paths=True),
 }
 
@@ -78,6 +81,8 @@ def parse_source(text: str) -> SystemAddress:
         port = parts.port or protocol.port
     except ValueError:
         raise ValueError("the port is no number from 1 to 65535") from None
+    if port != protocol.port and not protocol.any_port:
+        raise ValueError(f"must have no port: {scheme}:// is heard at port {protocol.port} only")
     path = parts.path.strip("/")
     if (scheme in OURS and not parts.hostname) or ((path or parts.query) and not protocol.paths):
         raise ValueError(f"must name a host and nothing else, as in {scheme}://192.168.1.5")

@@ -186,7 +186,7 @@ class LibrarySource:
 
     def _follow(self) -> None:
         try:
-            system = self._library.connect(self._address.scheme, {"hostname": self._address.host})
+            system = self._library.connect(self._address.scheme, _place(self._address))
             self.detail = ""
             while not self._closing:
                 system.waitForNextFrame()
@@ -194,6 +194,11 @@ class LibrarySource:
                 self._came.set()
         except Exception as error:  # noqa: BLE001 - what a foreign library raises is shown, and ends this thread only
             self.detail = f"{type(error).__name__}: {error}"
+
+
+def _place(address: SystemAddress) -> dict[str, str]:
+    port = {"port": str(address.port)} if OURS[address.scheme].any_port else {}
+    return {"hostname": address.host} | port
 
 
 def _frame_of(bodies: Any) -> CapturedFrame:

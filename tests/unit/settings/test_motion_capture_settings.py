@@ -35,6 +35,8 @@ def section(path: Path, options: tuple[str, ...] = ()) -> MotionCaptureSection:
         (("truth.from=vicon",), "truth.from: must name a motion capture system of the field: mocap (got vicon)"),
         (("truth.from=mocap",), "one camera at least, or a motion capture system that is not the truth"),
         (("motion_capture.mocap.source=http://1.2.3.4",), "must be an address such as natnet://"),
+        (("motion_capture.mocap.source=vicon://1.2.3.4:802",), "must have no port: vicon:// is heard at port 801 only"),
+        (("motion_capture.mocap.source=vrpn://1.2.3.4:3884",), "must have no port: vrpn:// is heard at port 3883 only"),
         (("motion_capture.mocap.bodies.ghost={}",), "ghost is no drone or target of the field"),
         (("motion_capture.mocap.bodies={drone_1: {name: a}, drone_2: {name: a}}",), "the body's name a is already"),
     ],

@@ -115,7 +115,8 @@ audit: $(STAMP)
 	test $$code -ne 2 || { echo "audit skipped: no database of vulnerabilities is in reach"; exit 0; }; exit $$code
 
 # Clients of others for the interoperability tests, each in an environment of its own.
-interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed $(INTEROP)/dronekit/.installed
+interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed $(INTEROP)/dronekit/.installed \
+	$(INTEROP)/zenoh_ros2/.installed
 
 $(INTEROP)/node/.installed: tests/interop/package.json
 	@command -v npm >/dev/null || { echo "npm is missing: the tests with npm ar-drone are skipped without it"; exit 1; }

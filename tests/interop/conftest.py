@@ -71,6 +71,19 @@ def hangar() -> Iterator[Any]:
         each.close()
 
 
+def interpreter_of(package: str, absent: Callable[[str], NoReturn]) -> Path:
+    """Return the Python of a package's own environment."""
+    python = INTEROP / package / "bin" / "python"
+    if not python.exists():
+        absent(f"PyPI {package} is not installed: run `make interop`")
+    return python
+
+
+@pytest.fixture
+def interpreter(absent: Callable[[str], NoReturn]) -> Callable[[str], Path]:
+    return lambda package: interpreter_of(package, absent)
+
+
 class Programs:
     """Starts clients and collects the line of JSON that each prints."""
 
@@ -93,13 +106,8 @@ class Programs:
         return self.python("pyardrone", script, *arguments)
 
     def python(self, package: str, script: str, *arguments: object) -> subprocess.Popen[str]:
-        python = self.environment(package) / "bin" / "python"
+        python = interpreter_of(package, self._absent)
         return self._start([str(python), str(HERE / script), *map(str, arguments)], dict(os.environ))
-
-    def environment(self, package: str) -> Path:
-        if not (INTEROP / package / "bin" / "python").exists():
-            self._absent(f"PyPI {package} is not installed: run `make interop`")
-        return INTEROP / package
 
     def _start(self, command: list[str], environment: dict[str, str]) -> subprocess.Popen[str]:
         pipe = subprocess.PIPE

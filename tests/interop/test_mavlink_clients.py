@@ -93,10 +93,9 @@ def test_mavsdk_finds_no_mission_and_flies_by_satellites(hangar: Any) -> None:
     assert max(flown) == pytest.approx(2.5, abs=0.3) and flown[-1] < 0.1
 
 
-def test_mavproxy_lists_no_mission_and_flies_by_satellites(hangar: Any, programs: Any, tmp_path: Path) -> None:
-    drones = hangar(1, kind="ardupilot")
-    script = programs.environment("mavproxy") / "bin" / "mavproxy.py"
-    command = [str(script.parent / "python"), str(script), f"--master=udpout:{drones.addresses[0]}:14550"]
+def test_mavproxy_lists_no_mission_and_flies_by_satellites(hangar: Any, interpreter: Any, tmp_path: Path) -> None:
+    python, drones = interpreter("mavproxy"), hangar(1, kind="ardupilot")
+    command = [str(python), str(python.with_name("mavproxy.py")), f"--master=udpout:{drones.addresses[0]}:14550"]
     pipe = subprocess.PIPE
     with subprocess.Popen(
         [*command, "--state-basedir", str(tmp_path)], stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True

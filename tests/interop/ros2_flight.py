@@ -1,0 +1,104 @@
+"""A flight seen by a foreign ROS 2 client through `view --ros2`, beside two nodes that talk to each other.
+
+Run in a network namespace of its own, as root there, for the port of ROS 2's router may be taken outside: `unshare
+--user --map-root-user --net python ros2_flight.py PYTHON FOLDER`; PYTHON: that of the foreign programs. Prints a line
+of JSON: what the client listed and decoded, and how many messages the nodes exchanged before, during and after.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "sitl"))
+
+from sitl_run import COMMAND, SitlRun
+
+_NODES = Path(__file__).with_name("ros2_nodes.py")
+_START_S, _SPAN_S, _WATCH_S, _LEAST = 30.0, 2.0, 90.0, 16
+
+
+class Stage:
+    """Processes with an output file each, all ended at the end."""
+
+    def __init__(self, python: str, folder: Path, stack: ExitStack) -> None:
+        self._python, self._folder, self._stack = python, folder, stack
+
+    def node(self, *arguments: str) -> "subprocess.Popen[bytes]":
+        return self.start(arguments[0], [self._python, str(_NODES), *arguments])
+
+    def start(self, name: str, command: list[str]) -> "subprocess.Popen[bytes]":
+        with (self._folder / f"{name}.txt").open("wb") as sink:
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sink, stderr=subprocess.STDOUT)
+        self._stack.callback(_end, process)
+        return process
+
+    def lines(self, name: str) -> list[str]:
+        return (self._folder / f"{name}.txt").read_text().splitlines()
+
+    def until(self, name: str, count: int = 1) -> None:
+        deadline_s = time.monotonic() + _START_S
+        while len(self.lines(name)) < count:
+            assert time.monotonic() < deadline_s, f"{name} said only {self.lines(name)}"
+            time.sleep(0.1)
+
+    def heard(self) -> int:
+        """Return how many messages the listener gets in a span of time."""
+        before = len(self.lines("listener"))
+        time.sleep(_SPAN_S)
+        return len(self.lines("listener")) - before
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    for number in (signal.SIGINT, signal.SIGKILL):
+        if process.poll() is None:
+            process.send_signal(number)
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                continue
+
+
+def _watched(stage: Stage) -> dict[str, Any]:
+    """Return what the client found; each order makes an event, which one who joined before sees on /rosout."""
+    watcher = stage.node("watcher", str(_WATCH_S), str(_LEAST))
+    for turn in range(int(_WATCH_S)):
+        if watcher.poll() is not None:
+            break
+        subprocess.run([*COMMAND, ("hold", "resume")[turn % 2]], check=False, capture_output=True)
+        time.sleep(1.0)
+    watcher.wait(30)
+    found: dict[str, Any] = json.loads(stage.lines("watcher")[-1])
+    return found
+
+
+def main(python: str, folder: Path) -> None:
+    """Print one line of JSON."""
+    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+    os.environ["XDG_RUNTIME_DIR"] = str(folder)
+    with ExitStack() as stack:
+        stage = Stage(python, folder, stack)
+        for name, lines in (("router", 1), ("talker", 0), ("listener", 10)):
+            stage.node(name)
+            stage.until(name, lines)
+        # How well it flies is not judged here, so a busy machine does without the checks before take-off.
+        run = SitlRun(folder, "sitl", "lab", "--anyway", "--duration", "240")
+        stack.callback(run.close)
+        run.until(lambda: all(run.mode(name) for name in run.record.drones), _START_S, "all drones heard")
+        run.until(lambda: any(run.run_dir.glob("state*.mcap")), _START_S, "a recording, which has the field")
+        told: dict[str, Any] = {"before": stage.heard()}
+        view = stage.start("view", [*COMMAND, "view", "--ros2"])
+        stage.until("view")
+        told |= _watched(stage) | {"during": stage.heard()}
+        _end(view)
+        told |= {"after": stage.heard(), "view": stage.lines("view"), "code": view.returncode}
+    print(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))

@@ -1,0 +1,52 @@
+"""A client of ROS 2 over Zenoh that others wrote sees a flight, and ROS 2's own nodes do not notice the view.
+
+That nobody moves a drone through the view: its session on the bus has the role VIEW, which the access list lets say
+nothing (tests/contract/test_guarded_bus.py), and the one on the side of ROS 2 subscribes to nothing.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+HERE = Path(__file__).parent
+ALONE = ["unshare", "--user", "--map-root-user", "--net"]
+
+pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(500)]
+
+
+@pytest.fixture
+def alone(absent: Callable[[str], NoReturn]) -> list[str]:
+    """What makes a network namespace; ends a test on a machine that has none."""
+    if shutil.which("unshare") is None or shutil.which("ip") is None:
+        absent("no network namespaces here: unshare or ip is not installed")
+    tried = subprocess.run([*ALONE, "ip", "link", "set", "lo", "up"], capture_output=True, text=True)
+    if tried.returncode:
+        pytest.skip(f"no network namespaces here: {tried.stderr.strip()}")
+    return ALONE
+
+
+@pytest.fixture
+def told(alone: list[str], interpreter: Callable[[str], Path], tmp_path: Path) -> dict[str, Any]:
+    command = [*alone, sys.executable, str(HERE / "ros2_flight.py"), str(interpreter("zenoh_ros2")), str(tmp_path)]
+    # Longer than all of its own limits together: killed, it would leave its flight behind.
+    done = subprocess.run(command, capture_output=True, text=True, timeout=480, env=os.environ)
+    assert done.returncode == 0, done.stdout + done.stderr
+    told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return told
+
+
+def test_a_foreign_client_decodes_each_topic_and_nodes_still_find_each_other(told: dict[str, Any]) -> None:
+    listed = set(told["listed"])
+    assert len(listed) >= 16, "our topics, and the chatter of the nodes"
+    assert set(told["decoded"]) == listed
+    assert {"/tf", "/tf_static", "/rosout", "/skein/markers", "/ceiling/camera_info", "/drone_1/odom"} <= listed
+    # Ten a second for two seconds; a busy machine may be late.
+    assert min(told["before"], told["during"], told["after"]) >= 10, told
+    assert told["code"] == 0 and "ROS 2 domain 0" in told["view"][0]

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from seen_page import Seen, eventually
 
+from groundstation.appearance.colours import ROBOT_COLOURS
 from groundstation.bus.messages import RUN, Severity
 from groundstation.report import run_facts
 from groundstation.report.file_names import HTML_NAME, JSON_NAME
@@ -96,7 +97,7 @@ def judged_run(folder: Path) -> None:
     run_facts.write(folder, run_facts.RunFacts(command="groundstation demo --duration 15"))
     judged = {"verdict": "failed", "reasons": ["target error (rms) 0.3 m, asked for at most 0.2 m"]}
     (folder / JSON_NAME).write_text(json.dumps(judged))
-    chart = Chart("Error", "m", "", [0.0, 1.0, 2.0], [Curve("error", "#0072b2", [0.1, 0.2, 0.3])])
+    chart = Chart("Error", "m", "", [0.0, 1.0, 2.0], [Curve("error", ROBOT_COLOURS[0], [0.1, 0.2, 0.3])])
     room = '<svg viewBox="0 0 9 9"><rect id="wall" width="9" height="9" fill="#ff0000"/></svg>'
     (folder / HTML_NAME).write_text(page("the run", "", [("Room", room), ("Flight", holders([chart], 0))], [chart]))
 

@@ -4,9 +4,9 @@ import io
 import re
 from itertools import takewhile
 from pathlib import Path
-from typing import Any
 
 import pytest
+from monitor_world import CAST, NOW, S, World, plan, sighting
 from rich.console import Console
 
 from groundstation.bus import messages as m
@@ -14,90 +14,11 @@ from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.cli.terminal import show
 from groundstation.field.resolved import ResolvedField
-from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.screen import DRAW_PERIOD_NS, Screen, line
-from groundstation.monitor.state import Cast, MonitorState, cast_from_field
+from groundstation.monitor.state import Cast, cast_from_field
 from groundstation.monitor.table import render
 
 DOCS = Path(__file__).parents[3] / "docs"
-S = 1_000_000_000
-NOW = 100 * S
-CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",))
-
-
-class World:
-    """A bus with a screen on it, and shorthands to speak as the other processes."""
-
-    def __init__(self) -> None:
-        exchange = MemoryExchange()
-        self._exchange = exchange
-        self.output = io.StringIO()
-        console = Console(file=self.output, force_terminal=True, width=140, height=40)
-        self.screen = Screen(MemoryBus(exchange, "lab", "monitor"), CAST, 0, console)
-
-    @property
-    def state(self) -> MonitorState:
-        return self.screen.state
-
-    def header(self, entity: str, age_s: float = 0.0) -> m.Header:
-        return m.Header(NOW - round(age_s * S), "here", entity, entity, 1)
-
-    def say(self, topic: t.Topic, message: m.Message) -> None:
-        MemoryBus(self._exchange, "lab", message.header.source).publish(topic, message)
-
-    def vehicle(
-        self, name: str, mode: str = "TRACK", battery: float | None = 0.8, age_s: float = 0.0, **more: Any
-    ) -> None:
-        state = more.pop("flight_state", m.FlightState.FLYING)
-        header = self.header(name, age_s)
-        self.say(
-            t.VEHICLE_STATUS,
-            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7, **more),
-        )
-
-    def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch) -> None:
-        wide = (0.04, 0.0, 0.0, 0.01)
-        robot = tuple(0.01 if index % 5 == 0 else 0.0 for index in range(16))
-        entities = (
-            m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, 0.2),
-            m.EntityEstimate("turtlebot", "target", (0.75, 0.25), wide, (0.0, 0.0), True, target_age_s),
-        )
-        header = self.header("team", age_s)
-        self.say(t.ESTIMATE, m.Estimate(header=header, entities=entities, epoch=1, searches=searches))
-
-    def status(self, name: str, state: m.Lifecycle = m.Lifecycle.READY, age_s: float = 0.0, detail: str = "") -> None:
-        header = self.header(name, age_s)
-        self.say(
-            t.PROCESS_STATUS,
-            m.ProcessStatus(header=header, state=state, pid=1, cpu=0.34, ticks=100, overruns=2, detail=detail),
-        )
-
-    def text(self) -> str:
-        self.screen._due_ns = 0
-        self.screen.turn(NOW)
-        console = Console(record=True, width=140, file=io.StringIO())
-        console.print(render(self.state, NOW))
-        return console.export_text()
-
-
-def sighting(world: World, observer: str) -> m.RelativeObservation:
-    return m.RelativeObservation(
-        header=world.header(observer, 0.1), observer=observer, subject="turtlebot", camera="drone_1_camera",
-        position_m=(0.0, 0.0, 1.0), yaw_rad=None, covariance=(0.0,) * 9,
-    )  # fmt: skip
-
-
-def plan(world: World) -> m.Plan:
-    return m.Plan(
-        header=world.header("team"), topology="drone_1/drone_2", cost=0.0123, controls=(), edges=(),
-        alternatives=(m.Alternative("drone_1,drone_2", 0.0150), m.Alternative("drone_1/drone_2", 0.0123)),
-        solver=m.SolverReport("converged", 40, 0.012, 2, 1), mode="multistart",
-    )  # fmt: skip
-
-
-@pytest.fixture
-def world() -> World:
-    return World()
 
 
 def test_an_empty_state_is_drawn(world: World) -> None:
@@ -204,88 +125,6 @@ def test_processes_and_events_are_listed(world: World) -> None:
     text = world.text()
     assert "tracker 34% 2% late" in text and "together 0.34 cores" in text
     assert "3 s ago  drone_2: wind  (land)" in text
-
-
-def _alarms(world: World) -> list[str]:
-    world.text()
-    return [alarm.text for alarm in alarms_of(world.state, NOW)]
-
-
-def test_nothing_wrong_raises_no_alarm(world: World) -> None:
-    world.vehicle("drone_1")
-    world.estimate()
-    world.status("tracker")
-    assert _alarms(world) == []
-
-
-@pytest.mark.parametrize("text", ["is not found", "drone_1 is not found"])
-def test_an_error_names_whom_it_is_about_once(world: World, text: str) -> None:
-    world.say(t.EVENT, m.Event(header=world.header("drone_1", 1.0), severity=m.Severity.ERROR, text=text))
-    (alarm,) = _alarms(world)
-    assert alarm in {"drone_1: is not found", "drone_1 is not found"} and alarm.count("drone_1") == 1
-    assert alarm in world.text()
-
-
-def test_an_alarm_keeps_what_it_is_about_while_its_figures_change(world: World) -> None:
-    for silence_s in (2.0, 4.0):
-        world.vehicle("drone_1", age_s=silence_s)
-        world.estimate(target_age_s=silence_s + 4.0)
-        world.text()
-        assert {alarm.about for alarm in alarms_of(world.state, NOW)} == {"drone_1 silent", "turtlebot lost"}
-
-
-def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> None:
-    world.vehicle("drone_1", battery=0.18)
-    world.vehicle("drone_2", age_s=4.0)
-    world.estimate(target_age_s=6.0, age_s=0.5)
-    world.status("recorder", m.Lifecycle.DEGRADED, detail="disk full")
-    world.status("ceiling", age_s=5.0)
-    assert _alarms(world) == [
-        "drone_2: nothing heard for 4 s",
-        "tracker: no estimate for 0.5 s",
-        "process ceiling: silent for 5 s",
-        "drone_1: battery 18% (lands at 15%)",
-        "turtlebot: not seen for 6 s",
-        "process recorder: disk full",
-    ]
-    assert "nothing heard for 4 s" in world.text()
-
-
-def test_what_keeps_a_drone_from_its_plan_is_an_alarm_with_what_follows(world: World) -> None:
-    world.vehicle("drone_1", detail="no camera has seen it for too long", lands_in_s=6.2, braked=True)
-    world.vehicle("drone_2", detail="hovers: its velocity is stuck", braked=True)
-    world.text()
-    first, second = alarms_of(world.state, NOW)
-    assert (first.text, first.grave) == ("drone_1 lands in 6 s: no camera has seen it for too long", True)
-    assert "HOLD does not stop that" in first.advice
-    assert (second.text, second.grave) == ("drone_2 hovers: its velocity is stuck", False)
-
-
-@pytest.mark.parametrize(("share", "grave"), [(0.61, None), (0.59, False), (0.29, True), (None, None)])
-def test_a_weak_link_is_an_alarm(world: World, share: float | None, grave: bool | None) -> None:
-    world.vehicle("drone_1", link_quality=share)
-    world.text()
-    assert [alarm.grave for alarm in alarms_of(world.state, NOW)] == ([] if grave is None else [grave])
-
-
-def test_an_unknown_battery_is_an_alarm_once_the_vehicle_speaks(world: World) -> None:
-    world.vehicle("drone_1", battery=None, flight_state=m.FlightState.UNKNOWN)
-    world.vehicle("drone_2", battery=None, flight_state=m.FlightState.LANDED)
-    assert _alarms(world) == ["drone_2: battery unknown"]
-
-
-def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(world: World) -> None:
-    world.vehicle("drone_1", battery=0.13, flight_state=m.FlightState.LANDING)
-    world.text()
-    (alarm,) = alarms_of(world.state, NOW)
-    assert alarm.text == "drone_1: battery 13%, it lands" and not alarm.grave
-
-
-def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
-    header = world.header("ceiling")
-    status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
-    world.say(t.CAMERA_STATUS, status)
-    assert _alarms(world) == ["ceiling: no pictures"]
 
 
 def test_the_screen_draws_four_times_a_second_and_gives_the_terminal_back(world: World) -> None:

@@ -1,0 +1,14 @@
+"""Tests of the monitor share a world to look at."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+from monitor_world import World
+
+
+@pytest.fixture
+def world() -> World:
+    return World()

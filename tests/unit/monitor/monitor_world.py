@@ -1,0 +1,87 @@
+"""A bus with the monitor's screen on it, and shorthands to speak as the other processes."""
+
+import io
+from typing import Any
+
+from rich.console import Console
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.monitor.screen import Screen
+from groundstation.monitor.state import Cast, MonitorState
+from groundstation.monitor.table import render
+
+S = 1_000_000_000
+NOW = 100 * S
+CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",))
+
+
+class World:
+    """A bus with a screen on it, and shorthands to speak as the other processes."""
+
+    def __init__(self) -> None:
+        exchange = MemoryExchange()
+        self._exchange = exchange
+        self.output = io.StringIO()
+        console = Console(file=self.output, force_terminal=True, width=140, height=40)
+        self.screen = Screen(MemoryBus(exchange, "lab", "monitor"), CAST, 0, console)
+
+    @property
+    def state(self) -> MonitorState:
+        return self.screen.state
+
+    def header(self, entity: str, age_s: float = 0.0) -> m.Header:
+        return m.Header(NOW - round(age_s * S), "here", entity, entity, 1)
+
+    def say(self, topic: t.Topic, message: m.Message) -> None:
+        MemoryBus(self._exchange, "lab", message.header.source).publish(topic, message)
+
+    def vehicle(
+        self, name: str, mode: str = "TRACK", battery: float | None = 0.8, age_s: float = 0.0, **more: Any
+    ) -> None:
+        state = more.pop("flight_state", m.FlightState.FLYING)
+        header = self.header(name, age_s)
+        self.say(
+            t.VEHICLE_STATUS,
+            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7, **more),
+        )
+
+    def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch) -> None:
+        wide = (0.04, 0.0, 0.0, 0.01)
+        robot = tuple(0.01 if index % 5 == 0 else 0.0 for index in range(16))
+        entities = (
+            m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, 0.2),
+            m.EntityEstimate("turtlebot", "target", (0.75, 0.25), wide, (0.0, 0.0), True, target_age_s),
+        )
+        header = self.header("team", age_s)
+        self.say(t.ESTIMATE, m.Estimate(header=header, entities=entities, epoch=1, searches=searches))
+
+    def status(self, name: str, state: m.Lifecycle = m.Lifecycle.READY, age_s: float = 0.0, detail: str = "") -> None:
+        header = self.header(name, age_s)
+        self.say(
+            t.PROCESS_STATUS,
+            m.ProcessStatus(header=header, state=state, pid=1, cpu=0.34, ticks=100, overruns=2, detail=detail),
+        )
+
+    def text(self) -> str:
+        self.screen._due_ns = 0
+        self.screen.turn(NOW)
+        console = Console(record=True, width=140, file=io.StringIO())
+        console.print(render(self.state, NOW))
+        return console.export_text()
+
+
+def sighting(world: World, observer: str) -> m.RelativeObservation:
+    return m.RelativeObservation(
+        header=world.header(observer, 0.1), observer=observer, subject="turtlebot", camera="drone_1_camera",
+        position_m=(0.0, 0.0, 1.0), yaw_rad=None, covariance=(0.0,) * 9,
+    )  # fmt: skip
+
+
+def plan(world: World) -> m.Plan:
+    return m.Plan(
+        header=world.header("team"), topology="drone_1/drone_2", cost=0.0123, controls=(), edges=(),
+        alternatives=(m.Alternative("drone_1,drone_2", 0.0150), m.Alternative("drone_1/drone_2", 0.0123)),
+        solver=m.SolverReport("converged", 40, 0.012, 2, 1), mode="multistart",
+    )  # fmt: skip

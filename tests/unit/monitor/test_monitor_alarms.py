@@ -1,0 +1,90 @@
+"""What the monitor and the console raise as alarms, and how grave each is."""
+
+import pytest
+from monitor_world import NOW, World
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.monitor.alarms import alarms_of
+
+
+def _alarms(world: World) -> list[str]:
+    world.text()
+    return [alarm.text for alarm in alarms_of(world.state, NOW)]
+
+
+def test_nothing_wrong_raises_no_alarm(world: World) -> None:
+    world.vehicle("drone_1")
+    world.estimate()
+    world.status("tracker")
+    assert _alarms(world) == []
+
+
+@pytest.mark.parametrize("text", ["is not found", "drone_1 is not found"])
+def test_an_error_names_whom_it_is_about_once(world: World, text: str) -> None:
+    world.say(t.EVENT, m.Event(header=world.header("drone_1", 1.0), severity=m.Severity.ERROR, text=text))
+    (alarm,) = _alarms(world)
+    assert alarm in {"drone_1: is not found", "drone_1 is not found"} and alarm.count("drone_1") == 1
+    assert alarm in world.text()
+
+
+def test_an_alarm_keeps_what_it_is_about_while_its_figures_change(world: World) -> None:
+    for silence_s in (2.0, 4.0):
+        world.vehicle("drone_1", age_s=silence_s)
+        world.estimate(target_age_s=silence_s + 4.0)
+        world.text()
+        assert {alarm.about for alarm in alarms_of(world.state, NOW)} == {"drone_1 silent", "turtlebot lost"}
+
+
+def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> None:
+    world.vehicle("drone_1", battery=0.18)
+    world.vehicle("drone_2", age_s=4.0)
+    world.estimate(target_age_s=6.0, age_s=0.5)
+    world.status("recorder", m.Lifecycle.DEGRADED, detail="disk full")
+    world.status("ceiling", age_s=5.0)
+    assert _alarms(world) == [
+        "drone_2: nothing heard for 4 s",
+        "tracker: no estimate for 0.5 s",
+        "process ceiling: silent for 5 s",
+        "drone_1: battery 18% (lands at 15%)",
+        "turtlebot: not seen for 6 s",
+        "process recorder: disk full",
+    ]
+    assert "nothing heard for 4 s" in world.text()
+
+
+def test_what_keeps_a_drone_from_its_plan_is_an_alarm_with_what_follows(world: World) -> None:
+    world.vehicle("drone_1", detail="no camera has seen it for too long", lands_in_s=6.2, braked=True)
+    world.vehicle("drone_2", detail="hovers: its velocity is stuck", braked=True)
+    world.text()
+    first, second = alarms_of(world.state, NOW)
+    assert (first.text, first.grave) == ("drone_1 lands in 6 s: no camera has seen it for too long", True)
+    assert "HOLD does not stop that" in first.advice
+    assert (second.text, second.grave) == ("drone_2 hovers: its velocity is stuck", False)
+
+
+@pytest.mark.parametrize(("share", "grave"), [(0.61, None), (0.59, False), (0.29, True), (None, None)])
+def test_a_weak_link_is_an_alarm(world: World, share: float | None, grave: bool | None) -> None:
+    world.vehicle("drone_1", link_quality=share)
+    world.text()
+    assert [alarm.grave for alarm in alarms_of(world.state, NOW)] == ([] if grave is None else [grave])
+
+
+def test_an_unknown_battery_is_an_alarm_once_the_vehicle_speaks(world: World) -> None:
+    world.vehicle("drone_1", battery=None, flight_state=m.FlightState.UNKNOWN)
+    world.vehicle("drone_2", battery=None, flight_state=m.FlightState.LANDED)
+    assert _alarms(world) == ["drone_2: battery unknown"]
+
+
+def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(world: World) -> None:
+    world.vehicle("drone_1", battery=0.13, flight_state=m.FlightState.LANDING)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert alarm.text == "drone_1: battery 13%, it lands" and not alarm.grave
+
+
+def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
+    header = world.header("ceiling")
+    status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
+    world.say(t.CAMERA_STATUS, status)
+    assert _alarms(world) == ["ceiling: no pictures"]

@@ -60,7 +60,8 @@ class LeaseBook:
             return "no live operator lease"
         if (command.issuer, command.header.source) != (self.holder, self.source):
             return f"the operator lease is held by {self.holder}"
-        return self.last_stop.words if self.last_stop is not None and self.last_stop.overtakes(command) else ""
+        stop = self.last_stop
+        return stop.words if stop is not None and stop.overtakes(command.header.stamp_ns) else ""
 
     def hear_stop(self, now_ns: int, stop: Command) -> None:
         """Remember a stop that counts."""

@@ -18,6 +18,6 @@ class StopMark:
         given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == clock else now_ns
         return cls(given_ns, f"{stop.verb} by {stop.issuer} came after it")
 
-    def overtakes(self, start: Command) -> bool:
-        """Whether a start of our clock was given before it."""
-        return start.header.stamp_ns < self.given_ns
+    def overtakes(self, start_ns: int) -> bool:
+        """Whether a start was given before it [ns; boot clock]."""
+        return start_ns < self.given_ns

@@ -121,9 +121,9 @@ class Flight:
             self._say(f"{self._state()}. To take off and track {insist} (Ctrl-C ends), or use: groundstation takeoff")
         else:
             self._say(f"{self._state()}; taking off")
-            operator.take_off(now_ns, anyway=self._plan.anyway)
+            operator.take_off(now_ns, anyway=self._plan.anyway, given_ns=self._began_ns)
             if operator.forbidden:
-                return f"nobody took off: {operator.forbidden}; to fly all the same: --anyway"
+                return f"nobody took off: {operator.forbidden}{'; to fly all the same: --anyway' * self._forbidden}"
             self._start.show_screen()
         began_ns = now_ns
         while True:

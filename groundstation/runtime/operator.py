@@ -82,15 +82,14 @@ class Operator:
 
     # --- orders --------------------------------------------------------------------------------------------------
 
-    def take_off(
-        self, now_ns: int, drones: tuple[str, ...] = (), then_track: bool = True, anyway: bool = False
-    ) -> None:
-        """Begin the take-off sequence of the given drones (none given: all), unless it is `forbidden`."""
-        self.forbidden = self._forbids(now_ns, drones, OPERATOR if anyway else "")
+    def take_off(self, now_ns: int, drones: tuple[str, ...] = (), anyway: bool = False, given_ns: int = 0) -> None:
+        """Take off, all or given drones, then track, unless `forbidden`, as by a stop after given_ns (0: given now)."""
+        overtaken = self._requests.overtaken(given_ns or now_ns)
+        self.forbidden = overtaken or self._forbids(now_ns, drones, OPERATOR if anyway else "")
         if self.forbidden:
             self._say(f"TAKE-OFF REFUSED: {self.forbidden}")
             return
-        self._begin(now_ns, drones, then_track)
+        self._begin(now_ns, drones, then_track=True)
 
     def _forbids(self, now_ns: int, drones: tuple[str, ...], insists: str) -> str:
         """Return why nobody may take off, or "": nothing is wrong, or somebody insists, which is put on record."""

@@ -68,8 +68,12 @@ class Requests:
             return ""
         if 0 < request.expires_ns <= now_ns:
             return f"given {(now_ns - request.header.stamp_ns) / NS_PER_S:.0f} s ago"
+        return self.overtaken(request.header.stamp_ns, names)
+
+    def overtaken(self, given_ns: int, names: Collection[str] = ()) -> str:
+        """Return which stop came after a start of some drones (none named: of all) was given, or ""."""
         later = [self._stops[name] for name in names or self._drones if name in self._stops]
-        return next((stop.words for stop in later if stop.overtakes(request)), "")
+        return next((stop.words for stop in later if stop.overtakes(given_ns)), "")
 
 
 def _make_room(memory: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""A flight that waits for Enter: what else is pressed meanwhile does not take the prompt away."""
+"""What is pressed before a take-off: the prompt stays, and a flight that asks nobody does not take off after a stop."""
 
 import os
 import time
@@ -22,9 +22,9 @@ _LONGEST_S = 5.0
 
 
 class Waiting:
-    """A run whose drone stands; a page presses HOLD at the first turn, the keyboard Enter at the fifth."""
+    """A run whose drone stands; a page presses a stop at the first turn, the keyboard Enter at the fifth."""
 
-    def __init__(self, keyboard: int) -> None:
+    def __init__(self, keyboard: int, stop: m.Verb) -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self._page = MemoryBus(exchange, "lab", "console")
@@ -34,6 +34,7 @@ class Waiting:
         self.failure, self.unwell = "", list[str]()
         self.said: list[str] = []
         self.heard: list[m.Verb] = []
+        self._stop = stop
         self._keyboard, self._turns, self._began = keyboard, 0, time.monotonic()
 
     def step(self) -> None:
@@ -43,8 +44,8 @@ class Waiting:
         self.heard += [r.message.verb for r in self._orders.drain() if isinstance(r.message, m.Command)]
         if self._turns == 1:
             header = self._page.header("team")
-            hold = m.Command(header=header, id="page-1", verb=m.Verb.HOLD, scope=(), issuer="console")
-            self._page.publish(t.COMMAND, hold)
+            stop = m.Command(header=header, id="page-1", verb=self._stop, scope=(), issuer="console")
+            self._page.publish(t.COMMAND, stop)
         if self._turns == 5:
             os.write(self._keyboard, b"\n")
         late = time.monotonic() - self._began > _LONGEST_S
@@ -64,13 +65,25 @@ def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     os.close(write)
 
 
-def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_none(keyboard: int) -> None:
-    waiting = Waiting(keyboard)
+def flown(waiting: Waiting, *, asks: bool) -> loop.FlightOutcome:
     terminal = cast(Terminal, SimpleNamespace(say=waiting.said.append, unmute=lambda: None))
-    plan = FlightPlan(None, asks=True, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
+    plan = FlightPlan(None, asks=asks, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
     flight = loop.Flight(cast(Supervisor, waiting), plan, terminal)
     flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
-    flight.run()
+    return flight.run()
+
+
+def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_none(keyboard: int) -> None:
+    waiting = Waiting(keyboard, m.Verb.HOLD)
+    flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after HOLD as before it"
     assert any("HOLD by console" in line for line in waiting.said)
     assert not any("landed by themselves" in line for line in waiting.said)
+
+
+@pytest.mark.parametrize("stop", [m.Verb.HOLD, m.Verb.LAND, m.Verb.CUT_MOTORS])
+def test_a_run_that_asks_nobody_does_not_take_off_after_a_stop(keyboard: int, stop: m.Verb) -> None:
+    waiting = Waiting(keyboard, stop)
+    outcome = flown(waiting, asks=False)
+    assert outcome.failure == f"nobody took off: {stop} by console came after it"
+    assert m.Verb.TAKEOFF not in waiting.heard

@@ -19,7 +19,7 @@ from drivers.camera.settings import SourceKind, parse_source
 from drivers.camera.sources.frames import FrameSource, Packet
 from drivers.camera.sources.opening import open_source
 from drivers.rmw_zenoh.wire import graph
-from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
+from groundstation.engineering_views.ros2.codec import Ros2Codec
 
 CODEC = Ros2Codec()
 TOPIC, DOMAIN = "/camera/image", 5
@@ -41,13 +41,13 @@ def image(encoding: str, pixels: Any, stamp_ns: int = 10**9, pad: int = 0) -> tu
     data = np.pad(rows, ((0, 0), (0, pad))).ravel()
     content = CODEC.make(IMAGE, header=header(stamp_ns), height=pixels.shape[0], width=pixels.shape[1],
                          encoding=encoding, is_bigendian=0, step=rows.shape[1] + pad, data=data)  # fmt: skip
-    return IMAGE, CODEC.encode(RosMessage(TOPIC, IMAGE, content))
+    return IMAGE, CODEC.encode(IMAGE, content)
 
 
 def compressed(suffix: str, words: str = "", data: bytes | None = None) -> tuple[str, bytes]:
     file = cv2.imencode(suffix, PIXELS)[1].tobytes() if data is None else data
     content = CODEC.make(COMPRESSED, header=header(10**9), format=words, data=np.frombuffer(file, np.uint8))
-    return COMPRESSED, CODEC.encode(RosMessage(TOPIC, COMPRESSED, content))
+    return COMPRESSED, CODEC.encode(COMPRESSED, content)
 
 
 class Node:
@@ -164,7 +164,7 @@ def test_empty_and_damaged_pictures_are_counted_and_passed_over(node: Node, sour
     huge = damaged[:16] + (60000).to_bytes(4, "big") * 2 + damaged[24:]
     for message in (
         compressed("", "jpeg", b""),
-        (IMAGE, CODEC.encode(RosMessage(TOPIC, IMAGE, empty))),
+        (IMAGE, CODEC.encode(IMAGE, empty)),
         (kind, whole[:-3]),
         (kind, whole[: -len(PIXELS.tobytes()) - 4] + (3).to_bytes(4, "little") + b"abc"),
         compressed("", "png", damaged[:40]),

@@ -8,6 +8,7 @@ import json
 import os
 import sys
 import time
+from typing import Any
 
 from rosbags.typesys import Stores, get_typestore
 
@@ -58,7 +59,9 @@ def subscribed(topic, kind, heard):
 def watcher(seconds, least):
     from zenoh_ros2_sdk.discovery import get_topic_names_and_types
 
-    decoded, subscriptions, end_s, grew_s = {}, {}, time.monotonic() + float(seconds), time.monotonic()
+    decoded: dict = {}
+    subscriptions: dict = {}
+    end_s, grew_s = time.monotonic() + float(seconds), time.monotonic()
     while time.monotonic() < end_s:
         for topic, kinds in get_topic_names_and_types(router_ip="127.0.0.1", router_port=PORT, domain_id=0):
             kind = kinds if isinstance(kinds, str) else kinds[0]
@@ -74,5 +77,6 @@ def watcher(seconds, least):
 
 
 if __name__ == "__main__":
-    {"router": router, "talker": talker, "listener": listener, "watcher": watcher}[sys.argv[1]](*sys.argv[2:])
+    roles: dict[str, Any] = {"router": router, "talker": talker, "listener": listener, "watcher": watcher}
+    roles[sys.argv[1]](*sys.argv[2:])
     os._exit(0)  # the SDK's threads would keep it

@@ -30,7 +30,11 @@ class Ros2Codec:
 
     def message(self, topic: str, kind: str, **fields: Any) -> RosMessage:
         """Return a message of a type from its fields."""
-        return RosMessage(topic, kind, bytes(self.store.serialize_cdr(self.make(kind, **fields), kind)))
+        return RosMessage(topic, kind, self.encode(kind, self.make(kind, **fields)))
+
+    def encode(self, kind: str, content: Any) -> bytes:
+        """Return the CDR bytes of a message object of a type."""
+        return bytes(self.store.serialize_cdr(content, kind))
 
     def hash_of(self, kind: str) -> str:
         """Return the type hash of a type, or what stands for it."""

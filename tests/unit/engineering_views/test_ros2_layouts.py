@@ -33,7 +33,7 @@ FOXGLOVE = {
 @pytest.fixture(scope="module")
 def said() -> dict[str, str]:
     """Type by topic of all that is said of a made-up run."""
-    scene, found = Ros2Scene(Ros2Codec(), field_of(DRONES, 8765)), {}
+    scene, found = Ros2Scene(Ros2Codec(), field_of(DRONES, 8765)), dict[str, str]()
     for stamp_ns, sample in SyntheticRun().samples(0.0, 1.0):
         key = keys.parse(sample.key)
         if key.topic not in SHOWN:

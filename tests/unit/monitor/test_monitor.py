@@ -143,7 +143,7 @@ def test_a_closed_terminal_does_not_end_the_process(world: World) -> None:
         def broken(_text: str) -> int:
             raise OSError(5, "Input/output error")
 
-        world.output.write = broken  # type: ignore[method-assign]
+        world.output.write = broken
         screen.turn(NOW)
         screen.turn(NOW + S)
 

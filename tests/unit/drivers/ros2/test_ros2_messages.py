@@ -10,7 +10,7 @@ import numpy as np
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
-from groundstation.engineering_views.ros2.codec import DISTRIBUTIONS, Ros2Codec, RosMessage
+from groundstation.engineering_views.ros2.codec import DISTRIBUTIONS, Ros2Codec
 
 CODEC = Ros2Codec()
 TYPES: Any = CODEC.store.types
@@ -38,7 +38,7 @@ def written(message: vehicle.OdometryMessage, frame: str = "odom") -> bytes:
         pose=make("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=np.zeros(36)),
         twist=make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=np.zeros(36)),
     )  # fmt: skip
-    return CODEC.encode(RosMessage("/odom", vehicle.ODOMETRY, content))
+    return CODEC.encode(vehicle.ODOMETRY, content)
 
 
 @pytest.mark.parametrize("frame", ["", "odom", "map"])
@@ -70,7 +70,7 @@ def battery(share: float) -> bytes:
         vehicle.BATTERY, header=header(""), voltage=11.1, percentage=share, cell_voltage=none, cell_temperature=none,
         location="", serial_number="", **unknown, **states,
     )  # fmt: skip
-    return CODEC.encode(RosMessage("/battery", vehicle.BATTERY, content))
+    return CODEC.encode(vehicle.BATTERY, content)
 
 
 def test_a_charge_is_a_share_or_unknown() -> None:
@@ -94,7 +94,7 @@ def test_velocities_are_written_as_others_read_them(stamp_ns: int | None) -> Non
 
 
 def test_nothing_is_one_byte() -> None:
-    assert CODEC.encode(RosMessage("/land", vehicle.EMPTY, CODEC.make(vehicle.EMPTY))) == vehicle.NOTHING
+    assert CODEC.encode(vehicle.EMPTY, CODEC.make(vehicle.EMPTY)) == vehicle.NOTHING
 
 
 def test_answers_are_a_truth_and_words() -> None:

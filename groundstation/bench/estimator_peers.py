@@ -12,11 +12,11 @@ import numpy as np
 from groundstation.arrays import Array, IntArray
 from groundstation.bench.estimator_kernels import correct_frame, expect, predict_often
 from groundstation.bench.estimator_team import SPEED_M_S, TURN_RAD_S, BenchTeam, belief_at
+from groundstation.estimation.event_kernels import event_kernels
 from groundstation.estimation.filter_state import State
 from groundstation.estimation.models.constant_velocity import ConstantVelocityTarget
 from groundstation.estimation.models.fixed_mount import FixedMount
 from groundstation.estimation.models.odometry_robot import OdometryRobot
-from groundstation.estimation.observe import event_kernels
 from groundstation.estimation.records import YAW, EventRow, OutcomeRow, Prediction
 from groundstation.kernel import Rows
 

@@ -15,6 +15,8 @@ class Role(StrEnum):
     """Speaks for its vehicles."""
     CAMERA = "camera"
     """Speaks for one camera."""
+    TARGET = "target"
+    """Speaks of one target's own motion."""
     RECORDER = "recorder"
     """Writes all of it down."""
     CONSOLE = "console"
@@ -33,8 +35,8 @@ class Role(StrEnum):
     """Listens only."""
 
 
-DEVICES = frozenset({Role.DRIVER, Role.CAMERA})
-"""Roles that speak of their own vehicles and cameras only."""
+DEVICES = frozenset({Role.DRIVER, Role.CAMERA, Role.TARGET})
+"""Roles that speak of their own vehicles, cameras and targets only."""
 WITNESSES = frozenset({Role.RECORDER, Role.CONSOLE, Role.MONITOR, Role.SIM_BRIDGE, Role.VIEW})
 """Roles that may hear ground truth and the simulator; nothing that estimates or flies is among them."""
 PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}

@@ -49,6 +49,7 @@ class Topic:
 
 _DRIVER = frozenset({Role.DRIVER})
 _CAMERA = frozenset({Role.CAMERA})
+_TARGET = frozenset({Role.TARGET})
 _TRACKER = frozenset({Role.TRACKER})
 _SUPERVISOR = frozenset({Role.SUPERVISOR})
 _CONSOLE = frozenset({Role.CONSOLE})
@@ -66,14 +67,16 @@ OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _C
 """Camera or motion capture driver to tracker: one marker that a camera saw, one body that was captured."""
 RANGE = Topic("range", m.RangeObservation, 10, Quality.SENSOR, _CAMERA)
 """Ranging driver to tracker: one robot's distances to the anchors."""
+REPORTED_MOTION = Topic("reported_motion", m.ReportedMotion, 20, Quality.SENSOR, _TARGET)
+"""Driver of a target's odometry to tracker: how it says that it moves."""
 SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: a completely searched picture, and the owners of the markers in it."""
 BODY_POSES = Topic("body_poses", m.BodyPoses, 30, Quality.SENSOR, _CAMERA)
 """Motion capture driver: where its system has each body, in each frame that it uses."""
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
-CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA)
-"""Camera driver: whether images arrive, and how many were used."""
+CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA | _TARGET)
+"""Driver of a camera or another sensor: whether images (frames, ranges, reports) arrive, and how many were used."""
 ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE, _TRACKER)
 """Tracker: mean and covariance of each robot and target, predicted to now."""
 BELIEF = Topic("belief", m.Belief, 5, Quality.STATE, _TRACKER)
@@ -131,6 +134,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         ODOMETRY,
         OBSERVATION,
         RANGE,
+        REPORTED_MOTION,
         SEARCHED_PICTURE,
         BODY_POSES,
         VEHICLE_STATUS,

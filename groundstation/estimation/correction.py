@@ -13,7 +13,7 @@ import numpy as np
 from groundstation.arrays import Matrix, Vector
 from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.linear import cholesky
-from groundstation.estimation.records import EntityRow
+from groundstation.estimation.records import EntityRow, Innovation
 from groundstation.kernel import kernel
 
 
@@ -175,6 +175,34 @@ def apply(mean: Vector, P: Matrix, rows: int, W: Matrix, factor: Matrix, y: Vect
         subtract_four(P, V)
     else:
         subtract_two(P, V)
+
+
+@kernel()
+def apply_to_block(mean: Vector, P: Matrix, block: EntityRow, rows: int, W: Matrix, innovation: Innovation) -> None:
+    """Correct one entity's block and nothing else, given W = H P: the others' rows of the gain are taken as zero.
+
+    Schmidt's consider update: K H P is V^T V on the block and between it and the others, with V = L^-1 W.
+    """
+    n, factor = P.shape[0], innovation.factor
+    V, u = np.zeros((rows, n)), np.empty(rows)
+    for i in range(rows):
+        u[i] = innovation.y[i]
+        for k in range(i):
+            u[i] -= factor[i, k] * u[k]
+        u[i] /= factor[i, i]
+        for j in range(n):
+            V[i, j] = W[i, j]
+            for k in range(i):
+                V[i, j] -= factor[i, k] * V[k, j]
+            V[i, j] /= factor[i, i]
+    start, stop = block.start, block.start + block.size
+    for i in range(rows):
+        for a in range(start, stop):
+            mean[a] += V[i, a] * u[i]
+            for j in range(n):
+                P[a, j] -= V[i, a] * V[i, j]
+                if j < start or j >= stop:
+                    P[j, a] = P[a, j]
 
 
 @kernel()

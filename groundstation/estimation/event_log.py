@@ -72,7 +72,7 @@ class EventLog:
 
     def correction(self, row: int, observer: str, subject: str, latency_ms: float) -> Correction:
         """Return the outcome of an observation as a value."""
-        verdict_code, size, nis, *values, alternative_chosen, joined = _OUTCOME.unpack_from(
+        verdict_code, size, nis, ahead_x, ahead_y, *values, alternative_chosen, joined = _OUTCOME.unpack_from(
             self._outcome_bytes, row * _OUTCOME.size
         )
         verdict, reason = _VERDICTS[verdict_code]
@@ -85,7 +85,9 @@ class EventLog:
         if not 0.0 <= nis < math.inf:
             return Correction(observer, subject, verdict, reason, latency_ms=latency_ms)
         residual, covariance = tuple(values[:size]), tuple(values[r.MAX_ROWS : r.MAX_ROWS + size * size])
-        return Correction(observer, subject, verdict, reason, residual, covariance, nis, latency_ms, bool(joined))
+        return Correction(
+            observer, subject, verdict, reason, residual, covariance, nis, latency_ms, bool(joined), (ahead_x, ahead_y)
+        )
 
     def _look(self) -> None:
         """Keep the tables as bytes, which Python reads and writes in half of numpy's time."""
@@ -108,14 +110,15 @@ def write_event(rows: memoryview, row: int, values: Sequence[float]) -> None:
 
 
 def observation_values(
-    m: Measurement | SensorReading, at: float, step: int, observer: int, subject: int, sensor: int
-) -> list[float]:
+    m: Measurement | SensorReading, at: float, step: int, observer: int, subject: int, sensor: int,
+    kind: int = r.OBSERVATION,
+) -> list[float]:  # fmt: skip
     """Return the first values of an observation's EventRow; raises ValueError for a reading of the wrong shape."""
     other = m.alternative if isinstance(m, Measurement) else None
     rows = len(m.z) if isinstance(m, SensorReading) else 3 if m.yaw_rad is None else 4
     values = [
         at,
-        r.OBSERVATION,
+        kind,
         observer,
         subject,
         sensor,

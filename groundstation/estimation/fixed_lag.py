@@ -13,15 +13,15 @@ from groundstation.arrays import IntArray
 from groundstation.bus.messages import Vector3, Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.correction import is_distribution
+from groundstation.estimation.event_kernels import event_kernels
 from groundstation.estimation.event_log import EventLog, change_values, observation_values
 from groundstation.estimation.filter_state import Belief, Inputs, Moments, Span
 from groundstation.estimation.layout import EntityKind, StateLayout
 from groundstation.estimation.measurement import Correction, Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models.protocol import DrivenModel
-from groundstation.estimation.observe import event_kernels
 from groundstation.estimation.odometry_ring import OdometryRing
 from groundstation.estimation.parameters import EstimatorParameters
-from groundstation.estimation.records import ADMITTED, DISMISSED, PENDING, PLACED
+from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PENDING, PLACED, REPORTED
 from groundstation.estimation.replay import replay
 from groundstation.estimation.tables import checkpoints_of, empty_state, tables_from_parameters
 from groundstation.time_units import NS_PER_S
@@ -79,11 +79,21 @@ class FixedLagFilter:
             self._odometry.add_height(self._mark(motion.stamp_ns - height_delay), index, motion.height_m)
         return verdict
 
+    def add_report(self, reading: SensorReading, tie: str, now_ns: int, *, used: bool) -> Verdict | None:
+        """Take what an entity says of its own motion, to be used or only compared; returns as `add_observation` does.
+
+        It is no sighting: it makes nobody join, is refused beyond the gate, and corrects nobody else.
+        """
+        return self._add(reading, REPORTED if used else COMPARED, tie, now_ns)
+
     def add_observation(self, m: Measurement | SensorReading, tie: str, now_ns: int) -> Verdict | None:
         """Take one observation; None: `take_corrections` has its effect after `advance`, else why it was refused.
 
         tie: orders observations of the same instant, so that their arrival cannot.
         """
+        return self._add(m, OBSERVATION, tie, now_ns)
+
+    def _add(self, m: Measurement | SensorReading, kind: int, tie: str, now_ns: int) -> Verdict | None:
         name = m.camera if isinstance(m, Measurement) else m.sensor
         number, subject = self._sensor_index.get(name), self._index.get(m.subject)
         if number is None or subject is None:
@@ -98,7 +108,7 @@ class FixedLagFilter:
             return verdict
         step = self._mark(m.stamp_ns)
         observer = self._index[sensor.carrier]
-        values = observation_values(m, self._seconds(m.stamp_ns), step, observer, subject, number)
+        values = observation_values(m, self._seconds(m.stamp_ns), step, observer, subject, number, kind)
         row = self._log.add(m.stamp_ns, tie, values)
         self._fresh[row] = (sensor.carrier, m.subject, (now_ns - m.stamp_ns) / 1e6)
         return None

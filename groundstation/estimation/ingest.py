@@ -13,6 +13,7 @@ from groundstation.bus.messages import (
     PoseHypothesis,
     RangeObservation,
     RelativeObservation,
+    ReportedMotion,
     VehicleStatus,
     Verdict,
 )
@@ -21,6 +22,7 @@ from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.range_intake import RangeIntake
+from groundstation.estimation.report_intake import ReportIntake
 
 _AIRBORNE = {
     FlightState.FLYING: True,
@@ -41,6 +43,7 @@ _TRIANGLES = {
     4: (itemgetter(1, 2, 3, 6, 7, 11), itemgetter(4, 8, 12, 9, 13, 14)),
 }
 
+_HEARD = (Odometry, RelativeObservation, RangeObservation, ReportedMotion, VehicleStatus, ImuSample)
 _STALE = {Novelty.NEW: None, Novelty.REPEATED: Verdict.DUPLICATE, Novelty.FROZEN: Verdict.FROZEN}
 
 REASONS = {
@@ -69,6 +72,7 @@ class Intake:
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
         self._attitudes = AttitudeIntake(joint.parameters.inertial)
         self.ranges = RangeIntake(joint, joint.parameters.ranging)
+        self.reports = ReportIntake(joint, joint.parameters.reporting)
         self._joins_early, self._tells_steps = joint.parameters.joins_early, joint.parameters.tells_steps
         self._standing: dict[str, tuple[int, bool]] = {}
 
@@ -78,7 +82,7 @@ class Intake:
             if message.header.clock == self._clock:
                 self._offsets[message.of] = message.offset_ns
             return Verdict.ACCEPTED
-        if not isinstance(message, Odometry | RelativeObservation | RangeObservation | VehicleStatus | ImuSample):
+        if not isinstance(message, _HEARD):
             return Verdict.ACCEPTED
         stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
@@ -95,6 +99,8 @@ class Intake:
             return self._observation(key, message, stamp_ns, now_ns)
         if isinstance(message, RangeObservation):
             return self._range(key, message, stamp_ns, now_ns)
+        if isinstance(message, ReportedMotion):
+            return self._report(key, message, stamp_ns, now_ns)
         return self._status(message, stamp_ns, now_ns)
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
@@ -174,6 +180,12 @@ class Intake:
         if len(told) > 1 and (stale := self._stale((message.observer, "", message.subject), told, stamp_ns)):
             return stale
         return self.ranges.take(key, message, stamp_ns, now_ns)
+
+    def _report(self, key: str, message: ReportedMotion, stamp_ns: int, now_ns: int) -> Verdict:
+        velocity = message.velocity_m_s
+        if len(velocity) != 2 or not _plausible(*velocity, message.std_m_s) or not message.std_m_s > 0.0:
+            return Verdict.IMPLAUSIBLE
+        return self.reports.take(key, message, stamp_ns, now_ns)
 
     def _stale(self, source: tuple[str, ...], values: tuple[object, ...], stamp_ns: int) -> Verdict | None:
         """Return why a reading says nothing new, or None: no second picture measures the same to the last bit."""

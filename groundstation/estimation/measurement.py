@@ -63,7 +63,8 @@ class OdometrySample:
 class Correction:
     """What one measurement did: residual y, its covariance S (row-major), NIS and verdict.
 
-    joined: the subject entered the state by it (again, where the verdict says so in `reason`).
+    joined: the subject entered the state by it (again, where the verdict says so in `reason`). ahead: which way and how
+    far from its belief the subject was seen, in deviations [world]; zero for all but targets.
     """
 
     observer: str
@@ -75,3 +76,9 @@ class Correction:
     nis: float | None = None
     latency_ms: float = 0.0
     joined: bool = False
+    ahead: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def is_report(self) -> bool:
+        """Return whether it is no sighting, but what its subject said of its own motion."""
+        return self.observer == self.subject

@@ -7,11 +7,9 @@ import math
 
 import numpy as np
 
-from groundstation.arrays import IntVector
 from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
 from groundstation.estimation.filter_state import Belief, Hypothesis, State, Tables, belief_of
 from groundstation.estimation.joining import admit
-from groundstation.estimation.model_kernels import handle
 from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.outliers import blame, doubt_velocity, forget_lie, note_given_up
 from groundstation.estimation.records import (
@@ -19,12 +17,10 @@ from groundstation.estimation.records import (
     ADMITTED,
     CONTRADICTED,
     DISMISSED,
-    EVENT_KINDS,
     INFLATED,
     KIND_CAMERA,
     KIND_ROBOT,
     MAX_ROWS,
-    OBSERVATION,
     OBSERVER_UNCONFIRMED,
     OBSERVER_UNKNOWN,
     PENDING,
@@ -40,8 +36,8 @@ from groundstation.estimation.records import (
     X,
     Y,
 )
-from groundstation.estimation.update import correct, note_motion, read, write_outcome
-from groundstation.kernel import address_of, kernel
+from groundstation.estimation.update import correct, note_motion, read, write_ahead, write_outcome
+from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
 
@@ -88,6 +84,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     unused_s = event.at - state.used_at[event.sensor, event.subject]
     note_motion(first, event)
     out.joined = out.alternative_chosen = 0
+    out.ahead_x = out.ahead_y = 0.0
     rows = read(first, sensor, event, event.measured, unused_s, used.z, used.R)
     out.verdict = -rows if rows < 0 else refusal(first, event, rows)
     if out.verdict != PENDING:
@@ -103,6 +100,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             out.verdict = SINGULAR
             return
         write_outcome(out, used.innovations[mode])
+        write_ahead(out, first.entities[event.subject], used.innovations[mode])
         excess = max(least_nis(used.innovations) / gate, 1.0)
         if excess > settings.wild_gates:
             out.verdict = blame(first, sensor, settings, event, rows, used)
@@ -169,10 +167,3 @@ def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> No
         memory.active = 1
         memory.wild.count = memory.refused.count = memory.unconfirmed = 0
         memory.corrected_at = event.at
-
-
-def event_kernels() -> IntVector:
-    """Return where the kernel for each kind of event is: `replay` calls it there."""
-    kernels = np.full(EVENT_KINDS, address_of(change, handle))
-    kernels[OBSERVATION] = address_of(observe, handle)
-    return kernels

@@ -17,13 +17,14 @@ from groundstation.estimation.models import (
     ObservationModel,
     OdometryRobot,
     RangeSensor,
+    ReportedVelocity,
 )
 from groundstation.estimation.models.odometry_robot import AERIAL
 from groundstation.estimation.ranged_robot import RangedRobot
 from groundstation.field.drones import FieldDrone, OnboardCamera
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, Ranging, WorldCamera, ranging_link
-from groundstation.field.targets import Target
+from groundstation.field.targets import Target, odometry_name
 from groundstation.geometry.rotations import (
     WORLD_FROM_DOWNWARD_OPTICAL,
     base_from_tilted_optical,
@@ -62,7 +63,8 @@ class EstimatorParameters:
     at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where they
     publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to take
     off. tells_steps: robots whose odometry may repeat itself in flight. world_cameras: sensors that hang in the room,
-    and can be bumped. ranging: by system, who has a transponder.
+    and can be bumped. ranging: by system, who has a transponder. reporting: targets whose
+    own odometry is heard.
     """
 
     entities: Mapping[str, MotionModel]
@@ -78,6 +80,7 @@ class EstimatorParameters:
     tells_steps: frozenset[str] = frozenset()
     world_cameras: frozenset[str] = frozenset()
     ranging: Mapping[str, Mapping[str, RangedRobot]] = field(default_factory=dict)
+    reporting: frozenset[str] = frozenset()
 
 
 def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
@@ -97,6 +100,8 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
             entities[link] = Anchor(system.anchors[anchor], system.bias_std_m)
             cameras[link] = RangeSensor(link, place_m, system.reach_m, RANGE_STAMP_STD_S)
     cameras |= {name: _onboard_camera(name, drone.camera) for name, drone in drones.items()}
+    reporting = frozenset(name for name, target in resolved.tracked.items() if target.odometry is not None)
+    cameras |= {odometry_name(name): ReportedVelocity(name) for name in resolved.tracked if name in reporting}
     return EstimatorParameters(
         entities,
         cameras,
@@ -109,6 +114,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         tells_steps=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.tells_steps),
         world_cameras=frozenset(resolved.cameras),
         ranging={name: _ranged(system, drones) for name, system in resolved.ranging.items()},
+        reporting=reporting,
     )
 
 

@@ -24,9 +24,9 @@ VX, VY = 2, 3
 POSE = 4  # entries of a pose
 
 # What an event is. ADMITTED: the subject may join, and does at once if it has a prior; DISMISSED: it leaves; PLACED: it
-# is put where the event says.
-OBSERVATION, ADMITTED, DISMISSED, PLACED = range(4)
-EVENT_KINDS = 4
+# is put where the event says; REPORTED: what the subject says of its own motion; COMPARED: the same, not used.
+OBSERVATION, ADMITTED, DISMISSED, PLACED, REPORTED, COMPARED = range(6)
+EVENT_KINDS = 6
 
 # Verdicts of the compiled filter (names in event_log.py).
 (PENDING, ACCEPTED, INFLATED, IMPLAUSIBLE, OUT_OF_VIEW, SINGULAR, OBSERVER_UNKNOWN, SUBJECT_GROUNDED, YAW_MISSING) = (
@@ -210,11 +210,16 @@ class EventRow(Record):
 
 
 class OutcomeRow(Record):
-    """What became of an event: verdict, and residual with its covariance (row-major) and NIS; size: their rows."""
+    """What became of an event: verdict, and residual with its covariance (row-major) and NIS; size: their rows.
+
+    ahead_x, ahead_y: which way and how far from its belief a sighting has its subject, in deviations [world].
+    """
 
     verdict: int
     size: int
     nis: float
+    ahead_x: float
+    ahead_y: float
     residual: Annotated[Array, (MAX_ROWS,)]
     covariance: Annotated[Array, (MAX_ROWS * MAX_ROWS,)]
     alternative_chosen: int

@@ -25,6 +25,7 @@ from groundstation.estimation.records import (
     VX,
     VY,
     YAW,
+    EntityRow,
     EventRow,
     Innovation,
     OutcomeRow,
@@ -155,3 +156,28 @@ def write_outcome(out: OutcomeRow, innovation: Innovation) -> None:
             for k in range(min(i, j) + 1):
                 total += innovation.factor[i, k] * innovation.factor[j, k]
             out.covariance[rows * i + j] = total
+
+
+@kernel()
+def write_ahead(out: OutcomeRow, entity: EntityRow, innovation: Innovation) -> None:
+    """Record which way from its belief a target was seen: H^T S^-1 y over x and y, whitened by its own covariance."""
+    rows, H, factor = innovation.prediction.size, innovation.prediction.H_subject, innovation.factor
+    if entity.kind != KIND_TARGET:
+        return
+    # L^-1 of the columns (H_x, H_y, y), S = L L^T
+    solved = np.empty((MAX_ROWS, 3))
+    for i in range(rows):
+        solved[i, 0], solved[i, 1], solved[i, 2] = H[i, X], H[i, Y], innovation.y[i]
+        for j in range(3):
+            for k in range(i):
+                solved[i, j] -= factor[i, k] * solved[k, j]
+            solved[i, j] /= factor[i, i]
+    information, score = np.zeros((2, 2)), np.zeros(2)
+    for i in range(rows):
+        for a in range(2):
+            score[a] += solved[i, a] * solved[i, 2]
+            for b in range(2):
+                information[a, b] += solved[i, a] * solved[i, b]
+    if cholesky(information, 2):
+        out.ahead_x = score[0] / information[0, 0]
+        out.ahead_y = (score[1] - information[1, 0] * out.ahead_x) / information[1, 1]

@@ -7,6 +7,11 @@ import msgspec
 from groundstation.field.room import Vector3
 
 
+def odometry_name(target: str) -> str:
+    """Return the name on the bus of what hears a target's own odometry."""
+    return f"{target}_odometry"
+
+
 class Marker(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A flat marker: `code` and `square_mm` of a checkerboard, or `dictionary`, `id` and `size_mm` of a tag."""
 
@@ -30,6 +35,15 @@ class TargetMarker(Marker, frozen=True, kw_only=True, forbid_unknown_fields=True
     height_m: float = 0.4
 
 
+class TargetOdometry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where a target publishes its own odometry, and how good its velocity is."""
+
+    source: str
+    speed_std_m_s: float = 0.05
+    delay_ms: float = 20.0
+    silent_after_s: float = 1.0
+
+
 class Target(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A ground robot that is tracked: its marker and its motion model."""
 
@@ -45,6 +59,7 @@ class Target(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     straight_s: float | None = None
     turning_s: float | None = None
     heading: bool = False
+    odometry: TargetOdometry | None = None
 
 
 class SingleTarget(Target, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -13,12 +13,13 @@ from groundstation.bus.topics import (
     OBSERVATION,
     ODOMETRY,
     RANGE,
+    REPORTED_MOTION,
     SEARCHED_PICTURE,
     VEHICLE_STATUS,
 )
 from groundstation.errors import MessageError
 
-TOPICS = (ODOMETRY, IMU, OBSERVATION, RANGE, SEARCHED_PICTURE, BODY_POSES, VEHICLE_STATUS, CLOCK)
+TOPICS = (ODOMETRY, IMU, OBSERVATION, RANGE, REPORTED_MOTION, SEARCHED_PICTURE, BODY_POSES, VEHICLE_STATUS, CLOCK)
 CAPACITY = 8192  # at 200 Hz odometry and IMU of ten drones: two seconds of a stalled loop
 _MAX_PER_TICK = 4096
 

@@ -40,6 +40,7 @@ from groundstation.bus.messages.sensing import (
     PoseHypothesis,
     RangeObservation,
     RelativeObservation,
+    ReportedMotion,
     SearchedPicture,
 )
 from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthState
@@ -82,6 +83,7 @@ __all__ = [
     "Quaternion",
     "RangeObservation",
     "RelativeObservation",
+    "ReportedMotion",
     "SearchMap",
     "SearchedPicture",
     "SensorLateness",

@@ -105,6 +105,15 @@ class RangeObservation(Message, frozen=True, kw_only=True):
         require_square("covariance", self.covariance, (3,))
 
 
+class ReportedMotion(Message, frozen=True, kw_only=True):
+    """What a target says of its own motion: a claim, which what cameras see overrules."""
+
+    velocity_m_s: tuple[float, float]
+    """Velocity forward and to the left [m/s; base]."""
+    std_m_s: float
+    """Standard deviation of each of them [m/s]."""
+
+
 class SearchedPicture(Message, frozen=True, kw_only=True):
     """A picture that a camera searched all over for markers, also when it shows none; stamped with the exposure."""
 

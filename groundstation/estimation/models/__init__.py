@@ -12,6 +12,7 @@ from groundstation.estimation.models.odometry_robot import OdometryRobot
 from groundstation.estimation.models.protocol import DrivenModel, MotionModel, ObservationModel, SwitchingModel
 from groundstation.estimation.models.range_bearing import RangeBearingSensor
 from groundstation.estimation.models.ranging import Anchor, RangeSensor
+from groundstation.estimation.models.reported_velocity import ReportedVelocity
 
 __all__ = [
     "Anchor",
@@ -29,5 +30,6 @@ __all__ = [
     "OdometryRobot",
     "RangeBearingSensor",
     "RangeSensor",
+    "ReportedVelocity",
     "SwitchingModel",
 ]

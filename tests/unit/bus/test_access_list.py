@@ -7,7 +7,19 @@ import pytest
 from groundstation.bus import keys
 from groundstation.bus.access import AccessList, access_control, audible, publishable
 from groundstation.bus.roles import SHELLS, Member, Role
-from groundstation.bus.topics import COMMAND, EVENT, LEASE, ODOMETRY, SETPOINT, TOPICS, TRUTH, Plane, Topic
+from groundstation.bus.topics import (
+    COMMAND,
+    EVENT,
+    LEASE,
+    OBSERVATION,
+    ODOMETRY,
+    REPORTED_MOTION,
+    SETPOINT,
+    TOPICS,
+    TRUTH,
+    Plane,
+    Topic,
+)
 
 DRIVER = Member("drone_1", Role.DRIVER, ("drone_1",), ("drone_1", "drone_2"))
 TRACKER = Member("tracker", Role.TRACKER, ("tracker",))
@@ -40,6 +52,17 @@ def test_a_driver_speaks_of_its_own_vehicles_and_as_itself_only() -> None:
         assert not may(DRIVER, topic, "drone_1", "drone_1")
 
 
+def test_a_target_speaks_of_its_own_motion_and_nothing_else() -> None:
+    target = Member("turtlebot_odometry", Role.TARGET, ("turtlebot_odometry",), ("turtlebot", "turtlebot_odometry"))
+    assert may(target, REPORTED_MOTION, "turtlebot", "turtlebot_odometry")
+    assert not may(target, REPORTED_MOTION, "rover", "turtlebot_odometry")
+    assert not may(target, REPORTED_MOTION, "turtlebot", "rover_odometry")
+    for topic in (ODOMETRY, OBSERVATION, SETPOINT, COMMAND):
+        assert not may(target, topic, "turtlebot", "turtlebot_odometry")
+    camera = Member("ceiling", Role.CAMERA, ("ceiling",), ("turtlebot",))
+    assert not may(camera, REPORTED_MOTION, "turtlebot", "ceiling")
+
+
 @pytest.mark.parametrize("topic", [SETPOINT, LEASE])
 def test_what_moves_a_drone_has_one_sender(topic: Topic) -> None:
     assert len(topic.senders) == 1
@@ -56,7 +79,8 @@ def test_views_say_nothing_and_shells_order_under_their_own_names() -> None:
 def test_truth_is_for_witnesses_only() -> None:
     key = keys.expression("lab", TRUTH, "drone_1", "sim_bridge")
     deaf = {role for role in Role if not covers(audible("lab", role), key)}
-    assert deaf == {Role.SUPERVISOR, Role.TRACKER, Role.DRIVER, Role.CAMERA, Role.CLI, Role.LIAISON, Role.HOST}
+    devices = {Role.DRIVER, Role.CAMERA, Role.TARGET}
+    assert deaf == devices | {Role.SUPERVISOR, Role.TRACKER, Role.CLI, Role.LIAISON, Role.HOST}
 
 
 def test_each_topic_that_is_spoken_of_has_a_sender() -> None:

@@ -1,0 +1,134 @@
+"""What targets say of their own motion, to the filter; and the watch that drops it where the cameras contradict it.
+
+Wheels slip, a lifted robot drives on, a base tells another one's figures. A report beyond the gate is refused one by
+one; one that pulls the belief along shows in the sightings, which then lie ahead of the belief, always to the same
+side. Who is dropped is compared only, and used again once all that it says has agreed for a while, which is longer each
+time.
+"""
+
+import math
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.bus.messages import ReportedMotion, Severity, Verdict
+from groundstation.bus.notice import Notice
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.measurement import Correction, SensorReading
+from groundstation.estimation.records import VX, VY
+from groundstation.field.targets import odometry_name
+from groundstation.time_units import NS_PER_S
+
+# Without a sighting nobody contradicts a report: it is used no longer than this [s].
+_UNSEEN_S = 5.0
+# Reports in a row beyond the gate, and how long they last [s], until the target is not believed.
+_REFUSED, _REFUSED_S = 5, 0.5
+# Share of the newest sighting in the mean of where they lie ahead, and the mean [deviations] that contradicts.
+_SHARE, _AHEAD = 0.1, 1.0
+# A comparison says something where the speed is known so well [m/s].
+_TELLING_M_S = 0.25
+# For how long all has to agree [s]: at first, and at most.
+_PROBATION_S, _LONGEST_S = 2.0, 64.0
+# A believed speed of so many deviations has a direction.
+_MOVES = 3.0
+_REMEDY = (
+    "look whether its wheels slip or it is lifted, and whether the topic is its own; cameras track it all the same"
+)
+
+
+@dataclass(slots=True)
+class _Trust:
+    """heeded: what it says is used; refused, since_ns: reports in a row beyond the gate, and the first; agreed_ns:
+    since when it agrees; ahead: mean of where sightings lie."""
+
+    heeded: bool = True
+    refused: int = 0
+    since_ns: int = 0
+    agreed_ns: int | None = None
+    probation_s: float = _PROBATION_S
+    ahead: tuple[float, float] = (0.0, 0.0)
+
+
+class ReportIntake:
+    """Use: `take` each report, `advance` once a tick with all that became of observations and reports."""
+
+    def __init__(self, joint: FixedLagFilter, targets: Collection[str]) -> None:
+        self._filter = joint
+        self._trust = {name: _Trust() for name in targets}
+        self._notices: list[Notice] = []
+
+    def take_notices(self) -> list[Notice]:
+        """Return and forget what the operator should know."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    def heeds(self, target: str) -> bool:
+        """Return whether what a target says of itself is used."""
+        return self._trust[target].heeded
+
+    def take(self, key: str, message: ReportedMotion, stamp_ns: int, now_ns: int) -> Verdict:
+        """Take one report, whose numbers were checked; ACCEPTED if it may count."""
+        name, variance = message.header.entity, message.std_m_s**2
+        if name not in self._trust:
+            return Verdict.UNKNOWN_ENTITY
+        covariance = (variance, 0.0, 0.0, variance)
+        reading = SensorReading(stamp_ns, odometry_name(name), name, message.velocity_m_s, covariance)
+        used = self._trust[name].heeded and self._filter.age_s(name) <= _UNSEEN_S
+        return self._filter.add_report(reading, f"{key}#{message.header.seq}", now_ns, used=used) or Verdict.ACCEPTED
+
+    def advance(self, now_ns: int, corrections: Iterable[Correction]) -> None:
+        """Judge the targets by what became of their reports and of sightings of them."""
+        for one in corrections:
+            trust = self._trust.get(one.subject)
+            if trust is None or one.nis is None:
+                continue
+            if one.is_report:
+                self._judge(one, trust, now_ns)
+            elif trust.heeded:
+                trust.ahead = _mean(trust.ahead, (0.0, 0.0) if one.joined else one.ahead)
+                if self._lag(one.subject, trust) > _AHEAD:
+                    self._drop(one.subject, trust)
+
+    def _judge(self, one: Correction, trust: _Trust, now_ns: int) -> None:
+        if one.verdict is not Verdict.ACCEPTED:
+            trust.agreed_ns = None
+            trust.since_ns = now_ns if trust.refused == 0 else trust.since_ns
+            trust.refused += 1
+            lasted = now_ns - trust.since_ns >= _REFUSED_S * NS_PER_S
+            if trust.heeded and lasted and trust.refused >= _REFUSED:
+                self._drop(one.subject, trust)
+            return
+        trust.refused = 0
+        if trust.heeded or math.sqrt(one.covariance[0]) > _TELLING_M_S:
+            return
+        trust.agreed_ns = now_ns if trust.agreed_ns is None else trust.agreed_ns
+        if now_ns - trust.agreed_ns >= trust.probation_s * NS_PER_S:
+            self._believe(one.subject, trust)
+
+    def _lag(self, name: str, trust: _Trust) -> float:
+        """Return how far ahead along its way a target is seen; who is believed to stand has no way, but all of it."""
+        belief = self._filter.belief()
+        if name not in belief.layout:
+            return 0.0
+        vx, vy = belief.mean_of(name)[VX : VY + 1].tolist()
+        deviation = math.sqrt(float(np.trace(belief.covariance_of(name)[VX : VY + 1, VX : VY + 1])))
+        speed = math.hypot(vx, vy)
+        if speed <= _MOVES * deviation:
+            return math.hypot(*trust.ahead)
+        return float(abs(vx * trust.ahead[0] + vy * trust.ahead[1]) / speed)
+
+    def _drop(self, name: str, trust: _Trust) -> None:
+        trust.heeded, trust.agreed_ns = False, None
+        text = f"{name} says that it moves otherwise than it is seen to: what it says is not used"
+        self._notices.append(Notice(Severity.WARNING, text, _REMEDY, name))
+
+    def _believe(self, name: str, trust: _Trust) -> None:
+        trust.heeded, trust.refused, trust.ahead = True, 0, (0.0, 0.0)
+        trust.probation_s = min(2.0 * trust.probation_s, _LONGEST_S)
+        text = f"{name} moves again as it says: what it says is used"
+        self._notices.append(Notice(Severity.INFO, text, entity=name))
+
+
+def _mean(mean: tuple[float, float], new: tuple[float, float]) -> tuple[float, float]:
+    return mean[0] + _SHARE * (new[0] - mean[0]), mean[1] + _SHARE * (new[1] - mean[1])

@@ -13,6 +13,7 @@ from drivers.camera.settings import parse_source
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role
 from groundstation.errors import OperatorMistake
+from groundstation.field.targets import odometry_name
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
 from groundstation.flight.real_parts import ALL_EMULATED, RealParts
 from groundstation.process.ports import port_of
@@ -23,6 +24,7 @@ from groundstation.settings.schema import Field
 from groundstation.settings.sections import (
     CAMERA,
     MOTION_CAPTURE,
+    ODOMETRY,
     RANGING,
     DriverSection,
     core_section,
@@ -41,6 +43,7 @@ _SENSOR_DRIVERS = {
     CAMERA: "drivers.camera.driver:run",
     MOTION_CAPTURE: "drivers.motion_capture.driver:run",
     RANGING: "drivers.ranging.driver:run",
+    ODOMETRY: "drivers.target_odometry.driver:run",
 }
 
 
@@ -74,12 +77,15 @@ def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) ->
 
 
 def _captures(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
-    """Return where the emulated motion capture and ranging systems listen: behind the cameras."""
+    """Return where emulated motion capture and ranging systems, and routers of targets, listen: behind the cameras."""
     first = len(field.cameras) + len(field.drones)
     hosts = {name: one.host for name, one in field.motion_capture.items()}
     hosts |= {name: one.host for name, one in field.ranging.items()}
+    told = {odometry_name(name): name for name, target in field.tracked.items() if target.odometry is not None}
+    hosts |= dict.fromkeys(told, "")
     places = {name: network.of(host).stream(index) for index, (name, host) in enumerate(hosts.items(), start=first)}
-    return {name: place for name, place in places.items() if name not in real.systems}
+    exist = real.systems | {name for name, target in told.items() if target in real.targets}
+    return {name: place for name, place in places.items() if name not in exist}
 
 
 def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
@@ -160,7 +166,7 @@ def router_section(
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:
     sensor = _SENSOR_DRIVERS.get(section.kind)
-    row = rows.CAMERA if sensor is not None else rows.DRONE
+    row = rows.DRONE if sensor is None else rows.TARGET if section.kind == ODOMETRY else rows.CAMERA
     spec = replace(
         row,
         name=section.name,

@@ -234,7 +234,7 @@ def _names(parts: Parts) -> Iterator[Finding]:
         named.append((("target", "name"), parts.target.name))
     named += [(("targets", name), name) for name in parts.targets]
     for path, name in named:
-        if name in RESERVED or name.startswith("sim_") or name.endswith("_camera"):
+        if name in RESERVED or name.startswith("sim_") or name.endswith(("_camera", "_odometry")):
             yield path, f"the name {name} is taken by the ground station itself"
     yield from _unique(((path, name, _kind_of(path)) for path, name in named), "the name")
 

@@ -73,7 +73,8 @@ def _drone_lines(name: str, drone: Drone) -> list[str]:
 def _target_line(name: str, target: TrackedBody) -> str:
     motion = target.model.replace("_", " ")
     weight = f", weight {target.weight:g}" if isinstance(target, OneOfTargets) else ""
-    return f"target {name}: marker {target.marker.identity} at {target.marker.height_m:g} m, {motion}{weight}"
+    heard = f", odometry from {target.odometry.source}" if target.odometry is not None else ""
+    return f"target {name}: marker {target.marker.identity} at {target.marker.height_m:g} m, {motion}{weight}{heard}"
 
 
 def _pair(point: tuple[float, float]) -> str:

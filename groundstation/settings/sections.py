@@ -9,10 +9,12 @@ from drivers.camera.settings import parse_source
 from drivers.motion_capture.settings import emulated_source
 from drivers.ranging.settings import emulated_source as emulated_gateway
 from groundstation.field.drones import camera_name
+from groundstation.field.targets import odometry_name
 from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
 from groundstation.settings.capture_sections import capture_section
 from groundstation.settings.drones import Drone
 from groundstation.settings.motion_capture import MotionCaptureSettings
+from groundstation.settings.odometry_sections import odometry_section, with_emulated_odometry
 from groundstation.settings.ranging_sections import ranging_section
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
@@ -25,6 +27,8 @@ CAMERA = "camera"
 MOTION_CAPTURE = "motion_capture"
 # And that of a ranging system.
 RANGING = "ranging"
+# And that of a target's odometry.
+ODOMETRY = "odometry"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +57,13 @@ def rerouted(
 
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
     port), spoken to as the field's own source is where that is the vehicle's own video, else by HTTP. captures: motion
-    capture or ranging system -> (address, port), spoken to by NatNet or as a gateway of ranges. This, and that a drone
-    may have any serial number, is all that simulation changes. streams_only: drones whose cameras are never their own
-    video. Raises KeyError for a name that is not in the field.
+    capture or ranging system, or odometry of a target -> (address, port), spoken to by NatNet, as a gateway of ranges,
+    or as a router of ROS 2. This, and that a drone may have any serial number, is all that simulation changes.
+    streams_only: drones whose cameras are never their own video. Raises KeyError for a name that is not in the field.
     """
+    heard = [*map(odometry_name, field.tracked)]
     for name in (*addresses, *streams, *captures):
-        if name not in {*field.drones, *field.cameras, *field.motion_capture, *field.ranging}:
+        if name not in {*field.drones, *field.cameras, *field.motion_capture, *field.ranging, *heard}:
             raise KeyError(name)
     drones = {
         name: _moved(_with_source(drone, streams.get(name), name in streams_only), addresses.get(name))
@@ -73,9 +78,8 @@ def rerouted(
         name: one.model_copy(update={"source": emulated_gateway(*captures[name])}) if name in captures else one
         for name, one in field.ranging.items()
     }
-    return field.model_copy(
-        update={"drones": drones, "cameras": cameras, "motion_capture": systems, "ranging": ranging}
-    )
+    update = {"drones": drones, "cameras": cameras, "motion_capture": systems, "ranging": ranging}
+    return with_emulated_odometry(field.model_copy(update=update), captures)
 
 
 def _emulated(system: MotionCaptureSettings, place: tuple[str, int] | None) -> MotionCaptureSettings:
@@ -144,7 +148,14 @@ def driver_sections(field: Field) -> list[DriverSection]:
         DriverSection(name, RANGING, name, ranging_section(field, name).model_dump_json(), (name,), system.host)
         for name, system in field.ranging.items()
     ]
-    return _vehicles(field) + fixed + captured + ranged + carried
+    reporting = [
+        DriverSection(
+            odometry_name(name), ODOMETRY, name, odometry_section(name, target, target.odometry).model_dump_json(),
+            (name, odometry_name(name)),
+        )
+        for name, target in field.tracked.items() if target.odometry is not None
+    ]  # fmt: skip
+    return _vehicles(field) + fixed + captured + ranged + reporting + carried
 
 
 def vehicle_order(field: Field, name: str) -> VehicleOrder:

@@ -5,8 +5,9 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from drivers.target_odometry.settings import parse_source
 from groundstation.settings.marker import MarkerSettings
-from groundstation.settings.values import Name, SettingsSection, Vector3
+from groundstation.settings.values import Name, SettingsSection, Vector3, read_by
 
 # Which of the models of motion each of these keys belongs to.
 _TURNING, _SWITCHING = ("coordinated_turn", "manoeuvring"), ("manoeuvring",)
@@ -42,6 +43,20 @@ class TargetMarkerSettings(MarkerSettings):
         return (0.0, 0.0, self.height_m)
 
 
+class TargetOdometrySettings(SettingsSection):
+    """What a target says of its own motion: a sensor besides the cameras, which overrule it."""
+
+    source: Annotated[str, read_by(parse_source)]
+    """The topic of its nav_msgs/Odometry behind a ROS 2 Zenoh router: ros2://192.168.1.20/odom?domain=0 (port 7447 and
+    domain 0 unless given). Only its velocity in its own frame is used."""
+    speed_std_m_s: Annotated[float, Field(gt=0, le=1)] = 0.05
+    """Standard deviation [m/s] of the reported velocity, slip of the wheels included."""
+    delay_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
+    """Time [ms] from a measurement to its arrival."""
+    silent_after_s: Annotated[float, Field(ge=0.2, le=10)] = 1.0
+    """Without odometry for so long [s] the operator is told; the target is tracked by cameras alone."""
+
+
 class TrackedBody(SettingsSection):
     """A ground robot that is tracked: its marker and its motion model."""
 
@@ -74,6 +89,8 @@ class TrackedBody(SettingsSection):
     """manoeuvring: mean time [s] in a turn; none: 2."""
     heading: bool = False
     """Whether the heading of the target's marker is estimated too, which helps the models that turn."""
+    odometry: TargetOdometrySettings | None = None
+    """The target's own odometry, if it is to be heard."""
 
     @model_validator(mode="before")
     @classmethod

@@ -77,6 +77,14 @@ CAMERA = ProcessSpec(  # name and entry are those of the camera
     nice=_NEEDED,  # drones that no picture places land; but it can use all that there is
     stop_order=StopOrder.DRIVES,
 )
+TARGET = ProcessSpec(  # name and entry are those of the driver of a target's odometry
+    name="",
+    role="target",
+    required=False,  # cameras track the target
+    hang_limit_s=2.0,
+    nice=_NEEDED,  # late reports are refused
+    stop_order=StopOrder.DRIVES,
+)
 LIAISON = ProcessSpec(  # name is that of the other host
     name="",
     role="liaison",
@@ -106,4 +114,4 @@ MONITOR = ProcessSpec(
     stop_order=StopOrder.DECIDES,  # the terminal is the operator's again before the shut-down writes on it
     on_terminal=True,
 )
-ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, LIAISON, CONSOLE, MONITOR)
+ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, TARGET, LIAISON, CONSOLE, MONITOR)

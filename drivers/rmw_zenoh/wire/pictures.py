@@ -1,6 +1,6 @@
 """The messages of cameras: CompressedImage and Image, as they are; pixels are not looked at.
 
-WIRE (docs/reference/ros2.md 5): fields and encodings.
+WIRE (docs/reference/ros2.md 6): fields and encodings.
 """
 
 from dataclasses import dataclass

@@ -8,19 +8,23 @@ from dataclasses import replace
 
 from groundstation.bus.messages import Severity, SimCommand, SimStatus, TruthState
 from groundstation.bus.topics import SIM_COMMAND, SIM_STATUS, TRUTH
+from groundstation.field.targets import odometry_name
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.natnet import NatnetEmulator
+from sim_bridge.devices.odometry_router import OdometryRouter
 from sim_bridge.devices.range_gateway import RangeGateway
 from sim_bridge.fault_kinds import exchanged
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.link_bursts import with_bursts
+from sim_bridge.mounting import generator_of_eye
 from sim_bridge.ranges import Radios
 from sim_bridge.real.followers import Followers
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
+from sim_bridge.wheel_odometry import WheelOdometry
 from sim_bridge.world.emulation import emulation_of
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.unicycle import Unicycle
@@ -115,8 +119,20 @@ class Harness:
             emulation = emulation_of(order.site.drones[name].kind)
             emulator = emulation.open(name, world.drones[body], world.onboard.get(body), order)
             self._stage.add(name, emulator, emulator.fileno())
+        targets = {odometry_name(name): name for name in world.targets}
         for name, place in order.captures.items():
-            self._open_capture(name, place)
+            if name in targets:
+                self._open_router(name, targets[name], place)
+            else:
+                self._open_capture(name, place)
+
+    def _open_router(self, name: str, target: str, place: tuple[str, int]) -> None:
+        order = self._order
+        errors, odometry = order.scenario.cameras.mounting_errors, order.site.tracked[target].odometry
+        assert odometry is not None
+        wheels = WheelOdometry(self.world.targets[target], errors, generator_of_eye(order.seed, name))
+        router = OdometryRouter(name, place, odometry.source, wheels)
+        self._stage.add(name, router, router.fileno())
 
     def _open_capture(self, name: str, place: tuple[str, int]) -> None:
         order, world = self._order, self.world

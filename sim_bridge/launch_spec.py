@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import SettingsError
+from groundstation.field.targets import odometry_name
 from groundstation.process.child import ChildSpec
 from groundstation.vehicles import kind_named
 from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
@@ -60,7 +61,7 @@ class LaunchSpec:
 
     addresses: loopback address of each emulated drone; streams: address and port of each emulated
     camera, by the name of the world-fixed camera or of the drone that carries it; real: drones and targets that exist;
-    captures: address and port of each emulated motion capture or ranging system.
+    captures: address and port of each emulated motion capture or ranging system, and router of a target's odometry.
     """
 
     child: ChildSpec
@@ -90,10 +91,9 @@ def read_order(path: Path) -> LaunchSpec:
     scenario = parse_scenario(json.dumps(envelope.scenario))
     if strangers := sorted(set(envelope.real) - set(site.bodies)):
         raise SettingsError([f"{path}: real: {name!r} is no body of the field" for name in strangers])
-    if strangers := sorted(set(envelope.captures) - {*site.motion_capture, *site.ranging}):
-        raise SettingsError(
-            [f"{path}: captures: {name!r} is no motion capture or ranging system" for name in strangers]
-        )
+    heard = map(odometry_name, site.tracked)
+    if strangers := sorted(set(envelope.captures) - {*site.motion_capture, *site.ranging, *heard}):
+        raise SettingsError([f"{path}: captures: {name!r} is no system or odometry of the field" for name in strangers])
     _check_faults(scenario.faults, site, envelope.streams, envelope.real)
     strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
     if strangers:

@@ -180,10 +180,19 @@ class TargetMarker(MarkerPrint):
     height_m: float
 
 
+class SiteOdometry(_Part):
+    """The odometry that a target publishes: topic and domain stand in the source."""
+
+    source: str
+    delay_ms: float = 20.0
+    speed_std_m_s: float = 0.05
+
+
 class SiteTarget(_Part):
     """A TurtleBot."""
 
     marker: TargetMarker
+    odometry: SiteOdometry | None = None
 
 
 class SingleTarget(SiteTarget):

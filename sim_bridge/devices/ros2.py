@@ -4,21 +4,19 @@ The node is strict where drivers are: it flies only after its take-off order, an
 0.5 s.
 """
 
-import json
 import math
 import os
-import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
-import zenoh
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.errors import GroundStationError
+from sim_bridge.devices.ros2_router import Ros2Router
 from sim_bridge.devices.tello import TelloBody
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.scenario import Scenario
@@ -49,19 +47,16 @@ class Ros2Emulator:
         self._body, self._wrong, self._section = body, wrong, _DEFAULTS | section
         self._waiting: deque[tuple[str, bytes]] = deque()
         self._bell = os.eventfd(0, os.EFD_NONBLOCK)
-        self._identity, self._order = os.urandom(16), ""
-        self._ticks = self._said = 0
+        self._order, self._ticks = "", 0
         self._heard_tick = -_HELD_TICKS
         frame = body.airframe
         self._start = (frame.x, frame.y, frame.yaw)
         endpoint = f"tcp/{address}:{self._section['port']}"
-        settings = {"mode": "router", "listen": {"endpoints": [endpoint], "exit_on_failure": True},
-                    "scouting": {"multicast": {"enabled": False}}}  # fmt: skip
         try:
-            self._session: Any = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
-        except zenoh.ZError as error:
+            self._router = Ros2Router(name, endpoint)
+        except GroundStationError:
             os.close(self._bell)
-            raise GroundStationError(f"emulated {name}: cannot listen on {endpoint}: {error}") from error
+            raise
         self._declare()
 
     def _key(self, name: str, kind: str) -> str:
@@ -74,16 +69,15 @@ class Ros2Emulator:
     def _declare(self) -> None:
         stamped = self._section["velocity_type"] == "twist_stamped"
         velocity = self._key("velocity", vehicle.TWIST_STAMPED if stamped else vehicle.TWIST)
-        self._session.declare_subscriber(velocity, self._taker("velocity"))
+        self._router.session.declare_subscriber(velocity, self._taker("velocity"))
         for order in ("take_off", "land", "cut"):
             if self._section["orders"] == "services":
                 key = self._key(order, vehicle.TRIGGER)
-                self._session.declare_queryable(key, self._server(order, key))
+                self._router.session.declare_queryable(key, self._server(order, key))
             else:
-                self._session.declare_subscriber(self._key(order, vehicle.EMPTY), self._taker(order))
-        dropping = {"congestion_control": zenoh.CongestionControl.DROP}
-        self._odometry = self._session.declare_publisher(self._key("odometry", vehicle.ODOMETRY), **dropping)
-        self._charge = self._session.declare_publisher(self._key("battery", vehicle.BATTERY), **dropping)
+                self._router.session.declare_subscriber(self._key(order, vehicle.EMPTY), self._taker(order))
+        self._odometry = self._router.publisher(self._key("odometry", vehicle.ODOMETRY))
+        self._charge = self._router.publisher(self._key("battery", vehicle.BATTERY))
 
     def _taker(self, what: str) -> Callable[[Any], None]:
         return lambda sample: self._ring(what, sample.payload.to_bytes())
@@ -135,9 +129,11 @@ class Ros2Emulator:
         if self.silent:
             return
         if self._ticks % _ODOMETRY_TICKS == 0:
-            self._publish(self._odometry, self._told())
+            self._router.publish(self._odometry, self._told())
         if self._ticks % _BATTERY_TICKS == 0:
-            self._publish(self._charge, vehicle.encode_battery(self._ticks * 5_000_000, self._readings().battery))
+            self._router.publish(
+                self._charge, vehicle.encode_battery(self._ticks * 5_000_000, self._readings().battery)
+            )
 
     def _go_on(self) -> None:
         body = self._body
@@ -174,13 +170,9 @@ class Ros2Emulator:
         message = vehicle.OdometryMessage(told.ticks * 5_000_000, where, _product(turn, lean), velocity, told.gyros)
         return vehicle.encode_odometry(message, "odom", "base_link")
 
-    def _publish(self, publisher: Any, payload: bytes) -> None:
-        self._said += 1
-        publisher.put(payload, attachment=graph.attachment(self._said, time.time_ns(), self._identity))
-
     def close(self) -> None:
         """End node and router."""
-        self._session.close()
+        self._router.close()
         os.close(self._bell)
 
 

@@ -22,6 +22,7 @@ from sim_bridge.study.camera_model import Eye, eyes_of
 from sim_bridge.study.capture_model import CaptureEye, captures_of
 from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.mavlink_copter import CopterLink
+from sim_bridge.study.odometry_model import OdometryEar, odometry_of
 from sim_bridge.study.ranging_model import RangingEye, ranging_of
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
@@ -122,6 +123,8 @@ class Study:
             *ranging_of(self.site, scenario.cameras.mounting_errors, options.seed),
         ]
         self._exposures = Exposures(self._eyes)
+        # Apart, so that cameras expose when they do without.
+        self._reports = Exposures(odometry_of(self.site, world, scenario.cameras.mounting_errors, options.seed))
         fence = field.room.fence
         self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])
         self.fence_violation_m = 0.0
@@ -186,7 +189,7 @@ class Study:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
         for eye in self._exposures.due(world.time_s):
             if isinstance(eye, RangingEye):
-                self._range(eye, now_ns)
+                self._tell(eye, now_ns)
                 continue
             delay_ms = eye.lateness_ms
             if delay_ms is None:
@@ -199,9 +202,12 @@ class Study:
             if (searched := eye.searched(seen, now_ns, CLOCK)) is not None:
                 self._send(now_ns + round(delay_ms * 1e6), f"searched_picture/{eye.name}", searched)
 
-    def _range(self, system: RangingEye, now_ns: int) -> None:
-        for told in system.look(self.world, now_ns, CLOCK):
-            self._send(now_ns + round(system.lateness_ms * 1e6), f"range/{system.name}", told)
+        for ear in self._reports.due(world.time_s):
+            self._tell(ear, now_ns)
+
+    def _tell(self, sensor: RangingEye | OdometryEar, now_ns: int) -> None:
+        for told in sensor.look(self.world, now_ns, CLOCK):
+            self._send(now_ns + round(sensor.lateness_ms * 1e6), f"told/{sensor.name}", told)
 
     def _send(self, arrival_ns: int, key: str, message: Message) -> None:
         heapq.heappush(self._queue, (arrival_ns, next(self._order), key, message))

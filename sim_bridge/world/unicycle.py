@@ -107,6 +107,11 @@ class Unicycle:
         """Stop at the walls."""
         self.x, self.y = _clamp(self.x, half_x_m), _clamp(self.y, half_y_m)
 
+    @property
+    def wheels(self) -> tuple[float, float]:
+        """Return speed [m/s] and turn rate [rad/s] as the wheels turn, which slip."""
+        return self._wheels
+
     def row(self) -> tuple[float, ...]:
         """Return the 13 numbers of the truth board."""
         vx, vy = self.speed * math.cos(self.yaw), self.speed * math.sin(self.yaw)

@@ -105,7 +105,7 @@ def test_settings_open_no_socket() -> None:
                 "groundstation.bus.zenoh_bus",
                 "groundstation.engineering_views.ros2.live",
                 "drivers.rmw_zenoh.session",
-                "sim_bridge.devices.ros2",
+                "sim_bridge.devices.ros2_router",
             ),
         ),
         ("ruamel", ("groundstation.settings", "groundstation.cli")),

@@ -158,7 +158,7 @@ def test_a_second_publisher_is_not_believed_and_what_is_no_message_is_counted() 
     room = Room()
     try:
         room.until(room.ready)
-        session = room.node._session
+        session = room.node._router.session
         key = graph.topic_key(3, "drone_1/odom", vehicle.ODOMETRY, "RIHS01_x")
         aloft = vehicle.OdometryMessage(9, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         stranger = graph.attachment(1, 9, b"another-publishe")

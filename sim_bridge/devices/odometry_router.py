@@ -1,0 +1,59 @@
+"""An emulated TurtleBot's node and its Zenoh router: nav_msgs/Odometry from its wheels, as rmw_zenoh publishes it.
+
+Pose and heading are what the wheels add up to, in a frame of their own.
+"""
+
+import math
+import os
+import time
+from urllib.parse import parse_qs, urlsplit
+
+from drivers.rmw_zenoh.wire import graph, vehicle
+from sim_bridge.devices.ros2_router import Ros2Router
+from sim_bridge.wheel_odometry import PERIOD_S, WheelOdometry
+from sim_bridge.world.world import TICK_S
+
+_HASH = "RIHS01_" + "0" * 64  # its reader asks for any
+_EVERY = round(PERIOD_S / TICK_S)
+
+
+class OdometryRouter:
+    """Router and publisher around one base; `sim_bridge.world.emulation.Emulator`. source: topic and domain."""
+
+    def __init__(self, name: str, place: tuple[str, int], source: str, wheels: WheelOdometry) -> None:
+        self.silent = self.deaf = False
+        self._wheels, self._ticks = wheels, 0
+        self._x = self._y = self._yaw = 0.0
+        self._router = Ros2Router(name, f"tcp/{place[0]}:{place[1]}")
+        parts = urlsplit(source)
+        domain = int(parse_qs(parts.query).get("domain", ["0"])[0])
+        key = graph.topic_key(domain, parts.path.strip("/"), vehicle.ODOMETRY, _HASH)
+        self._publisher = self._router.publisher(key)
+        self._bell = os.eventfd(0, os.EFD_NONBLOCK)  # nothing is ever heard
+
+    def fileno(self) -> int:
+        """Return a descriptor that never becomes readable."""
+        return self._bell
+
+    def receive(self) -> None:
+        """Hear nothing: nobody tells it anything."""
+
+    def send(self) -> None:
+        """Publish what is due at this tick."""
+        self._ticks += 1
+        if self.silent or self._ticks % _EVERY:
+            return
+        speed, turn_rate = self._wheels.read()
+        self._yaw = math.remainder(self._yaw + turn_rate * PERIOD_S, math.tau)
+        self._x += speed * math.cos(self._yaw) * PERIOD_S
+        self._y += speed * math.sin(self._yaw) * PERIOD_S
+        turned = (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
+        message = vehicle.OdometryMessage(
+            time.time_ns(), (self._x, self._y, 0.0), turned, (speed, 0.0, 0.0), (0.0, 0.0, turn_rate)
+        )
+        self._router.publish(self._publisher, vehicle.encode_odometry(message, "odom", "base_footprint"))
+
+    def close(self) -> None:
+        """End node and router."""
+        self._router.close()
+        os.close(self._bell)

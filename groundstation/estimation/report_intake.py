@@ -21,11 +21,11 @@ from groundstation.field.targets import odometry_name
 from groundstation.time_units import NS_PER_S
 
 # Without a sighting nobody contradicts a report: it is used no longer than this [s].
-_UNSEEN_S = 5.0
+_UNSEEN_S = 1.0
 # Reports in a row beyond the gate, and how long they last [s], until the target is not believed.
 _REFUSED, _REFUSED_S = 5, 0.5
 # Share of the newest sighting in the mean of where they lie ahead, and the mean [deviations] that contradicts.
-_SHARE, _AHEAD = 0.1, 1.0
+_SHARE, _AHEAD = 0.1, 1.4
 # A comparison says something where the speed is known so well [m/s].
 _TELLING_M_S = 0.25
 # For how long all has to agree [s]: at first, and at most.

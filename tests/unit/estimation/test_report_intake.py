@@ -128,8 +128,8 @@ def test_a_report_is_no_sighting(desk: Desk) -> None:
     assert desk.filter.age_s("cart") == pytest.approx(3.1, abs=0.06)
 
 
-def test_without_sightings_it_counts_for_five_seconds_only(desk: Desk) -> None:
-    desk.drive(5.0, truly, seen=False)
+def test_without_sightings_it_counts_for_a_second_only(desk: Desk) -> None:
+    desk.drive(0.9, truly, seen=False)
     held = desk.spread
     desk.drive(2.0, truly, seen=False)
     assert desk.spread > 2.0 * held

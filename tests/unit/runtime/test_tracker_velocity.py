@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import FlightState, Header, Message, Odometry, RelativeObservation, VehicleStatus
+from groundstation.control.view import Localisation
 from groundstation.field.resolved import ResolvedField
 from groundstation.tracker import tracker_from_field
 
@@ -144,8 +145,7 @@ def test_an_honest_velocity_is_as_good_as_before(flight: Flight) -> None:
 def test_whom_nobody_sees_must_know_its_velocity(flight: Flight, limit: dict[str, Any]) -> None:
     flight.run(2.0)
     tracker = flight.tracker
-    strict = replace(tracker.parameters.safety, **limit)
-    tracker.parameters = replace(tracker.parameters, safety=strict)
     assert tracker.converged("drone_1")
+    tracker._localisation = Localisation(replace(tracker.parameters.safety, **limit))
     flight.run(0.7, look=False)
     assert not tracker.converged("drone_1")

@@ -88,3 +88,13 @@ def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
     status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
     world.say(t.CAMERA_STATUS, status)
     assert _alarms(world) == ["ceiling: no pictures"]
+
+
+def test_each_alarm_says_first_whether_there_is_anything_to_do(world: World) -> None:
+    world.vehicle("drone_1", battery=0.18, link_quality=0.5, detail="hovers: its velocity is stuck", braked=True)
+    world.vehicle("drone_2", age_s=4.0, flight_state=m.FlightState.LOST)
+    world.estimate(6.0, 0.5)
+    world.text()
+    alarms = alarms_of(world.state, NOW)
+    assert len(alarms) == 7
+    assert all(alarm.advice.startswith(("Nothing to do", "To do")) for alarm in alarms), alarms

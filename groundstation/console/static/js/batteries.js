@@ -37,7 +37,7 @@ export function lastsWords(name) {
   const left = minutesLeft(name), status = store.s.vehicles?.[name], lands = willLand(name) && status.lands_in_s === null;
   if (status?.mode === "LANDING") return "landing now";
   if (!left) return "";
-  return `${lands ? "lands in" : ALOFT.has(status.mode) ? "good for" : "flies"} ${minuteWords(left)}`;
+  return `${lands ? "lands in" : ALOFT.has(status.mode) ? "battery for" : "flies"} ${minuteWords(left)}`;
 }
 
 // The same of the worst battery; of another drone that has to land sooner, if there is one.

@@ -24,7 +24,7 @@ export function showBanners() {
   if (ended) banners.push(["ended", ended.severity === "INFO" ? "calm" : "grave", [ended.text[0].toUpperCase() + ended.text.slice(1), resultWords()].filter(Boolean).join(". "), runOver() ? "The stop buttons are off: this run takes no more orders." : "", ended.severity !== "INFO"]);
   else if (!store.connected) banners.push(["link", "grave", "NO CONNECTION TO THE CONSOLE", `${store.reason ? `${store.reason}. ` : ""}${ageWords}`, true]);
   else if (silentS() > SILENT_S) banners.push(["silent", "grave", `CONSOLE SILENT for ${seconds(silentS())}`, ageWords, true]);
-  else if (trackerSilent()) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Positions are old. Drones hover, and land 3 s after its last word; LAND ALL works without it."]);
+  else if (trackerSilent()) banners.push(["tracker", "grave", `TRACKER SILENT for ${seconds(age)}`, "Nothing to do: drones hover, and land 3 s after its last word. Positions are old; LAND ALL works without it."]);
   const stop = store.connected ? unheardStop() : null;
   if (stop) banners.push(["unheard", "grave", `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, "Press again. What flies on: groundstation land in a shell, or its own remote control."]);
   for (const notice of notices.filter(({ at }) => performance.now() - at < 8000)) banners.push(["notice", notice.grave ? "grave" : "mild", notice.words, ""]);

@@ -1,6 +1,6 @@
 // A card for each drone and one for each target.
 
-import { batteryLevel, lastsWords } from "./batteries.js";
+import { batteryLevel, lastsWords, leastBattery } from "./batteries.js";
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
@@ -112,7 +112,8 @@ function showBattery(node, name, value) {
   text(node.previousElementSibling, lastsWords(name) || "battery");
   if (value === null || value === undefined) { delete node.dataset.words; node.className = ""; return text(node, "unknown"); }
   const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
-  const words = `${(100 * value).toFixed(0)} %${level === "full" ? "" : level === "empty" && standing ? " charge!" : " low"}`;
+  const scarce = value < leastBattery(name) + 0.15; // else it is the time above that is short
+  const words = `${(100 * value).toFixed(0)} %${level === "full" || !scarce ? "" : level === "empty" && standing ? " charge!" : " low"}`;
   if (node.dataset.words === words) return;
   node.dataset.words = words;
   node.className = level === "full" ? "" : level;

@@ -21,6 +21,9 @@ from groundstation.planning.parameters import MotionLimits
 
 # No two bodies are this near: a belief that has them there does not say on which side the other one is.
 _NO_SIDE_M = 0.1
+# The sides of a polygon within the circle of the fastest horizontal velocities.
+_ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
+_UP_DOWN = np.array(((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)))
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -68,10 +71,9 @@ def limit_setpoint(
     drift = None if drifts is None else drifts.get(robot)
     walls = walls if drift is None else [_held_off(wall, drift.tolist(), parameters) for wall in walls]
     walls += [_turning(wall, rate, parameters.reaction_s) for wall in walls]
-    velocity, met = project(velocity, np.array([wall.normal for wall in walls]), np.array([w.most for w in walls]))
+    velocity, met = _nearest(velocity, walls, parameters.limits_of(robot))
     names += [walls[i].name for i in met]
-    body = _within(stabilized_from_world(velocity, yaw), parameters.limits_of(robot))
-    vx, vy, vz = body.tolist()
+    vx, vy, vz = stabilized_from_world(velocity, yaw).tolist()
     limited = Setpoint((vx, vy, vz), float(rate), setpoint.phase, setpoint.blocked)
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
 
@@ -87,10 +89,16 @@ def _held_off(wall: _Wall, drift: Vector3, parameters: SafetyParameters) -> _Wal
     return _Wall(wall.name, wall.normal, wall.most - allowed)
 
 
-def _within(velocity: Array, limits: MotionLimits) -> Array:
-    """Return a velocity [base_stabilized] in its direction, no faster than the limits."""
-    fast = max(math.hypot(velocity[0], velocity[1]) / limits.max_speed_m_s, abs(velocity[2]) / limits.max_climb_m_s)
-    return velocity if fast <= 1.0 else velocity / fast
+def _nearest(wanted: Array, walls: list[_Wall], limits: MotionLimits) -> tuple[Array, list[int]]:
+    """Return the nearest velocity [world] that walls and limits allow, and which walls were met on the way."""
+    normals, most = np.array([wall.normal for wall in walls]), np.array([wall.most for wall in walls])
+    velocity, met = project(wanted, normals, most)
+    slow = math.hypot(velocity[0], velocity[1]) <= limits.max_speed_m_s and abs(velocity[2]) <= limits.max_climb_m_s
+    if not slow:  # two walls that push, at an acute angle, meet far away
+        speed = np.full(len(_ROUND), limits.max_speed_m_s * math.cos(math.pi / len(_ROUND)))
+        climb = np.full(2, limits.max_climb_m_s)
+        velocity, _ = project(wanted, np.concatenate((normals, _ROUND, _UP_DOWN)), np.concatenate((most, speed, climb)))
+    return velocity, met
 
 
 def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:

@@ -48,7 +48,7 @@ class Orders:
         self._due_ns = 0
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
-        self._taken_over = False
+        self._started = self._taken_over = False
         self._ordered_ns = -1
 
     def are_heeded(self, custom_mode: int) -> bool:
@@ -89,7 +89,8 @@ class Orders:
         self._watch_mode(now_ns, action, armed, guided, custom_mode)
         match action:
             case Action.TAKE_OFF:
-                return self._take_off(now_ns, armed, guided, landed, climbed_m)
+                self._watch_start(now_ns, armed, guided, custom_mode)
+                return None if self._taken_over else self._take_off(now_ns, armed, guided, landed, climbed_m)
             case Action.FLY:
                 return self._fly(now_ns, decision, guided)
             case Action.HOVER:
@@ -132,7 +133,8 @@ class Orders:
         self._rises_to_take_off = starts
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
-            self._requests.accepted.discard("take-off")  # once per start: a second one would begin its spool-up anew
+            self._started = self._taken_over = False
+            self._requests.accepted -= {"arming", "take-off"}  # once per start: a second one begins its spool-up anew
         elif action is not Action.HOVER or self._action is not Action.TAKE_OFF:
             self.starting, self._climb_until_ns = False, 0
         else:
@@ -152,9 +154,22 @@ class Orders:
             self._guided_ns = now_ns
             self._regain_until_ns = 0 if guided else self._regain_until_ns
         elif not self._taken_over and now_ns - self._guided_ns > _TAKEN_OVER_NS:
-            self._taken_over = True
-            text = f"{self._vehicle.name} is in {mode_name(self._flavour, custom_mode)}: not ours to fly until RESUME"
-            self.events.append((_WARNING, text + self.last_said(now_ns)))
+            self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
+
+    def _yield(self, now_ns: int, why: str) -> None:
+        self._taken_over = True
+        text = f"{self._vehicle.name} {why}: not ours to fly until RESUME"
+        self.events.append((_WARNING, text + self.last_said(now_ns)))
+
+    def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
+        # Nobody but a pilot, a second ground station or the autopilot itself ends what has begun: asked once more, it
+        # would climb against their stop.
+        if armed and (guided or "arming" in self._requests.accepted):
+            self._started = True
+        if self._started and not (armed and guided) and not self._taken_over:
+            mode = f"is in {mode_name(self._flavour, custom_mode)}" if armed else "was disarmed"
+            self._requests.drop("arming", "guided mode", "take-off")
+            self._yield(now_ns, f"{mode} while it takes off")
 
     def _take_off(
         self, now_ns: int, armed: bool, guided: bool, landed: int, climbed_m: float

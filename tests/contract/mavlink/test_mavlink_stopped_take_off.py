@@ -1,0 +1,63 @@
+"""Somebody else stops a vehicle while it takes off: its driver does not ask for what they ended."""
+
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from groundstation.bus.messages import Verb
+
+_RESTARTS = {MavCmd.DO_SET_MODE, MavCmd.NAV_TAKEOFF}
+_HOLD = {Flavour.PX4: px4_mode(Px4Main.AUTO, Px4Auto.HOLD), Flavour.ARDUPILOT: CopterMode.BRAKE}
+_LAND = {Flavour.PX4: px4_mode(Px4Main.AUTO, Px4Auto.LAND), Flavour.ARDUPILOT: CopterMode.LAND}
+
+
+def begin(rig):
+    rig.connect()
+    rig.until(lambda: not rig.host.watchdog.vehicle.not_ready, 8.0)
+    rig.order(Verb.TAKEOFF)
+    firmware = rig.emulator.firmware
+    rig.until(lambda: firmware.armed and firmware.mode == firmware.guided, 6.0)
+    rig.run(1.1)  # its heartbeat says so once a second
+    assert rig.mode == "TAKING_OFF"
+    rig.link.sent.clear()
+    return firmware
+
+
+def asked_again(rig) -> list[CommandLong]:
+    commands = [m for _, m in rig.sent(CommandLong)]
+    armings = [m for m in commands if m.command == MavCmd.COMPONENT_ARM_DISARM and m.param1 == 1.0]
+    return armings + [m for m in commands if m.command in _RESTARTS]
+
+
+def is_given_up(rig) -> bool:
+    return any("was disarmed while it takes off: not ours to fly until RESUME" in text for text in rig.texts)
+
+
+def test_a_hold_stays(rig):
+    firmware = begin(rig)
+    firmware.enter(_HOLD[rig.flavour])
+    rig.run(4.0)
+    assert not asked_again(rig)
+    assert firmware.mode == _HOLD[rig.flavour]
+    assert any("not ours to fly until RESUME" in text for text in rig.texts)
+
+
+def test_a_landing_ends_on_the_floor(rig):
+    firmware = begin(rig)
+    firmware.enter(_LAND[rig.flavour])
+    rig.run(4.0)
+    assert not asked_again(rig)
+    assert firmware.mode == _LAND[rig.flavour]
+    # ArduPilot has not left the floor yet, and switches its motors off.
+    assert rig.mode == "LANDING" if rig.flavour == Flavour.PX4 else is_given_up(rig)
+
+
+def test_motors_that_were_switched_off_stay_off_until_the_next_order(rig):
+    firmware = begin(rig)
+    firmware.armed = False
+    rig.run(4.0)
+    assert not asked_again(rig) and not firmware.armed
+    # PX4 says from its arming on that it flies: to its driver it has landed. ArduPilot still takes off.
+    assert rig.mode == "LANDED" if rig.flavour == Flavour.PX4 else is_given_up(rig)
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED", 10.0)
+    rig.order(Verb.TAKEOFF)
+    rig.until(lambda: rig.mode == "HOVER", 15.0)

@@ -82,6 +82,7 @@ class Harness:
             if self._clock.ticks % _COMMAND_TICKS == 0 and not self._child.supervisor_alive:
                 orphaned_ns = orphaned_ns or now_ns
                 if self._all_landed() or now_ns - orphaned_ns > _LANDING_LIMIT_S * 1e9:
+                    self._publish_truth(self._clock.deadline_ns)  # the last one may be from before the touch-down
                     return
 
     def tick(self, stamp_ns: int) -> None:

@@ -37,8 +37,11 @@ def fly(order: dict[str, Any], seed: int, events: bool) -> dict[str, Any]:
 def main() -> int:
     """Fly the seeds of the order on standard input; WRONG_ORDER for an unknown kind of fault or of vehicle."""
     order = json.load(sys.stdin)
-    known = [*map(str, KINDS), _HEALTHY]
-    if unknown := [kind for kind in order.get("kinds") or () if kind not in known]:
+    known, wanted = [*map(str, KINDS), _HEALTHY], order.get("kinds") or []
+    if _HEALTHY in wanted and len(wanted) > 1:
+        print(f"{_HEALTHY} flies healthy flights only: name it alone", file=sys.stderr)
+        return WRONG_ORDER
+    if unknown := [kind for kind in wanted if kind not in known]:
         print(f"no kind of fault: {', '.join(unknown)}; there are {', '.join(known)}", file=sys.stderr)
         return WRONG_ORDER
     if refusal := unhosted(order["field"]["drones"]):

@@ -51,6 +51,10 @@ def main() -> int:
         from sim_bridge.study.scenarios.command import main as scenarios
 
         return scenarios()
+    if sys.argv[1:2] == ["culprits"]:
+        from sim_bridge.study.culprits.command import main as culprits
+
+        return culprits()
     arguments = _parser().parse_args()
     try:
         field = resolved_field(arguments.field, arguments.set)

@@ -26,7 +26,7 @@ from sim_bridge.study.odometry_model import OdometryEar, odometry_of
 from sim_bridge.study.ranging_model import RangingEye, ranging_of
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
-from sim_bridge.study.wrong_figures import WrongFigures
+from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.noise import generator_of
@@ -85,9 +85,9 @@ class Study:
         scenario: Scenario,
         options: StudyOptions,
         real: Collection[str] = (),
-        wrong: WrongFigures | None = None,
+        wrong: WrongFigures = NOTHING_WRONG,
     ) -> None:
-        self.options, self._wrong = options, wrong or WrongFigures({})
+        self.options, self._wrong = options, wrong
         self.site = parse_site(msgspec.to_builtins(self._wrong.world(field)))
         self.world = World(self.site, scenario, options.seed, real, real)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)

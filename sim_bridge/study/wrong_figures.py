@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
@@ -14,6 +14,7 @@ _FIXED = {"x": ("position_m", 0), "y": ("position_m", 1), "z": ("position_m", 2)
 _FIXED |= {"roll": ("rotation_deg", 0), "pitch": ("rotation_deg", 1), "yaw": ("rotation_deg", 2)}
 _ONBOARD = {"pan": "pan_left_deg", "tilt": "tilt_down_deg"}
 _PLACES = ("ahead", "left", "up")
+_PAD = ("pad_x", "pad_y", "pad_yaw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +22,15 @@ class WrongFigures:
     """True minus told, by (who, part): m, deg, ms, shares.
 
     Parts: x, y, z, roll, pitch, yaw of a fixed camera; pan, tilt, ahead, left, up of a drone's; focal and delay of any;
-    print of a drone or target.
+    print of a drone or target; pad_x, pad_y, pad_yaw of where a drone stands. exchanged: who carries whose marker.
     """
 
     errors: Mapping[tuple[str, str], float]
+    exchanged: Mapping[str, str] = field(default_factory=dict)
 
-    def world(self, field: ResolvedField) -> ResolvedField:
+    def world(self, told: ResolvedField) -> ResolvedField:
         """Return the field as the world really is; lenses, prints and delays are in the sightings instead."""
-        cameras, drones = dict(field.cameras), dict(field.drones)
+        cameras, drones = dict(told.cameras), dict(told.drones)
         for (who, part), error in self.errors.items():
             if who in cameras and part in _FIXED:
                 name, axis = _FIXED[part]
@@ -37,7 +39,9 @@ class WrongFigures:
                 cameras[who] = _with(cameras[who], name, tuple(moved))
             elif who in drones and (part in _ONBOARD or part in _PLACES):
                 drones[who] = _with(drones[who], "camera", _mounted(drones[who].camera, part, error))
-        return msgspec.structs.replace(field, cameras=cameras, drones=drones)
+            elif who in drones and part in _PAD:
+                drones[who] = _placed(drones[who], part, error)
+        return msgspec.structs.replace(told, cameras=cameras, drones=drones)
 
     def reported(self, o: RelativeObservation) -> RelativeObservation:
         """Return a sighting as a detector reports it that believes the field."""
@@ -50,10 +54,15 @@ class WrongFigures:
         x, y, z = (value / (1.0 + printed) for value in o.position_m)
         yaw = None if o.yaw_rad is None else math.remainder(o.yaw_rad - turned, math.tau)
         header = msgspec.structs.replace(o.header, stamp_ns=o.header.stamp_ns + round(late_ms * 1e6))
-        return msgspec.structs.replace(o, header=header, position_m=(x, y, z / (1.0 + focal)), yaw_rad=yaw)
+        place = (x, y, z / (1.0 + focal))
+        subject = self.exchanged.get(o.subject, o.subject)
+        return msgspec.structs.replace(o, header=header, subject=subject, position_m=place, yaw_rad=yaw)
 
     def _of(self, who: str, part: str) -> float:
         return self.errors.get((who, part), 0.0)
+
+
+NOTHING_WRONG = WrongFigures({})
 
 
 def _with(struct: Any, name: str, value: Any) -> Any:
@@ -66,3 +75,10 @@ def _mounted(camera: Any, part: str, error: float) -> Any:
     place = list(camera.position_m)
     place[_PLACES.index(part)] += error
     return _with(camera, "position_m", tuple(place))
+
+
+def _placed(drone: Any, part: str, error: float) -> Any:
+    if part == "pad_yaw":
+        return _with(drone, "pad_yaw_deg", drone.pad_yaw_deg + error)
+    x, y = drone.pad_m
+    return _with(drone, "pad_m", (x + error, y) if part == "pad_x" else (x, y + error))

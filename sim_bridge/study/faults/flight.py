@@ -16,6 +16,7 @@ from groundstation.bus import clock
 from groundstation.bus.api import Received
 from groundstation.bus.keys import Key
 from groundstation.bus.messages import Message
+from groundstation.bus.notice import Notice
 from groundstation.bus.topics import OBSERVATION, SEARCHED_PICTURE, Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
@@ -38,6 +39,7 @@ from sim_bridge.study.faults.orders import TeamOrders
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
 from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of
 from sim_bridge.study.faults.wrong_cameras import WrongEye
+from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
@@ -112,11 +114,12 @@ class FaultFlight:
         sections: Sequence[Section],
         seconds: float,
         planner_of: Callable[[Planner], Planner] = lambda planner: planner,
+        wrong: WrongFigures = NOTHING_WRONG,
     ) -> None:
         field = field_from_json(msgspec.json.encode(drawn.field))
-        self._drawn, self._seconds, self._field = drawn, seconds, field
+        self._drawn, self._seconds, self._field, self._wrong = drawn, seconds, field, wrong
         scenario, seed = drawn.scenario, drawn.seed
-        self.site = parse_site(drawn.field)
+        self.site = parse_site(msgspec.to_builtins(wrong.world(field)))
         self.world = World(self.site, scenario, seed)
         self.said: list[tuple[str, str]] = []
         self.events: list[tuple[float, str]] = []
@@ -186,7 +189,7 @@ class FaultFlight:
         if ticks % self._tick_every == 0:
             self.tracking.tick(now_ns)
             mark = self._spent("tracker", mark)
-        if ticks % _ORDER_TICKS == 0:
+        if ticks % _ORDER_TICKS == 0 and self.may_start():
             self._orders.step(now_ns, self.drivers.hosts)
         self.drivers.turn(now_ns, ticks)
         self._spent("drivers", mark)
@@ -203,12 +206,14 @@ class FaultFlight:
         for eye in self._exposures.due(world.time_s):
             delay_ms = self._drawn.scenario.cameras.video_delay_ms + self._rng.uniform(*_DETECTOR_MS)
             seen = eye.look(world, now_ns, clock.clock_id())
-            messages: list[tuple[Topic, Message]] = [(OBSERVATION, sighting) for sighting in seen]
+            for sighting in seen:
+                arrival_ns = sighting.header.stamp_ns + round(delay_ms * 1e6)
+                self._send(arrival_ns, OBSERVATION, self._wrong.reported(sighting))
             if (searched := eye.searched(seen, now_ns, clock.clock_id())) is not None:
-                messages.append((SEARCHED_PICTURE, searched))
-            for topic, message in messages:
-                arrival_ns = message.header.stamp_ns + round(delay_ms * 1e6)
-                heapq.heappush(self._queue, (arrival_ns, next(self._order), topic, message))
+                self._send(searched.header.stamp_ns + round(delay_ms * 1e6), SEARCHED_PICTURE, searched)
+
+    def _send(self, arrival_ns: int, topic: Topic, message: Message) -> None:
+        heapq.heappush(self._queue, (arrival_ns, next(self._order), topic, message))
 
     def _deliver(self, now_ns: int) -> None:
         while self._queue and self._queue[0][0] <= now_ns:
@@ -221,7 +226,7 @@ class FaultFlight:
         for _, line in self._schedule.apply(now_s):
             self.events.append((now_s, line))
         for notice in self.tracking.notices:
-            self.events.append((now_s, notice.text))
+            self.note(now_s, notice)
         self.tracking.notices.clear()
         self.events += [(now_s, text) for _, text in self.said]
         self.said.clear()
@@ -238,6 +243,14 @@ class FaultFlight:
     def heeds(self, message: Message) -> bool:
         """Return whether the tracker takes a message in: all of them, but in studies of other methods."""
         return True
+
+    def may_start(self) -> bool:
+        """Return whether the team is ordered to take off: at once, but in studies of what comes before."""
+        return True
+
+    def note(self, now_s: float, notice: Notice) -> None:
+        """Take what the tracker tells the operator."""
+        self.events.append((now_s, notice.text))
 
     def watch(self) -> None:
         """Look on as the team tracks, each time that it is judged: for other studies."""

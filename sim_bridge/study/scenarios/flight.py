@@ -12,6 +12,7 @@ from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
 from sim_bridge.study.scenarios.first_program import along_an_edge
 from sim_bridge.study.scenarios.strategies import STRATEGIES
+from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
 from sim_bridge.surroundings import ScenarioExpectation
 
 _DOWN = ("LANDING", "LANDED")
@@ -26,9 +27,16 @@ def as_drawn(field: dict[str, Any], scenario: Scenario, seed: int) -> Drawn:
 class ScenarioFlight(FaultFlight):
     """A flight of a scenario under a strategy; `run` returns its figures."""
 
-    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, strategy: str) -> None:
+    def __init__(
+        self,
+        drawn: Drawn,
+        sections: Sequence[Section],
+        seconds: float,
+        strategy: str,
+        wrong: WrongFigures = NOTHING_WRONG,
+    ) -> None:
         chosen = STRATEGIES[strategy]
-        super().__init__(drawn, sections, seconds, chosen.planner_of)
+        super().__init__(drawn, sections, seconds, chosen.planner_of, wrong)
         self._strategy, self._edges_only = strategy, chosen.edges_only
         self._errors = TrackingErrors(JUDGE_S)
         self._switches, self._topology = 0, ""

@@ -1,0 +1,103 @@
+"""`groundstation experiment culprits`: labs whose field file is wrong, and whether the right figure is blamed."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.numbers import FiniteRange
+from groundstation.errors import SettingsError
+
+if TYPE_CHECKING:
+    from groundstation.experiments.culprit_rows import WrongLab
+    from groundstation.experiments.faults import FlightBatch
+
+_BATCH = 5
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation experiment culprits                       (every row, 5 seeds each)\n"
+    "  groundstation experiment culprits --only nothing --seeds 100\n"
+    '  groundstation experiment culprits --only "pan of one,all markers" --seeds 1 --json\n\n'
+    "Exit codes: 0 in 9 of 10 flights of each row what is wrong was named, 1 it was not, 2 wrong settings."
+)
+@click.option("--seeds", type=click.IntRange(1, 1000), default=5, show_default=True, help="Flights of each row.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
+@click.option("--only", default="", help="Rows by name, with commas (default: all).")
+@click.option(
+    "--duration", "seconds", type=FiniteRange(5, 600), default=25.0, show_default=True, help="Seconds of tracking."
+)
+@click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name.")
+@click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path.")
+@campaign_options("culprits")
+def culprits(
+    seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
+) -> int:
+    """Fly labs that are not as their field file says, and judge what the operator is told.
+
+    In each row one thing is wrong: a delay, a camera's mounting, a marker's size, a lens, a pad, exchanged markers. The
+    team stands on its pads for 4 s and is judged, then takes off whatever was found. Named in time is what a finding
+    refuses before the take-off, or the first accusation within 20 s of the order to take off, of the right thing.
+    """
+    from groundstation.experiments.culprits import row_of, table, verdict_on
+    from groundstation.experiments.faults import flights_of
+    from groundstation.experiments.runner import write_atomically
+
+    planned = _planned(only, seeds, seed, **flown)
+    batches = [batch for _, own in planned for batch in own]
+    found = iter(fly_all(batches, scheduler, workers, len(batches) == 1, out))
+    rows, flights = [], []
+    for lab, own in planned:
+        known = [one for _ in own for one in flights_of([next(found)])[0]]
+        verdicts = [verdict_on(lab, one, _began_s(lab)) for one in known]
+        rows.append(row_of(lab, verdicts))
+        flights += [
+            {"lab": lab.name, **verdict, "told": one["told"]} for verdict, one in zip(verdicts, known, strict=True)
+        ]
+    document = {"experiment": "culprits", "rows": rows, "flights": flights}
+    write_atomically(out / "culprits.json", json.dumps(document, indent=1) + "\n")
+    click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
+    return ExitCode.OK if all(row["as_wanted"] >= 0.9 * row["flights"] for row in rows) else ExitCode.FAILED
+
+
+def _began_s(lab: "WrongLab") -> float:
+    return max((fault["start_s"] for fault in lab.faults), default=0.0)
+
+
+def _planned(
+    only: str, seeds: int, seed: int, seconds: float, field: str, scenario: str, options: tuple[str, ...]
+) -> "list[tuple[WrongLab, list[FlightBatch]]]":
+    """Return the batches of flights of each row that was asked for."""
+    from groundstation.experiments.culprit_rows import labs_of
+    from groundstation.experiments.faults import batches
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.scenario import load_scenario
+
+    path = find_field(field)
+    order = flown_field(path, options) | {"seconds": seconds}
+    base = load_scenario(find_scenario(scenario, path))
+    if not order["field"]["cameras"] or len(order["field"]["drones"]) < 2:
+        raise SettingsError([f"{path}: culprits needs a fixed camera and two drones"])
+    return [
+        (lab, batches(_order(order, base, lab), seed, seeds, _BATCH, "culprits"))
+        for lab in _chosen(only, labs_of(order["field"]))
+    ]
+
+
+def _order(order: dict[str, Any], base: dict[str, Any], lab: "WrongLab") -> str:
+    """Return what the simulator is told besides the seeds."""
+    cameras = {**(base.get("cameras") or {}), **(lab.cameras or {})}
+    scenario = {**base, "cameras": cameras, "faults": list(lab.faults)}
+    wrong = {"errors": lab.errors, "exchanged": lab.exchanged}
+    return json.dumps(order | wrong | {"scenario": scenario}, sort_keys=True)
+
+
+def _chosen(only: str, labs: "tuple[WrongLab, ...]") -> "list[WrongLab]":
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    known = {lab.name: lab for lab in labs}
+    if strangers := [name for name in names if name not in known]:
+        raise SettingsError([f"--only: no row {', '.join(map(repr, strangers))}; there are {', '.join(known)}"])
+    return [known[name] for name in names] or list(labs)

@@ -1,0 +1,112 @@
+"""What can be wrong in a lab, and what the operator must read of it."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+WrongFigure = tuple[str, str, float]
+"""Who, which part, true minus told: m, deg, ms, shares."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrongLab:
+    """One thing that is wrong.
+
+    errors, exchanged, faults: what it is; cameras: how bad their pictures are besides. says: what must be told first,
+    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: nothing is wrong, and nothing may be told.
+    size: in the unit of that text; None: it has none. on_pads: it must be found before anybody takes off.
+    """
+
+    name: str
+    errors: tuple[WrongFigure, ...] = ()
+    exchanged: tuple[tuple[str, str], ...] = ()
+    faults: tuple[Mapping[str, Any], ...] = ()
+    cameras: Mapping[str, Any] | None = None
+    says: str = ""
+    size: float | None = None
+    on_pads: bool = False
+
+
+_FIGURE = r"(-?[\d.]+) \+- [\d.]+"
+_LATE_MS, _TURN_DEG, _ASIDE_M, _PRINT, _FOCAL = 50.0, 3.0, 0.2, 0.05, 0.03
+_BUMP_DEG, _BUMPED_AT_S = 5.0, 22.0
+
+
+def labs_of(field: Mapping[str, Any]) -> tuple[WrongLab, ...]:
+    """Return all rows for a resolved field with a fixed camera, two drones and a target: its first ones."""
+    ceiling, target = next(iter(field["cameras"])), (field["target"] or {}).get("name") or next(iter(field["targets"]))
+    one, other = list(field["drones"])[:2]
+    return (
+        *_healthy(),
+        *_delays(ceiling, one),
+        *_mountings(one, other),
+        *_sizes(target, one, field["drones"]),
+        *_roots(ceiling),
+        *_places(one, other),
+    )
+
+
+def _healthy() -> Iterable[WrongLab]:
+    yield WrongLab("nothing")
+    yield WrongLab("30 % of frames lost", cameras={"frame_loss": 0.3})
+    yield WrongLab("corner noise x 3", cameras={"corner_noise_px": 0.6})
+
+
+def _delays(ceiling: str, one: str) -> Iterable[WrongLab]:
+    def late(subject: str) -> str:
+        return rf"{subject}: (?:\S+'s pictures are|the pictures of \S+ camera are|its pictures seem) {_FIGURE} ms older"
+
+    yield WrongLab("ceiling's pictures", ((ceiling, "delay", _LATE_MS),), says=late(ceiling), size=_LATE_MS)
+    yield WrongLab("a drone's pictures", ((one, "delay", _LATE_MS),), says=late(one), size=_LATE_MS)
+
+
+def _mountings(one: str, other: str) -> Iterable[WrongLab]:
+    for part, direction in (("pan", "farther to the left"), ("tilt", "lower")):
+        looks = rf"looks {_FIGURE} deg {direction}"
+        own = rf"{one}: {one}'s camera {looks}"
+        yield WrongLab(f"{part} of one", ((one, part, _TURN_DEG),), says=own, size=_TURN_DEG)
+        both = tuple((name, part, _TURN_DEG) for name in (one, other))
+        yield WrongLab(f"{part} of both", both, says=rf": every drone's camera {looks}", size=_TURN_DEG)
+
+
+def _sizes(target: str, one: str, drones: Iterable[str]) -> Iterable[WrongLab]:
+    larger, percent = rf"{_FIGURE} % larger", 100.0 * _PRINT
+    yield WrongLab(
+        "target's marker", ((target, "print", _PRINT),), says=rf".*: {target}'s marker is {larger}", size=percent
+    )
+    own = rf".*: {one}'s marker is {larger}"
+    yield WrongLab("a drone's marker", ((one, "print", _PRINT),), says=own, size=percent, on_pads=True)
+    prints = tuple((name, "print", _PRINT) for name in (*drones, target))
+    yield WrongLab("all markers", prints, says=rf".*: all markers are {larger}", size=percent, on_pads=True)
+    longer = rf"{one}: {one}'s camera has a focal length {_FIGURE} % longer"
+    yield WrongLab("a drone's lens", ((one, "focal", _FOCAL),), says=longer, size=100.0 * _FOCAL)
+
+
+def _roots(ceiling: str) -> Iterable[WrongLab]:
+    aside = rf".*: {ceiling} hangs {_FIGURE} m aside"
+    yield WrongLab("ceiling aside", ((ceiling, "x", _ASIDE_M),), says=aside, size=_ASIDE_M, on_pads=True)
+    for part, word in (("yaw", "turned"), ("roll", "tilted")):
+        said = rf".*: {ceiling} is {word} by {_FIGURE} deg"
+        yield WrongLab(f"ceiling {word}", ((ceiling, part, _TURN_DEG),), says=said, size=_TURN_DEG, on_pads=True)
+    bump = {"kind": "camera_bumped", "entity": ceiling, "start_s": _BUMPED_AT_S, "value": _BUMP_DEG}
+    said = rf"{ceiling}: was bumped: .* turned by {_FIGURE} deg"
+    yield WrongLab("ceiling bumped", faults=(bump,), says=said, size=_BUMP_DEG)
+
+
+def _places(one: str, other: str) -> Iterable[WrongLab]:
+    said = rf".*: {one} stands on the pad of {other}|.*: {other} stands on the pad of {one}"
+    yield WrongLab("markers exchanged", exchanged=((one, other), (other, one)), says=said, on_pads=True)
+    carried = ((one, "pad_x", 0.4), (one, "pad_y", -0.3))
+    yield WrongLab("a wrong pad", carried, says=rf".*: {one} stands {_FIGURE} m from its pad", size=0.5, on_pads=True)
+    turned = ((one, "pad_yaw", 20.0),)
+    said = rf".*: {one}'s marker is turned by {_FIGURE} deg"
+    yield WrongLab("turned on its pad", turned, says=said, size=20.0, on_pads=True)
+
+
+def size_told(lab: WrongLab, line: str) -> float | None:
+    """Return the size that a line tells if it names the right culprit first, NaN where it tells none; None: another."""
+    found = re.match(lab.says, line) if lab.says else None
+    if found is None:
+        return None
+    return float(found[1]) if found.lastindex else float("nan")

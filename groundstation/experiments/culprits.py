@@ -1,0 +1,100 @@
+"""Is the right thing blamed? Verdicts on flights of wrong labs, and their table. Pure."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from groundstation.experiments.culprit_rows import WrongLab, size_told
+
+WITHIN_S = 20.0
+SIZE_SHARE = 0.25
+# What accuses somebody or something; other warnings tell what follows from it.
+_ACCUSES = ("explains best", "contradicts the belief", "its pictures seem", "was bumped")
+_EXCUSED = "probably not its fault"
+_REFUTED = "what was told is refuted"
+
+
+def accusations(flight: Mapping[str, Any]) -> list[tuple[float, str]]:
+    """Return what was said to be wrong, as (seconds after the order to take off, "SUBJECT: TEXT"); 0 s: on the pads."""
+    found = [(0.0, line) for _, line in flight["on_pads"] or ()]
+    for at_s, severity, entity, text, remedy in flight["told"]:
+        accused = any(words in text for words in _ACCUSES) and not remedy.startswith(_EXCUSED)
+        if accused and severity in ("WARNING", "ERROR"):
+            found.append((at_s, f"{entity}: {text}"))
+    return found
+
+
+def verdict_on(lab: WrongLab, flight: Mapping[str, Any], since_s: float = 0.0) -> dict[str, Any]:
+    """Return what became of one flight.
+
+    since_s: when what is wrong began [s after the order to take off]. end: "refused" (rightly, before the take-off),
+    "right" (told in flight, in time), "late", "wrong" (another one was blamed first), "silent"; of a healthy lab
+    "silent" or "false alarm". size_error: share by which the size told is wrong; said: the first accusation.
+    """
+    said = accusations(flight)
+    refused = any(level == "MUST" for level, _ in flight["on_pads"] or ())
+    first = said[0] if said else None
+    size = None if first is None else size_told(lab, first[1])
+    end = _end(lab, first, size, refused, since_s)
+    told = size is not None and lab.size is not None and not math.isnan(size)
+    return {
+        "seed": flight["seed"],
+        "end": end,
+        "at_s": None if first is None else first[0],
+        "size_error": abs(size - lab.size) / abs(lab.size) if told and size is not None and lab.size else None,
+        "refuted": any(_REFUTED in text for _, _, _, text, _ in flight["told"]),
+        "rmse_m": flight.get("rmse_m"),
+        "said": "" if first is None else first[1],
+    }
+
+
+def _end(lab: WrongLab, first: tuple[float, str] | None, size: float | None, refused: bool, since_s: float) -> str:
+    if first is None:
+        return "silent"
+    if not lab.says:
+        return "false alarm"
+    if size is None:
+        return "wrong"
+    if first[0] == 0.0 and refused:
+        return "refused"
+    return "right" if first[0] - since_s <= WITHIN_S else "late"
+
+
+def row_of(lab: WrongLab, verdicts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return one row of the table: how many flights ended how, the latest time, the median size error, the rmse."""
+    ends = [one["end"] for one in verdicts]
+    good = [one for one in verdicts if one["end"] in ("refused", "right")]
+    errors = sorted(one["size_error"] for one in good if one["size_error"] is not None)
+    tracked = [one["rmse_m"] for one in verdicts if one["rmse_m"] is not None]
+    return {
+        "lab": lab.name,
+        "flights": len(verdicts),
+        "ends": {end: ends.count(end) for end in dict.fromkeys(ends)},
+        "as_wanted": _as_wanted(lab, ends),
+        "latest_s": max((one["at_s"] for one in good), default=None),
+        "size_ok": sum(error <= SIZE_SHARE for error in errors) if errors else None,
+        "sizes": len(errors),
+        "rmse_m": sum(tracked) / len(tracked) if tracked else None,
+        "otherwise": {one["seed"]: one["said"] for one in verdicts if one["end"] in ("wrong", "false alarm", "late")},
+    }
+
+
+def _as_wanted(lab: WrongLab, ends: Sequence[str]) -> int:
+    if not lab.says:
+        return ends.count("silent")
+    return ends.count("refused") + (0 if lab.on_pads else ends.count("right"))
+
+
+def table(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return the rows as lines of text, below each what was said otherwise."""
+    head = ("wrong", "as wanted", "latest", "size", "rmse")
+    lines = ["{:22s} {:>9s} {:>8s} {:>6s} {:>8s}  ends".format(*head)]
+    for row in rows:
+        latest = "-" if row["latest_s"] is None else f"{row['latest_s']:.1f} s"
+        size = "-" if row["size_ok"] is None else f"{row['size_ok']}/{row['sizes']}"
+        rmse = "-" if row["rmse_m"] is None else f"{row['rmse_m']:.3f} m"
+        ends = ", ".join(f"{end} {count}" for end, count in row["ends"].items())
+        wanted = f"{row['as_wanted']}/{row['flights']}"
+        lines.append(f"{row['lab']:22s} {wanted:>9s} {latest:>8s} {size:>6s} {rmse:>8s}  {ends}")
+        lines += [f"    seed {seed}: {said[:150]}" for seed, said in row["otherwise"].items()]
+    return lines

@@ -1,0 +1,58 @@
+"""One flight with wrong figures: the team stands on its pads and is judged, then takes off all the same."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from groundstation.bus.messages import RelativeObservation, Severity
+from groundstation.bus.notice import Notice
+from groundstation.bus.topics import OBSERVATION
+from groundstation.doctor.finding import Level
+from groundstation.preflight.judge import pad_findings
+from groundstation.preflight.pad_record import PadRecord
+from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.vehicles import Section
+from sim_bridge.study.scenarios.flight import ScenarioFlight
+from sim_bridge.study.wrong_figures import WrongFigures
+
+STAND_S = 4.0
+_TOLD = frozenset({Severity.WARNING, Severity.ERROR})
+
+
+class CulpritFlight(ScenarioFlight):
+    """A flight that notes what is told; `fly` returns it with the figures of tracking.
+
+    on_pads: findings that are not well as [level, text]; told: [s after the order to take off, severity, entity, text,
+    remedy] of each notice.
+    """
+
+    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, wrong: WrongFigures) -> None:
+        super().__init__(drawn, sections, seconds, "ours", wrong)
+        self.on_pads: list[tuple[str, str]] | None = None
+        self.told: list[tuple[float, str, str, str, str]] = []
+        self._pads = PadRecord(self._field.world_sensors)
+        self._sightings = self._bus("preflight").subscribe([OBSERVATION])
+
+    def may_start(self) -> bool:
+        """Judge the pads once the team has stood for a while; then it may."""
+        if self.on_pads is not None:
+            return True
+        for received in self._sightings.drain():
+            if isinstance(received.message, RelativeObservation):
+                self._pads.see(received.message, self.now_ns)
+        if self.world.time_s >= STAND_S:
+            findings = pad_findings(self._field, self._pads.medians(self.now_ns))
+            self.on_pads = [
+                (str(one.level), f"{one.subject}: {one.found}") for one in findings if one.level is not Level.OK
+            ]
+        return False
+
+    def note(self, now_s: float, notice: Notice) -> None:
+        """Keep what is told, with its time."""
+        super().note(now_s, notice)
+        if self.on_pads is not None:
+            row = (str(notice.severity), notice.entity, notice.text, notice.remedy)
+            self.told.append((round(now_s - STAND_S, 2), *row))
+
+    def fly(self) -> dict[str, Any]:
+        """Fly to the end; returns seed, findings, notices, figures and the time spent."""
+        return {**super().fly(), "on_pads": self.on_pads, "told": self.told}

@@ -114,7 +114,7 @@ def demo_command(seed: int, duration_s: float | None, folder: Path) -> list[str]
     command = [sys.executable, "-m", "groundstation", "demo", "--headless", "--seed", str(seed)]
     if duration_s is not None:
         command += ["--duration", f"{duration_s:g}"]
-    return [*command, "--report", str(folder)]
+    return [*command, "--output", str(folder)]
 
 
 def fly_one(seed: int, duration_s: float | None, folder: Path) -> tuple[DemoOutcome, bool]:

@@ -29,7 +29,7 @@ _SHOWN_MISSING = 3
     epilog="\b\nExamples:\n"
     "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
     "  groundstation calibrate camera rtsp://192.168.1.60/front --board skein --square-mm 44 --name drone_1_front\n"
-    "  groundstation calibrate camera pictures/ --board 9x6 --preview judged/\n\n"
+    "  groundstation calibrate camera pictures/ --board 9x6 --judged\n\n"
     "Show the board in every part of the picture, near and far, tilted to all sides, and hold still for each view.\n\n"
     "Exit codes: 0 written, 2 wrong usage, 4 no pictures or no lens can be fitted."
 )
@@ -39,7 +39,7 @@ _SHOWN_MISSING = 3
 @click.option("--name", default="camera", show_default=True, help="Name of the camera; NAME.yaml is written.")
 @click.option("--views", type=click.IntRange(6, 200), default=20, show_default=True, help="Views to collect.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help=f"File to write.  [default: {_FOLDER}/NAME.yaml]")
-@click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write judged pictures here.")
+@click.option("--judged", is_flag=True, help="Write the judged pictures beside it, into the folder NAME-judged.")
 @click.option("--force", is_flag=True, help="Overwrite an existing calibration.")
 @click.option(
     "--recipe",
@@ -59,13 +59,14 @@ def camera(source: str, board: str, square_mm: float, recipe: str, **options: An
     if re.fullmatch(_NAME, options["name"]) is None:
         raise click.UsageError(f"--name {options['name']}: must be of small letters, digits and _, a letter first")
     output = _require_output(options["output"] or _FOLDER / f"{options['name']}.yaml", options["force"])
-    if options["preview"] is not None:
-        require_folder(options["preview"])
+    judged = output.with_name(f"{output.stem}-judged") if options["judged"] else None
+    if judged is not None:
+        require_folder(judged)
     try:
         pattern = pattern_of(board, square_mm, as_opencv=recipe == "opencv")
     except ValueError as error:
         raise click.UsageError(f"--board: {error}") from None
-    session = CalibrationSession(pattern, options["views"], options["preview"])
+    session = CalibrationSession(pattern, options["views"], judged)
     session.watch(source)
     fit = session.fit(as_opencv=recipe == "opencv")
     _write(output, source, session, fit)
@@ -84,8 +85,8 @@ def _require_output(path: Path, force: bool) -> Path:
 class CalibrationSession:
     """Looking at pictures of one source until they suffice; names to the operator what is still missing."""
 
-    def __init__(self, pattern: "Pattern", enough: int, preview: Path | None) -> None:
-        self._pattern, self._enough, self._preview = pattern, enough, preview
+    def __init__(self, pattern: "Pattern", enough: int, judged: Path | None) -> None:
+        self._pattern, self._enough, self._judged = pattern, enough, judged
         self._judge: Judge | None = None
         self._size = (0, 0)
         self._screen = ProgressLine()
@@ -129,18 +130,18 @@ class CalibrationSession:
             raise OperatorMistake(f"picture {shot.name} is {now}, those before were {before}: a lens has one size")
         flaw, corners = self._judge.look(shot.name, shot.grey)
         self._screen.show(shot.name, flaw, len(self._judge.views), self._enough, self.missing)
-        if self._preview is not None:
+        if self._judged is not None:
             self._save(shot, flaw, corners)
 
     def _save(self, shot: "SourcePicture", flaw: "Flaw | None", corners: Any) -> None:
         from drivers.camera.calibration import annotate
 
-        assert self._preview is not None
+        assert self._judged is not None
         drawn, colour = annotate.canvas(shot.grey), annotate.BAD if flaw else annotate.GOOD
         if corners is not None:
             annotate.dots(drawn, corners, colour)
         annotate.lines(drawn, [f"{shot.name}: {flaw or 'kept'}"], colour)
-        annotate.save(self._preview, shot.name, drawn)
+        annotate.save(self._judged, shot.name, drawn)
 
     def fit(self, as_opencv: bool) -> "LensFit":
         """Return the lens of the views; raises OperatorMistake when there are too few, with what to do."""

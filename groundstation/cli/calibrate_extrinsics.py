@@ -50,16 +50,18 @@ _ROLLED_DEG = 1.0
 )
 @click.option("--frames", type=click.IntRange(1, 1000), default=20, show_default=True, help="Pictures to average.")
 @click.option("--onboard", is_flag=True, help="A drone's camera on a bench instead of one fixed in the world.")
-@click.option("--preview", type=click.Path(path_type=Path, file_okay=False), help="Write the last picture, annotated.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Write the last picture here, annotated."
+)
 def extrinsics(source: str, calibration: Path, **options: Any) -> int:
     """Measure where the camera at SOURCE is and how it is turned; prints the lines for the field file."""
     from drivers.camera.calibration.extrinsics import Mark, place_camera
 
     layout = _layout_of(options)
     lens = lens_of(calibration)
-    if options["preview"] is not None:
-        require_folder(options["preview"])
-    gathering = _gather(source, lens, str(calibration), options["frames"], options["preview"])
+    if options["output"] is not None:
+        require_folder(options["output"])
+    gathering = _gather(source, lens, str(calibration), options["frames"], options["output"])
     steady = gathering.steady()
     named = {marker.code for marker in layout.markers}
     _require_sound(gathering, named)
@@ -96,7 +98,7 @@ def _layout_of(options: dict[str, Any]) -> "FloorMarkers":
     return layout.model_copy(update=changes)
 
 
-def _gather(source: str, lens: "CameraIntrinsics", calibration: str, frames: int, preview: Path | None) -> "Gathering":
+def _gather(source: str, lens: "CameraIntrinsics", calibration: str, frames: int, output: Path | None) -> "Gathering":
     from drivers.camera.calibration import annotate
     from drivers.camera.calibration.feed import shots
     from drivers.camera.calibration.static_markers import Gathering
@@ -106,13 +108,13 @@ def _gather(source: str, lens: "CameraIntrinsics", calibration: str, frames: int
         for shot in shots(source, (lens.width_px, lens.height_px)):
             require_size(shot, lens, calibration)
             seen = gathering.take(shot.grey)
-            if preview is not None:
+            if output is not None:
                 drawn = annotate.canvas(shot.grey)
                 for one in seen:
                     colour = annotate.BAD if one.code is None else annotate.GOOD
                     annotate.dots(drawn, one.corners, colour)
                     annotate.label(drawn, "?" if one.code is None else str(one.code), one.corners[0], colour)
-                annotate.save(preview, "extrinsics", drawn)
+                annotate.save(output, "extrinsics", drawn)
             if gathering.pictures >= frames:
                 break
     return gathering

@@ -8,12 +8,14 @@ import click
 
 
 @click.command(
-    epilog="\b\nExamples:\n  groundstation host\n  groundstation host --site lab --logs /var/log/skein\n\n"
+    epilog="\b\nExamples:\n  groundstation host\n  groundstation host --site lab --output /var/log/skein\n\n"
     "Ctrl-C lands the drones of this host. Exit codes: 130 interrupted, 2 not a member of one site."
 )
 @click.option("--site", help="The site to serve, where this host has joined several.")
 @click.option(
-    "--logs",
+    "-o",
+    "--output",
+    "logs",
     type=click.Path(file_okay=False, path_type=Path),
     default=Path("hosted"),
     show_default=True,

@@ -39,7 +39,8 @@ _SIMULATED: tuple[Option, ...] = (
     ),
     click.option("--seed", type=click.IntRange(0), help="Seed of all noise (default: the scenario's)."),
     click.option(
-        "--report",
+        "-o",
+        "--output",
         type=click.Path(file_okay=False, path_type=Path),
         help="Folder for the run's folder and a copy of the report (default: runs/, no copy).",
     ),
@@ -130,7 +131,7 @@ class Rehearsal:
     scenario: str
     duration: float | None
     seed: int | None
-    report: Path | None
+    output: Path | None
     headless: bool
     anyway: bool
     options: tuple[str, ...]
@@ -170,8 +171,8 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
             mode=mode, field=str(path), scenario=scenario, seed=seed, tracking_s=duration, real=parts.names
         )
         there = simulated(loaded, net, parts)
-        report = asked.report
-        return _run(path, there, plan, facts, headless=asked.headless, simulation=simulation, report=report)
+        output = asked.output
+        return _run(path, there, plan, facts, headless=asked.headless, simulation=simulation, output=output)
     finally:
         net.release()
 
@@ -184,7 +185,7 @@ def _run(
     *,
     headless: bool,
     simulation: "Simulation | None" = None,
-    report: Path | None = None,
+    output: Path | None = None,
 ) -> int:
     from groundstation.flight.composition import fly_endpoint, process_table
     from groundstation.flight.loop import Flight, require_outcome
@@ -195,8 +196,8 @@ def _run(
     from groundstation.supervisor.supervisor import Supervisor
     from groundstation.supervisor.terminal import Terminal
 
-    removed = [] if report else make_room(Path(field.recording.directory), field.recording.keep_gb)
-    run_dir = make_run_dir(report or Path(field.recording.directory), path.stem)
+    removed = [] if output else make_room(Path(field.recording.directory), field.recording.keep_gb)
+    run_dir = make_run_dir(output or Path(field.recording.directory), path.stem)
     (run_dir / "resolved.yaml").write_text(yaml_of(field))
     write_facts(run_dir, facts)
     log_to(run_dir)
@@ -216,7 +217,7 @@ def _run(
         outcome = Flight(supervisor, plan, terminal).run()
         terminal.flush()
         judged = field.recording.enabled and not plan.look_only
-        passed = _judge(run_dir, report) if judged else None
+        passed = _judge(run_dir, output) if judged else None
     finally:
         supervisor.close()  # the page has shown by then what the run came to
     require_outcome(outcome)

@@ -125,6 +125,11 @@ ELSEWHERE = {
 RENAMED = {
     "replay": {"--headless": "--until-end"},
     "view": {"--save": "--output"},
+    "sitl": {"--report": "--output"},
+    "demo": {"--report": "--output"},
+    "host": {"--logs": "--output"},
+    "calibrate camera": {"--preview": "--judged"},
+    "calibrate extrinsics": {"--preview": "--output"},
     "bench estimator": {"--duration": "--flight-ms"},
     "experiment faults": {"--seconds": "--duration"},
     "experiment scenarios": {"--seconds": "--duration"},

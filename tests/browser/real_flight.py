@@ -43,7 +43,7 @@ def kernels() -> None:
 @pytest.fixture
 def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    arguments = ["sitl", "lab", "--headless", "--duration", "120", "--report", str(tmp_path)]
+    arguments = ["sitl", "lab", "--headless", "--duration", "120", "--output", str(tmp_path)]
     arguments += ["--set", f"console.listen={NETWORK}", "--scenario", str(FEW_PICTURES)]
     process = subprocess.Popen([sys.executable, "-m", "groundstation", *arguments], stdout=subprocess.DEVNULL)
     try:

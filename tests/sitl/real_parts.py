@@ -50,7 +50,7 @@ class Run:
     def __init__(self, path: Path, *arguments: str) -> None:
         self.folder = path.parent
         pipe = subprocess.PIPE
-        options = ("--headless", "--seed", "1", "--report", str(self.folder), *FEW)
+        options = ("--headless", "--seed", "1", "--output", str(self.folder), *FEW)
         command = [*GROUND, "sitl", str(path), *options, *arguments]
         self.process = subprocess.Popen(
             command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True, cwd=self.folder

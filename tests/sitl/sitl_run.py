@@ -31,7 +31,7 @@ class SitlRun:
     ) -> None:
         self.folder = folder
         self.output = folder / "output.txt"
-        report = () if "--report" in arguments else ("--report", str(folder))
+        report = () if "--output" in arguments else ("--output", str(folder))
         scenario = () if "--scenario" in arguments else ("--scenario", str(FEW_PICTURES))
         screen = ("--headless",) if terminal is None else ()
         command = [*program, *arguments, *screen, *report, *scenario]

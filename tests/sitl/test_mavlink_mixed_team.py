@@ -22,7 +22,7 @@ def flown(folder):
     scenario = folder / "four_pictures.yaml"
     scenario.write_text("schema_version: 1\ncameras: {fps: 4}\n")
     few = ["--scenario", str(scenario), "--set", "recording.image_fps=1", "--set", "planner.rate_hz=5"]
-    options = ["--headless", "--seed", "1", *few, "--report", str(folder)]
+    options = ["--headless", "--seed", "1", *few, "--output", str(folder)]
     result = subprocess.run(
         [*command, *options],
         capture_output=True,

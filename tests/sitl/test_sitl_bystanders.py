@@ -76,7 +76,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_full_disk_stops_the_recording_but_neither_flight_nor_restarts(sitl: Start, small_disk: Path) -> None:
-    run = sitl("--report", str(small_disk))
+    run = sitl("--output", str(small_disk))
     run.until_tracking()
     with suppress(OSError), (small_disk / "filler").open("wb", buffering=0) as filler:
         while True:

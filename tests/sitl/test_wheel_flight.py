@@ -67,7 +67,7 @@ def test_the_shipped_fields_are_there(installed: Environment, field: str) -> Non
 def test_the_demo_flies(installed: Environment) -> None:
     installed.run("python", "-m", "groundstation.runtime.compile_kernels")
     # Fails the criterion that both topologies occur: so short a flight needs one.
-    arguments = ("--headless", "--duration", "10", "--report", "judged")
+    arguments = ("--headless", "--duration", "10", "--output", "judged")
     installed.run("groundstation", "demo", *arguments, accepted=(0, 1))
     judged = json.loads((installed.home / "judged" / "report.json").read_text(encoding="utf-8"))
     assert judged["landed"]

@@ -78,7 +78,7 @@ def test_a_demo_that_never_ends_is_asked_to_land(monkeypatch: pytest.MonkeyPatch
 
 def test_the_command_passes_seed_duration_and_folder(tmp_path: Path) -> None:
     command = bench_demo.demo_command(4, 30.0, tmp_path)
-    assert command[3:] == ["demo", "--headless", "--seed", "4", "--duration", "30", "--report", str(tmp_path)]
+    assert command[3:] == ["demo", "--headless", "--seed", "4", "--duration", "30", "--output", str(tmp_path)]
 
 
 def test_bench_help_lists_benches(capsys: pytest.CaptureFixture[str]) -> None:

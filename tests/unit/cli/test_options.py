@@ -21,7 +21,6 @@ MEANINGS = {
     "--json": r"^Print .*JSON|^Print report\.json",
     "--output": r"^Write|Where to|[Ff]older|[Ff]ile|PDF",
     "--port": r"Port .*serve",
-    "--preview": r"Write .*picture",
     "--robots": r"Team size",
     "--rounds": r"Number of rounds",
     "--run": r"run",

@@ -114,13 +114,13 @@ def test_our_own_recipe_fits_the_photographs_better_than_the_published_lens(cali
 
 
 def test_a_known_lens_is_found_again_within_its_own_deviation(tmp_path, calibrated, board_pictures):
-    code, said, file = calibrated(folder_of(tmp_path / "in", board_pictures), "--preview", str(tmp_path / "seen"))
+    code, said, file = calibrated(folder_of(tmp_path / "in", board_pictures), "--judged")
     assert code == 0, said
     for name in ("fx_px", "fy_px", "cx_px", "cy_px"):
         assert abs(file[name] - getattr(LENS, name)) < 0.5 + 4.0 * file["std"][name], name
     assert file["residual_px"] < 0.2 and file["views"] == len(POSES)
     assert intrinsics_of(load_calibration(tmp_path / "out" / "lens.yaml")).width_px == 480
-    assert len(list((tmp_path / "seen").iterdir())) == len(POSES)
+    assert len(list((tmp_path / "out" / "lens-judged").iterdir())) == len(POSES)
 
 
 def test_a_view_that_fits_no_lens_is_dropped_by_name(tmp_path, calibrated, board_pictures):

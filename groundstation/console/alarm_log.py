@@ -14,11 +14,13 @@ _BREAK_NS = 2_000_000_000
 
 @dataclass(slots=True)
 class _Episode:
-    """One alarm from its begin to its end, by the clock of `note`; text: as it was worded last."""
+    """One alarm from its begin to its end, by the clock of `note`; text: as it was worded last;
+    asks: whether it asked for an act at any time.
+    """
 
     about: str
     text: str
-    grave: bool
+    asks: bool
     began_ns: int
     ended_ns: int | None = None
 
@@ -41,15 +43,15 @@ class AlarmLog:
             alarm_now = standing.pop(episode.about, None) if episode.goes_on(now_ns) else None
             if alarm_now is not None:
                 episode.text, episode.ended_ns = alarm_now.text, None
-                episode.grave |= alarm_now.grave
+                episode.asks |= alarm_now.asks
             elif episode.ended_ns is None:
                 episode.ended_ns = now_ns
-        self._episodes.extendleft(_Episode(one.about, one.text, one.grave, now_ns) for one in standing.values())
+        self._episodes.extendleft(_Episode(one.about, one.text, one.asks, now_ns) for one in standing.values())
 
     def as_json(self) -> list[dict[str, Any]]:
         """Return the alarms that are over, the last one to begin first; times in milliseconds."""
         return [
-            {"text": one.text, "grave": one.grave, "began": one.began_ns / 1e6, "ended": one.ended_ns / 1e6}
+            {"text": one.text, "asks": one.asks, "began": one.began_ns / 1e6, "ended": one.ended_ns / 1e6}
             for one in self._episodes
             if one.ended_ns is not None
         ]

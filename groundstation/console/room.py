@@ -13,7 +13,6 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Volume, WorldCamera
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.rotations import base_from_tilted_optical, world_from_downward_optical
-from groundstation.vehicles import kind_named
 
 Json = dict[str, Any]
 
@@ -45,7 +44,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
         "site": site,
         "truth": truth,
         "room": {"size_m": [8.0, 6.0, 4.5], "fence": None},
-        "drones": [{"name": name, "battery_min": 0.15, "flight_time_s": None} for name in drones],
+        "drones": [{"name": name} for name in drones],
         "cameras": [],
         "volumes": [],
         "targets": [],
@@ -74,8 +73,6 @@ def _drone(name: str, drone: FieldDrone) -> Json:
     tilt, pan = np.radians(camera.tilt_down_deg), np.radians(camera.pan_left_deg)
     return {
         "name": name,
-        "battery_min": drone.limits.battery_min,
-        "flight_time_s": kind_named(drone.kind).flight_time_s,
         "max_speed_m_s": drone.limits.max_speed_m_s,
         "pad_m": drone.pad_m,
         "pad_yaw_rad": float(np.radians(drone.pad_yaw_deg)),

@@ -16,12 +16,14 @@ from groundstation.console.snapshot import Snapshot
 from groundstation.console.standing import StandingDrones
 from groundstation.field.room import WorldCamera
 from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.batteries import Battery, battery_of
+from groundstation.monitor.endurance import AIRBORNE
+from groundstation.monitor.safety import safety_of
 from groundstation.monitor.state import Cast, MonitorState, StampedMessage
 from groundstation.sensing.switches import Switch, switch_between
 
 _EVENTS = 40
 _ALTERNATIVES = 8
-_AIRBORNE = frozenset({m.FlightState.TAKING_OFF, m.FlightState.FLYING, m.FlightState.HOVERING, m.FlightState.LANDING})
 # Sections that change slowly are looked at every so many turns.
 _OFTEN, _SELDOM = 2, 5
 NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
@@ -95,7 +97,8 @@ class ConsoleState:
     def put_often(self, board: Snapshot) -> None:
         """Put what changes ten times a second."""
         known = self.monitor
-        board.put("vehicles", {name: _vehicle(seen) for name, seen in known.vehicles.items()})
+        vehicles = known.vehicles.items()
+        board.put("vehicles", {name: _vehicle(seen) | _battery(battery_of(known, name)) for name, seen in vehicles})
         board.put("flight", self._flight())
         board.put("plan", _plan(known.plan))
         board.put("switch", _switch(self.switch))
@@ -105,7 +108,7 @@ class ConsoleState:
     def _flight(self) -> dict[str, Any]:
         """Return since when somebody is in the air, and whether anybody ever was."""
         seen = self.monitor.vehicles.values()
-        airborne = [status.stamp_ns for status in seen if status.message.flight_state in _AIRBORNE]
+        airborne = [status.stamp_ns for status in seen if status.message.flight_state in AIRBORNE]
         self._flown |= bool(airborne)
         self._airborne_since_ns = (self._airborne_since_ns or min(airborne)) if airborne else None
         since_ns = self._airborne_since_ns
@@ -139,7 +142,8 @@ class ConsoleState:
         board.put("search_maps", self._search_maps())
         alarms = alarms_of(known, now_ns)
         self.alarm_log.note(alarms, now_ns)
-        board.put("alarms", [asdict(alarm) for alarm in alarms])
+        board.put("alarms", [{**asdict(alarm), "asks": alarm.asks} for alarm in alarms])
+        board.put("safety", asdict(safety_of(known, alarms)))
         board.put("past_alarms", self.alarm_log.as_json())
         board.put("health", self.health.summary())
         if self.preflight is not None:
@@ -200,13 +204,25 @@ def _vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
         "at": _ms(seen),
         "mode": status.mode,
         "flight": status.flight_state,
-        "battery": status.battery,
         "link": status.link_quality,
         "rate_hz": round(status.rate_hz, 1),
         "detail": status.detail,
         "braked": status.braked,
         "lands_in_s": None if status.lands_in_s is None else round(status.lands_in_s, 1),
         "rejected": sum(status.rejected.values()),
+    }
+
+
+def _battery(battery: Battery) -> dict[str, Any]:
+    left = battery.endurance
+    minutes = None if left is None else round(left.minutes, 1)
+    words = "" if left is None else left.words
+    return {
+        "battery": battery.level,
+        "battery_min": battery.limit,
+        "charge": battery.charge,
+        "minutes": minutes,
+        "good_for": words,
     }
 
 

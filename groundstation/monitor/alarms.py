@@ -4,18 +4,30 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from groundstation.bus.messages import FlightState, Lifecycle, Severity, VehicleStatus
+from groundstation.monitor.batteries import Battery, Charge, battery_of
+from groundstation.monitor.endurance import AIRBORNE
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0
 ESTIMATE_SILENT_S = 0.3
 PROCESS_SILENT_S = 3.0
 CAMERA_SILENT_S = 2.0
-TARGET_LOST_S = 3.0
 WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
+_TO_DO = "To do: "
+_BEFORE_FLIGHT = {
+    Charge.LOW: "charge it before it flies again",
+    Charge.EMPTY: "charge it before it flies again",
+    Charge.UNKNOWN: "until it is known it may not take off",
+}
+_AFTER_LANDING = "Nothing to do now: see to its power and cable when all have landed."
+_RESTARTED = "Nothing to do: what hangs is started again."
 _DOWN = {
-    FlightState.EMERGENCY: "To do: keep away until its motors stand, then level it on its pad.",
-    FlightState.LOST: "To do: see to its battery and its link.",
+    FlightState.EMERGENCY: (
+        "EMERGENCY",
+        f"{_TO_DO}keep away until its motors stand, then level it on its pad.",
+    ),
+    FlightState.LOST: ("its driver hears nothing of it", f"{_TO_DO}see to its battery and its link."),
 }
 
 
@@ -24,7 +36,7 @@ class Alarm:
     """One line; `grave` ones are red, the others yellow.
 
     about: the same for as long as it is the same alarm, while figures in its text change.
-    advice: whether an operator must do something, which it says first, and what happens next.
+    advice: whether an operator must do something now, which it says first, and what happens next.
     """
 
     about: str
@@ -32,17 +44,23 @@ class Alarm:
     grave: bool = True
     advice: str = ""
 
+    @property
+    def asks(self) -> bool:
+        """Whether an operator must do something now."""
+        return self.advice.startswith(_TO_DO)
+
 
 def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
-    """Return all alarms, grave ones first."""
+    """Return all alarms: those that ask for an act first, then the grave ones."""
     alarms = [
         *_vehicles(state, now_ns),
         *_tracker(state, now_ns),
+        *_lost(state),
         *_cameras(state, now_ns),
         *_processes(state, now_ns),
         *_events(state, now_ns),
     ]
-    return sorted(dict.fromkeys(alarms), key=lambda alarm: not alarm.grave)
+    return sorted(dict.fromkeys(alarms), key=lambda alarm: (not alarm.asks, not alarm.grave))
 
 
 def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
@@ -52,10 +70,10 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
             yield Alarm(f"{name} silent", silence, advice="Nothing to do: it hovers, then lands. Stops are sent to it.")
         else:
             yield from _failsafe(name, seen.message)
-        if advice := _DOWN.get(seen.message.flight_state):
-            state_words = f"{name}: {seen.message.flight_state}"
-            yield Alarm(state_words, state_words, advice=advice)
-        yield from _battery(name, seen.message, state.cast.drones.get(name, 0.15))
+        if down := _DOWN.get(seen.message.flight_state):
+            words, advice = down
+            yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
+        yield from _battery(name, seen.message.flight_state, battery_of(state, name))
         yield from _link(name, seen.message.link_quality)
 
 
@@ -69,21 +87,24 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
 
 
-def _battery(name: str, status: VehicleStatus, limit: float) -> Iterator[Alarm]:
-    about = f"{name} battery"
-    if status.battery is None:
-        if status.flight_state is not FlightState.UNKNOWN:
-            yield Alarm(about, f"{name}: battery unknown", False, "To do: see why. Until then it may not take off.")
-    elif status.battery < limit + 0.05 and status.flight_state is FlightState.LANDING:
-        yield Alarm(about, f"{name}: battery {status.battery:.0%}, it lands", False, "Nothing to do.")
-    elif status.battery < limit + 0.05:
-        low = f"{name}: battery {status.battery:.0%} (lands at {limit:.0%})"
-        yield Alarm(about, low, status.battery < limit, "To do: LAND it where it suits you; it lands by itself then.")
+def _battery(name: str, flight: FlightState, battery: Battery) -> Iterator[Alarm]:
+    if battery.charge is Charge.GOOD or (battery.level is None and flight is FlightState.UNKNOWN):
+        return
+    about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"it lands by itself at {battery.limit:.0%}"
+    if flight is FlightState.LANDING:
+        yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
+    elif flight not in AIRBORNE:
+        yield Alarm(about, held, False, f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}.")
+    elif battery.charge is Charge.EMPTY:
+        below = battery.level is not None and battery.level < battery.limit
+        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it where it suits you; {lands}.")
+    else:
+        yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
 
 
 def _link(name: str, share: float | None) -> Iterator[Alarm]:
     if share is not None and share < WEAK_LINK:
-        advice = "To do: LAND it, or clear the way to it. Without a link it hovers, then lands by itself."
+        advice = f"{_TO_DO}LAND it, or clear the way to it. Without a link it lands by itself."
         yield Alarm(f"{name} link", f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 
@@ -94,29 +115,47 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     if age > ESTIMATE_SILENT_S:
         advice = "Nothing to do: drones hover, then land."
         yield Alarm("tracker silent", f"tracker: no estimate for {age:.1f} s", advice=advice)
-    for target in map(state.entity, state.cast.targets):
-        if target is not None and target.age_s > TARGET_LOST_S:
+
+
+def _lost(state: MonitorState) -> Iterator[Alarm]:
+    """Who should be seen and is not; of a drone that lands for it, that alarm tells."""
+    entities = state.estimate.message.entities if state.estimate else ()
+    for entity in (entity for entity in entities if entity.age_s > state.cast.lost_after_s):
+        seen = state.vehicles.get(entity.name)
+        if entity.name in state.cast.targets:
             advice = "Nothing to do: who is in TRACK looks for it."
-            yield Alarm(f"{target.name} lost", f"{target.name}: not seen for {target.age_s:.0f} s", False, advice)
+        elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
+            advice = "Nothing to do: it lands by itself if this lasts."
+        else:
+            continue
+        yield Alarm(f"{entity.name} lost", f"{entity.name} is lost: not seen for {entity.age_s:.0f} s", False, advice)
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.cameras.items():
         if not seen.message.connected or seen.age_s(now_ns) > CAMERA_SILENT_S:
             why = f" ({seen.message.detail})" if seen.message.detail else ""
-            yield Alarm(f"{name} pictures", f"{name}: no pictures{why}", False, "To do: see to its power and cable.")
+            yield Alarm(f"{name} pictures", f"{name}: no pictures{why}", False, _AFTER_LANDING)
 
 
 def _processes(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.processes.items():
         status = seen.message
         if seen.age_s(now_ns) > PROCESS_SILENT_S and status.state is not Lifecycle.STOPPING:
-            yield Alarm(f"process {name} silent", f"process {name}: silent for {seen.age_s(now_ns):.0f} s")
+            yield Alarm(
+                f"process {name} silent", f"process {name}: silent for {seen.age_s(now_ns):.0f} s", advice=_RESTARTED
+            )
         elif status.state is Lifecycle.DEGRADED:
-            yield Alarm(f"process {name} degraded", f"process {name}: {status.detail or 'degraded'}", False)
+            yield Alarm(
+                f"process {name} degraded",
+                f"process {name}: {status.detail or 'degraded'}",
+                False,
+                "Nothing to do now.",
+            )
 
 
 def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for seen in state.events:
         if seen.message.severity is Severity.ERROR and seen.age_s(now_ns) < _EVENT_SHOWN_S:
-            yield Alarm(seen.message.sentence, seen.message.sentence, advice=seen.message.remedy)
+            advice = f"{_TO_DO}{seen.message.remedy}" if seen.message.remedy else ""
+            yield Alarm(seen.message.sentence, seen.message.sentence, advice=advice)

@@ -10,6 +10,8 @@ import msgspec
 from groundstation.bus import messages as m
 from groundstation.bus.api import Received
 from groundstation.field.resolved import ResolvedField
+from groundstation.monitor.endurance import TakeOff, take_off_of
+from groundstation.vehicles import kind_named
 
 _EVENTS = 50
 _COMMANDS = 8
@@ -18,18 +20,27 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Cast:
-    """Who should be there: drones with their battery limit, targets, world-fixed cameras."""
+    """Who should be there: drones with their battery limit, targets, world-fixed cameras.
+
+    flight_times_s: what a full battery of a drone usually lasts, where its kind says so. lost_after_s: unseen for so
+    long, a robot or target is lost.
+    """
 
     site: str = ""
     drones: dict[str, float] = field(default_factory=dict)
     targets: tuple[str, ...] = ()
     cameras: tuple[str, ...] = ()
+    flight_times_s: dict[str, float] = field(default_factory=dict)
+    lost_after_s: float = 3.0
 
 
 def cast_from_field(resolved: ResolvedField) -> Cast:
     """Return the cast of a resolved field."""
     drones = {name: drone.limits.battery_min for name, drone in resolved.drones.items()}
-    return Cast(resolved.site, drones, tuple(resolved.tracked), tuple(resolved.cameras))
+    usual = {name: kind_named(drone.kind).flight_time_s for name, drone in resolved.drones.items()}
+    flight_times_s = {name: time_s for name, time_s in usual.items() if time_s is not None}
+    lost_after_s = resolved.estimator.lost_after_s
+    return Cast(resolved.site, drones, tuple(resolved.tracked), tuple(resolved.cameras), flight_times_s, lost_after_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +63,7 @@ class MonitorState:
     hint: str = ""
     started_ns: int = 0
     vehicles: dict[str, StampedMessage[m.VehicleStatus]] = field(default_factory=dict)
+    take_offs: dict[str, TakeOff | None] = field(default_factory=dict)
     cameras: dict[str, StampedMessage[m.CameraStatus]] = field(default_factory=dict)
     processes: dict[str, StampedMessage[m.ProcessStatus]] = field(default_factory=dict)
     sightings: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -94,6 +106,7 @@ class MonitorState:
         match message:
             case m.VehicleStatus():
                 self.vehicles[entity] = StampedMessage(stamp_ns, message)
+                self.take_offs[entity] = take_off_of(self.take_offs.get(entity), stamp_ns, message)
             case m.CameraStatus():
                 self.cameras[entity] = StampedMessage(stamp_ns, message)
             case m.ProcessStatus():

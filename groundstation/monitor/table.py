@@ -12,7 +12,8 @@ from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
 from groundstation.control.unseen_targets import TELL_AFTER_S, unseen_words
 from groundstation.geometry.ellipse import semi_axes_95
-from groundstation.monitor.alarms import TARGET_LOST_S, alarms_of
+from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.batteries import Charge, battery_of
 from groundstation.monitor.state import MonitorState, StampedMessage
 
 _SEEN_S = 0.6
@@ -139,7 +140,7 @@ def _unseen(state: MonitorState, now_ns: int) -> Iterator[Text]:
         if target is None or state.estimate is None or name in searched:
             continue
         age_s = target.age_s + state.estimate.age_s(now_ns)
-        if TELL_AFTER_S < age_s <= TARGET_LOST_S:
+        if TELL_AFTER_S < age_s <= state.cast.lost_after_s:
             yield Text(unseen_words(name, age_s, target.mean[:2]), style="yellow")
 
 
@@ -161,9 +162,7 @@ def _vehicle(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, T
 
 
 def _battery(state: MonitorState, name: str) -> str:
-    battery = state.vehicles[name].message.battery or 0.0
-    limit = state.cast.drones.get(name, 0.15)
-    return "bold red" if battery < limit + 0.05 else "yellow" if battery < limit + 0.15 else ""
+    return {Charge.EMPTY: "bold red", Charge.LOW: "yellow"}.get(battery_of(state, name).charge, "")
 
 
 def _belief(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Text, Text]:

@@ -38,7 +38,7 @@ class FakeFlight(threading.Thread):
         self.braked: set[str] = set()
         self.unseen_s: dict[str, float] = {}  # for how long nobody has seen it
         self.deaf: set[str] = set()
-        self.frozen = False
+        self.frozen = self.fenced = False
         self.findings: tuple[m.PreflightFinding, ...] = ()  # of the checks before a take-off
         self.distance_m = 1.3  # of the drones from the target
         self.lease = True
@@ -162,7 +162,7 @@ class FakeFlight(threading.Thread):
 
     def _say_plan(self, s: float) -> None:
         bus, up = self.bus("tracker"), self.flying()
-        bus.publish(t.PLAN, plan_at(s, bus.header("team"), up, self.cameras, self.sees))
+        bus.publish(t.PLAN, plan_at(s, bus.header("team"), up, self.cameras, self.sees, self.fenced))
 
     def _say_innovations(self, s: float, tick: int) -> None:
         bus = self.bus("tracker")

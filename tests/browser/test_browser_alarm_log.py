@@ -32,11 +32,12 @@ def test_past_alarms_are_read_behind_the_strip_by_keyboard(stage: Any) -> None:
     assert weak_links(page.state()) == []  # it lasts
     stage.flight.link.clear()
     page.wait(weak_links)
-    page.wait(lambda s: button.inner_text() == f"Past alarms {len(s['sections']['past_alarms'])}")
+    # At least: the page adds what only it noticed.
+    page.wait(lambda s: int(button.inner_text().split()[-1]) >= len(s["sections"]["past_alarms"]) > 0)
     button.focus()
     page.page.keyboard.press("Enter")
     clock = r"\d\d:\d\d:\d\d"
-    assert re.search(rf"{clock} – {clock}, \d+ s\s+warning\s+drone_1: weak link, 8% arrives", log.inner_text())
+    assert re.search(rf"{clock} – {clock}, \d+ s\s+ACT\s+drone_1: weak link, 8% arrives", log.inner_text())
     assert in_focus(page) == "alarm-log" and button.get_attribute("aria-expanded") == "true"
     assert "Alarms that are over" in log.get_attribute("aria-label")
     assert moved(page, before) == {} and clipped(page.page) == []

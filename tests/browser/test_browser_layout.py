@@ -51,7 +51,7 @@ def test_nothing_moves_while_alarms_and_orders_come(stage: Any, size: tuple[int,
     stage.flight.frozen = True
     page.there("hold").click()
     page.there("drone_2-land").click()
-    page.there("banner-tracker").wait_for(timeout=20_000)
+    page.there("banner-tracker").wait_for(state="attached", timeout=20_000)
     page.wait(lambda s: len(s["orders"]) == 2)
     page.page.wait_for_timeout(700)
     assert moved(page, before) == {}
@@ -83,7 +83,7 @@ def test_no_text_is_cut_off_from_the_flight_to_the_end_of_the_run(stage: Any, si
     assert whole(page) == []
     stage.flight.battery = {"drone_1": 0.9, "drone_2": None}
     page.wait(lambda s: page.there("worst-battery").inner_text().split() == ["unknown", "drone_2"])
-    assert page.there("battery-lasts").inner_text() == "others ≥ 90 %"
+    assert page.there("battery-lasts").inner_text() == "worst battery"
     assert whole(page) == []
     page.shot(f"layout_{size[0]}")
     stage.flight.event(Severity.WARNING, "run ended: not every drone reported a landing", RUN)
@@ -130,16 +130,16 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page = stage.open()
     stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
-    assert page.there("battery-lasts").inner_text() == "lands in ~5 min"
+    assert page.there("battery-lasts").inner_text() == "worst battery, good for ~5 min"
     page.page.wait_for_timeout(31_000)
     stage.flight.battery["drone_2"] = 0.5
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "lands in 1 min")
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery, good for 1 min")
     stage.flight.battery["drone_1"] = 0.52  # it spends more: 37 points are left of 75
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "another: < 1 min")
-    assert page.there("worst-battery").inner_text() == "50 % drone_2"
+    page.wait(lambda s: page.there("worst-battery").inner_text() == "52 % drone_1")
+    assert page.there("battery-lasts").inner_text() == "worst battery, good for < 1 min"
     stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: "flies ~4 min" in page.there("card-drone_2").inner_text())
-    assert "lands in < 1 min" in page.there("card-drone_1").inner_text()
+    page.wait(lambda s: "good for ~4 min" in page.there("card-drone_2").inner_text())
+    assert "good for < 1 min" in page.there("card-drone_1").inner_text()
 
 
 def test_the_bar_says_what_the_team_does(stage: Any) -> None:
@@ -149,8 +149,8 @@ def test_the_bar_says_what_the_team_does(stage: Any) -> None:
     page.wait(lambda s: page.there("recording").inner_text() == "on")
     assert page.there("air-time").inner_text().startswith("0:")
     stage.flight.modes["drone_1"] = "LANDING"
-    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
-    assert page.there("team-who").inner_text() == "drone_1"
+    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING + TRACK")
+    assert page.there("team-who").inner_text() == "drone_1 + drone_2"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("team-mode").inner_text() == "ON GROUND")
     stage.flight.battery["drone_1"] = None
@@ -162,16 +162,19 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     verdict = page.there("verdict")
     stage.flight.battery["drone_2"] = 0.6
     page.wait(lambda s: verdict.inner_text() == "drone_1 and drone_2 track the target. Nobody is lost.")
-    assert page.there("banner-none").inner_text() == "✓ No alarms"
+    page.wait(lambda s: page.there("safety").inner_text() == "SAFE")
+    lasting = "No alarms. All who fly are heard and seen; batteries are good for ~5 min or more."
+    assert page.there("banner-none").inner_text() == lasting
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "TRACK"}
     said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets them go on."
     page.wait(lambda s: verdict.inner_text() == said)
     stage.flight.battery["drone_2"] = 0.28
-    low = "CAUTION: The battery of drone_2 is low: 28 %, lands in ~1 min"
-    page.wait(lambda s: page.there("banner-concern").inner_text() == low)
+    low = "drone_2: battery 28%, good for ~1 min\nNothing to do yet: it lands by itself at 15%."
+    page.wait(lambda s: page.there("banner-alarm").inner_text() == low)
+    assert page.there("safety").inner_text() == "WATCH"
     stage.flight.battery["drone_2"] = 0.6
-    stage.flight.unseen_s[TARGET] = 2.0
-    page.wait(lambda s: "Not seen: turtlebot for 2 s." in verdict.inner_text())
+    stage.flight.unseen_s[TARGET] = 4.0
+    page.wait(lambda s: "Lost: turtlebot, not seen for 4 s." in verdict.inner_text())
     page.shot("verdict")
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: verdict.inner_text() == "Nobody flies. TAKE OFF flies again.")
@@ -180,56 +183,68 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
 def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
-    page.wait(lambda s: duty.inner_text().startswith("Watches turtlebot"))
-    assert "drone_1 is located by ceiling" in duty.inner_text()
-    assert "limited by the fence" in page.there("drone_2-duty").inner_text()
+    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered by operator: watches turtlebot"))
+    assert "Seen by ceiling." in duty.inner_text()
+    stage.flight.fenced = True
+    page.wait(lambda s: "Slowed by the fence." in page.there("drone_2-duty").inner_text())
     stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"
     stage.flight.lands_in_s["drone_1"] = 1.8
     stage.flight.braked.add("drone_1")
     page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle.")
-    page.wait(lambda s: "drone_1 lands in 2 s: hovers: no telemetry" in page.there("banner-alarm").inner_text())
+    page.wait(lambda s: "drone_1 lands in 2 s: hovers: no telemetry" in page.there("banner-alarm").first.inner_text())
     assert page.there("drone_1-mode").inner_text() == "lands in 2 s"
-    assert page.there("hold").inner_text() == "HOLD 1\ndrone_1 lands anyway"
+    assert page.there("hold").inner_text() == "HOLD 1\ndrone_2 hovers;\ndrone_1 lands anyway"
     stage.flight.detail.clear()
     stage.flight.lands_in_s.clear()
     stage.flight.braked.clear()
     stage.flight.modes["drone_1"] = "HOLD"
-    page.wait(lambda s: duty.inner_text() == "Held by operator.")
+    page.wait(lambda s: duty.inner_text() == "Hovers in place: HOLD ordered by operator.")
     assert page.there("hold").inner_text().startswith("HOLD 2")
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nnobody flies")
     assert page.there("take-off").inner_text().startswith("TAKE OFF 2")
 
 
-# What stands in the place of alarms, below it, on HOLD, and on the cards of both drones.
+# Whether it is safe, why, who does what, what HOLD would do, and the modes on the cards of both drones.
 TOLD = {
-    "all_is_well": ("No alarms", "track the target. Nobody is lost.", "hover in place", "track", "track"),
-    "one_lands_for_its_battery": ("battery 13%", "drone_2 lands.", "drone_2 lands anyway", "track", "landing"),
-    "all_are_held": ("No alarms", "RESUME lets them go on.", "hold already", "hold", "hold"),
-    "one_is_unseen_and_will_land": (
-        "lands in 6 s",
-        "Not seen: drone_1",
-        "drone_1 lands anyway",
-        "lands in 6 s",
-        "track",
+    "all_is_well": ("SAFE", "No alarms", "track the target. Nobody is lost.", "hover in place", "track", "track"),
+    "one_lands_for_its_battery": (
+        *("WATCH", "battery 13%, it lands", "drone_1 tracks the target; drone_2 lands."),
+        *("drone_1 hovers;\ndrone_2 lands anyway", "track", "landing"),
     ),
-    "the_tracker_is_silent": ("TRACKER SILENT", "Who is lost is not", "lands anyway", "lands in 1 s", "lands in 1 s"),
-    "one_has_a_stuck_sensor": ("stuck at 0.27 m/s", "drone_2 hovers. Nobody", "hover in place", "track", "hover"),
-    "all_land": ("No alarms", "drone_1 and drone_2 land.", "lands anyway", "landing", "landing"),
-    "one_has_a_weak_link": ("weak link, 31%", "Nobody is lost.", "hover in place", "track", "track"),
-    "one_stands_with_an_unknown_battery": ("battery 19%", "drone_2 stands.", "hover in place", "track", "landed"),
-    "the_target_is_lost": ("turtlebot: not seen for 7 s", "look for the target", "hover in place", "search", "search"),
+    "all_are_held": ("SAFE", "No alarms", "RESUME lets them go on.", "hovering already", "hold", "hold"),
+    "one_is_unseen_and_will_land": (
+        *("WATCH", "drone_1 lands in 6 s", "Lost: drone_1, not seen for 4 s"),
+        *("drone_2 hovers;\ndrone_1 lands anyway", "lands in 6 s", "track"),
+    ),
+    "the_tracker_is_silent": (
+        *("WATCH", "TRACKER SILENT", "land by themselves in 1 s. Nobody knows who is lost."),
+        *("all land anyway", "lands in 1 s", "lands in 1 s"),
+    ),
+    "one_has_a_stuck_sensor": (
+        *("WATCH", "stuck at 0.27 m/s", "drone_2 hovers. Nobody", "hover in place", "track", "hover"),
+    ),
+    "all_land": ("SAFE", "No alarms", "drone_1 and drone_2 land.", "all land anyway", "landing", "landing"),
+    "one_has_a_weak_link": ("ACT", "weak link, 31%", "Nobody is lost.", "hover in place", "track", "track"),
+    "one_stands_with_an_unknown_battery": (
+        *("ACT", "battery 19%, good for < 1 min", "drone_2 stands."),
+        *("drone_1 hovers;\ndrone_2 stands", "track", "landed"),
+    ),
+    "the_target_is_lost": (
+        *("WATCH", "turtlebot is lost: not seen for 7 s", "look for the target. Lost: turtlebot, not seen for 7 s"),
+        *("hover in place", "search", "search"),
+    ),
 }
 
 
 def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()
-    places = [page.there(name) for name in ("banners", "verdict", "hold", "drone_1-mode", "drone_2-mode")]
+    places = [page.there(name) for name in ("safety", "banners", "verdict", "hold", "drone_1-mode", "drone_2-mode")]
 
     def told(name: str) -> bool:
         return all(words in place.inner_text() for words, place in zip(TOLD[name], places, strict=True))
 
-    SITUATIONS["all_is_well"](stage.flight)
     page.wait(lambda s: told("all_is_well"))
     stands = {}
     for size in SIZES:
@@ -253,7 +268,7 @@ def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     page = stage.open()
     page.wait(lambda s: page.there("take-off").get_attribute("title") == "nobody on the floor")
     assert page.there("take-off").is_disabled() and page.there("drone_1-takeoff").is_disabled()
-    assert page.there("track").get_attribute("title") == "under way"
+    assert page.there("track").get_attribute("title") == "tracking already"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}
     page.wait(lambda s: page.there("drone_1-takeoff").is_enabled())
     assert page.there("resume").is_enabled() and page.there("drone_2-takeoff").is_disabled()

@@ -43,7 +43,8 @@ def test_the_stage_is_named_at_every_size(floor: Stage, size: tuple[int, int]) -
         ("HOVER", "LANDED", "take-off"),
         ("HOVER", "HOVER", "form"),
         ("TRACK", "TRACK", "track"),
-        ("LANDING", "TRACK", "land"),
+        ("LANDING", "TRACK", "track"),
+        ("LANDING", "LANDED", "land"),
     ):
         floor.flight.modes = {"drone_1": one, "drone_2": two}
         eventually(lambda stage=stage: now(page) == stage, what=stage)

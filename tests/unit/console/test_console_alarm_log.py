@@ -13,19 +13,19 @@ def test_an_alarm_is_logged_when_it_ends_with_its_last_words_and_its_times() -> 
         assert log.as_json() == []
     log.note([], 4 * S)
     (past,) = log.as_json()
-    assert past == {"text": "drone_1: nothing heard for 3 s", "grave": True, "began": 1000.0, "ended": 4000.0}
+    assert past == {"text": "drone_1: nothing heard for 3 s", "asks": False, "began": 1000.0, "ended": 4000.0}
     log.note([], 20 * S)
     assert log.as_json() == [past]
 
 
-def test_what_wavers_is_one_alarm_and_as_grave_as_it_ever_was() -> None:
+def test_what_wavers_is_one_alarm_and_asked_for_what_it_ever_did() -> None:
     log = AlarmLog()
-    log.note([Alarm("drone_1 link", "drone_1: weak link, 29%")], 1 * S)
+    log.note([Alarm("drone_1 link", "drone_1: weak link, 29%", advice="To do: LAND it.")], 1 * S)
     log.note([], 2 * S)
     log.note([Alarm("drone_1 link", "drone_1: weak link, 59%", grave=False)], 3 * S)
     assert log.as_json() == []
     log.note([], 4 * S)
-    assert [(past["began"], past["ended"], past["grave"]) for past in log.as_json()] == [(1000.0, 4000.0, True)]
+    assert [(past["began"], past["ended"], past["asks"]) for past in log.as_json()] == [(1000.0, 4000.0, True)]
 
 
 def test_what_comes_back_later_is_another_alarm_and_the_last_one_stands_first() -> None:

@@ -133,12 +133,13 @@ def test_sections_say_what_came() -> None:
     assert said["plan"]["cost_cm2"] == 100.0 and said["plan"]["controls"][0]["wanted"] == [0.5, 0, 0]
     assert said["setpoints"]["drone_1"]["at"] == 1000.0
     assert said["truth"]["turtlebot"]["yaw"] == 1.0
-    assert said["vehicles"]["drone_1"]["battery"] == 0.5
+    assert (said["vehicles"]["drone_1"]["battery"], said["vehicles"]["drone_1"]["charge"]) == (0.5, "good")
     assert said["events"][0]["remedy"] == "duck"
     assert said["processes"]["tracker"]["late"] == 0.02
     assert said["cameras"]["ceiling"]["fps"] == 15
     assert said["sample"]["error_m"] == pytest.approx(0.1)
-    assert any("bang" in alarm["text"] and alarm["grave"] for alarm in said["alarms"])
+    assert any("bang" in alarm["text"] and alarm["grave"] and alarm["asks"] for alarm in said["alarms"])
+    assert said["safety"] == {"level": "ACT", "reason": "drone_1: bang. To do: duck"}
 
 
 def plan(at_s: float, topology: str, cost: float, stay: dict[str, float]) -> Received:

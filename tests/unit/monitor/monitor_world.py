@@ -14,7 +14,9 @@ from groundstation.monitor.table import render
 
 S = 1_000_000_000
 NOW = 100 * S
-CAST = Cast("lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",))
+CAST = Cast(
+    "lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",), {"drone_1": 720.0, "drone_2": 720.0}
+)
 
 
 class World:
@@ -47,11 +49,13 @@ class World:
             m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7, **more),
         )
 
-    def estimate(self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch) -> None:
+    def estimate(
+        self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch, drone_age_s: float = 0.2
+    ) -> None:
         wide = (0.04, 0.0, 0.0, 0.01)
         robot = tuple(0.01 if index % 5 == 0 else 0.0 for index in range(16))
         entities = (
-            m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, 0.2),
+            m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, drone_age_s),
             m.EntityEstimate("turtlebot", "target", (0.75, 0.25), wide, (0.0, 0.0), True, target_age_s),
         )
         header = self.header("team", age_s)

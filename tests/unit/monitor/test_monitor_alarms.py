@@ -36,18 +36,18 @@ def test_an_alarm_keeps_what_it_is_about_while_its_figures_change(world: World) 
         assert {alarm.about for alarm in alarms_of(world.state, NOW)} == {"drone_1 silent", "turtlebot lost"}
 
 
-def test_silence_and_low_battery_raise_alarms_grave_ones_first(world: World) -> None:
+def test_what_asks_for_an_act_stands_first_then_what_is_grave(world: World) -> None:
     world.vehicle("drone_1", battery=0.18)
     world.vehicle("drone_2", age_s=4.0)
     world.estimate(target_age_s=6.0, age_s=0.5)
     world.status("recorder", m.Lifecycle.DEGRADED, detail="disk full")
     world.status("ceiling", age_s=5.0)
     assert _alarms(world) == [
+        "drone_1: battery 18%, good for < 1 min",
         "drone_2: nothing heard for 4 s",
         "tracker: no estimate for 0.5 s",
         "process ceiling: silent for 5 s",
-        "drone_1: battery 18% (lands at 15%)",
-        "turtlebot: not seen for 6 s",
+        "turtlebot is lost: not seen for 6 s",
         "process recorder: disk full",
     ]
     assert "nothing heard for 4 s" in world.text()
@@ -83,6 +83,33 @@ def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(world: Wo
     assert alarm.text == "drone_1: battery 13%, it lands" and not alarm.grave
 
 
+@pytest.mark.parametrize(
+    ("level", "text", "asks"),
+    [(0.29, "good for ~1 min", False), (0.21, "good for < 1 min", True), (0.14, "good for < 1 min", True)],
+)
+def test_a_battery_asks_for_a_landing_in_the_last_minute(world: World, level: float, text: str, asks: bool) -> None:
+    world.vehicle("drone_1", battery=level)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert alarm.text == f"drone_1: battery {level:.0%}, {text}"
+    assert (alarm.asks, alarm.grave) == (asks, level < 0.15)
+
+
+def test_a_drone_that_stands_with_a_low_battery_asks_for_nothing_now(world: World) -> None:
+    world.vehicle("drone_1", "LANDED", battery=0.1, flight_state=m.FlightState.LANDED)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.text, alarm.asks) == ("drone_1: battery 10%", False)
+
+
+def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: World) -> None:
+    world.vehicle("drone_1")
+    world.estimate(drone_age_s=4.0)
+    assert _alarms(world) == ["drone_1 is lost: not seen for 4 s"]
+    world.vehicle("drone_1", detail="no camera has seen it for too long", lands_in_s=6.0)
+    assert _alarms(world) == ["drone_1 lands in 6 s: no camera has seen it for too long"]
+
+
 def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
     header = world.header("ceiling")
     status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
@@ -96,5 +123,5 @@ def test_each_alarm_says_first_whether_there_is_anything_to_do(world: World) -> 
     world.estimate(6.0, 0.5)
     world.text()
     alarms = alarms_of(world.state, NOW)
-    assert len(alarms) == 7
+    assert len(alarms) == 7 and {alarm.asks for alarm in alarms} == {True, False}
     assert all(alarm.advice.startswith(("Nothing to do", "To do")) for alarm in alarms), alarms

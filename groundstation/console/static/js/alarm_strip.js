@@ -5,6 +5,8 @@ import { byId, el, text } from "./dom.js";
 import { momentWords } from "./playback.js";
 import { store } from "./store.js";
 
+// What is to be done about an alarm: the word that leads it, and how it is counted.
+const RANKS = { ACT: "to act on", WATCH: "to watch", notice: "more" };
 let shown = "";
 
 export function startStrip() {
@@ -48,8 +50,8 @@ export function showMore(ranks, whole) {
 }
 
 function counted(ranks) {
-  const counts = ["warning", "caution", "notice"].map((rank) => [rank, ranks.filter((one) => one === rank).length]);
-  return counts.filter(([, count]) => count).map(([rank, count]) => `${count} ${rank}${count > 1 ? "s" : ""}`);
+  const counts = Object.keys(RANKS).map((rank) => [rank, ranks.filter((one) => one === rank).length]);
+  return counts.filter(([, count]) => count).map(([rank, count]) => `${count} ${RANKS[rank]}`);
 }
 
 export function showLog() {
@@ -60,8 +62,8 @@ export function showLog() {
   host.querySelector("ol").replaceChildren(...past.map(pastAlarm));
 }
 
-function pastAlarm({ text: words, grave, began, ended }) {
-  const lasted = ((ended - began) / 1000).toFixed(0), rank = grave ? "warning" : "caution";
+function pastAlarm({ text: words, asks, began, ended }) {
+  const lasted = ((ended - began) / 1000).toFixed(0), rank = asks ? "ACT" : "WATCH";
   return el("li", { data: { rank } }, el("span", { class: "num" }, `${momentWords(began)} – ${momentWords(ended)}, ${lasted} s`),
     el("span", { class: "mark" }, rank), el("span", {}, words));
 }

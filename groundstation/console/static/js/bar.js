@@ -1,9 +1,9 @@
 // The bar on top: the team at a glance, how far the run is, and what it would accept.
 
-import { teamLastsWords, worstBattery } from "./batteries.js";
+import { worstBattery } from "./batteries.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { oldestS, recording, STAGES, stage, stageWord, teamMode } from "./glance.js";
-import { ageS, droneNames, replaying, store } from "./store.js";
+import { ageS, replaying, store } from "./store.js";
 import { verdict } from "./verdict.js";
 
 const WALL_KEY = "skein-wall", OLD_S = 1, TOO_OLD_S = 4;
@@ -22,19 +22,13 @@ export function showBar() {
   const since = store.s.flight?.airborne_since_ms, airborne = since ? ageS(since) : null;
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();
-  show("worst-battery", !battery ? "–" : battery.value === null ? `unknown ${battery.name}` : `${(100 * battery.value).toFixed(0)} % ${battery.name}`, battery?.level);
-  text(byId("battery-lasts"), batteryLabel(battery));
+  show("worst-battery", battery ? `${battery.words} ${battery.name}` : "–", battery?.level);
+  text(byId("battery-lasts"), battery?.lasts ? `worst battery, ${battery.lasts}` : "worst battery");
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
   text(byId("verdict"), replaying() ? store.scene.replay.note : verdict());
   showStages();
-}
-
-// What stands under the worst battery: when it lands its drone, or the least of those that are known.
-function batteryLabel(battery) {
-  if (battery?.value === null && battery.least) return `others ≥ ${(100 * battery.least[1]).toFixed(0)} %`;
-  return (battery && teamLastsWords(battery.name)) || "worst battery";
 }
 
 // A stage that is done, the one now, and those to come; where there is no room, only the one now has its name.

@@ -1,6 +1,7 @@
 // What a drone does now and why, in a sentence or two, and what limits it.
 
 import { joined } from "./dom.js";
+import { isLost } from "./glance.js";
 import { ageS, store } from "./store.js";
 
 const FRESH_S = 1;
@@ -9,7 +10,7 @@ const RELIED_ON = 100;
 const LIMITS = {
   fence: "the fence",
   separation: "a drone nearby",
-  speed: "its top speed",
+  speed: "its speed limit",
   stale: "an old estimate",
   uncertain: "an uncertain place",
   unknown: "an unknown place",
@@ -27,19 +28,30 @@ function tracked(name, plan) {
   const relied = (plan.edges ?? []).filter(([, , information]) => information >= RELIED_ON);
   const watched = relied.filter(([observer]) => observer === name).map(([, subject]) => subject);
   const watchers = relied.filter(([, subject]) => subject === name).map(([observer]) => observer);
-  const sought = Object.keys(store.s.estimate?.searches ?? {});
+  const targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost);
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
-  const does = watched.length ? `watches ${joined(watched)}` : sought.length ? `looks for ${joined(sought)}` : "moves to where it will see more";
-  const known = watchers.length ? `${name} is located by ${joined(watchers)}` : `nobody sees ${name} now`;
-  return sentence([does, known, limits && `limited by ${limits}`].filter(Boolean).join("; "));
+  const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
+  const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${who}` : ""}`;
+  const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
+  const known = watchers.length ? `Seen by ${joined(watchers)}` : `Nobody sees ${name} now`;
+  return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
 }
+
+const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
+const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:" };
 
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
 function reasonOf({ mode, detail }) {
-  if (mode === "LANDED" || mode === "CUT") return `stands with its motors off: ${detail}`;
-  const [, doing, who] = detail.match(/^(landing|taking off) for (.+)$/) ?? [];
-  if (who) return `${doing === "landing" ? "lands" : "takes off"}: ordered by ${who}`;
+  if (mode === "LANDED" || mode === "CUT") return standing(detail);
+  const [, doing, who] = detail.match(ORDERS) ?? [];
+  if (who) return `${ORDERED[doing]} ordered by ${who}`;
   return mode === "LANDING" && detail && !detail.startsWith("land") ? `lands: ${detail}` : detail;
+}
+
+// Why it landed stands in brackets in its driver's words.
+function standing(detail) {
+  const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, , who] = why?.match(ORDERS) ?? [];
+  return why ? `stands, motors off. It landed: ${who ? `ordered by ${who}` : why}` : `stands with its motors off: ${detail}`;
 }
 
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.

@@ -1,7 +1,6 @@
 // What a start or a stop would do now.
 
-import { leastBattery } from "./batteries.js";
-import { ALOFT, aloft, modeNow, modes } from "./glance.js";
+import { ALOFT, aloft, lostTarget, modeNow, modes } from "./glance.js";
 import { ageS, droneNames, runOver, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
@@ -14,13 +13,13 @@ export function refusalOf(verb, names = droneNames()) {
   const resumes = needResume(names);
   if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
   if (resumes) return "press RESUME";
-  return all.includes("HOVER") ? "" : all.includes("TRACK") ? "under way" : "nobody hovers";
+  return all.includes("HOVER") ? "" : all.includes("TRACK") ? (lostTarget() ? "searching already" : "tracking already") : "nobody hovers";
 }
 
 function takeOffRefusal(standing) {
   if (!standing.length) return "nobody on the floor";
   if (standing.every(([, status]) => status.battery === null)) return "battery unknown";
-  return standing.every(([name, status]) => status.battery < leastBattery(name)) ? "battery too low" : "";
+  return standing.every(([, status]) => status.battery < status.battery_min) ? "battery too low" : "";
 }
 
 // After an order or a failsafe a drone hovers until RESUME; after its take-off until TRACK. RESUME lets both go on.
@@ -30,17 +29,24 @@ function needResume(names) {
 
 const SHORT = 8; // letters of a name that has room on a button
 
-// What a stop of these drones would do now, where that is not what it is for; "" where it is.
+// Who does what, in the few words that a button has room for: "drone_1 hovers", "2 hover".
+function does(names, one, many) {
+  if (!names.length) return "";
+  return names.length > 1 ? `${names.length} ${many}` : `${names[0].length > SHORT ? "1" : names[0]} ${one}`;
+}
+
+// What a stop of these drones would do now, to whom, and to whom not; "" where it does to all what it is for.
 export function effectOf(verb, names = droneNames()) {
-  const up = names.filter((name) => ALOFT.has(modeNow(name)));
+  const up = names.filter((name) => ALOFT.has(modeNow(name))), down = names.filter((name) => modeNow(name) && !up.includes(name));
   if (!modes(names).length) return "";
   if (!up.length) return names.length > 1 ? "nobody flies" : "it stands";
-  if (verb === "LAND") return isIdle(verb, names) ? "landing already" : "";
-  if (verb === "CUT_MOTORS") return "";
-  const bound = up.filter((name) => !holding([name]).length);
-  if (bound.length === up.length) return "lands anyway";
-  if (bound.length) return bound.length > 1 ? `${bound.length} land anyway` : `${bound[0].length > SHORT ? "1" : bound[0]} lands anyway`;
-  return isIdle(verb, names) ? "hold already" : "";
+  if (verb === "CUT_MOTORS") return up.length > 1 ? "" : "press 1 s: it falls";
+  const idle = isIdle(verb, names), held = holding(names), bound = up.filter((name) => !held.includes(name));
+  if (verb === "LAND") return idle ? "landing already" : down.length ? does(up, "lands", "land where they are") : "";
+  if (bound.length === names.length) return "all land anyway";
+  if (held.length === names.length) return idle ? "hovering already" : "";
+  const already = idle ? " already" : "";
+  return [does(held, `hovers${already}`, `hover${already}`), does(bound, "lands anyway", "land anyway"), does(down, "stands", "stand")].filter(Boolean).join(";\n");
 }
 
 // Whether a stop would change nothing now.
@@ -60,5 +66,5 @@ const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
 export function unheardStop() {
   const order = runOver() ? null : (store.s.orders ?? []).find(({ verb }) => STOPS.has(verb));
   const silent = (order?.rows ?? []).filter(({ stage }) => !stage).map(({ name }) => name), age = ageS(order?.given_ms);
-  return silent.length && age > UNHEARD_S && age < FORGOTTEN_S ? { verb: order.verb.replace("_", " "), names: silent.join(", ") } : null;
+  return silent.length && age > UNHEARD_S && age < FORGOTTEN_S ? { id: order.id, verb: order.verb.replace("_", " "), names: silent.join(", ") } : null;
 }

@@ -1,6 +1,6 @@
 // What the bar says of the whole team, worked out of the newest of everything.
 
-import { ageS, droneNames, estimateAge, isTarget, entities, runOver, store, trackerSilent } from "./store.js";
+import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
@@ -15,25 +15,30 @@ export const modes = (names = droneNames()) => names.map(modeNow).filter(Boolean
 export const aloft = () => modes().filter((mode) => ALOFT.has(mode)).length;
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
-// The most careful thing that any drone does is what the team does: [words, level, who does it if not all do].
+// What they do who do not stand, the most careful first: [words, level, who does each if not all do the same].
 export function teamMode() {
   const all = statuses().map(modeOf), silent = droneNames().filter((name) => store.s.vehicles?.[name] && ageS(store.s.vehicles[name].at) > HEARD_S);
   if (runOver()) return ["RUN OVER", "calm"];
   if (silent.length) return ["NOT HEARD", "bad", some(silent)];
-  for (const [mode, level] of CAREFUL) if (all.includes(mode)) return [mode.replace("_", " "), level, some(doing(mode))];
-  if (all.includes("TRACK")) return tracking();
-  if (all.includes("HOVER")) return ["HOVER", "warn"];
-  return all.length ? ["ON GROUND", "calm"] : ["–", "calm"];
+  const done = CAREFUL.filter(([mode]) => all.includes(mode));
+  if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
+  const who = done.map(([mode]) => some(doing(mode))).filter(Boolean);
+  return [done.map(([mode]) => modeWord(mode)).join(" + "), levelOf(...done[0]), who.join(" + ")];
 }
 
-const CAREFUL = [["CUT", "bad"], ["LANDING", "warn"], ["TAKING_OFF", "warn"], ["HOLD", "warn"]];
+const CAREFUL = [["CUT", "bad"], ["LANDING", "warn"], ["TAKING_OFF", "warn"], ["HOLD", "warn"], ["HOVER", "warn"], ["TRACK", "good"]];
 
-function tracking() {
-  if (trackerSilent()) return ["NO TRACKER", "bad"];
-  return lostTarget() ? ["SEARCH", "warn"] : ["TRACK", "good", some(doing("TRACK"))];
+const levelOf = (mode, level) => (mode !== "TRACK" || modeWord(mode) === mode ? level : "warn");
+
+// What a mode is for now: who is to track a target that is lost searches for it.
+export function modeWord(mode) {
+  if (mode !== "TRACK") return mode.replace("_", " ");
+  return trackerSilent() ? "NO TRACKER" : lostTarget() ? "SEARCH" : mode;
 }
 
-export const lostTarget = () => targetAgeS() > (store.scene?.lost_after_s ?? 3);
+// Not seen for so long that it is searched for, or soon lands.
+export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + estimateAge() > (store.scene?.lost_after_s ?? 3);
+export const lostTarget = () => (store.scene?.targets ?? []).every(({ name }) => isLost(name));
 // Who does this now, among those that are heard of.
 export const doing = (mode) => droneNames().filter((name) => modeOf(store.s.vehicles?.[name]) === mode);
 
@@ -49,7 +54,7 @@ function some(names) {
 export function stage() {
   const all = modes();
   if (runOver()) return "over";
-  if (all.includes("LANDING")) return "land";
+  if (all.includes("LANDING") && !all.some((mode) => ALOFT.has(mode) && mode !== "LANDING")) return "land";
   if (all.includes("TAKING_OFF")) return "take-off";
   if (all.includes("HOVER") && !all.includes("TRACK")) return all.includes("LANDED") ? "take-off" : "form";
   return aloft() ? "track" : store.s.flight?.flown ? "land" : "pre-flight";

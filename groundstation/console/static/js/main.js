@@ -1,6 +1,7 @@
 // Puts the page together: what comes in marks what is to be drawn; drawing happens once per picture of the screen.
 
 import { startStrip } from "./alarm_strip.js";
+import { addNotice, showBanners } from "./banners.js";
 import { showBar, startBar } from "./bar.js";
 import { buildCameras, pictures, showCameras, showDetections, startCameras } from "./cameras.js";
 import { buildCharts, showSamples } from "./charts.js";
@@ -12,7 +13,7 @@ import { drawMap, drawn, layers } from "./map.js";
 import { give, showControls, showOrders, startOrders } from "./commands.js";
 import { colourOf, fenceColour, ink, startTheme, takeColours } from "./palette.js";
 import { showPlan, showSwitch, showTimeline } from "./plan.js";
-import { addNotice, showBanners, showEvents, showHealth, showProcesses, showTop } from "./status.js";
+import { showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { showPreflight } from "./preflight.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";

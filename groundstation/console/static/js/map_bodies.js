@@ -3,7 +3,9 @@
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
+import { seconds } from "./dom.js";
 import { limitsOf } from "./duty.js";
+import { isLost } from "./glance.js";
 import { FIGURE, NAME, around, keepClear, note } from "./labels.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
@@ -79,7 +81,7 @@ export function drawBodies(g, view, stale) {
     if (body.kind === "robot") drawDrone(g, x, y, body.mean[3], Math.max(13, 0.27 * view.scale), colourOf(body.name));
     else drawTarget(g, x, y, body.velocity, Math.max(9, 0.18 * view.scale), colourOf(body.name));
     const age = estimateAge() + body.age_s;
-    const suffix = stale || age > 1 ? ` ${age.toFixed(1)} s old` : "";
+    const suffix = stale ? `, ${seconds(age)} ago` : isLost(body.name) ? `, lost for ${seconds(age)}` : "";
     keepClear(x, y, bodyRadius(view) / 2);
     note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 13), colourOf(body.name), 13, 700);
   }
@@ -158,7 +160,7 @@ export function drawVelocities(g, view, stale) {
     const limits = limitsOf(control);
     if (!limits) continue;
     const places = around(from[0], from[1], bodyRadius(view) + 6, 11).slice(1);
-    note(g, FIGURE, name, `limited by ${limits}`, places, ink().text, 11, 500);
+    note(g, FIGURE, name, `slowed by ${limits}`, places, ink().text, 11, 500);
   }
 }
 
@@ -172,7 +174,7 @@ export function drawTruth(g, view) {
     g.moveTo(x - r, y + r); g.lineTo(x + r, y - r);
     g.moveTo(x, y); g.lineTo(...view.point(position[0] + 0.32 * Math.cos(yaw), position[1] + 0.32 * Math.sin(yaw)));
     g.stroke();
-    if (!entity(name)) note(g, NAME, name, `${name} (truth)`, around(x, y, 10, 11), ink().truth, 11, 500);
+    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, `${name} (truth)`, around(x, y, 10, 11), ink().truth, 11, 500);
   }
 }
 

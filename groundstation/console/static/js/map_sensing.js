@@ -2,7 +2,7 @@
 
 import { bodyToWorld, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
-import { drawArrow, label, path } from "./canvas.js";
+import { drawArrow, path } from "./canvas.js";
 import { FIGURE, SENSOR, around, keepClear, note } from "./labels.js";
 import { ageS, droneNames, entities, entity, isSeen, store, targetHeight } from "./store.js";
 
@@ -19,7 +19,7 @@ export function drawFootprints(g, view) {
     const height = up.length ? Math.max(...up) : 0;
     const points = footprint(camera.rays, camera.position_m, 0, height);
     if (!points.length) continue;
-    drawWorldView(g, view, points, `${camera.name} at ${height.toFixed(1)} m`);
+    drawWorldView(g, view, points, `view of ${camera.name} at ${height.toFixed(1)} m`);
   }
   for (const volume of store.scene.volumes) drawVolume(g, view, volume);
   for (const drone of store.scene.drones) {
@@ -48,8 +48,9 @@ function drawWorldView(g, view, points, words) {
   g.lineWidth = 1.5;
   g.stroke();
   g.setLineDash([]);
-  const [x, y] = view.point(Math.min(...points.map((p) => p[0])), Math.min(...points.map((p) => p[1])));
-  label(g, words, x, y + 13, ink().dim, 11, 400, "left");
+  const x = points.map((p) => p[0]), y = points.map((p) => p[1]);
+  const [left, low] = view.point(Math.min(...x), Math.min(...y)), [right, high] = view.point(Math.max(...x), Math.max(...y));
+  note(g, FIGURE, words, words, [[left, low + 13, "left"], [right, low + 13, "right"], [left, high - 5, "left"], [right, high - 5, "right"]], ink().dim, 11, 400);
 }
 
 // The box in which a motion capture system sees bodies, at whatever height.

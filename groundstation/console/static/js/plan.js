@@ -92,7 +92,7 @@ function cuts(plan) {
   const lines = limited.map((control) => {
     const speed = (v) => Math.hypot(v[0], v[1]).toFixed(2);
     const how = control.wanted ? `${speed(control.wanted)} → ${speed(control.velocity)} m/s` : `now ${speed(control.velocity)} m/s`;
-    return el("div", {}, el("strong", {}, control.robot), ` limited by ${limitsOf(control)}: ${how}`);
+    return el("div", {}, el("strong", {}, control.robot), ` slowed by ${limitsOf(control)}: ${how}`);
   });
   return el("div", { class: "cuts num", data: { testid: "cuts" } }, ...(lines.length ? lines : [el("span", { class: "dim" }, "Safety limits nobody now.")]));
 }

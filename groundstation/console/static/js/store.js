@@ -85,7 +85,8 @@ function extendTrails(estimate) {
 export const entities = () => store.s.estimate?.entities ?? [];
 export const entity = (name) => entities().find((candidate) => candidate.name === name);
 export const estimateAge = () => ageS(store.s.estimate?.at);
-const TRACKER_S = 0.5;
+const TRACKER_S = 0.5, CONSOLE_S = 0.8;
+export const consoleSilent = () => silentS() > CONSOLE_S;
 // It was heard once, and is not any more.
 export const trackerSilent = () => Number.isFinite(estimateAge()) && estimateAge() > TRACKER_S;
 export const isTarget = (name) => (store.scene?.targets ?? []).some((target) => target.name === name);

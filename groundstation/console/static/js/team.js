@@ -1,11 +1,11 @@
 // A card for each drone and one for each target.
 
-import { batteryLevel, lastsWords, leastBattery } from "./batteries.js";
-import { byId, el, seconds, svg, text } from "./dom.js";
+import { batteryWords, lastsWords } from "./batteries.js";
+import { byId, el, joined, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { give } from "./commands.js";
 import { dutyOf, landsIn } from "./duty.js";
-import { aloft, doing, lostTarget, modeOf } from "./glance.js";
+import { aloft, doing, modeOf, modeWord } from "./glance.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from "./store.js";
 
@@ -75,23 +75,17 @@ function showVehicle(name, { root, values, mode, detail }) {
   const silent = status && age > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
   const left = status && landsIn(name);
-  text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeWord(status) : "no word yet");
+  text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeWord(modeOf(status)).toLowerCase() : "no word yet");
   mode.dataset.level = silent || left ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : (modeOf(status) === status.mode ? LEVELS[status.mode] : "warn") ?? "wait";
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
   if (!status) return;
-  showBattery(values.battery, name, status.battery);
+  showBattery(values.battery, status);
   text(values.rate, `${status.rate_hz.toFixed(0)} Hz`);
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
   showLink(values.link, status.link);
   showDuty(detail, name, silent);
-}
-
-// What its mode is for now, as the bar has it for the team.
-function modeWord(status) {
-  const mode = modeOf(status);
-  return mode === "TRACK" && lostTarget() ? "search" : mode.replace("_", " ").toLowerCase();
 }
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.
@@ -108,19 +102,16 @@ function showLink(node, share) {
   node.dataset.link = level;
 }
 
-function showBattery(node, name, value) {
-  text(node.previousElementSibling, lastsWords(name) || "battery");
-  if (value === null || value === undefined) { delete node.dataset.words; node.className = ""; return text(node, "unknown"); }
-  const level = { bad: "empty", warn: "low", good: "full" }[batteryLevel(name, value)], standing = ["LANDED", "CUT"].includes(store.s.vehicles?.[name]?.mode);
-  const scarce = value < leastBattery(name) + 0.15; // else it is the time above that is short
-  const words = `${(100 * value).toFixed(0)} %${level === "full" || !scarce ? "" : level === "empty" && standing ? " charge!" : " low"}`;
+function showBattery(node, status) {
+  text(node.previousElementSibling, lastsWords(status) || "battery");
+  const [words, level] = batteryWords(status), known = status.battery !== null;
   if (node.dataset.words === words) return;
   node.dataset.words = words;
-  node.className = level === "full" ? "" : level;
-  node.dataset.battery = level;
+  node.className = level;
+  node.dataset.battery = status.charge;
   const fill = el("i");
-  fill.style.width = `${Math.max(6, 100 * value)}%`;
-  node.replaceChildren(el("span", { class: "battery" }, fill), words);
+  fill.style.width = `${Math.max(6, 100 * status.battery)}%`;
+  node.replaceChildren(...(known ? [el("span", { class: "battery" }, fill)] : []), words);
 }
 
 const UNSEEN_S = 0.6; // a target may then be hidden, or be elsewhere
@@ -128,7 +119,7 @@ const UNSEEN_S = 0.6; // a target may then be hidden, or be elsewhere
 function beliefWords(body, age, lost) {
   if (trackerSilent()) return "Where it is now nobody knows: the tracker is silent.";
   if (!body) return "";
-  if (lost) return doing("TRACK").length ? "Nobody sees it: the team looks for it." : "Nobody sees it.";
+  if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${joined(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
   if (age > UNSEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
   return doing("TRACK").length ? "Seen: the team tracks it." : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
@@ -141,9 +132,9 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   const old = estimateAge() > STALE_S;
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
-    const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? ["unknown"] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, search?.toLowerCase() ?? (!body ? "not found yet" : lost ? "lost" : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
-    mode.dataset.level = search === "LOST" ? "bad" : search ? "warn" : !body ? "wait" : lost ? "bad" : age > UNSEEN_S ? "warn" : "good";
+    const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
+    text(mode, trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? "not found yet" : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
+    mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > UNSEEN_S ? "warn" : "good";
     text(detail, words ?? beliefWords(body, age, lost));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }

@@ -1,14 +1,13 @@
-// What the team does and who is lost, in a line that is always there, below the alarms; and what stands there without one.
+// What the team does and who is lost, in a line that is always there, below the alarms.
 
-import { lastsWords, worstBattery } from "./batteries.js";
 import { joined } from "./dom.js";
 import { landsIn } from "./duty.js";
 import { refusalOf } from "./effects.js";
-import { aloft, doing, lostTarget, modes, stage, teamMode } from "./glance.js";
+import { aloft, doing, isLost, lostTarget, modes, stage, teamMode } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
 import { droneNames, entity, estimateAge, store, trackerSilent } from "./store.js";
 
-const FRESH_S = 1, NAMED = 4; // more drones than this are counted
+const NAMED = 4; // more drones than this are counted
 // Of one, of several.
 const DEEDS = {
   TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], HOLD: ["holds", "hold"], TAKING_OFF: ["takes off", "take off"],
@@ -20,10 +19,15 @@ const NEXT = {
   LANDING: "Who lands stays down until a new TAKE OFF.",
 };
 
+// Whom a failsafe lands, told together where it is at the same time: [names, [words of one, of several]].
+function landings(soon) {
+  return [...new Set(soon.map(landsIn))].map((time) => [soon.filter((name) => landsIn(name) === time), [`lands by itself in ${time}`, `land by themselves in ${time}`]]);
+}
+
 function deeds() {
   const counted = droneNames().length > NAMED, soon = droneNames().filter(landsIn);
   const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name)), mode === "TRACK" && lostTarget() ? LOOKS : words]);
-  const told = [[soon, ["lands soon", "land soon"]], ...modal].filter(([names]) => names.length);
+  const told = [...landings(soon), ...modal].filter(([names]) => names.length);
   const parts = told.map(([names, [one, many]]) => `${counted ? names.length : joined(names)} ${names.length > 1 ? many : one}`);
   return parts.length ? `${parts.join("; ")}.` : "";
 }
@@ -35,10 +39,10 @@ function sought() {
 }
 
 function lost() {
-  if (trackerSilent()) return "Who is lost is not known while the tracker is silent.";
-  const ages = sought().map((name) => [name, entity(name)]).map(([name, body]) => [name, body ? body.age_s + estimateAge() : Infinity]);
-  const unseen = ages.filter(([, age]) => age > FRESH_S).map(([name, age]) => `${name} ${Number.isFinite(age) && age < 1e5 ? `for ${age.toFixed(0)} s` : "yet"}`);
-  return unseen.length ? `Not seen: ${joined(unseen)}.` : "Nobody is lost.";
+  if (trackerSilent()) return "Nobody knows who is lost.";
+  const unseen = sought().filter(isLost).map((name) => [name, (entity(name)?.age_s ?? Infinity) + estimateAge()]);
+  const words = unseen.map(([name, age]) => `${name}, not seen ${Number.isFinite(age) && age < 1e5 ? `for ${age.toFixed(0)} s` : "yet"}`);
+  return words.length ? `Lost: ${joined(words)}.` : "Nobody is lost.";
 }
 
 // What lets those go on that wait for it.
@@ -59,13 +63,4 @@ export function verdict() {
   if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
   if (!aloft()) return `Nobody flies. ${takeOff()}`;
   return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");
-}
-
-// [kind, level, words]: what stands in the place of an alarm.
-export function calm() {
-  const battery = worstBattery();
-  if (!battery || battery.level === "good") return ["none", "calm", modes().length ? "✓ No alarms" : "No alarms yet"];
-  if (battery.value === null) return ["concern", "mild", `The battery of ${battery.name} is unknown`];
-  const figures = [`${(100 * battery.value).toFixed(0)} %`, lastsWords(battery.name)].filter(Boolean).join(", ");
-  return ["concern", "mild", `The battery of ${battery.name} is low: ${figures}`];
 }

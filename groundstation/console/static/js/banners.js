@@ -1,0 +1,81 @@
+// The strip of alarms: whether it is safe, in a word; then what asks for an act, and the gravest.
+
+import { showLog, showMore } from "./alarm_strip.js";
+import { byId, el, seconds, text } from "./dom.js";
+import { resultWords } from "./ending.js";
+import { drawn } from "./map.js";
+import { ownAlarms } from "./own_alarms.js";
+import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
+
+const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
+const notices = [];
+
+export function addNotice({ text: words, grave }) {
+  notices.push({ words, grave, at: performance.now() });
+  if (notices.length > 3) notices.shift();
+}
+
+// Each: what a test finds it by, its colour, its words, what follows, and its rank: ACT, WATCH or a notice. shell: whether
+// only a shell helps.
+function banners(own) {
+  const { ended } = store.s;
+  const all = ended ? [ending(ended)] : own.map((alarm) => ({ ...alarm, level: "grave", rank: "ACT" }));
+  if (!ended && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
+  for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
+  for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, SHOWN) : []) {
+    if (alarm.about !== "tracker silent") all.push({ kind: "alarm", level: alarm.grave ? "grave" : "mild", title: alarm.text, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" });
+  }
+  if (!all.length && !replaying()) all.push({ kind: "none", level: "calm", title: store.s.safety?.reason ?? "No alarms yet." });
+  const urgency = ({ level, rank }) => (rank === "ACT" ? 0 : level === "grave" ? 1 : 2);
+  return all.sort((a, b) => urgency(a) - urgency(b));
+}
+
+function ending({ severity, text: words }) {
+  const landed = severity === "INFO", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
+  return { kind: "ended", level: landed ? "calm" : "grave", title, more: runOver() ? "The stop buttons are off: this run takes no more orders." : "", shell: !landed };
+}
+
+function silentTracker() {
+  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}`, rank: "WATCH",
+    more: "Nothing to do: drones hover, and land 3 s after its last word. Positions are old; LAND ALL works without it." };
+}
+
+// As the console's process judges it, but for what only this page can know.
+function safetyWord(own) {
+  const { ended, safety } = store.s;
+  if (ended) return ended.severity === "INFO" ? "SAFE" : "ACT";
+  return own.length ? "ACT" : safety?.level ?? "WATCH";
+}
+
+export function showBanners() {
+  const own = ownAlarms(), all = banners(own), word = safetyWord(own), badge = byId("safety");
+  text(badge, word);
+  badge.dataset.level = LEVELS[word];
+  const host = byId("banners"), kinds = all.map(({ kind }) => kind).join();
+  if (host.dataset.kinds !== kinds) {
+    noteSilence(kinds.split(","), (host.dataset.kinds ?? "").split(","), { tracker: estimateAge(), silent: silentS() });
+    host.dataset.kinds = kinds;
+    host.replaceChildren(...all.map(({ kind, shell }) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
+  }
+  all.forEach(({ level, title, more, rank }, index) => {
+    const node = host.children[index];
+    node.className = `banner ${level}`;
+    text(node.children[0], index && rank !== "notice" ? `${rank}: ${title}` : title);
+    text(node.children[1], more ?? "");
+  });
+  showLog();
+  showMore(all.slice(1).map(({ rank }) => rank), !host.firstElementChild || fitted(host.firstElementChild));
+}
+
+// Fits an alarm into the strip's height, which is its least, in smaller letters if need be; returns whether it does.
+function fitted(banner) {
+  const fits = () => banner.offsetHeight <= Math.ceil(parseFloat(getComputedStyle(banner).minHeight));
+  banner.classList.remove("long");
+  if (!fits()) banner.classList.add("long");
+  return fits();
+}
+
+// For tests: how late the page was to say that something is silent.
+function noteSilence(kinds, before, ages) {
+  for (const [kind, afterS] of Object.entries(ages)) if (kinds.includes(kind) && !before.includes(kind)) drawn.marks[kind] = { afterS, gapS: drawn.gapS };
+}

@@ -1,0 +1,58 @@
+"""How long batteries last: by the mean drain of this flight, before that by what a kind usually flies. Pure."""
+
+from dataclasses import dataclass
+
+from groundstation.bus.messages import FlightState, VehicleStatus
+
+AIRBORNE = frozenset({FlightState.TAKING_OFF, FlightState.FLYING, FlightState.HOVERING, FlightState.LANDING})
+# What has to be spent before a drain is believed, and for how long.
+_LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
+_NS_PER_MIN = 60e9
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """When a drone was first heard in the air, and its battery then."""
+
+    stamp_ns: int
+    battery: float
+
+
+@dataclass(frozen=True, slots=True)
+class Endurance:
+    """Minutes until a battery lands its drone; measured: by the mean drain of this flight, not by its kind."""
+
+    minutes: float
+    measured: bool
+
+    @property
+    def words(self) -> str:
+        """Say it: "6 min" as measured, "~6 min" by the kind."""
+        if self.minutes < 1.0:
+            return "< 1 min"
+        return f"{'' if self.measured else '~'}{int(self.minutes)} min"
+
+
+def take_off_of(known: TakeOff | None, stamp_ns: int, status: VehicleStatus) -> TakeOff | None:
+    """Return the take-off that this status belongs to: none on the floor; anew with a fuller battery or in the past."""
+    if status.battery is None or status.flight_state not in AIRBORNE:
+        return None
+    if known is None or stamp_ns < known.stamp_ns or status.battery > known.battery:
+        return TakeOff(stamp_ns, status.battery)
+    return known
+
+
+def endurance(
+    stamp_ns: int, battery: float, limit: float, take_off: TakeOff | None, flight_time_s: float | None
+) -> Endurance | None:
+    """Return how long a battery is good for; None where nobody knows.
+
+    battery, limit: shares of a full one, at `stamp_ns` and when it lands its drone. flight_time_s: of a full battery,
+    None where its kind does not say.
+    """
+    left = max(0.0, battery - limit)
+    if take_off is not None:
+        minutes, spent = (stamp_ns - take_off.stamp_ns) / _NS_PER_MIN, take_off.battery - battery
+        if minutes >= _LEAST_MIN and spent >= _LEAST_DRAIN:
+            return Endurance(left * minutes / spent, True)
+    return None if flight_time_s is None else Endurance(left * flight_time_s / 60.0, False)

@@ -1,0 +1,46 @@
+"""Whether it is safe, in a word and a sentence. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from groundstation.monitor.alarms import Alarm
+from groundstation.monitor.batteries import battery_of
+from groundstation.monitor.endurance import AIRBORNE
+from groundstation.monitor.state import MonitorState
+
+
+class Level(StrEnum):
+    """SAFE: nothing is wrong. WATCH: something is, and nothing need be done. ACT: somebody must do something now."""
+
+    SAFE = "SAFE"
+    WATCH = "WATCH"
+    ACT = "ACT"
+
+
+@dataclass(frozen=True, slots=True)
+class Safety:
+    """The word, and the reason for it as a sentence or two."""
+
+    level: Level
+    reason: str
+
+
+def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
+    """Judge the team by the alarms that stand, in the order of `alarms_of`."""
+    if alarms:
+        first = alarms[0]
+        return Safety(Level.ACT if first.asks else Level.WATCH, f"{first.text}. {first.advice}".rstrip())
+    if set(state.cast.drones) - set(state.vehicles):
+        return Safety(Level.WATCH, "Not every drone has been heard yet.")
+    up = [name for name, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE]
+    if not up:
+        return Safety(Level.SAFE, "No alarms. Nobody flies.")
+    return Safety(Level.SAFE, f"No alarms. All who fly are heard and seen{_lasting(state, up)}.")
+
+
+def _lasting(state: MonitorState, up: Sequence[str]) -> str:
+    known = [left for name in up if (left := battery_of(state, name).endurance) is not None]
+    if len(known) < len(up):
+        return ""
+    return f"; batteries are good for {min(known, key=lambda left: left.minutes).words} or more"

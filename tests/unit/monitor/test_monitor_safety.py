@@ -1,0 +1,72 @@
+"""Whether it is safe: one word and its reason, from alarms and states."""
+
+from dataclasses import replace
+
+import pytest
+from monitor_world import CAST, NOW, World
+
+from groundstation.bus import messages as m
+from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.safety import Level, Safety, safety_of
+
+
+def judged(world: World) -> Safety:
+    world.text()
+    return safety_of(world.state, alarms_of(world.state, NOW))
+
+
+def both(world: World, mode: str = "TRACK", **more: object) -> None:
+    for name in ("drone_1", "drone_2"):
+        world.vehicle(name, mode, **more)
+
+
+def test_it_is_safe_while_nothing_is_wrong_and_the_reason_says_how_long(world: World) -> None:
+    both(world)
+    world.vehicle("drone_2", battery=0.65)
+    world.estimate()
+    reason = "No alarms. All who fly are heard and seen; batteries are good for ~6 min or more."
+    assert judged(world) == Safety(Level.SAFE, reason)
+
+
+def test_how_long_batteries_last_is_left_out_where_it_is_not_known(world: World) -> None:
+    both(world)
+    world.state.cast = replace(CAST, flight_times_s={"drone_1": 720.0})
+    assert judged(world).reason == "No alarms. All who fly are heard and seen."
+
+
+def test_it_is_safe_while_nobody_flies(world: World) -> None:
+    both(world, "LANDED", flight_state=m.FlightState.LANDED)
+    assert judged(world) == Safety(Level.SAFE, "No alarms. Nobody flies.")
+
+
+def test_who_was_never_heard_is_to_be_watched(world: World) -> None:
+    world.vehicle("drone_1")
+    assert judged(world) == Safety(Level.WATCH, "Not every drone has been heard yet.")
+
+
+@pytest.mark.parametrize(
+    ("trouble", "level"),
+    [
+        ({"lands_in_s": 6.0, "detail": "no camera has seen it"}, Level.WATCH),
+        ({"braked": True, "detail": "hovers: its velocity is stuck"}, Level.WATCH),
+        ({"battery": 0.28}, Level.WATCH),
+        ({"battery": 0.13, "flight_state": m.FlightState.LANDING}, Level.WATCH),
+        ({"battery": 0.18}, Level.ACT),
+        ({"link_quality": 0.31}, Level.ACT),
+        ({"flight_state": m.FlightState.EMERGENCY}, Level.ACT),
+    ],
+)
+def test_trouble_is_to_be_watched_or_acted_on(world: World, trouble: dict[str, object], level: Level) -> None:
+    both(world)
+    world.vehicle("drone_1", **trouble)
+    said = judged(world)
+    assert said.level is level
+    assert ("To do: " in said.reason) is (level is Level.ACT) and said.reason.startswith("drone_1")
+
+
+def test_what_asks_for_an_act_decides_beside_what_is_graver(world: World) -> None:
+    both(world)
+    world.vehicle("drone_1", link_quality=0.5)
+    world.vehicle("drone_2", age_s=4.0)
+    said = judged(world)
+    assert said.level is Level.ACT and "weak link" in said.reason

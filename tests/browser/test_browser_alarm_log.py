@@ -1,6 +1,7 @@
 """Alarms that are over: they are read behind the strip, by keyboard, and nothing moves."""
 
 import re
+import signal
 from typing import Any
 
 import pytest
@@ -65,3 +66,22 @@ def test_past_alarms_outlive_a_reload_and_give_way_to_those_that_last(stage: Any
     page.wait(lambda s: page.there("more-alarms").is_visible())
     page.there("more-alarms").click()
     assert page.there("alarm-log").is_hidden() and page.page.locator(".banner:visible").count() >= 2
+
+
+def test_what_only_the_page_noticed_is_a_past_alarm_as_well(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.console.send_signal(signal.SIGSTOP)
+    try:
+        page.there("banner-silent").wait_for(timeout=20_000)
+        assert page.there("safety").inner_text() == "ACT"
+    finally:
+        stage.console.send_signal(signal.SIGCONT)
+    page.wait(lambda s: page.there("banner-silent").count() == 0)
+    page.there("past-alarms").click()
+    log = page.there("alarm-log")
+    page.wait(lambda s: re.search(r"ACT\s+CONSOLE SILENT for \d", log.inner_text()))
+    page.page.reload()
+    page.wait(lambda s: s["frames"] > 2)
+    page.there("past-alarms").click()
+    page.wait(lambda s: re.search(r"ACT\s+CONSOLE SILENT for \d", log.inner_text()))

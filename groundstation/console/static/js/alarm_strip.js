@@ -2,6 +2,7 @@
 // time, so that nothing moves.
 
 import { byId, el, text } from "./dom.js";
+import { ownPast } from "./own_alarms.js";
 import { momentWords } from "./playback.js";
 import { store } from "./store.js";
 
@@ -55,7 +56,7 @@ function counted(ranks) {
 }
 
 export function showLog() {
-  const past = store.s.past_alarms ?? [], button = byId("log"), host = byId("alarm-log"), key = JSON.stringify(past);
+  const past = [...(store.s.past_alarms ?? []), ...ownPast()].sort((a, b) => b.began - a.began), button = byId("log"), host = byId("alarm-log"), key = JSON.stringify(past);
   text(button, host.hidden ? `Past alarms ${past.length || ""}`.trim() : "close");
   if (host.hidden || key === shown) return;
   shown = key;

@@ -4,7 +4,7 @@ import { showLog, showMore } from "./alarm_strip.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { resultWords } from "./ending.js";
 import { drawn } from "./map.js";
-import { ownAlarms } from "./own_alarms.js";
+import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
 import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
@@ -51,6 +51,7 @@ export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own), badge = byId("safety");
   text(badge, word);
   badge.dataset.level = LEVELS[word];
+  noteOwnAlarms(own);
   const host = byId("banners"), kinds = all.map(({ kind }) => kind).join();
   if (host.dataset.kinds !== kinds) {
     noteSilence(kinds.split(","), (host.dataset.kinds ?? "").split(","), { tracker: estimateAge(), silent: silentS() });

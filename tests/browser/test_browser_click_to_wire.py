@@ -64,7 +64,7 @@ def test_a_click_on_hold_is_obeyed_within_50_ms(
             eventually(lambda: wire.look().all_hover(), 5.0, "both drones hover")
             clicked_s = page.page.evaluate("() => window.__clicked.at(-1)") / 1e3 - time.time() + time.monotonic()
             delays += [wire.obeyed_s(drone, clicked_s) or 0.0 for drone in wire.heard]
-            page.there("track").click()
+            page.there("resume").click()
         assert live.supervisor.alive, "the run has ended before its time"
     finally:
         bus.close()

@@ -20,13 +20,13 @@ _BATCH = 5
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation experiment culprits                       (every row, 5 seeds each)\n"
-    "  groundstation experiment culprits --only nothing --seeds 100\n"
-    '  groundstation experiment culprits --only "pan of one,all markers" --seeds 1 --json\n\n'
+    "  groundstation experiment culprits --rows nothing --seeds 100\n"
+    '  groundstation experiment culprits --rows "pan of one,all markers" --seeds 1 --json\n\n'
     "Exit codes: 0 in 9 of 10 flights of each row what is wrong was named, 1 it was not, 2 wrong settings."
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=5, show_default=True, help="Flights of each row.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
-@click.option("--only", default="", help="Rows by name, with commas (default: all).")
+@click.option("--rows", "only", default="", metavar="NAMES", help="Only these rows, by commas (default: all).")
 @click.option(
     "--duration", "seconds", type=FiniteRange(5, 600), default=25.0, show_default=True, help="Seconds of tracking."
 )
@@ -99,5 +99,5 @@ def _chosen(only: str, labs: "tuple[WrongLab, ...]") -> "list[WrongLab]":
     names = [name.strip() for name in only.split(",") if name.strip()]
     known = {lab.name: lab for lab in labs}
     if strangers := [name for name in names if name not in known]:
-        raise SettingsError([f"--only: no row {', '.join(map(repr, strangers))}; there are {', '.join(known)}"])
+        raise SettingsError([f"--rows: no row {', '.join(map(repr, strangers))}; there are {', '.join(known)}"])
     return [known[name] for name in names] or list(labs)

@@ -48,8 +48,8 @@ class Needed:
     def wish(self) -> str:
         """Return its permitted values, in words."""
         if self.accepted is not None:
-            return f"{self.accepted[0]:g} to {self.accepted[1]:g}"
-        return " or ".join(f"{value:g}" for value in (self.value, *self.others))
+            return f"{self.accepted[0]:.7g} to {self.accepted[1]:.7g}"
+        return " or ".join(f"{value:.7g}" for value in (self.value, *self.others))
 
 
 _PX4 = (
@@ -118,7 +118,7 @@ def overridden(flavour: Flavour, overrides: Mapping[str, float]) -> str:
     """Return the warning for parameters that the field file has otherwise than indoor flight needs them, or ""."""
     usual = {name: need for need in needed(flavour, 0) for name in need.names}
     bold = [
-        f"{n} {v:g} instead of {usual[n].wish}" for n, v in overrides.items() if n in usual and not usual[n].takes(v)
+        f"{n} {v:.7g} instead of {usual[n].wish}" for n, v in overrides.items() if n in usual and not usual[n].takes(v)
     ]
     return f"parameters as the field file says: {', '.join(bold)}" if bold else ""
 
@@ -139,4 +139,4 @@ def difference(wanted: Needed, found: Mapping[str, float]) -> str:
     name = next((n for n in wanted.names if n in found), None)
     if name is None:
         return f"{wanted.name} is missing, needs {wanted.wish} ({wanted.reason})"
-    return "" if wanted.takes(found[name]) else f"{name} is {found[name]:g}, needs {wanted.wish} ({wanted.reason})"
+    return "" if wanted.takes(found[name]) else f"{name} is {found[name]:.7g}, needs {wanted.wish} ({wanted.reason})"

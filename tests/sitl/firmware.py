@@ -66,12 +66,12 @@ class Firmware:
         environment |= {"PX4_SYS_AUTOSTART": "10040", "PX4_SIM_MODEL": "sihsim_quadx", "PX4_SIMULATOR": "sihsim"}
         environment["PX4_SIM_SPEED_FACTOR"] = f"{self.speed:g}"
         presets = {"SENS_EN_GPSSIM": 0.0} | self.parameters
-        environment |= {f"PX4_PARAM_{name}": f"{value:g}" for name, value in presets.items()}
+        environment |= {f"PX4_PARAM_{name}": f"{value:.7g}" for name, value in presets.items()}
         return [binary, "-i", str(self.system - 1), "-d", str(Path(binary).parents[1] / "etc")], environment
 
     def _copter(self) -> tuple[list[str], dict[str, str]]:
         defaults = self.folder / "defaults.parm"
-        defaults.write_text("".join(f"{name} {value:g}\n" for name, value in (_COPTER | self.parameters).items()))
+        defaults.write_text("".join(f"{name} {value:.7g}\n" for name, value in (_COPTER | self.parameters).items()))
         quiet = [item for n in range(2, 9) for item in (f"--serial{n}", "none:")]
         command = [binary_of("ardupilot"), "--model", "quad", "--home", "47.4,8.5,488,0", "-I", str(self.system)]
         command += ["--sysid", str(self.system), "--defaults", str(defaults), "--speedup", f"{self.speed:g}"]

@@ -22,6 +22,11 @@ def test_a_range_is_accepted_as_a_whole(value, good):
     assert (difference(of("COM_OF_LOSS_T"), {"COM_OF_LOSS_T": value}) == "") is good
 
 
+def test_large_values_are_told_in_full():
+    text = difference(of("ARMING_CHECK", Flavour.ARDUPILOT), {"ARMING_CHECK": 1})
+    assert text.startswith("ARMING_CHECK is 1, needs 1048574 (")
+
+
 def test_what_is_missing_is_named_with_what_it_needs():
     assert difference(of("EKF2_HGT_REF"), {}) == "EKF2_HGT_REF is missing, needs 3 (height comes from outside)"
 

@@ -56,6 +56,7 @@ _PX4 = (
     Needed("EKF2_GPS_CTRL", 0, "no GPS indoors"),
     Needed("EKF2_EV_CTRL", 11, "position, height and heading come from outside; velocity does not"),
     Needed("EKF2_HGT_REF", 3, "height comes from outside"),
+    Needed("EKF2_RNG_CTRL", 0, "a distance sensor would replace our height as the reference"),
     Needed("EKF2_MAG_TYPE", 5, "no compass near steel"),
     Needed("EKF2_EV_DELAY", 0, "poses are sent as predicted to now", REAL32, accepted=(0, 50)),
     Needed("EKF2_EVP_NOISE", 0.03, "lower bound of the error of our positions, 1 to 3 cm", REAL32, (0.01, 0.06)),

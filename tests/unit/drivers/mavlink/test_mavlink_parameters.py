@@ -22,6 +22,10 @@ def test_a_range_is_accepted_as_a_whole(value, good):
     assert (difference(of("COM_OF_LOSS_T"), {"COM_OF_LOSS_T": value}) == "") is good
 
 
+def test_a_distance_sensor_may_not_stand_for_our_height():
+    assert difference(of("EKF2_RNG_CTRL"), {"EKF2_RNG_CTRL": 1}).startswith("EKF2_RNG_CTRL is 1, needs 0 (")
+
+
 def test_large_values_are_told_in_full():
     text = difference(of("ARMING_CHECK", Flavour.ARDUPILOT), {"ARMING_CHECK": 1})
     assert text.startswith("ARMING_CHECK is 1, needs 1048574 (")

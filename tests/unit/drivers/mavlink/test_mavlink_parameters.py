@@ -22,8 +22,11 @@ def test_a_range_is_accepted_as_a_whole(value, good):
     assert (difference(of("COM_OF_LOSS_T"), {"COM_OF_LOSS_T": value}) == "") is good
 
 
-def test_a_distance_sensor_may_not_stand_for_our_height():
-    assert difference(of("EKF2_RNG_CTRL"), {"EKF2_RNG_CTRL": 1}).startswith("EKF2_RNG_CTRL is 1, needs 0 (")
+@pytest.mark.parametrize(
+    ("name", "factory", "wish"), [("EKF2_RNG_CTRL", 1, "0"), ("EKF2_NOAID_TOUT", 5_000_000, "500000 to 900000")]
+)
+def test_neither_a_distance_sensor_nor_dead_reckoning_may_stand_for_our_positions(name, factory, wish):
+    assert difference(of(name), {name: factory}).startswith(f"{name} is {factory}, needs {wish} (")
 
 
 def test_large_values_are_told_in_full():

@@ -183,15 +183,14 @@ class Tracker:
             return False
         if self._joinings.is_unsettled(name):
             return False
-        return self._localisation.holds(self._belief, name, self.filter.age_s(name))
+        return self._localisation.holds(self._belief, name, self._tied_age_s(name))
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""
         layout, unlocalised_s = self._belief.layout, self.unlocalised_s()
-        return tuple(
-            entity_estimate(self.filter, self._belief, name, self.converged(name), unlocalised_s.get(name, 0.0))
-            for name in layout.robots + layout.targets
-        )
+        names = layout.robots + layout.targets
+        known = {name: (self.converged(name), self._tied_age_s(name), unlocalised_s.get(name, 0.0)) for name in names}
+        return tuple(entity_estimate(self.filter, self._belief, name, *told) for name, told in known.items())
 
     def target_age_s(self) -> float | None:
         """Return the time since any target was last observed; None if none is believed anywhere."""
@@ -212,6 +211,10 @@ class Tracker:
             else self._rooted_age_s(name)
             for name, age_s in ages_s.items()
         }
+
+    def _tied_age_s(self, name: str) -> float:
+        """Return since when an entity was not seen, nor saw one that something fixed in the room knows; or infinity."""
+        return min(self.filter.age_s(name), self._roots.age_s(name))
 
     def _rooted_age_s(self, robot: str) -> float:
         """Return since when nothing fixed in the room has told where a robot is; infinite if it has not joined."""

@@ -7,7 +7,7 @@ from groundstation.estimation.layout import EntityKind
 
 
 def entity_estimate(
-    joint: FixedLagFilter, belief: JointBelief, name: str, converged: bool, unlocalised_s: float
+    joint: FixedLagFilter, belief: JointBelief, name: str, converged: bool, age_s: float, unlocalised_s: float
 ) -> EntityEstimate:
     """Return a robot's x, y, z, yaw or a target's x, y with covariance and velocity [m, rad, m/s; world]."""
     block = belief.layout.block(name)
@@ -25,7 +25,7 @@ def entity_estimate(
         covariance=tuple(covariance[:size, :size].ravel().tolist()),
         velocity_m_s=velocity,
         converged=converged,
-        age_s=joint.age_s(name),
+        age_s=age_s,
         unlocalised_s=unlocalised_s,
         contradicted=joint.contradicted(name),
     )

@@ -55,6 +55,11 @@ class Orders:
         """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
         return custom_mode == self._guided and not self._taken_over
 
+    def climbs_by_itself(self, now_ns: int) -> bool:
+        """Return whether the vehicle ends its take-off by itself, told nothing."""
+        ours = self._flavour is not Flavour.ARDUPILOT or self._action is not Action.HOVER
+        return not ours and self._rises_to_take_off and now_ns < self._climb_until_ns
+
     def last_said(self, now_ns: int) -> str:
         """Return the vehicle's last text, if recent: it explains a change of its mode."""
         if not self.said or now_ns - self.said[-1][0] > _EXPLAINS_NS:
@@ -115,7 +120,7 @@ class Orders:
         risen_m = self.lift.hear(now_ns, self.starting, landed, reported_m, climb_m_s)
         if not self.lift.lifted:
             if self.starting:
-                self.drift.stand()
+                self.drift.stand(now_ns)
             else:
                 self.drift.reset()
         believed = self.drift.place(now_ns)
@@ -239,7 +244,7 @@ class Orders:
             return None
         self._due_ns = max(self._due_ns + self._period_ns, now_ns)
         vehicle = self._vehicle
-        drift = self.drift.drift(now_ns)
+        drift = self.drift.correction(now_ns)
         message = setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits, drift)
         self.drift.tell(now_ns, (message.vx, -message.vy, -message.vz))
         return message

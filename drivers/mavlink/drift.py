@@ -12,6 +12,9 @@ from groundstation.time_units import NS_PER_S
 
 # Velocities of the belief are noisy by 0.05 m/s.
 _SMOOTHING_S = 0.12
+# The belief learns of an error half a second late (sightings are late, and it takes some); one that grows with a tilt
+# has changed by then as much as it did lately.
+_LATELY_S = 0.6
 # Climb rates of the belief are mostly the autopilot's own word, less an error that changes over seconds.
 _CLIMB_SMOOTHING_S, _MOST_CLIMB_M_S = 0.4, 0.3
 # Without the tracker an estimator's error of the velocity lasts for about that long.
@@ -23,6 +26,8 @@ _FRESH_NS = 300_000_000
 _MOST_M_S = 1.5
 _SUDDEN_M_S, _SUDDEN_M_S2 = 0.45, 0.8
 _TRUSTED_AGAIN_NS = NS_PER_S
+# Right after lift-off a large error begins at once (docs/reference/mavlink.md 2.1), and a second of it is half a metre.
+_LIFT_OFF_NS = 3 * NS_PER_S
 # Up to here it does not matter whose word is wrong.
 _SMALL_M_S = 0.2
 _RESPONSE_S, _JUDGED_S, _EVEN_M_S = 0.6, 0.5, 0.1
@@ -68,18 +73,20 @@ class DriftFeedback:
     def reset(self) -> None:
         """Forget everything: the vehicle is on the floor."""
         self._drift: Vector2 = (0.0, 0.0)
+        self._lately: Vector2 = (0.0, 0.0)
         self._climb_drift_m_s = 0.0
         self._at_ns: int | None = None
         self._believed_ns: int | None = None
         self._doubted_until_ns = 0
+        self._stood_ns: int | None = None
         self._obedience, self._obeys = Obedience(), True
         self._place: Vector3 = _STILL
         self._yaw_rad = 0.0
         self._held: Vector3 | None = None
 
-    def stand(self) -> None:
-        """Forget the error of its climb rate, which sways on the floor."""
-        self._climb_drift_m_s = 0.0
+    def stand(self, now_ns: int) -> None:
+        """Note that it has not lifted off yet; the error of its climb rate, which sways on the floor, is forgotten."""
+        self._climb_drift_m_s, self._stood_ns = 0.0, now_ns
 
     def tell(self, now_ns: int, velocity_m_s: Vector3) -> None:
         """Note the velocity [base_stabilized] that goes out, correction included."""
@@ -104,18 +111,30 @@ class DriftFeedback:
         if not first and math.dist(error, self._drift) > _SUDDEN_M_S + _SUDDEN_M_S2 * since_ns / NS_PER_S:
             self._doubted_until_ns = now_ns + _TRUSTED_AGAIN_NS
         self._drift = _towards(self._drift, error, 1.0 if first else _share(since_ns, _SMOOTHING_S))
+        self._lately = _towards(self._lately, error, 1.0 if first else _share(since_ns, _LATELY_S))
         self._at_ns = now_ns
 
     def drift(self, now_ns: int) -> Vector3:
-        """Return reported less true velocity [m/s; base_stabilized], the correction of a commanded velocity."""
+        """Return reported less true velocity [m/s; base_stabilized], as it was seen last."""
+        return self._corrected(now_ns, self._drift)
+
+    def correction(self, now_ns: int) -> Vector3:
+        """Return what a commanded velocity lacks [m/s; base_stabilized]: the drift, and what it has become by now."""
+        x, y = (2.0 * seen - before for seen, before in zip(self._drift, self._lately, strict=True))
+        return self._corrected(now_ns, (x, y))
+
+    def _corrected(self, now_ns: int, drift: Vector2) -> Vector3:
+        """Return as much of a drift [world] as is believed and corrected [base_stabilized]."""
         size = math.hypot(*self._drift)
         doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
-        if self._at_ns is None or doubted:
+        lifts_off = self._stood_ns is not None and now_ns - self._stood_ns <= _LIFT_OFF_NS
+        if self._at_ns is None or (doubted and not lifts_off):
             return _STILL
         fades = math.exp(-max(0.0, (now_ns - self._at_ns) / NS_PER_S - _SEEN_S) / _FORGETS_S)
-        left_over = fades * min(1.0, _MOST_M_S / max(size, _MOST_M_S))
+        x, y = drift
+        left_over = fades * min(1.0, _MOST_M_S / max(math.hypot(x, y), _MOST_M_S))
         up = max(-_MOST_CLIMB_M_S, min(_MOST_CLIMB_M_S, fades * self._climb_drift_m_s))
-        return self._in_heading(left_over * self._drift[0], left_over * self._drift[1], up)
+        return self._in_heading(left_over * x, left_over * y, up)
 
     @property
     def size_m_s(self) -> float:

@@ -31,7 +31,7 @@ class Vehicle:
 
     def step(self, wanted=None):
         self.now_ns += STEP_NS
-        feedback, drift = self.feedback, self.feedback.drift(self.now_ns)
+        feedback, drift = self.feedback, self.feedback.correction(self.now_ns)
         if wanted is None:
             wanted = feedback.hold(self.now_ns)
         else:
@@ -92,6 +92,32 @@ def test_a_sudden_error_is_no_drift():
     assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0)
 
 
+def test_at_lift_off_a_sudden_error_is_corrected_at_once():
+    vehicle = Vehicle()
+    vehicle.feedback.stand(vehicle.now_ns)
+    vehicle.fly(0.5)
+    vehicle.error = (0.7, 0.0)
+    vehicle.fly(1.0)
+    assert math.hypot(*vehicle.feedback.drift(vehicle.now_ns)[:2]) == pytest.approx(0.7, abs=0.15)
+    vehicle.fly(3.0)
+    vehicle.error = (-0.5, 0.0)
+    vehicle.step()
+    assert vehicle.feedback.drift(vehicle.now_ns) == (0.0, 0.0, 0.0), "three seconds later it is no drift"
+
+
+def test_an_error_that_changes_evenly_is_corrected_by_what_it_is_by_now():
+    """The belief knows of an error 0.45 s late."""
+    feedback, grows_m_s2, late_s = DriftFeedback(), 0.2, 0.45
+    for turn in range(200):
+        learnt = grows_m_s2 * (turn * 0.02 - late_s)
+        entity = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), (1e-4,) * 16, (0.1, 0.0, 0.0), True, 0.1)
+        feedback.tell(S + turn * STEP_NS, (0.1 + learnt, 0.0, 0.0))
+        feedback.hear(S + turn * STEP_NS, entity, (0.1 + learnt, 0.0, 0.0))
+    now = grows_m_s2 * 199 * 0.02
+    assert feedback.correction(S + 199 * STEP_NS)[0] == pytest.approx(now, abs=0.03)
+    assert feedback.drift(S + 199 * STEP_NS)[0] < now - 0.09, "what it was seen to be"
+
+
 def test_an_error_beyond_what_is_corrected_is_corrected_as_far():
     """Nothing is as far off as the whole error: a correction that ends at a limit is a step of that size."""
     vehicle = Vehicle()
@@ -100,7 +126,7 @@ def test_an_error_beyond_what_is_corrected_is_corrected_as_far():
     for _ in range(200):  # 2 m/s within four seconds
         vehicle.error = (vehicle.error[0] + 0.01, 0.0)
         vehicle.step()
-        corrected.append(math.hypot(*vehicle.feedback.drift(vehicle.now_ns)[:2]))
+        corrected.append(math.hypot(*vehicle.feedback.correction(vehicle.now_ns)[:2]))
     assert max(corrected) == pytest.approx(1.5)
     assert max(abs(b - a) for a, b in itertools.pairwise(corrected)) < 0.05
     assert math.hypot(*vehicle.velocity) < 0.7

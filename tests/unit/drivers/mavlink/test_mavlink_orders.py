@@ -71,6 +71,20 @@ def test_a_hover_after_the_take_off_goes_on_to_its_height_and_a_later_hold_keeps
     assert climb.height_m == pytest.approx(reached_m, abs=0.05)
 
 
+def test_an_ardupilot_that_ends_its_take_off_is_told_nothing_and_so_not_judged_by_it():
+    climb = Climb(Flavour.ARDUPILOT, seen=True)
+    climb.rise_to(0.3)
+    climb.turn(DriverMode.HOVER, Action.HOVER)
+    assert climb.orders.climbs_by_itself(climb.now_ns)
+    climb.height_m = TAKE_OFF_M + 0.1
+    climb.turn(DriverMode.HOVER, Action.HOVER)
+    assert not climb.orders.climbs_by_itself(climb.now_ns)
+    px4 = Climb(Flavour.PX4, seen=True)
+    px4.rise_to(0.3)
+    px4.turn(DriverMode.HOVER, Action.HOVER)
+    assert not px4.orders.climbs_by_itself(px4.now_ns)
+
+
 def stands(orders, seconds, action, mode, reported=(0.2, 0.0, 0.1), at_m=(0.0, 0.0)):
     """Have it stand somewhere, motors on, with a velocity of its own; returns what it was told last."""
     told = None

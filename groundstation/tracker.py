@@ -283,6 +283,7 @@ class Tracker:
         sight = Sight(
             min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
+            lookout.unsteered,
         )  # fmt: skip
         wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         limited = {

@@ -1,15 +1,18 @@
 """How far robots may leave the sight of the world-fixed cameras, so that they come back before they are lost."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.control.parameters import ControlParameters
-from groundstation.control.view import spread_m, view_of, way_back_m
+from groundstation.control.view import VIEW_INSET_M, spread_m, view_of, way_back_m
 from groundstation.estimation.belief import JointBelief
-from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.models import Rectangle, SensorSuite
+
+_HOLD_GAIN = 1.0  # of the way that is left to the border of where a robot may be [1/s]
 
 
 @dataclass
@@ -44,6 +47,45 @@ class Excursions:
         way_m = way_back_m(places, view)
         back_s = left_s - way_m / p.return_speed_m_s - p.return_margin_s
         return np.where(way_m > 0.0, back_s, math.inf)
+
+
+def within_reach(
+    velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite,
+    error_m_s: float, drift_m_s: Array,
+) -> Array:  # fmt: skip
+    """Return the part of a velocity (2) [m/s; world] with which a robot stays where it could come back from unseen.
+
+    It could from now on, into the nearest world-fixed view at its height; another one that it reaches from there in
+    time counts as the same. error_m_s: rms error of its odometry that is to be expected; drift_m_s: motion besides what
+    it is told (2) [m/s; world], which counts towards the borders.
+    """
+    mean, p = belief.mean_of(name), parameters
+    left_s = time_left_s(spread_m(belief, name), 0.0, p, error_m_s)
+    views = sensors.root_views(float(mean[2]) + sensors.marker_height_m[name])
+    view = _connected(mean[:2], views, p.return_speed_m_s * left_s)
+    if view is None:
+        return velocity
+    reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)
+    low, high = np.transpose((view.x_m, view.y_m))
+    most, drift = p.return_speed_m_s, np.clip(drift_m_s, -p.return_drift_m_s, p.return_drift_m_s)
+    slowest = np.clip(_HOLD_GAIN * (low - reach_m - mean[:2]), -most, most) - drift
+    fastest = np.clip(_HOLD_GAIN * (high + reach_m - mean[:2]), -most, most) - drift
+    return np.asarray(np.clip(velocity, slowest, fastest))
+
+
+def _connected(place: Array, views: Sequence[Rectangle], way_m: float) -> Rectangle | None:
+    """Return the box about the view nearest to a place (2) and those at most a way from it, a little inside."""
+    nearest = min(views, key=lambda view: math.dist(place, view.nearest(*place.tolist())), default=None)
+    if nearest is None:
+        return None
+    near = [view for view in views if _apart_m(nearest, view) <= way_m]
+    xs, ys = [x for view in near for x in view.x_m], [y for view in near for y in view.y_m]
+    return Rectangle((min(xs), max(xs)), (min(ys), max(ys))).shrunk(VIEW_INSET_M)
+
+
+def _apart_m(one: Rectangle, other: Rectangle) -> float:
+    gaps = ((max(a[0], b[0]) - min(a[1], b[1])) for a, b in ((one.x_m, other.x_m), (one.y_m, other.y_m)))
+    return math.hypot(*(max(0.0, gap) for gap in gaps))
 
 
 def time_left_s(

@@ -6,12 +6,12 @@ from groundstation.bus.messages import Message, SearchedPicture, Severity, Targe
 from groundstation.bus.notice import Notice
 from groundstation.control.excursion import Excursions
 from groundstation.control.missing_robots import MissingRobots
+from groundstation.control.odometry_errors import OdometryErrors
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.control.target_search import Search, SearchMode, SearchState
 from groundstation.control.unseen_targets import UnseenTargets
-from groundstation.control.view import velocity_error_m_s
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.room_map import RoomMap
 from groundstation.sensing.models import SensorSuite
@@ -32,6 +32,7 @@ class Lookout:
         self._excursions = Excursions(control, sensors)
         self._search = Search(search, control.lost_after_s, sensors, targets, self._excursions)
         self._robots = MissingRobots(sensors, robots)
+        self._errors = OdometryErrors()
         self._names = tuple(robots)
         self._modes: dict[str, str] = {}
         self._unseen = UnseenTargets()
@@ -54,8 +55,13 @@ class Lookout:
         return self._robots.missed_s
 
     @property
+    def unsteered(self) -> tuple[str, ...]:
+        """Return the robots that follow no setpoints, as their drivers say: they wait or land."""
+        return tuple(name for name in self._names if self._modes.get(name, _OBEYS) != _OBEYS)
+
+    @property
     def velocity_errors_m_s(self) -> Mapping[str, float]:
-        """Return the rms error of each robot's odometry [m/s]."""
+        """Return the rms error of each robot's odometry that is to be expected [m/s]."""
         return self._excursions.velocity_errors_m_s
 
     def take(self, message: Message, in_our_time: bool = True) -> None:
@@ -76,9 +82,7 @@ class Lookout:
         each airborne robot is, itself or through others. Infinite: not in the belief.
         """
         self._excursions.unseen_s = {name: age_s for name, age_s in ages_s.items() if name in self._names}
-        self._excursions.velocity_errors_m_s = {
-            n: velocity_error_m_s(belief, n) for n in self._names if n in belief.layout
-        }
+        self._excursions.velocity_errors_m_s = self._errors.advance(belief)
         for name in self._robots.advance(belief, rooted_s):
             text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))

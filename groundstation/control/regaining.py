@@ -1,6 +1,7 @@
 """How a robot that tracks gets a target back into its picture: it turns to it and backs off, before any search."""
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
@@ -10,12 +11,22 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world
 from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.topology import Topology
 
 _WAY_GAIN, _TURN_GAIN = 1.5, 2.0  # of what a robot is off its distance and heading [1/s]
 _FASTEST_M_S = 0.5
 _ABOVE_RAD = 0.12  # a target is kept so much above the middle of the picture: who backs off tips it up
 _MOST_SPREAD_M = 0.6  # a belief that is wider says too little of how far to back off
 _NEAREST_M = 0.3
+
+
+def who_regains(target: str, topology: Topology, belief: JointBelief, sensors: SensorSuite) -> Collection[str]:
+    """Return the robots that get a target back: the lowest level, or the nearest where only others have it in reach."""
+    at, lowest = belief.mean_of(target)[:2], topology.levels[-1]
+    eyes = [name for name in belief.layout.robots if name in topology.robots and name in sensors.onboard]
+    ways_m = {name: math.dist(belief.mean_of(name)[:2], at) for name in eyes}
+    near = [name for name in eyes if ways_m[name] <= sensors.onboard[name].view.range_m]
+    return lowest if not near or lowest.intersection(near) else (min(near, key=ways_m.__getitem__),)
 
 
 def regaining(robot: str, target: str, belief: JointBelief, sensors: SensorSuite) -> tuple[Array, float] | None:

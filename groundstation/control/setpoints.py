@@ -8,9 +8,10 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import Vector3
+from groundstation.control.excursion import within_reach
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.parameters import ControlParameters
-from groundstation.control.regaining import regaining
+from groundstation.control.regaining import regaining, who_regains
 from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.search_spacing import apart
 from groundstation.control.stand import Stand
@@ -49,7 +50,8 @@ class Sight:
     target_age_s: since any target was last observed where it is believed, None if never; unseen_s: since a camera last
     saw each robot; missed_s: since when a camera should see a robot and does not; missing: targets that are to be
     searched for: while others are tracked, one robot does; velocity_errors_m_s: of each robot's odometry, rms;
-    drifts_m_s: motion of each robot besides what it is told (3) [m/s; world].
+    drifts_m_s: motion of each robot besides what it is told (3) [m/s; world]; unsteered: robots that follow no
+    setpoints: they wait or land.
     """
 
     target_age_s: float | None = None
@@ -59,6 +61,7 @@ class Sight:
     search: Stands = lambda _robots, _targets: {}
     velocity_errors_m_s: Mapping[str, float] = field(default_factory=dict)
     drifts_m_s: Mapping[str, Array] = field(default_factory=dict)
+    unsteered: Collection[str] = ()
 
 
 NOTHING_SEEN = Sight()
@@ -95,7 +98,7 @@ def setpoints_from_plan(
         phases[scout] = FlightMode.SEARCH
     searching = sight.search([name for name in robots if phases[name] is FlightMode.SEARCH], missing)
     stands = _stands(phases, belief, robots, parameters, sensors, searching, sight.missed_s)
-    coming = [name for name in robots if phases[name] is FlightMode.RETURN]
+    coming = [name for name in robots if phases[name] is FlightMode.RETURN and name not in sight.unsteered]
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
         if phase is FlightMode.UNKNOWN:
@@ -103,6 +106,7 @@ def setpoints_from_plan(
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, belief, parameters, sensors, sight)
             vx, vy = _giving_way(name, (vx, vy), coming, belief, parameters)
+            vx, vy = _recoverable(name, (vx, vy), belief, parameters, sensors, sight)
             wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
         else:
             drift = sight.drifts_m_s.get(name, _NO_DRIFT) if phase is FlightMode.RETURN else _NO_DRIFT
@@ -120,13 +124,13 @@ def _regained(
     """
     vx, vy, rate = (float(value) for value in plan.controls[name])
     age_s = sight.target_age_s
-    if age_s is None or age_s <= parameters.regain_after_s or name not in plan.topology.levels[-1]:
+    if age_s is None or age_s <= parameters.regain_after_s:
         return vx, vy, rate
     place = belief.mean_of(name)[:2]
     tracked = (one for one in belief.layout.targets if one not in sight.missing)
     target = min(tracked, key=lambda one: math.dist(belief.mean_of(one)[:2], place))
     found = regaining(name, target, belief, sensors)
-    if found is None:
+    if found is None or name not in who_regains(target, plan.topology, belief, sensors):
         return vx, vy, rate
     (vx, vy), rate = found[0].tolist(), found[1]
     return vx, vy, rate
@@ -151,6 +155,25 @@ def _giving_way(
         least = min(parameters.search_speed_m_s, _STAND_GAIN * lacking_m)
         wanted = wanted + max(0.0, least - float(off @ wanted)) * off
     return float(wanted[0]), float(wanted[1])
+
+
+def _recoverable(
+    name: str,
+    velocity: tuple[float, float],
+    belief: JointBelief,
+    parameters: ControlParameters,
+    sensors: SensorSuite,
+    sight: Sight,
+) -> tuple[float, float]:
+    """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost."""
+    yaw, error_m_s = float(belief.mean_of(name)[3]), sight.velocity_errors_m_s.get(name, 0.0)
+    if error_m_s <= parameters.sound_error_m_s:
+        return velocity
+    wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
+    drift = sight.drifts_m_s.get(name, _NO_DRIFT)[:2]
+    held = within_reach(wanted[:2], name, belief, parameters, sensors, error_m_s, drift)
+    forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
+    return forward, left
 
 
 def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight) -> bool:

@@ -79,6 +79,15 @@ def test_who_relays_goes_on_with_its_plan() -> None:
     assert out["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))
 
 
+def test_the_nearest_gets_back_what_the_lowest_level_cannot_reach() -> None:
+    """drone_2 is the lowest and 5 m away; a topology says who looks at whom, not who sees what."""
+    far = wanted(belief(np.array([2.4, 0.0, 1.6, 0.2]), np.array([3.0, 0.0, 0.0, 0.0])), 0.5, "drone_1/drone_2")
+    assert far["drone_1"].velocity_m_s[0] < -0.2
+    assert far["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))
+    nobody = wanted(belief(np.array([0.5, 0.0, 1.6, 0.2]), np.array([4.0, 0.0, 0.0, 0.0])), 0.5, "drone_1/drone_2")
+    assert nobody["drone_1"].velocity_m_s[:2] == pytest.approx((0.2, -0.1))
+
+
 def test_a_place_that_is_known_badly_is_looked_at_from_farther_away() -> None:
     drone, target = np.array([-0.7, 0.0, 1.6, 0.0]), np.array([0.5, 0.0, 0.0, 0.0])
     sharp, vague = (regaining("drone_1", "turtlebot", belief(drone, target, std), SENSORS) for std in (0.02, 0.3))

@@ -1,17 +1,18 @@
 """The way back into a world-fixed view starts in time for it."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from groundstation.control.excursion import Excursions, time_left_s
+from groundstation.control.excursion import Excursions, time_left_s, within_reach
 from groundstation.control.flight_mode import FlightMode
 from groundstation.control.parameters import control_from_field
 from groundstation.control.returning import is_lost
 from groundstation.control.setpoints import Sight, setpoints_from_plan
-from groundstation.control.view import velocity_error_m_s, way_back_m
+from groundstation.control.view import VIEW_INSET_M, velocity_error_m_s, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.sensing.from_field import sensors_from_field
@@ -98,6 +99,37 @@ def test_excursions_of_a_drone_whose_odometry_is_wrong_end_sooner() -> None:
     left_s = excursions.left_s("drone_1", here)
     assert left_s == pytest.approx((CONTROL.return_limit_m - 0.05) / 0.2)
     assert left_s < trusted_s
+
+
+@pytest.mark.parametrize(("error_m_s", "back_s"), [(0.2, 0.8), (0.25, 0.34), (0.5, 0.0)])
+def test_who_would_be_lost_unseen_stays_where_it_could_come_back_from(error_m_s: float, back_s: float) -> None:
+    """Known to 0.02 m it reaches 0.48 m after 0.46 m / error; of that time 1.5 s are for turning and being found."""
+    at = belief(np.array([1.2, 0.0, 1.6, 0.0]), 0.02)
+    outwards = within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, SENSORS, error_m_s, np.zeros(2))
+    inwards = within_reach(np.array([-0.4, 0.1]), "drone_1", at, CONTROL, SENSORS, error_m_s, np.zeros(2))
+    drifting = within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, SENSORS, error_m_s, np.array([0.2, 0.0]))
+    border_m = SENSORS.root_views(1.6 + SENSORS.marker_height_m["drone_1"])[0].x_m[1] - VIEW_INSET_M
+    assert outwards == pytest.approx([border_m + back_s * CONTROL.return_speed_m_s - 1.2, 0.0])
+    assert inwards == pytest.approx([-0.4, 0.1])
+    assert drifting == pytest.approx(outwards - [0.2, 0.0])
+
+
+@pytest.mark.parametrize(("error_m_s", "crosses"), [(0.2, True), (0.6, False)])
+def test_a_view_that_it_reaches_in_time_may_be_crossed_to(error_m_s: float, crosses: bool) -> None:
+    ceiling = SENSORS.world["ceiling"]
+    two = {name: replace(ceiling, position_m=(x, 0.0, 4.2)) for name, x in (("west", -1.6), ("east", 1.6))}
+    at = belief(np.array([-0.4, 0.0, 1.6, 0.0]), 0.02)  # 0.8 m between them
+    found = within_reach(
+        np.array([0.5, 0.0]), "drone_1", at, CONTROL, replace(SENSORS, world=two), error_m_s, np.zeros(2)
+    )
+    assert found[0] == pytest.approx(0.5) if crosses else found[0] < 0.0
+
+
+def test_without_a_view_in_the_room_nobody_is_held_back() -> None:
+    blind, at = replace(SENSORS, world={}), belief(np.array([1.12, 0.0, 1.6, 0.0]), 0.02)
+    assert within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, blind, 0.4, np.zeros(2)) == pytest.approx(
+        [0.5, 0.0]
+    )
 
 
 def test_places_from_which_it_could_not_be_back_in_time_are_not_gone_to() -> None:

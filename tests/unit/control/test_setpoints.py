@@ -172,6 +172,27 @@ def test_who_tracks_makes_room_for_one_that_comes_back_with_a_doubtful_place(uns
         assert (vx, vy) == (0.0, 0.1)
 
 
+def test_nobody_makes_room_for_one_that_lands() -> None:
+    at = belief((1.6, 0.3, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0), robot_std=0.3)
+    sight = Sight(0.1, {"drone_1": 20.0}, unsteered=("drone_1",))
+    out = setpoints_from_plan(plan((1.5, 1.5)), at, NAMES, CONTROL, SENSORS, sight)
+    assert out["drone_1"].phase is FlightMode.RETURN
+    assert out["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))
+
+
+def test_a_plan_does_not_take_out_of_the_view_whose_odometry_errs() -> None:
+    at = belief((1.2, 0.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0))
+    wrong, sound = (
+        setpoints_from_plan(
+            plan((1.5, 1.5)), at, NAMES, CONTROL, SENSORS, Sight(0.1, velocity_errors_m_s={"drone_1": error})
+        )
+        for error in (0.35, 0.05)
+    )
+    assert sound["drone_1"].velocity_m_s[:2] == pytest.approx((0.2, -0.1))
+    assert wrong["drone_1"].velocity_m_s[0] < -0.1
+    assert wrong["drone_1"].yaw_rate_rad_s == sound["drone_1"].yaw_rate_rad_s
+
+
 def test_the_way_back_is_flown_against_the_drift_that_was_measured() -> None:
     at = belief((3.0, 0.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0), robot_std=0.4)
 

@@ -179,18 +179,16 @@ class Tracker:
 
     def converged(self, name: str) -> bool:
         """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
-        if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
-            return False
-        if self._joinings.is_unsettled(name):
+        unrooted = name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent
+        if unrooted or self._joinings.is_unsettled(name):
             return False
         return self._localisation.holds(self._belief, name, self._tied_age_s(name))
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""
-        layout, unlocalised_s = self._belief.layout, self.unlocalised_s()
-        names = layout.robots + layout.targets
-        known = {name: (self.converged(name), self._tied_age_s(name), unlocalised_s.get(name, 0.0)) for name in names}
-        return tuple(entity_estimate(self.filter, self._belief, name, *told) for name, told in known.items())
+        names, ages_s = self._belief.layout.robots + self._belief.layout.targets, self.unlocalised_s()
+        told = {name: (self.converged(name), self._tied_age_s(name), ages_s.get(name, 0.0)) for name in names}
+        return tuple(entity_estimate(self.filter, self._belief, name, *known) for name, known in told.items())
 
     def target_age_s(self) -> float | None:
         """Return the time since any target was last observed; None if none is believed anywhere."""
@@ -238,9 +236,8 @@ class Tracker:
         missing = self.lookout.missing
         if len(missing) == len(self._targets):
             return ()
-        limit = self.parameters.control.hint_std_m
         known = [name for name in missing if name in self._belief.layout]
-        return tuple(name for name in known if spread_m(self._belief, name) > limit)
+        return tuple(n for n in known if spread_m(self._belief, n) > self.parameters.control.hint_std_m)
 
     def request(self) -> PlanRequest:
         """Return the snapshot for the next plan."""
@@ -283,8 +280,7 @@ class Tracker:
         sight = Sight(
             min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
-            lookout.unsteered,
-        )  # fmt: skip
+            lookout.unsteered)  # fmt: skip
         wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)

@@ -51,9 +51,9 @@ class Orders:
         self._started = self._taken_over = False
         self._ordered_ns = -1
 
-    def are_heeded(self, custom_mode: int) -> bool:
+    def are_heeded(self, now_ns: int, custom_mode: int) -> bool:
         """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
-        return custom_mode == self._guided and not self._taken_over
+        return custom_mode == self._guided and not self._taken_over and not self.climbs_by_itself(now_ns)
 
     def climbs_by_itself(self, now_ns: int) -> bool:
         """Return whether the vehicle ends its take-off by itself, told nothing."""

@@ -198,8 +198,7 @@ class MavlinkVehicle:
             state = FlightState.HOVERING
         elif state is FlightState.LANDED and self.orders.starting:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
-        ours = self.orders.are_heeded(known.custom_mode) and not self.orders.climbs_by_itself(now_ns)
-        velocity = self._true_velocity(now_ns, known) if ours else None
+        velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
         not_ready = self._not_ready(now_ns, known)
         battery = known.battery if now_ns - known.battery_ns < _BATTERY_NS else None
         lost_s = self.vision.lost_s(now_ns)

@@ -8,8 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import FlightState, Header, Message, Odometry, RelativeObservation, VehicleStatus
+from groundstation.bus.messages import (
+    FlightState,
+    Header,
+    Message,
+    Odometry,
+    RelativeObservation,
+    VehicleStatus,
+    Verdict,
+)
 from groundstation.control.view import Localisation
+from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
 from groundstation.tracker import tracker_from_field
 
@@ -149,3 +158,18 @@ def test_whom_nobody_sees_must_know_its_velocity(flight: Flight, limit: dict[str
     tracker._localisation = Localisation(replace(tracker.parameters.safety, **limit))
     flight.run(0.7, look=False)
     assert not tracker.converged("drone_1")
+
+
+def test_who_sees_what_the_room_knows_of_is_localised_by_it(flight: Flight) -> None:
+    """drone_1, which nobody sees, sees a target that something else knows of, which the ceiling sees."""
+    tracker = flight.tracker
+    tracker._localisation = Localisation(replace(tracker.parameters.safety, max_velocity_error_m_s=0.001))
+    flight.run(0.7, look=False)
+    assert not tracker.converged("drone_1")
+    chain = [
+        Correction(observer, "turtlebot", Verdict.ACCEPTED, "", latency_ms=100.0) for observer in ("ceiling", "drone_1")
+    ]
+    tracker._roots.advance(flight.now, chain, flying=True)
+    assert tracker.converged("drone_1")
+    (told,) = tracker.estimates()
+    assert told.age_s == pytest.approx(0.1)

@@ -44,12 +44,15 @@ class FaultKind(StrEnum):
     RANGES_SILENT = "ranges_silent"
     RANGES_FROZEN = "ranges_frozen"
     RANGES_LONG = "ranges_long"
+    ODOMETRY_SILENT = "odometry_silent"
+    ODOMETRY_FROZEN = "odometry_frozen"
+    ODOMETRY_SCALED = "odometry_scaled"
 
 
 class Part(Enum):
     """What can have a fault: any vehicle, one whose emulator has it (`VehicleKind.emulated_faults`), a camera, the
-    marker of a drone or target, a motion capture system, its body on a drone or target, a ranging system, or a
-    drone's radio for it."""
+    marker of a drone or target, a motion capture system, its body on a drone or target, a ranging system, a
+    drone's radio for it, or a target that tells its odometry."""
 
     VEHICLE = auto()
     ABLE_VEHICLE = auto()
@@ -59,6 +62,7 @@ class Part(Enum):
     BODY = auto()
     RANGING = auto()
     TRANSPONDER = auto()
+    ODOMETRY = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +109,9 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.RANGES_SILENT: KindRules(Part.RANGING),
     FaultKind.RANGES_FROZEN: KindRules(Part.RANGING),
     FaultKind.RANGES_LONG: KindRules(Part.TRANSPONDER, (-5.0, 5.0), 0.5),
+    FaultKind.ODOMETRY_SILENT: KindRules(Part.ODOMETRY),
+    FaultKind.ODOMETRY_FROZEN: KindRules(Part.ODOMETRY),
+    FaultKind.ODOMETRY_SCALED: KindRules(Part.ODOMETRY, (-5.0, 5.0), 0.5),
 }
 
 
@@ -127,10 +134,11 @@ class Fault(Section):
     capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame; body_jumped: all
     systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other; ranges_silent,
     ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long: those of a drone are
-    value [m] too long, as behind a wall."""
+    value [m] too long, as behind a wall; odometry_silent, odometry_frozen, odometry_scaled: a target's own odometry
+    ends, repeats its contents, tells value times the speed of its wheels."""
     entity: str
     """The drone, camera (of a drone's camera: the drone), motion capture or ranging system; for boards and bodies a
-    drone or target."""
+    drone or target; for odometry a target that tells its own."""
     start_s: Annotated[float, Field(ge=0)]
     """When it breaks [s after the simulator is ready]."""
     end_s: Annotated[float, Field(ge=0)] | None = None

@@ -15,7 +15,7 @@ from sim_bridge.cameras import render_specs
 from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.devices.odometry_router import OdometryRouter
 from sim_bridge.devices.range_gateway import RangeGateway
-from sim_bridge.fault_kinds import exchanged
+from sim_bridge.fault_kinds import Part, exchanged, of_part
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.link_bursts import with_bursts
@@ -132,7 +132,8 @@ class Harness:
         errors, odometry = order.scenario.cameras.mounting_errors, order.site.tracked[target].odometry
         assert odometry is not None
         wheels = WheelOdometry(self.world.targets[target], errors, generator_of_eye(order.seed, name))
-        router = OdometryRouter(name, place, odometry.source, wheels)
+        faults = [fault for fault in of_part(order.scenario.faults, Part.ODOMETRY) if fault.entity == target]
+        router = OdometryRouter(name, place, odometry.source, wheels, faults)
         self._stage.add(name, router, router.fileno())
 
     def _open_capture(self, name: str, place: tuple[str, int]) -> None:

@@ -125,6 +125,7 @@ def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], r
         Part.BODY: list(site.bodies),
         Part.RANGING: sorted(site.ranging),
         Part.TRANSPONDER: list(site.drones) if site.ranging else [],
+        Part.ODOMETRY: [name for name, target in site.tracked.items() if target.odometry is not None],
     }
     problems = []
     for number, fault in enumerate(faults):

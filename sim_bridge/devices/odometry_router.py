@@ -6,10 +6,13 @@ Pose and heading are what the wheels add up to, in a frame of their own.
 import math
 import os
 import time
+from collections.abc import Iterable
+from dataclasses import replace
 from urllib.parse import parse_qs, urlsplit
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from sim_bridge.devices.ros2_router import Ros2Router
+from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.wheel_odometry import PERIOD_S, WheelOdometry
 from sim_bridge.world.world import TICK_S
 
@@ -18,11 +21,17 @@ _EVERY = round(PERIOD_S / TICK_S)
 
 
 class OdometryRouter:
-    """Router and publisher around one base; `sim_bridge.world.emulation.Emulator`. source: topic and domain."""
+    """Router and publisher around one base; `sim_bridge.world.emulation.Emulator`.
 
-    def __init__(self, name: str, place: tuple[str, int], source: str, wheels: WheelOdometry) -> None:
+    source: topic and domain; faults: those of this target's odometry.
+    """
+
+    def __init__(
+        self, name: str, place: tuple[str, int], source: str, wheels: WheelOdometry, faults: Iterable[Fault] = ()
+    ) -> None:
         self.silent = self.deaf = False
-        self._wheels, self._ticks = wheels, 0
+        self._wheels, self._faults, self._ticks = wheels, tuple(faults), 0
+        self._told: vehicle.OdometryMessage | None = None
         self._x = self._y = self._yaw = 0.0
         self._router = Ros2Router(name, f"tcp/{place[0]}:{place[1]}")
         parts = urlsplit(source)
@@ -41,17 +50,24 @@ class OdometryRouter:
     def send(self) -> None:
         """Publish what is due at this tick."""
         self._ticks += 1
-        if self.silent or self._ticks % _EVERY:
+        now_s = self._ticks * TICK_S
+        if self.silent or self._ticks % _EVERY or standing(self._faults, FaultKind.ODOMETRY_SILENT, now_s):
             return
+        if self._told is None or not standing(self._faults, FaultKind.ODOMETRY_FROZEN, now_s):
+            self._told = self._measured(now_s)
+        message = replace(self._told, stamp_ns=time.time_ns())
+        self._router.publish(self._publisher, vehicle.encode_odometry(message, "odom", "base_footprint"))
+
+    def _measured(self, now_s: float) -> vehicle.OdometryMessage:
+        """Return what it has to say, without a stamp."""
         speed, turn_rate = self._wheels.read()
+        scaled = standing(self._faults, FaultKind.ODOMETRY_SCALED, now_s)
+        speed *= scaled.amount if scaled else 1.0
         self._yaw = math.remainder(self._yaw + turn_rate * PERIOD_S, math.tau)
         self._x += speed * math.cos(self._yaw) * PERIOD_S
         self._y += speed * math.sin(self._yaw) * PERIOD_S
         turned = (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
-        message = vehicle.OdometryMessage(
-            time.time_ns(), (self._x, self._y, 0.0), turned, (speed, 0.0, 0.0), (0.0, 0.0, turn_rate)
-        )
-        self._router.publish(self._publisher, vehicle.encode_odometry(message, "odom", "base_footprint"))
+        return vehicle.OdometryMessage(0, (self._x, self._y, 0.0), turned, (speed, 0.0, 0.0), (0.0, 0.0, turn_rate))
 
     def close(self) -> None:
         """End node and router."""

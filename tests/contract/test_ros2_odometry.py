@@ -23,6 +23,7 @@ from groundstation.bus.messages import CameraStatus, ReportedMotion
 from groundstation.bus.topics import CAMERA_STATUS, REPORTED_MOTION
 from groundstation.engineering_views.ros2.codec import Ros2Codec
 from sim_bridge.devices.odometry_router import OdometryRouter
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.wheel_odometry import WheelOdometry
 
 KIND, HOST, MS = "nav_msgs/msg/Odometry", "127.0.0.1", 1_000_000
@@ -155,6 +156,31 @@ def test_the_emulated_turtlebot_speaks_as_a_stranger_would(rig: Rig, port: int) 
         assert all(abs(one.velocity_m_s[0] - 0.3) < 0.005 for one in rig.reports) and not rig.driver.counts
         router.silent = True
         rig.until(lambda: any("DEGRADED no report for 0.4 s" in one for one in rig.child.told), router.send)
+    finally:
+        router.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [("odometry_silent", "no report for 0.4 s"), ("odometry_frozen", "hangs"), ("odometry_scaled", "")],
+)
+def test_a_scenario_breaks_the_emulated_odometry(rig: Rig, port: int, kind: str, told: str) -> None:
+    base: Any = SimpleNamespace(wheels=(0.4, -0.2))
+    wheels = WheelOdometry(base, False, np.random.default_rng(1))
+    fault = Fault(kind=FaultKind(kind), entity="cart", start_s=0.5)
+    router = OdometryRouter("cart_odometry", (HOST, port), rig.driver._settings.source, wheels, [fault])
+
+    def tick() -> None:
+        time.sleep(0.005)
+        router.send()
+
+    try:
+        rig.until(lambda: rig.child.told[-2:-1] == ["READY"], tick)
+        if told:
+            rig.until(lambda: "DEGRADED" in rig.child.told[-2] and told in rig.child.told[-2], tick)
+        else:
+            rig.until(lambda: abs(rig.reports[-1].velocity_m_s[0] - 0.2) < 0.005, tick)
+        assert any(abs(one.velocity_m_s[0] - 0.4) < 0.005 for one in rig.reports), "it was sound before"
     finally:
         router.close()
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenario_faults import faults, until_the_first_fault
 
 from groundstation.bus.messages import VelocitySetpoint
 from groundstation.bus.topics import SETPOINT
@@ -24,25 +25,6 @@ Start = Callable[..., Any]
 
 def report_of(run: Any) -> dict[str, Any]:
     return dict(json.loads((run.run_dir / "report.json").read_text()))
-
-
-def faults(folder: Path, *lines: str) -> str:
-    """Write a scenario with these faults; returns its path."""
-    path = folder / "faults.yaml"
-    path.write_text("schema_version: 1\nfaults:\n" + "".join(f"  - {{{line}}}\n" for line in lines))
-    return str(path)
-
-
-def until_the_first_fault(run: Any, kind: str = "capture_frozen") -> tuple[float, float]:
-    """Wait for the tracking and for the first fault of a scenario; returns when each began [s]."""
-
-    def begun() -> bool:
-        return any(kind in text for text in run.events())
-
-    if run.until(lambda: begun() or all(run.mode(name) == "TRACK" for name in DRONES), 90, "a beginning") and begun():
-        pytest.skip(f"this machine was too busy to fly before the first fault:\n{run.text}")
-    tracking = run.until_tracking()
-    return tracking, run.until(begun, 60, "the first fault")
 
 
 def told_to_hover(run: Any, drone: str, since: float) -> bool:
@@ -81,7 +63,7 @@ def test_poses_that_cannot_be_true_are_told_and_flown_over(sitl: Start, tmp_path
         "kind: bodies_swapped, entity: drone_1, other: drone_2, start_s: 30, end_s: 31",
     )
     run = sitl("sitl", "mocap-lab", "--duration", "24", "--scenario", scenario)
-    tracking, began = until_the_first_fault(run)
+    tracking, began = until_the_first_fault(run, "capture_frozen")
     run.until(lambda: any("bodies_swapped" in text and "ends" in text for text in run.events()), 60, "the last fault")
     # All three bodies after the freeze, one after the jump, two after the exchange.
     ended = run.until(lambda: sum("is followed again" in text for text in run.events()) == 6, 5, "followed again")

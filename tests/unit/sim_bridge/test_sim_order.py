@@ -244,6 +244,7 @@ def test_a_run_whose_pictures_come_late_is_invalid() -> None:
     [
         ({"kind": "uniform_floor", "entity": "px4_1"}, "'px4_1' is none of drone_1, drone_2"),
         ({"kind": "wrong_board", "entity": "drone_1", "other": "nobody"}, "other: 'nobody' is none of"),
+        ({"kind": "odometry_silent", "entity": "turtlebot"}, "'turtlebot' is none of"),
         ({"kind": "picture_black", "entity": "turtlebot"}, "'turtlebot' is none of ceiling, drone_1"),
         ({"kind": "ids_swapped", "entity": "drone_1", "other": "px4_1"}, "drone_1 and px4_1 are of different kinds"),
     ],

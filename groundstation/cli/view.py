@@ -40,6 +40,7 @@ _PORT = click.IntRange(1024, 65535)
 @click.option(
     "--distro", type=click.Choice(_ROS_DISTRIBUTIONS), default="jazzy", show_default=True, help="ROS 2: which."
 )
+@click.option("--truth", is_flag=True, help="ROS 2: show true states too; a simulation has them.")
 def view(  # click hands each option over as a parameter
     viewer: str | None,
     name: str | None,
@@ -49,6 +50,7 @@ def view(  # click hands each option over as a parameter
     router: str,
     domain: int,
     distro: str,
+    truth: bool,
 ) -> int:
     """Show a running ground station to an engineer's viewer, on loopback. It takes no orders and stops nothing."""
     from groundstation.bus.roles import Role
@@ -62,10 +64,10 @@ def view(  # click hands each option over as a parameter
     _require(viewer)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
     record = choose(name)
-    bus = join(record, "view", Role.VIEW, at_most_hz=_enough_hz(record) if viewer == "ros2" else {})
+    bus = join(record, "view", Role.VIEW, at_most_hz=_thinned(record) if viewer == "ros2" else {})
     shown: LiveView | None = None
     try:
-        opened = _open_ros2(record, router, domain, distro) if viewer == "ros2" else None
+        opened = _open_ros2(record, router, domain, distro, truth) if viewer == "ros2" else None
         shown = opened or _open(viewer, record, port, page_port, output)
         dropped = watch(bus, shown, lambda: record.alive)
         click.echo("the run has ended" if shown.alive else "the viewer's server has ended", err=True)
@@ -108,22 +110,24 @@ def _open(viewer: str, record: "RuntimeRecord", port: int | None, page_port: int
     return RerunView(record.name, field, timeline, now_ns, server, output)
 
 
-def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str) -> "LiveView":
+def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str, truth: bool) -> "LiveView":
     from groundstation.bus import clock
     from groundstation.engineering_views.ros2 import LAYOUTS
     from groundstation.engineering_views.ros2.live import Ros2View
     from groundstation.recording.timeline import Timeline
 
     timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
-    bridge = Ros2View(router, domain, distro, _field_of(record), timeline)
+    bridge = Ros2View(router, domain, distro, _field_of(record), timeline, truth)
     click.echo(f"{record.name} in ROS 2 domain {domain} by {router} (Ctrl-C leaves it; the flight goes on)")
     click.echo(f"layouts for RViz and Foxglove: {LAYOUTS}")
     return bridge
 
 
-def _enough_hz(record: "RuntimeRecord") -> dict[str, float]:
+def _thinned(record: "RuntimeRecord") -> dict[str, float]:
+    from groundstation.bus.zenoh_bus import speak_on_one_thread
     from groundstation.engineering_views.ros2.live import enough_hz
 
+    speak_on_one_thread()
     return enough_hz(record.site, _field_of(record))
 
 

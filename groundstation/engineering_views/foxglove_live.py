@@ -6,7 +6,7 @@ from groundstation.bus import codec, keys
 from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
 from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_schema
-from groundstation.engineering_views.watch import everything
+from groundstation.engineering_views.watch import USUAL_PERIOD_S, everything
 from groundstation.errors import MessageError, OperatorMistake
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.capture import Capture, Entry
@@ -22,6 +22,8 @@ _DRAWN = frozenset(topic.name for topic in (ESTIMATE, PLAN, SETPOINT))
 
 class FoxgloveView:
     """Serves until closed; viewers come and go. It takes no orders: no services, nothing can be published to it."""
+
+    PERIOD_S = USUAL_PERIOD_S
 
     def __init__(self, name: str, field: ResolvedField | None, timeline: Timeline, port: int) -> None:
         self._context = foxglove.Context()

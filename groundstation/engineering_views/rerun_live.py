@@ -11,7 +11,7 @@ from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.keys import Key
 from groundstation.engineering_views.rerun_file import APPLICATION
 from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
-from groundstation.engineering_views.watch import everything
+from groundstation.engineering_views.watch import USUAL_PERIOD_S, everything
 from groundstation.errors import GroundStationError, MessageError
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.file_topics import is_picture
@@ -59,6 +59,8 @@ class RerunServer:
 
 class RerunView:
     """Shows the bus's messages, on a server or in a file."""
+
+    PERIOD_S = USUAL_PERIOD_S
 
     def __init__(
         self,

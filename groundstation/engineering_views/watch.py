@@ -2,20 +2,22 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.topics import IMU, JOURNAL, ODOMETRY
 from groundstation.recording.file_topics import IMAGE_TOPICS, STATE_TOPICS
 
-_PERIOD_S = 0.05
+USUAL_PERIOD_S = 0.05
 # Nobody looks at hundreds of samples a second; recordings have them.
 _SHOWN = tuple(topic for topic in STATE_TOPICS if topic not in (IMU, ODOMETRY, JOURNAL))
 
 
 class LiveView(Protocol):
-    """Something that shows samples."""
+    """Something that shows samples; PERIOD_S: between two looks for new ones."""
+
+    PERIOD_S: ClassVar[float]
 
     @property
     def alive(self) -> bool:
@@ -37,14 +39,12 @@ def everything(bus: Bus) -> tuple[Subscription, ...]:
 
 
 def watch(bus: Bus, view: LiveView, goes_on: Callable[[], bool]) -> int:
-    """Show new messages, 20 times a second, until `goes_on` says no or the view is gone; returns how many samples were
-    dropped.
-    """
+    """Show new messages until `goes_on` says no or the view is gone; returns how many samples were dropped."""
     queues = view.subscribe(bus)
     while view.alive and goes_on():
         now_ns = clock.now_ns()
         for queue in queues:
             for sample in queue.drain_samples():
                 view.take(sample, now_ns)
-        time.sleep(_PERIOD_S)
+        time.sleep(view.PERIOD_S)
     return sum(queue.overflowed for queue in queues)

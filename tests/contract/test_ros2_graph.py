@@ -74,6 +74,23 @@ def test_a_foreign_client_lists_and_decodes(router: str) -> None:
         foreign.close()
 
 
+@pytest.mark.parametrize("truth", [False, True])
+def test_true_states_come_where_they_are_asked_for(router: str, truth: bool) -> None:
+    exchange = MemoryExchange()
+    simulator, watcher = MemoryBus(exchange, "lab", "sim_bridge"), MemoryBus(exchange, "lab", "view")
+    bridge = Ros2View(router, 7, "jazzy", None, Timeline(clock.clock_id(), clock.unix_offset_ns()), truth)
+    try:
+        queues = bridge.subscribe(watcher)
+        state = m.TruthState(
+            header=simulator.header("drone_1"), position_m=(0, 0, 1), velocity_m_s=(0, 0, 0), attitude_rad=(0, 0, 0),
+            on_ground=False,
+        )  # fmt: skip
+        simulator.publish(t.TRUTH, state)
+        assert sum(len(queue.drain_samples()) for queue in queues) == truth
+    finally:
+        bridge.close()
+
+
 def test_a_missing_router_is_named_with_the_remedy() -> None:
     timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
     with pytest.raises(OperatorMistake, match="no ROS 2 Zenoh router answers"):

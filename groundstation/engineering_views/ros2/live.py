@@ -12,7 +12,7 @@ from groundstation.bus import codec as bus_codec
 from groundstation.bus import keys
 from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.keys import Key
-from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, SETPOINT, TRUTH
+from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, SETPOINT, TRUTH, VEHICLE_STATUS
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import STATES, Ros2Scene
 from groundstation.errors import MessageError, OperatorMistake
@@ -22,28 +22,46 @@ from groundstation.time_units import NS_PER_S
 
 _STATIC_NS = NS_PER_S
 _NODE = "skein"
+_MOTION_HZ, _HEALTH_HZ = 12.5, 2.0
 
 
 def enough_hz(site: str, field: ResolvedField | None) -> dict[str, float]:
     """Return how many samples a second are enough, by the keys of what comes more often.
 
-    Estimates: every second one, for the turns of the view are 20 a second.
+    States of motion: a little more than there are turns, or one would find none now and then.
     """
     if field is None:
         return {}
     drones = tuple(field.drones)
-    often = [(ESTIMATE, ("*",), 25.0), (SETPOINT, drones, 10.0), (TRUTH, (*drones, *field.tracked), 10.0)]
+    often = [
+        (ESTIMATE, ("*",), _MOTION_HZ),
+        (SETPOINT, drones, _MOTION_HZ),
+        (TRUTH, (*drones, *field.tracked), _MOTION_HZ),
+        (VEHICLE_STATUS, drones, _HEALTH_HZ),
+    ]
     return {keys.expression(site, topic, name): rate_hz for topic, names, rate_hz in often for name in names}
 
 
 class Ros2View:
-    """Publishes until closed. It subscribes to nothing: no ROS 2 program can move a drone through it."""
+    """Publishes until closed. It subscribes to nothing: no ROS 2 program can move a drone through it.
+
+    truth: whether it shows true states, which only a simulator tells: they are a third of all that would come.
+    """
+
+    PERIOD_S = 0.1
 
     def __init__(
-        self, router: str, domain: int, distribution: str, field: ResolvedField | None, timeline: Timeline
+        self,
+        router: str,
+        domain: int,
+        distribution: str,
+        field: ResolvedField | None,
+        timeline: Timeline,
+        truth: bool = False,
     ) -> None:
         self._codec, self._timeline, self._domain = Ros2Codec(distribution), timeline, domain
         self._scene = Ros2Scene(self._codec, field)
+        self._states = tuple(topic for topic in STATES if truth or topic is not TRUTH)
         # A peer would not be brokered by the router, and scouting would find other people's.
         settings = {
             "mode": "client",
@@ -70,7 +88,7 @@ class Ros2View:
 
     def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
         """Return the queues of what it shows: each turn the newest state and picture, and all events."""
-        return bus.subscribe((*STATES, IMAGE), newest=True), bus.subscribe((EVENT,))
+        return bus.subscribe((*self._states, IMAGE), newest=True), bus.subscribe((EVENT,))
 
     def take(self, sample: Sample, now_ns: int) -> None:
         """Say on what arrived at a boot-clock time; what does not decode is passed over."""

@@ -1,4 +1,4 @@
-"""Ellipses, links and commanded velocities of the scene as RViz markers, ten times a second."""
+"""Ellipses, links and commanded velocities of the scene as RViz markers, five times a second."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -12,7 +12,7 @@ from groundstation.engineering_views.ros2.geometry import Builder
 from groundstation.engineering_views.scene import LINK_COLOUR, Body, SensingLink, ViewScene
 from groundstation.time_units import NS_PER_S
 
-_PERIOD_NS = NS_PER_S // 10
+_PERIOD_NS = NS_PER_S // 5
 # WIRE (docs/reference/ros2.md 3): visualization_msgs/msg/Marker.
 _ARROW, _DISC, _LINE_STRIP, _TEXT = 0, 3, 4, 9
 _LIFETIME_S = 1

@@ -19,7 +19,7 @@ def test_each_way_in_which_it_breaks_is_told_and_the_team_tracks_on(sitl: Start,
         tmp_path,
         "kind: odometry_silent, entity: turtlebot, start_s: 24, end_s: 27",
         "kind: odometry_frozen, entity: turtlebot, start_s: 30, end_s: 33",
-        "kind: odometry_scaled, entity: turtlebot, value: -1, start_s: 36, end_s: 44",
+        "kind: odometry_scaled, entity: turtlebot, value: 0, start_s: 36, end_s: 46",
     )
     run = sitl("sitl", "lab", *HEARD, "--duration", "35", "--scenario", scenario)
     tracking, _ = until_the_first_fault(run, "odometry_silent")

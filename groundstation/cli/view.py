@@ -2,7 +2,7 @@
 
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -41,16 +41,8 @@ _PORT = click.IntRange(1024, 65535)
     "--distro", type=click.Choice(_ROS_DISTRIBUTIONS), default="jazzy", show_default=True, help="ROS 2: which."
 )
 @click.option("--truth", is_flag=True, help="ROS 2: show true states too; a simulation has them.")
-def view(  # click hands each option over as a parameter
-    viewer: str | None,
-    name: str | None,
-    port: int | None,
-    page_port: int,
-    output: Path | None,
-    router: str,
-    domain: int,
-    distro: str,
-    truth: bool,
+def view(
+    viewer: str | None, name: str | None, port: int | None, page_port: int, output: Path | None, **ros2: Any
 ) -> int:
     """Show a running ground station to an engineer's viewer, on loopback. It takes no orders and stops nothing."""
     from groundstation.bus.roles import Role
@@ -67,7 +59,7 @@ def view(  # click hands each option over as a parameter
     bus = join(record, "view", Role.VIEW, at_most_hz=_thinned(record) if viewer == "ros2" else {})
     shown: LiveView | None = None
     try:
-        opened = _open_ros2(record, router, domain, distro, truth) if viewer == "ros2" else None
+        opened = _open_ros2(record, **ros2) if viewer == "ros2" else None
         shown = opened or _open(viewer, record, port, page_port, output)
         dropped = watch(bus, shown, lambda: record.alive)
         click.echo("the run has ended" if shown.alive else "the viewer's server has ended", err=True)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Sample, Subscription
@@ -17,7 +17,7 @@ _SHOWN = tuple(topic for topic in STATE_TOPICS if topic not in (IMU, ODOMETRY, J
 class LiveView(Protocol):
     """Something that shows samples; PERIOD_S: between two looks for new ones."""
 
-    PERIOD_S: ClassVar[float]
+    PERIOD_S: float
 
     @property
     def alive(self) -> bool:

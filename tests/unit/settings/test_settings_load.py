@@ -195,7 +195,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     path = tmp_path / "s.yaml"
     path.write_text(WRONG_SCENARIO.lstrip(), encoding="utf-8")
     kinds = [f"'{kind}'" for kind in FaultKind][:-1]
-    assert len(kinds) == 29
+    assert len(kinds) == 32
     with pytest.raises(SettingsError) as caught:
         load_scenario(path, ["cameras.blur_px=20", "seed"])
     assert [problem.removeprefix(f"{path}") for problem in caught.value.problems] == [
@@ -205,7 +205,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
         ":4: target.path.half_lenght_m: unknown key, did you mean half_length_m?",
         ":6: cameras.fps: must be <= 60 (got 90)",
         ":7: cameras.corner_noise: unknown key, did you mean corner_noise_px?",
-        f":9: faults[0].kind: must be {', '.join(kinds)} or 'ranges_long'"
+        f":9: faults[0].kind: must be {', '.join(kinds)} or 'odometry_scaled'"
         ' (got "camera_ct"), did you mean camera_cut?',
     ]
     path.write_text("schema_version: 1\ntarget:\n  path: {shape: figure_eigth}\n", encoding="utf-8")

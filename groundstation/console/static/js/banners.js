@@ -8,6 +8,7 @@ import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
 import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
+const COLOURS = { ACT: "grave", WATCH: "mild" };  // an alarm's is that of its word
 const notices = [];
 
 export function addNotice({ text: words, grave }) {
@@ -37,7 +38,7 @@ function ending({ severity, text: words }) {
 
 function silentTracker() {
   return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}`, rank: "WATCH",
-    more: "Nothing to do: drones hover, and land 3 s after its last word. Positions are old; LAND ALL works without it." };
+    more: "Nothing to do: the drones hover, and soon land by themselves. Positions are old; LAND ALL works without it." };
 }
 
 // As the console's process judges it, but for what only this page can know.
@@ -60,7 +61,7 @@ export function showBanners() {
   }
   all.forEach(({ level, title, more, rank }, index) => {
     const node = host.children[index];
-    node.className = `banner ${level}`;
+    node.className = `banner ${COLOURS[rank] ?? level}`;
     text(node.children[0], index && rank !== "notice" ? `${rank}: ${title}` : title);
     text(node.children[1], more ?? "");
   });

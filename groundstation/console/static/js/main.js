@@ -113,7 +113,7 @@ function buildLayers() {
 function buildLegend() {
   const c = ink(), rows = [
     ["95 % ellipse of the position", svg("ellipse", { cx: 15, cy: 7, rx: 12, ry: 5, fill: c.dim, "fill-opacity": 0.25, stroke: c.dim })],
-    ["link: expected precision; dashed: unseen", svg("path", { d: "M1 7 H16", stroke: c.link, "stroke-width": 5 }), svg("path", { d: "M18 7 H30", stroke: c.link, "stroke-width": 2, "stroke-dasharray": "4 3" })],
+    ["link: expected precision; dashed: planned, nothing seen along it now", svg("path", { d: "M1 7 H16", stroke: c.link, "stroke-width": 5 }), svg("path", { d: "M18 7 H30", stroke: c.link, "stroke-width": 2, "stroke-dasharray": "4 3" })],
     [`camera footprint at ${targetHeight().toFixed(1)} m`, svg("path", { d: "M4 12 L26 12 L29 2 L1 2 Z", fill: c.dim, "fill-opacity": 0.2, stroke: c.dim })],
     ["velocity × 1.5 s", svg("path", { d: "M2 7 H22 M18 3 L25 7 L18 11", stroke: c.text, "stroke-width": 2.5, fill: "none" })],
     ["target's prediction", svg("path", { d: "M2 7 H28", stroke: colourOf(store.scene.targets[0]?.name), "stroke-width": 2, "stroke-dasharray": "2 4" })],

@@ -90,7 +90,7 @@ export function drawGraph(g, view) {
     if (Math.hypot(a[0] - b[0], a[1] - b[1]) * view.scale < FIGURE_PX) continue;
     const figure = information > 0 ? `± ${precision(information)}` : "";
     const places = [0.5, 0.4, 0.6, 0.3, 0.7].map((share) => onLink(view, a, b, share));
-    note(g, FIGURE, `${observer} ${subject}`, `${figure}${seen ? "" : " unseen"}`, places, colour, 11, 500);
+    note(g, FIGURE, `${observer} ${subject}`, `${figure}${seen ? "" : " planned"}`, places, colour, 11, 500);
   }
 }
 

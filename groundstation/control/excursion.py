@@ -62,7 +62,7 @@ def within_reach(
     mean, p = belief.mean_of(name), parameters
     left_s = time_left_s(spread_m(belief, name), 0.0, p, error_m_s)
     views = sensors.root_views(float(mean[2]) + sensors.marker_height_m[name])
-    view = _connected(mean[:2], views, p.return_speed_m_s * left_s)
+    view = _connected(mean[:2], views, p.return_speed_m_s * max(0.0, left_s))
     if view is None:
         return velocity
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)

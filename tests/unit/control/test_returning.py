@@ -125,6 +125,14 @@ def test_a_view_that_it_reaches_in_time_may_be_crossed_to(error_m_s: float, cros
     assert found[0] == pytest.approx(0.5) if crosses else found[0] < 0.0
 
 
+def test_who_is_known_too_little_already_is_held_to_the_view() -> None:
+    """No time is left to fly on unseen."""
+    at = belief(np.array([1.2, 0.0, 1.6, 0.0]), 0.6)
+    border_m = SENSORS.root_views(1.6 + SENSORS.marker_height_m["drone_1"])[0].x_m[1] - VIEW_INSET_M
+    held = within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, SENSORS, 0.4, np.zeros(2))
+    assert held == pytest.approx([border_m - 1.2, 0.0])
+
+
 def test_without_a_view_in_the_room_nobody_is_held_back() -> None:
     blind, at = replace(SENSORS, world={}), belief(np.array([1.12, 0.0, 1.6, 0.0]), 0.02)
     assert within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, blind, 0.4, np.zeros(2)) == pytest.approx(

@@ -57,8 +57,8 @@ class Orders:
 
     def climbs_by_itself(self, now_ns: int) -> bool:
         """Return whether the vehicle ends its take-off by itself, told nothing."""
-        ours = self._flavour is not Flavour.ARDUPILOT or self._action is not Action.HOVER
-        return not ours and self._rises_to_take_off and now_ns < self._climb_until_ns
+        hovers = self._flavour is Flavour.ARDUPILOT and self._action is Action.HOVER
+        return hovers and self._rises_to_take_off and now_ns < self._climb_until_ns
 
     def last_said(self, now_ns: int) -> str:
         """Return the vehicle's last text, if recent: it explains a change of its mode."""
@@ -212,10 +212,9 @@ class Orders:
             self.drift.let_go()
         if not self._rises_to_take_off or climbed_m >= _CLIMBED * self._vehicle.take_off_m:
             self._climb_until_ns = 0
-        if now_ns < self._climb_until_ns:
-            # It has left the ground; it goes on to its take-off height (ArduPilot does so by itself).
-            if self._flavour is Flavour.ARDUPILOT:
-                return None
+        if self.climbs_by_itself(now_ns):
+            return None
+        if now_ns < self._climb_until_ns:  # it has left the ground, and goes on to its take-off height
             return self._climb(now_ns, climbed_m)
         if not guided:
             return None

@@ -31,21 +31,22 @@ def is_given_up(rig) -> bool:
     return any("was disarmed while it takes off: not ours to fly until RESUME" in text for text in rig.texts)
 
 
-def test_a_hold_stays(rig):
+def stop(rig, mode):
+    """Somebody else changes its mode, and it stays changed."""
     firmware = begin(rig)
-    firmware.enter(_HOLD[rig.flavour])
+    firmware.enter(mode)
     rig.run(4.0)
     assert not asked_again(rig)
-    assert firmware.mode == _HOLD[rig.flavour]
+    assert firmware.mode == mode
+
+
+def test_a_hold_stays(rig):
+    stop(rig, _HOLD[rig.flavour])
     assert any("not ours to fly until RESUME" in text for text in rig.texts)
 
 
 def test_a_landing_ends_on_the_floor(rig):
-    firmware = begin(rig)
-    firmware.enter(_LAND[rig.flavour])
-    rig.run(4.0)
-    assert not asked_again(rig)
-    assert firmware.mode == _LAND[rig.flavour]
+    stop(rig, _LAND[rig.flavour])
     # ArduPilot has not left the floor yet, and switches its motors off.
     assert rig.mode == "LANDING" if rig.flavour == Flavour.PX4 else is_given_up(rig)
 

@@ -52,7 +52,7 @@ def culprits(
     rows, flights = [], []
     for lab, own in planned:
         known = [one for _ in own for one in flights_of([next(found)])[0]]
-        verdicts = [verdict_on(lab, one, _began_s(lab)) for one in known]
+        verdicts = [verdict_on(lab, one) for one in known]
         rows.append(row_of(lab, verdicts))
         flights += [
             {"lab": lab.name, **verdict, "told": one["told"]} for verdict, one in zip(verdicts, known, strict=True)
@@ -61,10 +61,6 @@ def culprits(
     write_atomically(out / "culprits.json", json.dumps(document, indent=1) + "\n")
     click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
     return ExitCode.OK if all(row["as_wanted"] >= 0.9 * row["flights"] for row in rows) else ExitCode.FAILED
-
-
-def _began_s(lab: "WrongLab") -> float:
-    return max((fault["start_s"] for fault in lab.faults), default=0.0)
 
 
 def _planned(
@@ -91,7 +87,9 @@ def _order(order: dict[str, Any], base: dict[str, Any], lab: "WrongLab") -> str:
     """Return what the simulator is told besides the seeds."""
     cameras = {**(base.get("cameras") or {}), **(lab.cameras or {})}
     scenario = {**base, "cameras": cameras, "faults": list(lab.faults)}
-    wrong = {"errors": lab.errors, "exchanged": lab.exchanged}
+    from groundstation.experiments.culprit_rows import STAND_S
+
+    wrong = {"errors": lab.errors, "exchanged": lab.exchanged, "stand_s": STAND_S}
     return json.dumps(order | wrong | {"scenario": scenario}, sort_keys=True)
 
 

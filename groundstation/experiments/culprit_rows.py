@@ -5,6 +5,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+STAND_S = 4.0
+"""How long the team stands on its pads before it is judged and ordered to take off."""
+
 WrongFigure = tuple[str, str, float]
 """Who, which part, true minus told: m, deg, ms, shares."""
 
@@ -26,6 +29,11 @@ class WrongLab:
     says: str = ""
     size: float | None = None
     on_pads: bool = False
+
+    @property
+    def since_s(self) -> float:
+        """When it begins to be wrong, in seconds after the order to take off; 0: it always was."""
+        return max((fault["start_s"] - STAND_S for fault in self.faults), default=0.0)
 
 
 _FIGURE = r"(-?[\d.]+) \+- [\d.]+"

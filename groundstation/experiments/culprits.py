@@ -24,40 +24,39 @@ def accusations(flight: Mapping[str, Any]) -> list[tuple[float, str]]:
     return found
 
 
-def verdict_on(lab: WrongLab, flight: Mapping[str, Any], since_s: float = 0.0) -> dict[str, Any]:
+def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
     """Return what became of one flight.
 
-    since_s: when what is wrong began [s after the order to take off]. end: "refused" (rightly, before the take-off),
-    "right" (told in flight, in time), "late", "wrong" (another one was blamed first), "silent"; of a healthy lab
-    "silent" or "false alarm". size_error: share by which the size told is wrong; said: the first accusation.
+    end: "refused" (rightly, before the take-off), "right" (told in flight, in time), "late", "wrong" (another one was
+    blamed first, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm". size_error:
+    share by which the size told is wrong; said: the first accusation.
     """
-    said = accusations(flight)
-    refused = any(level == "MUST" for level, _ in flight["on_pads"] or ())
+    said, on_pads = accusations(flight), flight["on_pads"]
     first = said[0] if said else None
     size = None if first is None else size_told(lab, first[1])
-    end = _end(lab, first, size, refused, since_s)
-    told = size is not None and lab.size is not None and not math.isnan(size)
+    refused = bool(on_pads) and on_pads[0][0] == "MUST"
+    end = _end(lab, first, size, refused)
     return {
         "seed": flight["seed"],
         "end": end,
         "at_s": None if first is None else first[0],
-        "size_error": abs(size - lab.size) / abs(lab.size) if told and size is not None and lab.size else None,
+        "size_error": None if size is None or not lab.size or math.isnan(size) else abs(size / lab.size - 1.0),
         "refuted": any(_REFUTED in text for _, _, _, text, _ in flight["told"]),
         "rmse_m": flight.get("rmse_m"),
         "said": "" if first is None else first[1],
     }
 
 
-def _end(lab: WrongLab, first: tuple[float, str] | None, size: float | None, refused: bool, since_s: float) -> str:
+def _end(lab: WrongLab, first: tuple[float, str] | None, size: float | None, refused: bool) -> str:
     if first is None:
         return "silent"
     if not lab.says:
         return "false alarm"
-    if size is None:
+    if size is None or first[0] < lab.since_s:
         return "wrong"
-    if first[0] == 0.0 and refused:
+    if refused:
         return "refused"
-    return "right" if first[0] - since_s <= WITHIN_S else "late"
+    return "right" if first[0] - lab.since_s <= WITHIN_S else "late"
 
 
 def row_of(lab: WrongLab, verdicts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """`python -m sim_bridge.study culprits < order.json`: fly some seeds with wrong figures; a JSON line for each.
 
 The order: field (resolved, as the ground station is told), sections of its drivers as [kind, section], scenario, seeds,
-seconds, errors as [who, part, true minus told], exchanged as [drone, whose marker it carries].
+seconds, errors as [who, part, true minus told], exchanged as [drone, whose marker it carries], stand_s: seconds on the
+pads.
 """
 
 import json
@@ -27,6 +28,7 @@ def main() -> int:
     sections = [(kind, section) for kind, section in order["sections"]]
     wrong = WrongFigures({(who, part): size for who, part, size in order["errors"]}, dict(order["exchanged"]))
     for seed in order["seeds"]:
-        flight = CulpritFlight(as_drawn(order["field"], scenario, seed), sections, order["seconds"], wrong)
+        drawn = as_drawn(order["field"], scenario, seed)
+        flight = CulpritFlight(drawn, sections, order["seconds"], wrong, order["stand_s"])
         print(json.dumps(flight.fly()), flush=True)
     return 0

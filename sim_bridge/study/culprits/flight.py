@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from groundstation.bus.messages import RelativeObservation, Severity
+from groundstation.bus.messages import RelativeObservation
 from groundstation.bus.notice import Notice
 from groundstation.bus.topics import OBSERVATION
 from groundstation.doctor.finding import Level
@@ -14,9 +14,6 @@ from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight
 from sim_bridge.study.wrong_figures import WrongFigures
 
-STAND_S = 4.0
-_TOLD = frozenset({Severity.WARNING, Severity.ERROR})
-
 
 class CulpritFlight(ScenarioFlight):
     """A flight that notes what is told; `fly` returns it with the figures of tracking.
@@ -25,8 +22,11 @@ class CulpritFlight(ScenarioFlight):
     remedy] of each notice.
     """
 
-    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, wrong: WrongFigures) -> None:
+    def __init__(
+        self, drawn: Drawn, sections: Sequence[Section], seconds: float, wrong: WrongFigures, stand_s: float
+    ) -> None:
         super().__init__(drawn, sections, seconds, "ours", wrong)
+        self._stand_s = stand_s
         self.on_pads: list[tuple[str, str]] | None = None
         self.told: list[tuple[float, str, str, str, str]] = []
         self._pads = PadRecord(self._field.world_sensors)
@@ -39,7 +39,7 @@ class CulpritFlight(ScenarioFlight):
         for received in self._sightings.drain():
             if isinstance(received.message, RelativeObservation):
                 self._pads.see(received.message, self.now_ns)
-        if self.world.time_s >= STAND_S:
+        if self.world.time_s >= self._stand_s:
             findings = pad_findings(self._field, self._pads.medians(self.now_ns))
             self.on_pads = [
                 (str(one.level), f"{one.subject}: {one.found}") for one in findings if one.level is not Level.OK
@@ -51,7 +51,7 @@ class CulpritFlight(ScenarioFlight):
         super().note(now_s, notice)
         if self.on_pads is not None:
             row = (str(notice.severity), notice.entity, notice.text, notice.remedy)
-            self.told.append((round(now_s - STAND_S, 2), *row))
+            self.told.append((round(now_s - self._stand_s, 2), *row))
 
     def fly(self) -> dict[str, Any]:
         """Fly to the end; returns seed, findings, notices, figures and the time spent."""

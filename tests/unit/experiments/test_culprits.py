@@ -1,10 +1,11 @@
 """Is the right thing blamed? Verdicts on flights of wrong labs, by what the operator reads."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from groundstation.experiments.culprit_rows import WrongLab, labs_of, size_told
+from groundstation.experiments.culprit_rows import STAND_S, WrongLab, labs_of, size_told
 from groundstation.experiments.culprits import accusations, row_of, table, verdict_on
 
 FIELD = {"cameras": {"ceiling": {}}, "drones": {"a": {}, "b": {}}, "target": {"name": "rover"}}
@@ -55,7 +56,9 @@ def test_ends_of_a_wrong_lab() -> None:
     assert verdict_on(lab, flown(right))["size_error"] == pytest.approx(0.2)
     assert verdict_on(lab, flown(other, right))["end"] == "wrong"
     assert verdict_on(lab, flown((25.0, *right[1:])))["end"] == "late"
-    assert verdict_on(lab, flown((25.0, *right[1:])), since_s=10.0)["end"] == "right"
+    begun = replace(lab, faults=({"start_s": STAND_S + 10.0},))
+    assert verdict_on(begun, flown((25.0, *right[1:])))["end"] == "right"
+    assert verdict_on(begun, flown((9.0, *right[1:])))["end"] == "wrong", "it was not wrong yet"
     assert verdict_on(lab, flown(other, on_pads=pads))["end"] == "refused"
     assert verdict_on(lab, flown())["end"] == "silent"
 

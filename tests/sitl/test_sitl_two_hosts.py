@@ -70,7 +70,7 @@ DOWN, TRACK, HOVER = frozenset({"LANDING", "LANDED"}), frozenset({"TRACK"}), fro
 class End:
     """Something of a host that ends; landing_s: when its drones are told to land at the latest, None: never.
 
-    modes: of drone_1 and drone_2 at the end.
+    concerned: whom it stops; modes: of drone_1 and drone_2 at the end; resumes: whether they go on after RESUME.
     """
 
     victim: str
@@ -78,19 +78,22 @@ class End:
     signal: str = "SIGKILL"
     modes: tuple[Modes, Modes] = (DOWN, DOWN)
     stopped_s: float = STOPPED_S
+    concerned: tuple[str, ...] = ("drone_1", "drone_2")
+    resumes: bool = False
 
 
 SLOW = [
     End("host", AT_ONCE_S),
-    End("driver", LAND_S, "SIGSTOP", (DOWN, TRACK)),
+    End("driver", LAND_S, "SIGSTOP", (DOWN, TRACK), concerned=("drone_1",)),
 ]
 ON_DEMAND = [
     End("host", LAND_S + LINK_S, "SIGSTOP"),
-    End("driver", LAND_S, modes=(DOWN, TRACK)),
+    End("driver", LAND_S, modes=(DOWN, TRACK), concerned=("drone_1",)),
     End("supervisor", AT_ONCE_S + LINK_S),
     End("run", LAND_S + LINK_S),
     End("link", LAND_S + LINK_S, modes=(TRACK, TRACK)),  # nothing is heard of them any more
-    End("liaison", None, modes=(HOVER, HOVER)),
+    End("liaison", None, modes=(TRACK, TRACK), concerned=()),  # its successor is there within the drivers' patience
+    End("liaison", None, "SIGSTOP", (HOVER, HOVER), resumes=True),
     End("all", FIRMWARE_S, modes=(TRACK, TRACK), stopped_s=FIRMWARE_S + STOPPED_S),
 ]
 ENDS = [*SLOW, *(pytest.param(end, marks=pytest.mark.exhaustive) for end in ON_DEMAND)]
@@ -98,18 +101,18 @@ ENDS = [*SLOW, *(pytest.param(end, marks=pytest.mark.exhaustive) for end in ON_D
 
 @pytest.mark.parametrize("end", ENDS, ids=lambda end: f"{end.victim}-{end.signal}")
 def test_every_end_of_a_host_ends_as_that_of_its_processes(tmp_path: Path, end: End) -> None:
-    told = flown(tmp_path, duration_s=60, kill=end.victim, signal=end.signal)
-    concerned = ["drone_1"] if end.victim == "driver" else ["drone_1", "drone_2"]
-    for name in concerned:
+    told = flown(tmp_path, duration_s=60, kill=end.victim, signal=end.signal, resume=end.resumes)
+    for name in end.concerned:
         assert told["stopped_s"][name] < end.stopped_s, "it hovers before it lands"
         assert told["went_m"][name] < 1.0
     if end.landing_s is None:
         assert told["landed_s"] == {}, told["events"]
     else:
-        assert set(told["landed_s"]) == set(concerned), told["events"]
+        assert set(told["landed_s"]) == set(end.concerned), told["events"]
         assert max(told["landed_s"].values()) < end.landing_s + DOWN_S, told["landed_s"]
     for mode, allowed in zip(told["modes"].values(), end.modes, strict=True):
         assert mode in allowed, told["events"]
+    assert set(told["resumed"]) == ({"TRACK"} if end.resumes else set()), told["text"]
     if end.victim in ("host", "supervisor") and end.signal == "SIGKILL":
         assert told["left"] == [], "nothing of the host is left"
     if end.victim in ("host", "link", "all"):

@@ -110,7 +110,7 @@ def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
 def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
     """Break something in flight; return when the drones stood and how they had flown [s, m].
 
-    kill: the victim; signal: "SIGKILL", or "SIGSTOP" for one that freezes.
+    kill: the victim; signal: "SIGKILL", or "SIGSTOP" for one that freezes; resume: order RESUME at the end.
     """
     host, run = two.start(order)
     victims = {"liaison": lambda: [run.pid(f"liaison_{HOST}")], "supervisor": lambda: [run.process.pid]}
@@ -145,6 +145,7 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
             "went_m": {name: math.dist(before[name][:2], after[name][:2]) for name in before},
             "stopped_s": {name: stopped_s(run, name, killed_s) for name in before},
             "modes": {name: run.mode(name) for name in before},
+            "resumed": resumed(run) if order.get("resume") else [],
             "left": [name for name, pid in children.items() if Path(f"/proc/{pid}").exists()],
             "events": [event for event in run.events() if "INFO" not in event],
         }
@@ -152,6 +153,13 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
         with suppress(AssertionError):
             run.close()
         end(host.pid)
+
+
+def resumed(run: SitlRun) -> list[str]:
+    """Order RESUME from a shell of the run's host; return the modes of its drones a second later."""
+    subprocess.run([*COMMAND, "resume"], cwd=run.folder, check=True, stdout=subprocess.DEVNULL, timeout=20.0)
+    rest(run, 1.0)
+    return [run.mode(name) for name in run.record.drones]
 
 
 def stopped_s(run: SitlRun, drone: str, since: float) -> float:

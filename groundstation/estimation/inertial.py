@@ -98,28 +98,45 @@ class InertialAttitude:
             self._bias.take_heading(stamp_ns, yaw_rad, self._yaw, reset + self._resets)
 
     def at(self, stamp_ns: int) -> Attitude | None:
-        """Return the attitude of the nearest sample, with the heading of `stamp_ns`; None where all are too far."""
-        sample = self._nearest(stamp_ns)
-        if sample is None:
+        """Return the attitude at a time; None where all samples are too far."""
+        tilted = self._at(stamp_ns)
+        if tilted is None:
             return None
-        yaw = wrap(sample[3] + self._heading_rate() * (stamp_ns - sample[0]) / NS_PER_S)
         attitude_std = math.sqrt(self._variance)
-        return Attitude(sample[1], sample[2], yaw, self._resets, attitude_std, self._bias.yaw_std_rad)
+        return Attitude(*tilted, self._resets, attitude_std, self._bias.yaw_std_rad)
 
     def tilt_at(self, stamp_ns: int) -> tuple[float, float] | None:
-        """Return (roll, pitch) at an earlier time, of the nearest sample; None where there is none within 0.1 s."""
-        sample = self._nearest(stamp_ns)
-        return None if sample is None else (sample[1], sample[2])
+        """Return (roll, pitch) at a time, as `at` does."""
+        tilted = self._at(stamp_ns)
+        return None if tilted is None else tilted[:2]
 
-    def _nearest(self, stamp_ns: int) -> tuple[int, float, float, float] | None:
-        """Return (time, roll, pitch, yaw) of the nearest sample, or None where there is none within 0.1 s."""
-        found = None
+    def _at(self, stamp_ns: int) -> Vector3 | None:
+        """Return (roll, pitch, yaw) at a time between two samples, or at the present rates within 0.1 s of one."""
+        after: tuple[int, float, float, float] | None = None
         for sample in reversed(self._kept):
-            if found is None or abs(sample[0] - stamp_ns) < abs(found[0] - stamp_ns):
-                found = sample
             if sample[0] <= stamp_ns:
-                break
-        return None if found is None or abs(found[0] - stamp_ns) > _FRESH_NS else found
+                return self._between(sample, after, stamp_ns)
+            after = sample
+        return None if after is None or after[0] - stamp_ns > _FRESH_NS else after[1:]
+
+    def _between(
+        self, before: tuple[int, float, float, float], after: tuple[int, float, float, float] | None, stamp_ns: int
+    ) -> Vector3 | None:
+        elapsed_ns = stamp_ns - before[0]
+        if after is None:
+            return self._ahead(before, elapsed_ns / NS_PER_S) if elapsed_ns <= _FRESH_NS else None
+        if min(elapsed_ns, after[0] - stamp_ns) > _FRESH_NS:
+            return None
+        share = elapsed_ns / (after[0] - before[0])
+        roll, pitch, yaw = (
+            here + share * wrap(there - here) for here, there in zip(before[1:], after[1:], strict=True)
+        )
+        return roll, pitch, wrap(yaw)
+
+    def _ahead(self, newest: tuple[int, float, float, float], elapsed_s: float) -> Vector3:
+        roll, pitch, yaw = newest[1:]
+        roll_rate, pitch_rate, yaw_rate = self._rates_of_angles(*self._rate)
+        return roll + elapsed_s * roll_rate, pitch + elapsed_s * pitch_rate, wrap(yaw + elapsed_s * yaw_rate)
 
     def _is_fresh(self, stamp_ns: int) -> bool:
         return self._stamp_ns is not None and abs(stamp_ns - self._stamp_ns) <= _FRESH_NS
@@ -132,15 +149,16 @@ class InertialAttitude:
 
     def _turn(self, wx: float, wy: float, wz: float, elapsed_s: float) -> None:
         """Integrate body rates."""
+        roll_rate, pitch_rate, yaw_rate = self._rates_of_angles(wx, wy, wz)
+        self._yaw = wrap(self._yaw + elapsed_s * yaw_rate)
+        self._roll += elapsed_s * roll_rate
+        self._pitch += elapsed_s * pitch_rate
+
+    def _rates_of_angles(self, wx: float, wy: float, wz: float) -> Vector3:
+        """Return how fast roll, pitch and yaw change at these body rates."""
         sine, cosine, tangent = math.sin(self._roll), math.cos(self._roll), math.tan(self._pitch)
         about_vertical = wy * sine + wz * cosine
-        self._yaw = wrap(self._yaw + elapsed_s * about_vertical / math.cos(self._pitch))
-        self._roll += elapsed_s * (wx + about_vertical * tangent)
-        self._pitch += elapsed_s * (wy * cosine - wz * sine)
-
-    def _heading_rate(self) -> float:
-        _, wy, wz = self._rate
-        return (wy * math.sin(self._roll) + wz * math.cos(self._roll)) / math.cos(self._pitch)
+        return wx + about_vertical * tangent, wy * cosine - wz * sine, about_vertical / math.cos(self._pitch)
 
     def _level(self, force: Vector3, stamp_ns: int, elapsed_s: float, within_s: float) -> None:
         """Draw roll and pitch towards what the accelerometers say; what a gyro's bias does against it stays."""

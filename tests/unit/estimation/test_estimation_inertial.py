@@ -175,6 +175,24 @@ def test_the_tilt_of_a_moment_ago_is_remembered(flying: Vehicle) -> None:
     assert flying.attitude.tilt_at(START - 10**9) is None
 
 
+def test_between_samples_and_just_after_the_newest_it_turns_as_the_gyroscopes_say() -> None:
+    vehicle = InertialAttitude()
+    rates, force = (math.radians(30.0), math.radians(-20.0), math.radians(10.0)), (0.0, 0.0, 0.0)
+    for step in range(10):
+        vehicle.take_imu(START + 2 * step * STEP_NS, rates, force, standing=False)
+    newest, lasting_s = vehicle.at(START + 18 * STEP_NS), STEP_NS / 1e9
+    assert newest is not None
+    for later, turned_s in ((-STEP_NS, -lasting_s), (STEP_NS, lasting_s)):
+        found = vehicle.at(START + 18 * STEP_NS + later)
+        assert found is not None
+        for was, now, rate in (
+            (newest.roll_rad, found.roll_rad, rates[0]),
+            (newest.pitch_rad, found.pitch_rad, rates[1]),
+            (newest.yaw_rad, found.yaw_rad, rates[2]),
+        ):
+            assert now - was == pytest.approx(rate * turned_s, abs=math.radians(0.02))
+
+
 def test_a_blow_is_no_gravity(flying: Vehicle) -> None:
     for _ in range(20):
         flying.now += STEP_NS

@@ -10,6 +10,7 @@ import click
 from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
 from groundstation.cli.experiment_culprits import culprits
 from groundstation.cli.experiment_faults import faults
+from groundstation.cli.experiment_missions import missions
 from groundstation.cli.experiment_mrclam import mrclam
 from groundstation.cli.experiment_scenarios import scenarios
 from groundstation.cli.numbers import FiniteRange
@@ -59,6 +60,7 @@ def experiment() -> None:
 experiment.add_command(mrclam)
 experiment.add_command(faults)
 experiment.add_command(culprits)
+experiment.add_command(missions)
 experiment.add_command(scenarios)
 
 

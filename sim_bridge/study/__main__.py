@@ -55,6 +55,10 @@ def main() -> int:
         from sim_bridge.study.culprits.command import main as culprits
 
         return culprits()
+    if sys.argv[1:2] == ["missions"]:
+        from sim_bridge.study.missions.command import main as missions
+
+        return missions()
     arguments = _parser().parse_args()
     try:
         field = resolved_field(arguments.field, arguments.set)

@@ -22,11 +22,13 @@ class WrongFigures:
     """True minus told, by (who, part): m, deg, ms, shares.
 
     Parts: x, y, z, roll, pitch, yaw of a fixed camera; pan, tilt, ahead, left, up of a drone's; focal and delay of any;
-    print of a drone or target; pad_x, pad_y, pad_yaw of where a drone stands. exchanged: who carries whose marker.
+    print of a drone or target; pad_x, pad_y, pad_yaw of where a drone stands. exchanged: who carries whose marker;
+    covariance_share: how much of their covariance sightings state.
     """
 
     errors: Mapping[tuple[str, str], float]
     exchanged: Mapping[str, str] = field(default_factory=dict)
+    covariance_share: float = 1.0
 
     def world(self, told: ResolvedField) -> ResolvedField:
         """Return the field as the world really is; lenses, prints and delays are in the sightings instead."""
@@ -55,8 +57,14 @@ class WrongFigures:
         yaw = None if o.yaw_rad is None else math.remainder(o.yaw_rad - turned, math.tau)
         header = msgspec.structs.replace(o.header, stamp_ns=o.header.stamp_ns + round(late_ms * 1e6))
         place = (x, y, z / (1.0 + focal))
-        subject = self.exchanged.get(o.subject, o.subject)
-        return msgspec.structs.replace(o, header=header, subject=subject, position_m=place, yaw_rad=yaw)
+        return msgspec.structs.replace(
+            o,
+            header=header,
+            subject=self.exchanged.get(o.subject, o.subject),
+            position_m=place,
+            yaw_rad=yaw,
+            covariance=tuple(self.covariance_share * value for value in o.covariance),
+        )
 
     def _of(self, who: str, part: str) -> float:
         return self.errors.get((who, part), 0.0)

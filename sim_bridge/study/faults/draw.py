@@ -63,15 +63,20 @@ def draw(
 ) -> Drawn:
     """Return the flight of a seed; window_s: between which times of the world faults begin [s]."""
     rng = generator_of(seed, "campaign")
-    pads = _pads(field, rng)
-    drones = {
-        name: {**drone, "pad_m": pads[i], "pad_yaw_deg": math.degrees(math.atan2(-pads[i][1], -pads[i][0]))}
-        for i, (name, drone) in enumerate(field["drones"].items())
-    }
-    target = base.target.model_copy(update={"path": _path(field, rng)})
+    drones = random_pads(field, rng)
+    target = base.target.model_copy(update={"path": random_eight(field, rng)})
     faults = _faults(field, rng, window_s, kinds)
     scenario = base.model_copy(update={"target": target, "faults": faults, "seed": seed})
     return Drawn({**field, "drones": drones}, scenario, seed)
+
+
+def random_pads(field: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Return the drones of a field (plain values) on other pads, each heading for the middle."""
+    pads = _pads(field, rng)
+    return {
+        name: {**drone, "pad_m": pads[i], "pad_yaw_deg": math.degrees(math.atan2(-pads[i][1], -pads[i][0]))}
+        for i, (name, drone) in enumerate(field["drones"].items())
+    }
 
 
 def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, float]]:
@@ -84,7 +89,8 @@ def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, 
     return pads
 
 
-def _path(field: dict[str, Any], rng: np.random.Generator) -> FigureEight:
+def random_eight(field: dict[str, Any], rng: np.random.Generator) -> FigureEight:
+    """Return a path within the fence of a field (plain values)."""
     fence = field["room"]["fence"]
     return FigureEight(
         half_length_m=float(rng.uniform(1.0, 0.85 * fence["x_m"][1])),

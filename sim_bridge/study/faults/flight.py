@@ -135,7 +135,7 @@ class FaultFlight:
             world = self.world
             self.devices = devices_of(self.site, world, scenario, self._values, addresses, self._network)
             self.drivers = Drivers(sections, self._bus, self.said)
-        self._orders = TeamOrders(self._bus("operator"))
+        self.orders = TeamOrders(self._bus("operator"))
         self._tracker_bus = self._bus("tracker")
         section = TrackerSection(field, epoch=1)
         feed = TrackerFeed(
@@ -148,7 +148,7 @@ class FaultFlight:
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
         self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S, root=self._only_root())
-        self._tracking_since_s: float | None = None
+        self.tracking_since_s: float | None = None
 
     def _bus(self, source: str) -> LocalBus:
         return LocalBus(self._exchange, self._field.site, source)
@@ -162,13 +162,14 @@ class FaultFlight:
         """Fly to the end."""
         began = time.process_time()
         with manual_clock(lambda: self.now_ns):
-            while not self._is_over():
+            while not self.is_over():
                 self.step()
         self.spent_s["cpu"] = time.process_time() - began
         return self._report()
 
-    def _is_over(self) -> bool:
-        since_s, now_s = self._tracking_since_s, self.world.time_s
+    def is_over(self) -> bool:
+        """Return whether the flight ends: after its time of tracking, or where it never began to track."""
+        since_s, now_s = self.tracking_since_s, self.world.time_s
         return now_s >= TRACKING_BY_S if since_s is None else now_s - since_s >= self._seconds
 
     def step(self) -> None:
@@ -190,7 +191,7 @@ class FaultFlight:
             self.tracking.tick(now_ns)
             mark = self._spent("tracker", mark)
         if ticks % _ORDER_TICKS == 0 and self.may_start():
-            self._orders.step(now_ns, self.drivers.hosts)
+            self.orders.step(now_ns, self.drivers.hosts)
         self.drivers.turn(now_ns, ticks)
         self._spent("drivers", mark)
         if ticks % _JUDGE_TICKS == 0:
@@ -230,9 +231,9 @@ class FaultFlight:
         self.tracking.notices.clear()
         self.events += [(now_s, text) for _, text in self.said]
         self.said.clear()
-        if self._orders.tracking and self._tracking_since_s is None:
-            self._tracking_since_s = now_s
-        if self._tracking_since_s is None:
+        if self.orders.tracking and self.tracking_since_s is None:
+            self.tracking_since_s = now_s
+        if self.tracking_since_s is None:
             return
         truth = dict(zip(self.world.bodies, self.world.states().copy(), strict=True))
         told = {name: decision.action is Action.FLY for name, decision in self.drivers.decisions.items()}
@@ -280,7 +281,7 @@ class FaultFlight:
         observable = tuple(self._observable(fault) for fault in faults)
         modes = {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}
         reasons = {name: host.watchdog.reason for name, host in self.drivers.hosts.items()}
-        flown = self._tracking_since_s is not None
+        flown = self.tracking_since_s is not None
         verdict = self.judge.verdict(faults, observable) if flown else {}
         return {
             "seed": self._drawn.seed,
@@ -294,7 +295,7 @@ class FaultFlight:
                 }
                 for fault, at_s in zip(faults, observable, strict=True)
             ],
-            "tracking_since_s": self._tracking_since_s,
+            "tracking_since_s": self.tracking_since_s,
             "modes": modes,
             "reasons": reasons,
             **verdict,

@@ -36,6 +36,10 @@ class TeamOrders:
             self.tracking = True
             self._order(Verb.TRACK, tuple(hosts), now_ns)
 
+    def land(self, now_ns: int, hosts: Mapping[str, VehicleHost]) -> None:
+        """Order LAND once."""
+        self._order(Verb.LAND, tuple(hosts), now_ns)
+
     def _order(self, verb: Verb, scope: tuple[str, ...], now_ns: int) -> None:
         header, expires_ns = self._bus.header(_TEAM), now_ns + 10 * _PERIOD_NS
         identity = f"{verb}-{now_ns}"

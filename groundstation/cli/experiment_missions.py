@@ -1,0 +1,68 @@
+"""`groundstation experiment missions`: healthy flights in random rooms, judged by truth until all stand."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.numbers import FiniteRange
+
+_BATCH = 10
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation experiment missions --flights 300\n"
+    "  groundstation experiment missions --flights 30 --understated 1 --seed 500\n\n"
+    "Exit codes: 0 all flew, within the fence and apart, and stand; 1 some did not; 2 wrong settings."
+)
+@click.option("--flights", type=click.IntRange(1), default=30, show_default=True, help="Number of flights.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
+@click.option(
+    "--understated",
+    type=FiniteRange(1, 100),
+    default=4.0,
+    show_default=True,
+    help="So many times too small is the covariance of sightings in every third flight; 1: in none.",
+)
+@click.option(
+    "--duration", "seconds", type=FiniteRange(5, 600), default=30.0, show_default=True, help="Seconds of tracking."
+)
+@click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
+@click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors.")
+@campaign_options("missions")
+def missions(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any) -> int:
+    """Fly random rooms, pads and targets to the end: take-off, tracking, the order to land, the floor.
+
+    Rooms of 6 to 12 m by 5 to 8 m; targets stand, or drive on one of the paths of scenarios at 0.15 to 0.6 m/s. Nothing
+    is wrong but what the scenario says, and in every third flight the covariance that sightings state. Judged by truth,
+    landing included: the fence, and a separation of 0.6 m.
+    """
+    from groundstation.experiments.faults import batches, flights_of
+    from groundstation.experiments.missions import rows_of, table
+    from groundstation.experiments.runner import write_atomically
+
+    planned = batches(_order(**flown), seed, flights, _BATCH, "missions")
+    found, _ = flights_of(fly_all(planned, scheduler, workers, len(planned) == 1, out))
+    rows = rows_of(found)
+    document = {"experiment": "missions", "rows": rows, "flights": found}
+    write_atomically(out / "missions.json", json.dumps(document, indent=1) + "\n")
+    click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
+    amiss = any(row["violations"] or row["not_landed"] or row["not_flown"] for row in rows)
+    return ExitCode.FAILED if amiss else ExitCode.OK
+
+
+def _order(name: str, scenario: str, options: tuple[str, ...], seconds: float, understated: float) -> str:
+    """Return the simulator's order besides the seeds."""
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.scenario import load_scenario
+
+    path = find_field(name)
+    order = flown_field(path, options) | {
+        "scenario": load_scenario(find_scenario(scenario, path)),
+        "seconds": seconds,
+        "understated": understated,
+    }
+    return json.dumps(order, sort_keys=True)

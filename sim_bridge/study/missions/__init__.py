@@ -1,0 +1,1 @@
+"""Healthy missions in random rooms with random targets, judged until all drones stand again."""

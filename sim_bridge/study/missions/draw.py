@@ -1,0 +1,53 @@
+"""What a seed of the missions stands for: a room, the pads, and what the target does."""
+
+from typing import Any
+
+import numpy as np
+
+from sim_bridge.scenario import Scenario
+from sim_bridge.study.faults.draw import Drawn, random_eight, random_pads
+from sim_bridge.target_paths import AlongWalls, Anywhere, Path, RandomWalk, Sprint, Waypoints
+from sim_bridge.world.noise import generator_of
+
+# Rooms in which a team of the shipped fields can fly; the fixed sensors stay where they are.
+_LENGTH_M, _WIDTH_M = (6.0, 12.0), (5.0, 8.0)
+_FENCE_INSET_M, _TARGET_INSET_M = 0.3, 0.6
+_SPEED_M_S = (0.15, 0.6)
+_POINTS = 5
+
+
+def draw_mission(field: dict[str, Any], base: Scenario, seed: int) -> Drawn:
+    """Return the flight of a seed: without faults, but with the sensor errors of a scenario."""
+    rng = generator_of(seed, "mission")
+    sized = {**field, "room": _room(field["room"], rng)}
+    told = {**sized, "drones": random_pads(sized, rng)}
+    path = _path(told, rng)
+    waits = {"departs_after_team_s": None} if isinstance(path, AlongWalls | Anywhere) else {}
+    target = base.target.model_copy(update={"path": path, **waits})
+    return Drawn(told, base.model_copy(update={"target": target, "faults": (), "seed": seed}), seed)
+
+
+def _room(room: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Return a room of another size, with a fence inside its walls."""
+    length_m, width_m = float(rng.uniform(*_LENGTH_M)), float(rng.uniform(*_WIDTH_M))
+    x_m, y_m = length_m / 2 - _FENCE_INSET_M, width_m / 2 - _FENCE_INSET_M
+    fence = {**room["fence"], "x_m": (-x_m, x_m), "y_m": (-y_m, y_m)}
+    return {**room, "size_m": (length_m, width_m, room["size_m"][2]), "fence": fence, "obstacles": {}}
+
+
+def _path(field: dict[str, Any], rng: np.random.Generator) -> Path:
+    """Return one of the ways to drive that a scenario can name, somewhere in the room."""
+    length_m, width_m, _ = field["room"]["size_m"]
+    x, y = length_m / 2 - _TARGET_INSET_M, width_m / 2 - _TARGET_INSET_M
+    speed_m_s = float(rng.uniform(*_SPEED_M_S))
+    area = {"x_m": (-x, x), "y_m": (-y, y), "speed_m_s": speed_m_s}
+    points = tuple((float(rng.uniform(-x, x)), float(rng.uniform(-y, y))) for _ in range(_POINTS))
+    paths: tuple[Path, ...] = (
+        random_eight(field, rng),
+        RandomWalk.model_validate(area),
+        Sprint.model_validate(area),
+        AlongWalls(speed_m_s=speed_m_s, from_wall_m=_TARGET_INSET_M, start_corner=int(rng.integers(4))),
+        Anywhere(),
+        Waypoints(points_m=((0.0, 0.0), *points), speed_m_s=speed_m_s),
+    )
+    return paths[int(rng.integers(len(paths)))]

@@ -1,0 +1,53 @@
+"""One mission: take-off, tracking, and the order to land; judged by truth until all drones stand."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.flight import FaultFlight
+from sim_bridge.study.faults.vehicles import Section
+from sim_bridge.study.wrong_figures import WrongFigures
+
+_DOWN_BY_S = 15.0
+_STANDS, _LANDS = "LANDED", "LANDING"
+
+
+class MissionFlight(FaultFlight):
+    """A flight that ends with LAND. covariance_share: what sightings state of their true covariance."""
+
+    def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, covariance_share: float) -> None:
+        super().__init__(drawn, sections, seconds, wrong=WrongFigures({}, covariance_share=covariance_share))
+        self._share = covariance_share
+        self._landing_since_s: float | None = None
+        self._landed_before: list[str] = []
+
+    def is_over(self) -> bool:
+        """Return whether all stand again, or should; orders LAND when the time of tracking is over."""
+        over = super().is_over()
+        if not over or self.tracking_since_s is None:
+            return over
+        if self._landing_since_s is None:
+            self._landing_since_s = self.world.time_s
+            self._landed_before = [name for name, mode in self._modes().items() if mode in (_LANDS, _STANDS)]
+            self.orders.land(self.now_ns, self.drivers.hosts)
+        stand = all(mode == _STANDS for mode in self._modes().values())
+        return stand or self.world.time_s - self._landing_since_s >= _DOWN_BY_S
+
+    def fly(self) -> dict[str, Any]:
+        """Fly to the end; landed_before: who landed without the order; landed: whether all stand at the end."""
+        report = self.run()
+        judged = ("separation_m", "fence_m", "unsafe", "unlocalised_s")
+        return {
+            "seed": report["seed"],
+            "path": self.scenario.target.path.shape,
+            "covariance_share": self._share,
+            "flown": report["tracking_since_s"] is not None,
+            **{name: report[name] for name in judged if name in report},
+            "landing_since_s": self._landing_since_s,
+            "landed_before": self._landed_before,
+            "landed": all(mode == _STANDS for mode in self._modes().values()),
+            "spent_s": report["spent_s"],
+        }
+
+    def _modes(self) -> dict[str, str]:
+        return {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}

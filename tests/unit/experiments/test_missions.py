@@ -1,0 +1,31 @@
+"""What missions come to: rows by how much covariance was stated, and which seeds broke a bound."""
+
+from typing import Any
+
+from groundstation.experiments.missions import rows_of, table
+
+
+def flown(seed: int, share: float = 1.0, **figures: Any) -> dict[str, Any]:
+    whole = {"separation_m": 0.9, "fence_m": 0.0, "unlocalised_s": 0.0, "unsafe": {}}
+    ends = {"landed_before": [], "landed": True}
+    return {"seed": seed, "covariance_share": share, "flown": True, **whole, **ends, **figures}
+
+
+def test_a_broken_bound_counts_and_another_fault_does_not() -> None:
+    near = flown(2, separation_m=0.5, unsafe={"separation": 12.0, "speed": 14.0})
+    (row,) = rows_of([flown(1), near, flown(3, unsafe={"unlocalised": 9.0}, unlocalised_s=1.4)])
+    assert (row["flights"], row["violations"]) == (3, {2: {"separation": 12.0}})
+    assert (row["separation_m"], row["unlocalised_s"]) == (0.5, 1.4)
+
+
+def test_flights_that_state_too_little_have_a_row_of_their_own() -> None:
+    whole, less = rows_of([flown(1), flown(3, 0.25, fence_m=0.1, unsafe={"fence": 31.0}, landed=False)])
+    assert whole["violations"] == {} and whole["not_landed"] == []
+    assert less["violations"] == {3: {"fence": 31.0}} and less["not_landed"] == [3]
+    assert table([whole, less])[2].split() == ["0.25", "1", "1", "0.90", "0.10", "0.00", "0", "1", "3"]
+
+
+def test_who_did_not_fly_is_told_and_has_no_figures() -> None:
+    (row,) = rows_of([{"seed": 7, "covariance_share": 1.0, "flown": False}])
+    assert (row["flights"], row["not_flown"], row["separation_m"]) == (0, [7], None)
+    assert table([row])[1].split() == ["1.00", "0", "0", "-", "-", "-", "0", "0", "7"]

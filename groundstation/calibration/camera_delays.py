@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from groundstation.bus.messages import RelativeObservation
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.likeliest import likeliest
-from groundstation.calibration.recorded_likelihood import Flown, costs
+from groundstation.calibration.recorded_likelihood import costs
 from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
 from groundstation.field.resolved import ResolvedField
 

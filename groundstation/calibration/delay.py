@@ -14,7 +14,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.bus.messages import Message, Odometry, RelativeObservation
 from groundstation.calibration.camera_delays import onboard_cameras
-from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
 from groundstation.calibration.time_offset import Part, across, briefly, interpolated, rate_hz, shift_between
 from groundstation.estimation.models import OdometryRobot

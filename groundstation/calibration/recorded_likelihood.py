@@ -5,12 +5,12 @@ No planner, no truth: only what the tracker took in, tick by tick.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
 from groundstation.bus.messages import Message, RelativeObservation
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.likeliest import Costs
 from groundstation.errors import OperatorMistake
 from groundstation.estimation.measurement import Correction
@@ -22,20 +22,6 @@ from groundstation.tracker import tracker_from_field
 # A correction counts like one of Student's distribution with so many degrees of freedom: outliers must not decide.
 _FREEDOM = 8.0
 _SETTLING_NS = 3_000_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Flown:
-    """What a tracker took in: (now [ns], its messages with their keys) by tick, and the clock it read."""
-
-    ticks: tuple[tuple[int, tuple[tuple[str, Message], ...]], ...]
-    clock: str
-    cameras: dict[str, int]
-
-    @property
-    def duration_s(self) -> float:
-        """Return how long it is."""
-        return (self.ticks[-1][0] - self.ticks[0][0]) / 1e9
 
 
 def flown_of(source: Source) -> Flown:

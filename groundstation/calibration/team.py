@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.team_batch import TeamBatch
 from groundstation.calibration.team_causes import Cause, causes, freed, posterior
 from groundstation.calibration.team_figures import Suspicion
@@ -50,6 +50,8 @@ _WORTH = {
     "yaw": math.radians(1.5),
 }
 _WORTH_M, _SIGMAS = 0.02, 3.0
+# What disturbs sightings lasts: so many of them say the same.
+_ALIKE = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +102,10 @@ def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
     batch = TeamBatch(team_record(flown, field), field)
     figures = batch.figures
     free = batch.fit(np.diag(figures.wide**2))
-    told, sigma = causes(free.information, free.pull, figures.surveyed, figures.suspicions())
+    told, sigma = causes(*free.if_alike(_ALIKE), figures.surveyed, figures.suspicions())
     final = batch.fit(sigma)
-    error, covariance = posterior(final.information, final.pull, sigma)
-    _, doubtful = posterior(free.information, free.pull, np.diag(figures.wide**2))
+    error, covariance = posterior(*final.if_alike(_ALIKE), sigma)
+    _, doubtful = posterior(*free.if_alike(_ALIKE), np.diag(figures.wide**2))
     std, doubtful_std = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(doubtful))
     rows = []
     for index, (who, part) in enumerate(figures.keys):

@@ -52,6 +52,10 @@ class Fit:
     misfit: float
     used: int
 
+    def if_alike(self, count: float) -> tuple[Array, Vector]:
+        """Return information and pull if so many sightings say the same."""
+        return self.information / count, self.pull / count
+
 
 class TeamBatch:
     """One recording, ready to be explained; raises OperatorMistake where no fixed camera saw a drone long enough."""

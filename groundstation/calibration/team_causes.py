@@ -14,10 +14,8 @@ from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_figures import Suspicion
 
 # By how much (log) a cause must raise the evidence; causes this much worse than the best are ruled out.
-_SURE, _RULED_OUT = math.log(1e4), math.log(20.0)
+SURE, _RULED_OUT = math.log(1e4), math.log(20.0)
 _MOST = 8
-# What disturbs sightings lasts: so many of them say the same.
-ALIKE = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,27 +28,30 @@ class Cause:
 
 
 def causes(
-    information: Array, pull: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]
+    H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion], sure: float = SURE
 ) -> tuple[tuple[Cause, ...], Array]:
-    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it."""
-    H, g = information / ALIKE, pull / ALIKE
+    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it.
+
+    H (n, n), g (n): information and pull. sure: by how much (log) each cause must raise the evidence.
+    """
     sigma, left, found = np.diag(surveyed**2), list(suspicions), list[Cause]()
     here = evidence(H, g, sigma)
     while left and len(found) < _MOST:
-        tried = [evidence(H, g, sigma + _spread(s)) - here for s in left]
+        tried = [evidence(H, g, sigma + spread(s)) - here for s in left]
         best = int(np.argmax(tried))
-        if tried[best] < _SURE:
+        if tried[best] < sure:
             break
         rivals = [
             s for s, gain in zip(left, tried, strict=True) if gain > tried[best] - _RULED_OUT and s is not left[best]
         ]
         found.append(Cause(left[best], tried[best], tuple(rivals)))
-        sigma = sigma + _spread(left.pop(best))
+        sigma = sigma + spread(left.pop(best))
         here = evidence(H, g, sigma)
     return tuple(found), sigma
 
 
-def _spread(s: Suspicion) -> Array:
+def spread(s: Suspicion) -> Array:
+    """Return what a suspicion adds to the covariance (n, n) of the figures' errors."""
     return np.asarray((s.directions * s.sigma**2) @ s.directions.T)
 
 
@@ -62,9 +63,9 @@ def evidence(H: Array, g: Vector, sigma: Array) -> float:
 
 def posterior(H: Array, g: Vector, sigma: Array) -> tuple[Vector, Array]:
     """Return mean and covariance of the errors."""
-    inner = np.eye(len(g)) + sigma @ (H / ALIKE)
+    inner = np.eye(len(g)) + sigma @ H
     covariance = np.linalg.solve(inner, sigma)
-    return np.asarray(np.linalg.solve(inner, sigma @ (g / ALIKE))), np.asarray(0.5 * (covariance + covariance.T))
+    return np.asarray(np.linalg.solve(inner, sigma @ g)), np.asarray(0.5 * (covariance + covariance.T))
 
 
 def freed(found: Sequence[Cause]) -> Array:

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from groundstation.bus.messages import Message, RelativeObservation
-from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.team_paths import TargetPath
 from groundstation.field.resolved import ResolvedField
 from groundstation.time_units import NS_PER_S

@@ -14,7 +14,7 @@ from groundstation.bus.messages import (
     RelativeObservation,
     VehicleStatus,
 )
-from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.flown import Flown
 from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.resolved import ResolvedField

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.bus.messages import Message, RelativeObservation, Severity
 from groundstation.calibration.delay import delays
-from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.sensor_delay import Delay
 from groundstation.field.resolved import ResolvedField
 from groundstation.runtime.latency_watch import PictureAge

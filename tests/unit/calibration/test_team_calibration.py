@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import FlightState, Header, Message, Odometry, RelativeObservation, VehicleStatus
-from groundstation.calibration.recorded_likelihood import Flown
+from groundstation.calibration.flown import Flown
 from groundstation.calibration.team import TeamCalibration, calibrate_team
 from groundstation.calibration.team_settings import with_changes
 from groundstation.errors import OperatorMistake

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.calibration.team_causes import ALIKE, causes, freed, posterior
+from groundstation.calibration.team_causes import causes, freed, posterior
 from groundstation.calibration.team_figures import Figures, Suspicion
 from groundstation.field.resolved import ResolvedField
 
@@ -15,14 +15,14 @@ def suspicions() -> list[Suspicion]:
 
 
 def test_what_is_within_its_survey_has_no_cause() -> None:
-    H = ALIKE * np.diag([1e6, 1e6, 1e6])
+    H = np.diag([1e6, 1e6, 1e6])
     found, sigma = causes(H, H @ np.array([0.01, -0.01, 0.005]), SURVEYED, suspicions())
     assert found == () and not freed(found).any()
     assert np.allclose(np.diag(sigma), SURVEYED**2)
 
 
 def test_one_figure_and_all_alike_are_told_apart() -> None:
-    H = ALIKE * np.diag([1e5, 1e5, 1e5])
+    H = np.diag([1e5, 1e5, 1e5])
     for errors, who in (([0.0, 0.2, 0.0], "b"), ([0.2, 0.2, 0.2], "")):
         found, sigma = causes(H, H @ np.array(errors), SURVEYED, suspicions())
         assert [one.suspicion.who for one in found] == [who]
@@ -32,7 +32,7 @@ def test_one_figure_and_all_alike_are_told_apart() -> None:
 
 def test_causes_that_explain_it_as_well_are_rivals() -> None:
     direction = np.array([1.0, 1.0, 0.0])
-    H = ALIKE * 1e5 * np.outer(direction, direction)
+    H = 1e5 * np.outer(direction, direction)
     found, _ = causes(H, H @ np.array([0.2, 0.0, 0.0]), SURVEYED, suspicions()[:3])
     assert found[0].suspicion.who in "ab" and {one.who for one in found[0].rivals} == {"a", "b"} - {
         found[0].suspicion.who

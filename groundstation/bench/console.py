@@ -24,7 +24,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Command
 from groundstation.bus.topics import COMMAND
 from groundstation.bus.zenoh_bus import open_bus, open_router
-from groundstation.console.section import run_id
+from groundstation.console.section import enough_hz, run_id
 from groundstation.console.server import HOST, claim_port
 from groundstation.errors import GroundStationError
 from groundstation.field.resolved import ResolvedField
@@ -94,8 +94,10 @@ def _quantiles(late_ms: list[float]) -> dict[str, float]:
 def _served(drones: tuple[str, ...]) -> Iterator[tuple["subprocess.Popen[bytes]", str, str]]:
     endpoint, port = f"tcp/{HOST}:{free_port()}", free_port()
     router = open_router(endpoint)
-    section = {"field": field_of(drones, port), "run_dir": "", "truth": True}
-    spec = ChildSpec("console", "console", endpoint, _SITE, section=msgspec.json.encode(section).decode())
+    field = field_of(drones, port)
+    section = msgspec.json.encode({"field": field, "run_dir": "", "truth": True}).decode()
+    enough = dict(enough_hz(_SITE, field.drones, field.tracked))
+    spec = ChildSpec("console", "console", endpoint, _SITE, section=section, at_most_hz=enough)
     command = [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:

@@ -33,8 +33,9 @@ def console(name: str | None, invite: str | None, port: int | None) -> None:
     import asyncio
 
     from groundstation.bus.roles import Role
+    from groundstation.bus.zenoh_bus import speak_on_one_thread
     from groundstation.console.room import bare_scene, scene_from_field
-    from groundstation.console.section import run_id
+    from groundstation.console.section import enough_hz, run_id
     from groundstation.console.server import ConsoleServer, claim_port
     from groundstation.field.behaviour import ConsoleValues
     from groundstation.supervisor.joining import join
@@ -46,7 +47,8 @@ def console(name: str | None, invite: str | None, port: int | None) -> None:
     truth = record.has_truth
     scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
     listener = claim_port(port or (field.console if field else ConsoleValues()).port)
-    bus = join(record, "console", Role.CONSOLE)
+    speak_on_one_thread()
+    bus = join(record, "console", Role.CONSOLE, at_most_hz=enough_hz(record.site, cast.drones, cast.targets))
     try:
         server = ConsoleServer(bus, cast, scene, field, listener, run_id(record.run_dir))
         click.echo(f"console of {record.name} at {server.url} (Ctrl-C leaves it; the flight goes on)")

@@ -10,6 +10,8 @@ from groundstation.cli.exits import ExitCode
 from groundstation.cli.monitor import choose
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from groundstation.engineering_views.watch import LiveView
     from groundstation.field.resolved import ResolvedField
     from groundstation.supervisor.runtime_file import RuntimeRecord
@@ -115,7 +117,7 @@ def _open_ros2(record: "RuntimeRecord", router: str, domain: int, distro: str, t
     return bridge
 
 
-def _thinned(record: "RuntimeRecord") -> dict[str, float]:
+def _thinned(record: "RuntimeRecord") -> "Mapping[str, float]":
     from groundstation.bus.zenoh_bus import speak_on_one_thread
     from groundstation.engineering_views.ros2.live import enough_hz
 

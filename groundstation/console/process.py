@@ -12,7 +12,7 @@ from groundstation.console.network import Network
 from groundstation.console.room import scene_from_field
 from groundstation.console.run_end import read_end
 from groundstation.console.section import ConsoleSection, devices_of, run_id
-from groundstation.console.server import HOST, ConsoleServer, claim_port
+from groundstation.console.server import HOST, RATE_HZ, ConsoleServer, claim_port
 from groundstation.errors import GroundStationError
 from groundstation.field.behaviour import ConsoleValues
 from groundstation.monitor.state import cast_from_field
@@ -52,7 +52,7 @@ def run(child: Child) -> int:
         child.beat()
         server.closed = child.run_ends
         child.tick_status(turns, late, server.overflowed)
-        if refused := intrusions.news(now_ns(), server.refused):
+        if turns % RATE_HZ == 0 and (refused := intrusions.news(now_ns(), server.refused)):
             child.event(Severity.WARNING, f"the console refused {refused}")
         if not child.stop_requested or not child.supervisor_alive:
             return child.supervisor_alive

@@ -1,11 +1,17 @@
 """What the console is handed at its start."""
 
 import hashlib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import msgspec
 
+from groundstation.bus.thinning import rates_by_key
+from groundstation.bus.topics import SETPOINT, TRUTH
 from groundstation.field.resolved import ResolvedField
+
+# A little more than the ten a second that are looked at, or one would be missing now and then.
+_MOTION_HZ = 12.5
 
 
 class ConsoleSection(msgspec.Struct, frozen=True):
@@ -19,6 +25,12 @@ class ConsoleSection(msgspec.Struct, frozen=True):
 def devices_of(identities: str) -> Path:
     """Return the folder of a run's invitations and devices; it lies with the run's certificates and goes with them."""
     return Path(identities) / "devices"
+
+
+def enough_hz(site: str, drones: Iterable[str], targets: Iterable[str]) -> Mapping[str, float]:
+    """Return how many samples a second [Hz] are enough, by the keys of what comes more often."""
+    drones = tuple(drones)
+    return rates_by_key(site, ((SETPOINT, drones, _MOTION_HZ), (TRUTH, (*drones, *targets), _MOTION_HZ)))
 
 
 def run_id(run_dir: str) -> str:

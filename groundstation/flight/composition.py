@@ -12,6 +12,7 @@ import msgspec
 from drivers.camera.settings import parse_source
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role
+from groundstation.console.section import enough_hz
 from groundstation.errors import OperatorMistake
 from groundstation.field.targets import odometry_name
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
@@ -115,7 +116,8 @@ def process_table(
     table += [_liaison(host, field) for host in hosts_of(field)]
     if field.console.enabled:
         page = json.dumps(json.loads(core) | {"truth": simulation is not None})
-        table.append(replace(rows.CONSOLE, section=page))
+        enough = enough_hz(field.site, field.drones, field.tracked)
+        table.append(replace(rows.CONSOLE, section=page, at_most_hz=enough))
     if monitor:
         table.append(replace(rows.MONITOR, section=core))
     elsewhere = [member for host in hosts_of(field) for member in members_on(host, field)]

@@ -3,9 +3,9 @@
 import logging
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
@@ -34,7 +34,8 @@ class ChildSpec:
     with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did); identity:
     what it shows the router, or the router shows others (None: nobody asks); clock: id of the run's clock where that is
     another host's ("": this host's own); nice: below 0 for a larger share of the processor (docs/decisions/0137);
-    spoken_since_ns: since when others have spoken in its place (0: nobody does).
+    spoken_since_ns: since when others have spoken in its place (0: nobody does); at_most_hz: by key, how many samples a
+    second its bus lets in. Whoever thins only looks, and is woken as seldom as can be (docs/decisions/0173).
     """
 
     name: str
@@ -49,6 +50,7 @@ class ChildSpec:
     clock: str = ""
     nice: int = 0
     spoken_since_ns: int = 0
+    at_most_hz: Mapping[str, float] = field(default_factory=dict)
 
 
 class Child:
@@ -86,9 +88,7 @@ class Child:
                 clock.follow(self.spec.clock, self._block.clock_offset_ns)
         self._set_state(Lifecycle.STARTING, "")
         if self.spec.endpoint:
-            from groundstation.bus.zenoh_bus import open_bus
-
-            self.bus = open_bus(self.spec.endpoint, self.spec.site, self.name, identity=self.spec.identity)
+            self.bus = self._opened_bus()
             self.publish_status()
         return self
 
@@ -114,6 +114,14 @@ class Child:
                 clock.follow(self.spec.clock, lambda: last_ns)  # threads of a driver may still read it
             self._block.close()
             self._block = None
+
+    def _opened_bus(self) -> Bus:
+        from groundstation.bus.zenoh_bus import open_bus, speak_on_one_thread
+
+        spec = self.spec
+        if spec.at_most_hz:
+            speak_on_one_thread()
+        return open_bus(spec.endpoint, spec.site, self.name, identity=spec.identity, at_most_hz=spec.at_most_hz)
 
     @property
     def _has_bus(self) -> bool:

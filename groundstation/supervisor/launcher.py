@@ -65,6 +65,7 @@ class Launcher:
                 clock=self._run.clock if spec.on_bus else "",
                 nice=spec.nice,
                 spoken_since_ns=spoken_since_ns,
+                at_most_hz=dict(spec.at_most_hz),
             )
         )
         if spec.command:

@@ -1,6 +1,7 @@
 """One row per process: its entry, its permitted silence, and its place in the shut-down."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 
 from groundstation.process.heartbeat import SUPERVISOR_SLOT
@@ -58,6 +59,7 @@ class ProcessSpec:
     on_terminal: it writes to the operator's terminal. entities: the vehicles or the camera that a device speaks of.
     kernels: it computes with compiled kernels, which are made before anything starts. nice: its share of the processor,
     beside that of others (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152).
+    at_most_hz: by key, how many samples a second are enough for it (docs/decisions/0173).
     """
 
     name: str
@@ -82,6 +84,7 @@ class ProcessSpec:
     kernels: bool = False
     nice: int = 0
     shows_end: bool = False
+    at_most_hz: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def is_router(self) -> bool:

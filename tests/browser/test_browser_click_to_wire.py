@@ -1,5 +1,7 @@
 """From a click on a stop to the first datagram that obeys it, in flight."""
 
+import math
+import os
 import re
 import time
 from collections.abc import Callable
@@ -9,8 +11,9 @@ import pytest
 from seen_page import Seen, eventually
 
 from drivers.datagrams import unpack
+from groundstation.bus.messages import Command, Verb
 from groundstation.bus.roles import Role
-from groundstation.bus.topics import RAW_TX
+from groundstation.bus.topics import COMMAND, RAW_TX
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
@@ -29,6 +32,8 @@ class Datagrams:
 
     def __init__(self, bus: ZenohBus) -> None:
         self._sent = bus.subscribe([RAW_TX], capacity=20_000)
+        self._ordered = bus.subscribe([COMMAND])
+        self.holds: dict[str, float] = {}
         self.heard: dict[str, list[tuple[float, bool]]] = {"drone_1": [], "drone_2": []}
 
     def look(self) -> "Datagrams":
@@ -36,6 +41,9 @@ class Datagrams:
             for stamp_ns, datagram in unpack(received.payload):
                 if motion := _MOTION.search(datagram):
                     self.heard[received.header.entity].append((stamp_ns * 1e-9, bool(int(motion[1]) & 1)))
+        for received in self._ordered.drain():
+            if isinstance(order := received.message, Command) and order.verb is Verb.HOLD:
+                self.holds[order.id] = order.header.stamp_ns * 1e-9
         return self
 
     def all_move(self) -> bool:
@@ -44,8 +52,17 @@ class Datagrams:
     def all_hover(self) -> bool:
         return not any(heard and heard[-1][1] for heard in self.heard.values())
 
+    def given_s(self, since_s: float) -> float:
+        """Return after how long the console gave the order."""
+        return next((at - since_s for at in self.look().holds.values() if at >= since_s), math.nan)
+
     def obeyed_s(self, drone: str, since_s: float) -> float | None:
         return next((at - since_s for at, moves in self.heard[drone] if at >= since_s and not moves), None)
+
+
+def _words(what: str, delays_s: list[float]) -> str:
+    ordered = sorted(1e3 * delay for delay in delays_s)
+    return f"{what}: median {ordered[len(ordered) // 2]:.0f} ms, worst of {len(ordered)} {ordered[-1]:.0f} ms"
 
 
 def test_a_click_on_hold_is_obeyed_within_50_ms(
@@ -56,7 +73,7 @@ def test_a_click_on_hold_is_obeyed_within_50_ms(
         wire = Datagrams(bus)
         page: Seen = open_page(served)
         page.page.evaluate(_LISTEN)
-        delays: list[float] = []
+        delays, given = list[float](), list[float]()
         eventually(lambda: wire.look().all_move(), 150.0, "both drones are moved")
         for _ in range(_CLICKS):
             eventually(lambda: wire.look().all_move(), 20.0, "both drones are moved again")
@@ -64,12 +81,12 @@ def test_a_click_on_hold_is_obeyed_within_50_ms(
             eventually(lambda: wire.look().all_hover(), 5.0, "both drones hover")
             clicked_s = page.page.evaluate("() => window.__clicked.at(-1)") / 1e3 - time.time() + time.monotonic()
             delays += [wire.obeyed_s(drone, clicked_s) or 0.0 for drone in wire.heard]
+            given.append(wire.given_s(clicked_s))
             page.there("resume").click()
         assert live.supervisor.alive, "the run has ended before its time"
     finally:
         bus.close()
-    delays.sort()
-    figures = f"median {1e3 * delays[len(delays) // 2]:.0f} ms, worst of {len(delays)} {1e3 * delays[-1]:.0f} ms"
+    figures = f"{_words('datagram', delays)}; {_words('order given', given)}; load {os.getloadavg()[0]:.1f}"
     record_property("click to datagram", figures)
     print(figures)
-    assert delays[0] > 0.0 and delays[-1] <= 0.05, figures
+    assert min(delays) > 0.0 and max(delays) <= 0.05, figures

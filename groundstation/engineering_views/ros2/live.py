@@ -3,6 +3,7 @@
 import json
 import os
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import zenoh
@@ -12,6 +13,7 @@ from groundstation.bus import codec as bus_codec
 from groundstation.bus import keys
 from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.keys import Key
+from groundstation.bus.thinning import rates_by_key
 from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, SETPOINT, TRUTH, VEHICLE_STATUS
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import STATES, Ros2Scene
@@ -25,7 +27,7 @@ _NODE = "skein"
 _MOTION_HZ, _HEALTH_HZ = 12.5, 2.0
 
 
-def enough_hz(site: str, field: ResolvedField | None) -> dict[str, float]:
+def enough_hz(site: str, field: ResolvedField | None) -> Mapping[str, float]:
     """Return how many samples a second are enough, by the keys of what comes more often.
 
     States of motion: a little more than there are turns, or one would find none now and then.
@@ -39,7 +41,7 @@ def enough_hz(site: str, field: ResolvedField | None) -> dict[str, float]:
         (TRUTH, (*drones, *field.tracked), _MOTION_HZ),
         (VEHICLE_STATUS, drones, _HEALTH_HZ),
     ]
-    return {keys.expression(site, topic, name): rate_hz for topic, names, rate_hz in often for name in names}
+    return rates_by_key(site, often)
 
 
 class Ros2View:

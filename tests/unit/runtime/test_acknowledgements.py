@@ -20,3 +20,15 @@ def test_ack_book_takes_only_news_from_who_was_asked() -> None:
     assert book.progress["drone_1"].text(final=True) == "sent / received / accepted / NOT CONFIRMED"
     assert book.note(ack("drone_1", AckStage.EFFECTIVE)) and book.confirmed and book.settled
     assert not book.note(ack("drone_1", AckStage.REFUSED)), "nothing after the end"
+
+
+def test_a_stop_that_nobody_heard_is_repeated_sooner_than_a_start() -> None:
+    bus = MemoryBus(MemoryExchange(), "lab", "x")
+
+    def book(verb: Verb) -> AwaitedAnswers:
+        return AwaitedAnswers(Command(header=bus.header("team"), id="1", verb=verb, scope=(), issuer="x"), ("drone_1",))
+
+    stop = book(Verb.HOLD)
+    assert stop.repeat_after_s == 0.1 < book(Verb.TRACK).repeat_after_s
+    stop.note(CommandAck(header=bus.header("drone_1"), command_id="1", verb=Verb.HOLD, stage=AckStage.RECEIVED))
+    assert stop.repeat_after_s == 1.0, "its effect takes time"

@@ -5,8 +5,8 @@ import { droneNames, store } from "./store.js";
 const RANKS = ["empty", "unknown", "low", "good"];
 const LEVELS = { empty: "bad", unknown: "warn", low: "warn", good: "good" };
 
-// In the same words in the bar and on the cards; "" where nobody knows.
-export const lastsWords = ({ good_for: time }) => time && `good for ${time}`;
+// Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows.
+export const lastsWords = ({ good_for: time, battery_min: limit }) => time && `${time} until ${(100 * limit).toFixed(0)} %`;
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);
 

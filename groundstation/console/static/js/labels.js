@@ -1,4 +1,5 @@
-// Words on the map that give way to each other: first the important ones, each at the first free of its places.
+// Words on the map that give way to each other: first the important ones, each at the first free of its places. A name
+// without a free place stands where it covers the least.
 
 import { label } from "./canvas.js";
 
@@ -24,10 +25,11 @@ export function note(g, rank, of, words, places, colour, size, weight) {
   waiting.push({ rank, key: `${rank} ${of}`, words, places, colour, size, weight, alpha: g.globalAlpha });
 }
 
-// Above, below and beside a body of a radius; then a line further off.
+// Above, below and beside a body of a radius; then further off, by lines and aslant.
 export function around(x, y, radius, size) {
   const up = y - radius, down = y + radius + size, side = y + size / 3, line = size * LINE;
   return [[x, up, "center"], [x, down, "center"], [x + radius, side, "left"], [x - radius, side, "right"],
+    [x + radius, up, "left"], [x - radius, up, "right"], [x + radius, down, "left"], [x - radius, down, "right"],
     [x, up - line, "center"], [x, down + line, "center"], [x, up - 2 * line, "center"], [x, down + 2 * line, "center"]];
 }
 
@@ -42,7 +44,7 @@ export function placeLabels(g, { width, height }) {
     const inside = (box) => box.left >= 0 && box.right <= width && box.top >= 0 && box.bottom <= height;
     const free = boxes.find((box) => inside(box) && !taken.some((other) => overlap(box, other)));
     if (!free && one.rank !== NAME) continue;
-    const box = free ?? boxes[0], [x, y, align] = one.places[box.index];
+    const box = free ?? leastCovering(boxes, inside), [x, y, align] = one.places[box.index];
     held.set(one.key, box.index);
     taken.push(box);
     placed.push({ words: one.words, ...box });
@@ -56,6 +58,18 @@ export function placeLabels(g, { width, height }) {
 function boxOf({ size }, [x, y, align], wide) {
   const left = align === "left" ? x : align === "right" ? x - wide : x - wide / 2;
   return { left, right: left + wide, top: y - size, bottom: y + 0.3 * size };
+}
+
+// The first of those that cover the least of what is taken, within the map if one is.
+function leastCovering(boxes, inside) {
+  const cost = (box) => taken.reduce((sum, other) => sum + shared(box, other), inside(box) ? 0 : Infinity);
+  return boxes.reduce((best, box) => (cost(box) < cost(best) ? box : best));
+}
+
+function shared(a, b) {
+  const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+  const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+  return Math.max(0, wide) * Math.max(0, high);
 }
 
 const overlap = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;

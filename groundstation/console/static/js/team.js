@@ -10,6 +10,7 @@ import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from "./store.js";
 
 const STALE_S = 1;
+const LONGEST_CAPTION = 9; // letters of a name that the column of its buttons has room for
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const cards = new Map();
 
@@ -52,7 +53,8 @@ function actions(name) {
     made.onclick = () => give(verb, [name]);
     return made;
   };
-  return el("div", { class: "actions" }, button("TAKEOFF", "Take off"), button("HOLD", "Hold"), button("LAND", "Land"));
+  const whom = el("span", { class: "whom" }, name.length <= LONGEST_CAPTION ? `only ${name}` : "only this one");
+  return el("div", { class: "actions" }, whom, button("TAKEOFF", "Take off"), button("HOLD", "Hold"), button("LAND", "Land"));
 }
 
 export function paint(only) {

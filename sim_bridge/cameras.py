@@ -1,6 +1,5 @@
 """The emulated cameras: one render process each, with its view and its address."""
 
-import math
 import multiprocessing
 import os
 import socket
@@ -10,17 +9,15 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
-import numpy as np
-
 from groundstation.errors import GroundStationError
 from groundstation.geometry.board import Checkerboard
+from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
-from groundstation.geometry.rotations import WORLD_FROM_DOWNWARD_OPTICAL, base_from_tilted_optical
 from groundstation.geometry.tag import SquareTag
 from groundstation.process.priority import take_share
 from groundstation.vehicles import kind_named
 from sim_bridge.fault_kinds import FaultKind, exchanged
-from sim_bridge.mounting import generator_of_eye, mounted
+from sim_bridge.mounting import generator_of_eye, mounted, on_drone, true_lens
 from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.spec import (
     BoardSpec,
@@ -33,7 +30,7 @@ from sim_bridge.render.spec import (
     RenderSpec,
 )
 from sim_bridge.scenario import Scenario
-from sim_bridge.site import Lens, Site
+from sim_bridge.site import Site
 from sim_bridge.world.emulation import video_of
 
 Stream = tuple[str, int]
@@ -54,12 +51,13 @@ def render_specs(
 
     unseen: bodies that no camera shows.
     """
-    body_at = exchanged(scenario.faults)
+    body_at, errors = exchanged(scenario.faults), scenario.cameras.mounting_errors
+    optics = {name: _optics(site, body_at.get(name, name), errors, seed) for name in streams}
     return [
         RenderSpec(
             camera=name,
-            mount=_mount(site, body_at.get(name, name), scenario.cameras.mounting_errors, seed),
-            intrinsics=_lens(site, body_at.get(name, name)).intrinsics,
+            mount=optics[name][0],
+            intrinsics=optics[name][1],
             boards=tuple(board for board in _boards(site) if board.body not in unseen),
             truth_name=truth_name,
             bodies=site.bodies,
@@ -84,25 +82,15 @@ def _own_video(site: Site, name: str, scenario: Scenario) -> OwnVideo | None:
     return video_of(drone.kind, name, scenario) if own else None
 
 
-def _lens(site: Site, name: str) -> Lens:
-    drone = site.drones.get(name)
-    if name in site.cameras:
-        return site.cameras[name].calibration
+def _optics(site: Site, name: str, errors: bool, seed: int) -> tuple[Mount, CameraIntrinsics]:
+    """Return a camera's mounting and lens as they really are."""
+    rng = generator_of_eye(seed, name)
+    drone, camera = site.drones.get(name), site.cameras.get(name)
+    if camera is not None:
+        return Mount(Pose(*mounted(camera, errors, rng))), true_lens(camera.calibration, errors, rng)
     if drone is None or drone.camera is None:
         raise GroundStationError(f"stream {name!r} belongs to no camera of the field")
-    return drone.camera.calibration
-
-
-def _mount(site: Site, name: str, errors: bool, seed: int) -> Mount:
-    drone = site.drones.get(name)
-    if drone is None or drone.camera is None:
-        camera = site.cameras.get(name)
-        if camera is None:
-            return Mount(Pose(WORLD_FROM_DOWNWARD_OPTICAL, np.zeros(3)))
-        return Mount(Pose(*mounted(camera, errors, generator_of_eye(seed, name))))
-    eye = drone.camera
-    rotation = base_from_tilted_optical(math.radians(eye.tilt_down_deg), math.radians(eye.pan_left_deg))
-    return Mount(Pose(rotation, np.array(eye.position_m)), name)
+    return Mount(Pose(*on_drone(drone.camera, errors, rng)), name), true_lens(drone.camera.calibration, errors, rng)
 
 
 def _boards(site: Site) -> tuple[BoardSpec, ...]:

@@ -1,17 +1,19 @@
-"""The true place of what is fixed in the room: a little off the field file, like a real one; a camera after a bump."""
+"""True mountings and lenses of cameras: a little off the field file, like real ones; a camera after a bump."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.geometry.rotations import rotation_from_euler, world_from_downward_optical
-from sim_bridge.site import SiteCamera, SiteCapture
+from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler, world_from_downward_optical
+from sim_bridge.site import EmulatedCamera, Lens, SiteCamera, SiteCapture
 from sim_bridge.world.noise import generator_of
 
 
 def generator_of_eye(seed: int, name: str) -> np.random.Generator:
-    """Return a camera's random generator: it draws the mounting first, so study and SITL have the same."""
+    """Return a camera's random generator: it draws mounting, then lens first, so study and SITL have the same."""
     return generator_of(seed, f"{name}/eye")
 
 
@@ -21,6 +23,36 @@ def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple
     error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
     known, place = world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m, dtype=np.float64)
     return (rotation_from_euler(*error) @ known, place + off) if errors else (known, place)
+
+
+def on_drone(camera: EmulatedCamera, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return base_from_optical (3, 3) and position [m; base] of a drone's camera, off by its deviations if said."""
+    tilt, pan = math.radians(camera.tilt_down_deg), math.radians(camera.pan_left_deg)
+    known, place = base_from_tilted_optical(tilt, pan), np.array(camera.position_m, dtype=np.float64)
+    turn, shift = math.radians(camera.attitude_std_deg), camera.position_std_m
+    if not errors or (turn == 0.0 and shift == 0.0):
+        return known, place
+    error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
+    return rotation_from_euler(*error) @ known, place + off
+
+
+def true_lens(told: Lens, errors: bool, rng: np.random.Generator) -> CameraIntrinsics:
+    """Return a camera's lens, off the field's figures by their deviations if said."""
+    lens, std = told.intrinsics, told.std
+    if not errors or std is None:
+        return lens
+    known = np.array((lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, *lens.distortion))
+    fx, fy, cx, cy, *distortion = rng.normal(known, tuple(std.model_dump().values())).tolist()
+    return replace(lens, fx_px=fx, fy_px=fy, cx_px=cx, cy_px=cy, distortion=tuple(distortion))
+
+
+def as_measured(point: Array, true: CameraIntrinsics, told: CameraIntrinsics) -> Array:
+    """Return a marker's place (3) [m; optical] as a detector finds it that believes another lens than the true one."""
+    if true == told:
+        return point
+    across = told.normalised_from_pixels(true.project(point))
+    depth = float(point[2]) * math.sqrt(told.fx_px * told.fy_px / (true.fx_px * true.fy_px))
+    return np.array([across[0] * depth, across[1] * depth, depth])
 
 
 def surveyed(system: SiteCapture, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:

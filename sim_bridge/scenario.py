@@ -161,8 +161,8 @@ class CameraScenario(Section):
     video_jitter_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
     """Half width of the uniform spread about that delay [ms]."""
     mounting_errors: bool = True
-    """Whether cameras fixed in the room are off by what the field says of their mounting (attitude_std_deg,
-    position_std_m), drawn from the seed; false: each is exactly where the field says."""
+    """Whether cameras, in the room and on drones, are off by what the field says of their mounting (attitude_std_deg,
+    position_std_m) and lens (the calibration's std), drawn from the seed; false: each is exactly as the field says."""
     frame_loss: Annotated[float, Field(ge=0, le=1)] = 0.05
     """Share of images that are lost; over TCP, that come 200 ms late."""
     corner_noise_px: Annotated[float, Field(ge=0, le=5)] = 0.2

@@ -34,8 +34,22 @@ class SimulatedRoom(_Part):
     obstacles: dict[str, SimulatedObstacle] = {}
 
 
+class LensStd(_Part):
+    """Standard deviations of a lens's figures."""
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    k1: float
+    k2: float
+    p1: float
+    p2: float
+    k3: float
+
+
 class Lens(_Part):
-    """Pinhole with plumb-bob distortion k1 k2 p1 p2 k3."""
+    """Pinhole with plumb-bob distortion k1 k2 p1 p2 k3, and how well its figures are known, if that is said."""
 
     width_px: int
     height_px: int
@@ -44,6 +58,7 @@ class Lens(_Part):
     cx_px: float
     cy_px: float
     distortion: tuple[float, float, float, float, float]
+    std: LensStd | None = None
 
     @property
     def intrinsics(self) -> CameraIntrinsics:
@@ -85,6 +100,8 @@ class EmulatedCamera(_Part):
     position_m: tuple[float, float, float]
     tilt_down_deg: float
     pan_left_deg: float = 0.0
+    attitude_std_deg: float = 0.0
+    position_std_m: float = 0.0
 
 
 class SiteDrone(_Part):

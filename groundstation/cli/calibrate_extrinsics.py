@@ -163,8 +163,15 @@ def _world_lines(placing: "Placing") -> list[str]:
         f"position_m: {_list(placing.pose.translation, 4)}   # +- {_list(placing.position_std_m, 4)}",
         "looking: down",
         f"rotation_deg: {_list(turn, 3)}   # roll, pitch, yaw; +- {_list(attitude, 3)}",
-        f"attitude_std_deg: {max(_LEAST_STD_DEG, float(attitude.max())):.3f}",
-        f"position_std_m: {max(_LEAST_STD_M, float(placing.position_std_m.max())):.4f}",
+        *_deviations(placing),
+    ]
+
+
+def _deviations(placing: "Placing") -> list[str]:
+    attitude_deg, position_m = math.degrees(placing.attitude_std_rad.max()), float(placing.position_std_m.max())
+    return [
+        f"attitude_std_deg: {max(_LEAST_STD_DEG, attitude_deg):.3f}",
+        f"position_std_m: {max(_LEAST_STD_M, position_m):.4f}",
     ]
 
 
@@ -184,4 +191,5 @@ def _onboard_lines(placing: "Placing") -> list[str]:
         f"position_m: {_list(placing.pose.translation, 4)}   # +- {_list(placing.position_std_m, 4)}",
         f"tilt_down_deg: {tilt:.3f}   # +- {attitude[1]:.3f}",
         f"pan_left_deg: {pan:.3f}   # +- {attitude[2]:.3f}",
+        *_deviations(placing),
     ]

@@ -26,13 +26,15 @@ class DroneLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class OnboardCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The camera that a drone carries [m; base]."""
+    """The camera that a drone carries [m; base]; the deviations are those of its mounting."""
 
     source: str
     calibration: LensCalibration
     position_m: Vector3 = (0.0, 0.0, 0.0)
     tilt_down_deg: float = 45.0
     pan_left_deg: float = 0.0
+    attitude_std_deg: float = 0.0
+    position_std_m: float = 0.0
     video_delay_ms: float = 120.0
 
 

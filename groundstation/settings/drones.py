@@ -65,6 +65,12 @@ class OnboardCameraSettings(SettingsSection):
     """Angle [deg] of the optical axis below the horizon."""
     pan_left_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Angle [deg] of the optical axis to the left of straight ahead."""
+    attitude_std_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """Standard deviation [deg] of the camera's attitude on the drone; 0: it is exactly as said. Simulated cameras are
+    off by it; for the filter it is part of the odometry's attitude_std_deg."""
+    position_std_m: Annotated[float, Field(ge=0, le=0.2)] = 0.0
+    """Standard deviation [m] of the camera's position on the drone; 0: it is exactly as said. Simulated cameras are off
+    by it."""
     video_delay_ms: VideoDelay = 120.0
     """Median time [ms] from the exposure of an image to its arrival. Measure it: groundstation calibrate delay."""
 

@@ -9,12 +9,9 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.bus.messages import Header, RelativeObservation, SearchedPicture
 from groundstation.geometry.board import Checkerboard
-from groundstation.geometry.rotations import (
-    base_from_tilted_optical,
-    rotation_from_euler,
-)
+from groundstation.geometry.rotations import rotation_from_euler
 from groundstation.geometry.tag import SquareTag
-from sim_bridge.mounting import generator_of_eye, mounted, turned_about
+from sim_bridge.mounting import as_measured, generator_of_eye, mounted, on_drone, true_lens, turned_about
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
 from sim_bridge.world.mavlink_copter import MavlinkCopter
@@ -74,7 +71,7 @@ def _hidden(world: World, carried: Carried, state: Array, eye: Array) -> bool:
 class Eye:
     """One camera, on a drone or in the world: looks at all boards but its carrier's own.
 
-    outliers: share of sightings with a gross error, beside what the scenario says. A fixed camera hangs a little off
+    outliers: share of sightings with a gross error, beside what the scenario says. Mounting and lens are a little off
     what the ground station knows, unless the scenario says otherwise.
     """
 
@@ -85,15 +82,14 @@ class Eye:
         self.name = name
         self.period_s = 1.0 / cameras.fps
         self.lateness_ms: float | None = None  # a video's delay is the scenario's
-        self._lens = lens.intrinsics
         self._carrier = name if isinstance(mount, SiteDrone) else None
         if isinstance(mount, SiteDrone):
             assert mount.camera is not None
-            tilt, pan = math.radians(mount.camera.tilt_down_deg), math.radians(mount.camera.pan_left_deg)
-            self._rotation, self._position = base_from_tilted_optical(tilt, pan), np.array(mount.camera.position_m)
+            self._rotation, self._position = on_drone(mount.camera, cameras.mounting_errors, rng)
         else:
             self._rotation, self._position = mounted(mount, cameras.mounting_errors, rng)
         self._mounted = self._rotation
+        self._told_lens, self._lens = lens.intrinsics, true_lens(lens, cameras.mounting_errors, rng)
         self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
         self._robots = frozenset(site.drones)
         self._scenario, self._outliers, self._rng = cameras, outliers, rng
@@ -167,7 +163,8 @@ class Eye:
         if not self._is_framed(carried.outline @ facing.T + centre):
             return None
         self._last_seen[carried.body] = now_s
-        return centre, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2])
+        place = as_measured(centre, self._lens, self._told_lens)
+        return place, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2])
 
     def _is_framed(self, points: Array) -> bool:
         """Return whether all points (n, 3) [optical] are in the picture, the border aside."""

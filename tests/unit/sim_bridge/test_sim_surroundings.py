@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -12,7 +13,7 @@ from groundstation.field.resolved import ResolvedField
 from sim_bridge.cameras import render_specs
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.link_bursts import with_bursts
-from sim_bridge.mounting import generator_of_eye, mounted
+from sim_bridge.mounting import as_measured, generator_of_eye, mounted, on_drone, true_lens
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.site import Site, parse_site
 from sim_bridge.study.camera_model import Eye
@@ -142,3 +143,71 @@ def test_rendered_cameras_hang_as_those_of_the_study(site: Site) -> None:
     assert 0.0 < np.linalg.norm(place - camera.position_m) < 4 * camera.position_std_m
     (exact,) = render_specs(site, scenario(cameras={"mounting_errors": False}), streams, "board", seed=4)
     assert exact.mount.parent_from_optical.translation == pytest.approx(camera.position_m)
+
+
+def said(site: Site, **figures: float) -> Site:
+    """Return the site with deviations of its first drone's camera; `fx_px` and others are of its lens."""
+    values = site.model_dump()
+    camera = next(iter(values["drones"].values()))["camera"]
+    mounting = {name: figures.pop(name) for name in ("attitude_std_deg", "position_std_m") if name in figures}
+    nothing = dict.fromkeys(("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"), 0.0)
+    camera |= mounting
+    camera["calibration"]["std"] = nothing | figures
+    return parse_site(values)
+
+
+def test_rendered_cameras_of_drones_are_off_as_those_of_the_study(site: Site) -> None:
+    off = said(site, attitude_std_deg=0.5, position_std_m=0.01, fx_px=3.0, cx_px=2.0)
+    name, drone = next(iter(off.drones.items()))
+    assert drone.camera is not None
+    (spec,) = render_specs(off, scenario(), {name: ("127.0.0.1", 8080)}, "board", seed=4)
+    rng = generator_of_eye(4, name)
+    rotation, place = on_drone(drone.camera, True, rng)
+    assert np.array_equal(spec.mount.parent_from_optical.rotation, rotation)
+    assert np.array_equal(spec.mount.parent_from_optical.translation, place)
+    assert spec.intrinsics == true_lens(drone.camera.calibration, True, rng)
+    assert spec.intrinsics.fx_px != drone.camera.calibration.fx_px
+    assert spec.intrinsics.fy_px == drone.camera.calibration.fy_px
+    exact = scenario(cameras={"mounting_errors": False})
+    (spec,) = render_specs(off, exact, {name: ("127.0.0.1", 8080)}, "board", seed=4)
+    assert spec.intrinsics == drone.camera.calibration.intrinsics
+    assert spec.mount.parent_from_optical.translation == pytest.approx(drone.camera.position_m)
+
+
+def test_drawn_mountings_and_lenses_scatter_as_the_field_says(site: Site) -> None:
+    off = said(site, attitude_std_deg=0.5, position_std_m=0.01, fx_px=3.0)
+    camera = next(iter(off.drones.values())).camera
+    assert camera is not None
+    known, _ = on_drone(camera, False, np.random.default_rng(0))
+    turns, shifts, focals = [], [], []
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        rotation, place = on_drone(camera, True, rng)
+        turns.append(math.degrees(math.acos(min(1.0, (np.trace(rotation @ known.T) - 1.0) / 2.0))))
+        shifts.append(place - camera.position_m)
+        focals.append(true_lens(camera.calibration, True, rng).fx_px - camera.calibration.fx_px)
+    assert math.sqrt(np.mean(np.square(turns)) / 3.0) == pytest.approx(0.5, rel=0.1)
+    assert np.std(shifts) == pytest.approx(0.01, rel=0.1)
+    assert np.std(focals) == pytest.approx(3.0, rel=0.1)
+
+
+def test_a_field_that_says_no_deviations_has_exact_cameras_on_its_drones(site: Site) -> None:
+    camera = next(iter(site.drones.values())).camera
+    assert camera is not None
+    rng, untouched = np.random.default_rng(1), np.random.default_rng(1)
+    _, place = on_drone(camera, True, rng)
+    assert tuple(place) == camera.position_m
+    assert true_lens(camera.calibration, True, rng) == camera.calibration.intrinsics
+    assert rng.random() == untouched.random()
+
+
+def test_a_detector_that_believes_a_wrong_lens_is_off_as_its_pixels_say(site: Site) -> None:
+    camera = next(iter(site.drones.values())).camera
+    assert camera is not None
+    told = camera.calibration.intrinsics
+    point = np.array([0.4, -0.2, 1.5])
+    assert np.array_equal(as_measured(point, told, told), point)
+    true = replace(told, fx_px=1.03 * told.fx_px, fy_px=1.03 * told.fy_px, cx_px=told.cx_px + 5.0)
+    found = as_measured(point, true, told)
+    assert told.project(found) == pytest.approx(true.project(point))
+    assert found[2] == pytest.approx(point[2] / 1.03)

@@ -133,6 +133,7 @@ def test_an_onboard_camera_is_placed_on_the_bench(tmp_path, measured):
     assert lines["tilt_down_deg"] == pytest.approx(43.0, abs=1.0)
     assert lines["pan_left_deg"] == pytest.approx(2.0, abs=1.0)
     assert np.allclose(lines["position_m"], camera.translation, atol=0.02)
+    assert 0.01 <= lines["attitude_std_deg"] < 2.0 and 0.001 <= lines["position_std_m"] < 0.05
 
 
 def test_what_does_not_tell_is_refused_with_what_is_missing(tmp_path, measured):

@@ -12,8 +12,10 @@ from groundstation.field.targets import odometry_name
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
+from sim_bridge.devices.captured_bodies import CapturedBodies
 from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.devices.odometry_router import OdometryRouter
+from sim_bridge.devices.pose_router import PoseRouter
 from sim_bridge.devices.range_gateway import RangeGateway
 from sim_bridge.fault_kinds import Part, exchanged, of_part
 from sim_bridge.faults import FaultSchedule
@@ -147,7 +149,8 @@ class Harness:
             return
         system = order.site.motion_capture[name]
         faults = order.scenario.faults
-        server = NatnetEmulator(name, place, system, world.bodies, world.states, rng, faults, errors)
+        seen = CapturedBodies(name, system, world.bodies, world.states, rng, faults, errors)
+        server = (PoseRouter if system.source.startswith("ros2://") else NatnetEmulator)(name, place, seen)
         self._stage.add(name, server, server.fileno())
 
     @property

@@ -154,8 +154,9 @@ class SiteVolume(_Part):
 
 
 class SiteCapture(_Part):
-    """A motion capture system: origin and heading of its axes in the world, its vertical axis, bodies, noise."""
+    """A motion capture system: protocol, origin and heading of its axes in the world, vertical axis, bodies, noise."""
 
+    source: str = ""
     volume_m: SiteVolume
     bodies: dict[str, SiteBody] = {}
     up: Literal["y", "z"] = "z"

@@ -92,9 +92,10 @@ def parse_source(text: str) -> SystemAddress:
     return address
 
 
-def emulated_source(host: str, port: int) -> str:
-    """Return the address of an emulated system, which speaks NatNet."""
-    return f"{_NATNET}://{host}:{port}"
+def emulated_source(text: str, host: str, port: int) -> str:
+    """Return the address of an emulated system: the same topics of ROS 2, or NatNet in place of any other protocol."""
+    place, parts = f"{host}:{port}", urlsplit(text)
+    return parts._replace(netloc=place).geturl() if parts.scheme == "ros2" else f"{_NATNET}://{place}"
 
 
 class BodySection(DriverSection):

@@ -58,7 +58,8 @@ def rerouted(
     addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
     port), spoken to as the field's own source is where that is the vehicle's own video, else by HTTP. captures: motion
     capture or ranging system, or odometry of a target -> (address, port), spoken to by NatNet, as a gateway of ranges,
-    or as a router of ROS 2. This, and that a drone may have any serial number, is all that simulation changes.
+    or as a router of ROS 2 where its source is one. This, and that a drone may have any serial number, is all that
+    simulation changes.
     streams_only: drones whose cameras are never their own video. Raises KeyError for a name that is not in the field.
     """
     heard = [*map(odometry_name, field.tracked)]
@@ -83,7 +84,9 @@ def rerouted(
 
 
 def _emulated(system: MotionCaptureSettings, place: tuple[str, int] | None) -> MotionCaptureSettings:
-    return system if place is None else system.model_copy(update={"source": emulated_source(*place)})
+    if place is None:
+        return system
+    return system.model_copy(update={"source": emulated_source(system.source, *place)})
 
 
 def _with_source(drone: Drone, stream: tuple[str, int] | None, plain: bool) -> Drone:

@@ -8,15 +8,13 @@ import os
 import time
 from collections.abc import Iterable
 from dataclasses import replace
-from urllib.parse import parse_qs, urlsplit
 
 from drivers.rmw_zenoh.wire import graph, vehicle
-from sim_bridge.devices.ros2_router import Ros2Router
+from sim_bridge.devices.ros2_router import ANY_HASH, Ros2Router, topic_of
 from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.wheel_odometry import PERIOD_S, WheelOdometry
 from sim_bridge.world.world import TICK_S
 
-_HASH = "RIHS01_" + "0" * 64  # its reader asks for any
 _EVERY = round(PERIOD_S / TICK_S)
 
 
@@ -34,9 +32,8 @@ class OdometryRouter:
         self._told: vehicle.OdometryMessage | None = None
         self._x = self._y = self._yaw = 0.0
         self._router = Ros2Router(name, f"tcp/{place[0]}:{place[1]}")
-        parts = urlsplit(source)
-        domain = int(parse_qs(parts.query).get("domain", ["0"])[0])
-        key = graph.topic_key(domain, parts.path.strip("/"), vehicle.ODOMETRY, _HASH)
+        domain, topic = topic_of(source)
+        key = graph.topic_key(domain, topic, vehicle.ODOMETRY, ANY_HASH)
         self._publisher = self._router.publisher(key)
         self._bell = os.eventfd(0, os.EFD_NONBLOCK)  # nothing is ever heard
 

@@ -4,11 +4,21 @@ import json
 import os
 import time
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import zenoh
 
 from drivers.rmw_zenoh.wire import graph
 from groundstation.errors import GroundStationError
+
+ANY_HASH = "RIHS01_" + "0" * 64
+"""A type's hash, where readers ask for any."""
+
+
+def topic_of(source: str) -> tuple[int, str]:
+    """Return domain and topic of an address ros2://HOST/TOPIC?domain=N."""
+    parts = urlsplit(source)
+    return int(parse_qs(parts.query).get("domain", ["0"])[0]), parts.path.strip("/")
 
 
 class Ros2Router:

@@ -16,7 +16,7 @@ from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.ros2_source import Ros2Source
 from drivers.motion_capture.settings import parse_source
 from drivers.motion_capture.sources import open_source
-from drivers.motion_capture.wire.ros2_pose import body_of, decode_pose
+from drivers.motion_capture.wire.ros2_pose import body_of, decode_pose, encode_pose
 from drivers.rmw_zenoh.wire import graph
 from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.engineering_views.ros2.codec import Ros2Codec
@@ -55,6 +55,10 @@ def test_a_pose_is_read_as_it_was_written(kind: str, frame: str) -> None:
     for length in range(60):
         with pytest.raises(WireError, match="short"):
             decode_pose(dds(kind), payload[:length])
+
+
+def test_a_pose_is_written_as_a_foreign_encoder_does() -> None:
+    assert encode_pose(5_000_000_006, PLACE, TURN) == written(KINDS[0], "world")
 
 
 def test_other_types_and_keys_are_refused() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from drivers.mavlink.parameters import needed
 from drivers.mavlink.wire.names import Flavour
+from sim_bridge.devices.captured_bodies import CapturedBodies
 from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.site import SiteCapture
 
@@ -62,7 +63,8 @@ class Hall(threading.Thread):
         self._row, self._over = np.full((1, 13), np.nan), threading.Event()
         system = SiteCapture.model_validate({"volume_m": self.BOX})
         rng = np.random.default_rng(1)
-        self._server = NatnetEmulator("mocap", self.PLACE, system, ["drone_2"], lambda: self._row, rng, errors=False)
+        bodies = CapturedBodies("mocap", system, ["drone_2"], lambda: self._row, rng, errors=False)
+        self._server = NatnetEmulator("mocap", self.PLACE, bodies)
 
     def run(self) -> None:
         begun, ticks = time.monotonic(), 0

@@ -3,10 +3,11 @@
 WIRE (docs/reference/ros2.md 1): `<domain>/<topic>/<DDS type>/<type hash>`.
 """
 
-from drivers.rmw_zenoh.wire.cdr import CdrReader, WireError
+from drivers.rmw_zenoh.wire.cdr import CdrReader, CdrWriter, WireError
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+POSE_STAMPED = "geometry_msgs/msg/PoseStamped"
 # DDS type -> texts before the pose: the frame, and of an Odometry that of the vehicle.
 _TEXTS = {
     "geometry_msgs::msg::dds_::PoseStamped_": 1,
@@ -38,3 +39,8 @@ def decode_pose(dds_type: str, payload: bytes) -> tuple[Vector3, Quaternion]:
         reader.text()
     x, y, z, qx, qy, qz, qw = reader.numbers("d", 7)
     return (x, y, z), (qx, qy, qz, qw)
+
+
+def encode_pose(stamp_ns: int, position: Vector3, quaternion: Quaternion) -> bytes:
+    """Return a PoseStamped in the frame `world`: Unix time [ns], place [m], quaternion (x, y, z, w)."""
+    return CdrWriter().header(stamp_ns, "world").numbers("d", *position, *quaternion).payload

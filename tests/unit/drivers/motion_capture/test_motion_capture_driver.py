@@ -20,6 +20,7 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import BodyPoses, CameraStatus, RelativeObservation
 from groundstation.bus.topics import BODY_POSES, CAMERA_STATUS, OBSERVATION
 from groundstation.errors import SettingsError
+from sim_bridge.devices.captured_bodies import CapturedBodies
 from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.site import SiteCapture
@@ -88,7 +89,8 @@ def rig(request, monkeypatch):
         return np.array([[*at, 0, 0, 0, 0.1, 0.0, 0.3, 0, 0, 0, 0] for at in PLACES.values()])
 
     capture = SiteCapture.model_validate({"volume_m": WIDE, "up": "y", "position_m": (0.3, 0.0, 0.0), "yaw_deg": 30.0})
-    system = NatnetEmulator("mocap", place, capture, PLACES, states, np.random.default_rng(1), faults, errors=False)
+    seen = CapturedBodies("mocap", capture, PLACES, states, np.random.default_rng(1), faults, errors=False)
+    system = NatnetEmulator("mocap", place, seen)
     order = {
         "name": "mocap",
         "source": f"natnet://{HOST}:{place[1]}",

@@ -1,0 +1,103 @@
+"""What a motion capture system sees of all bodies: their true poses with its noise, and its faults, at any wire."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.geometry.rotations import rotation_from_euler, rotation_x, rotation_z
+from sim_bridge.fault_kinds import Fault, FaultKind, standing
+from sim_bridge.mounting import surveyed
+from sim_bridge.site import SiteBody, SiteCapture
+
+FRAME_TICKS = 2  # 100 frames a second
+TICK_S = 0.005
+
+
+@dataclass(frozen=True, slots=True)
+class SeenBody:
+    """A body's pose in the system's axes: its name there, place [m], quaternion (x, y, z, w), whether it is tracked."""
+
+    name: str
+    place: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+    inside: bool
+
+
+class CapturedBodies:
+    """The frames of one system.
+
+    states: returns a row for each body, as `World.states` has them; errors: whether its axes are a little off.
+    """
+
+    def __init__(
+        self, name: str, system: SiteCapture, bodies: Iterable[str], states: Callable[[], Array],
+        rng: np.random.Generator, faults: Iterable[Fault] = (), errors: bool = True,
+    ) -> None:  # fmt: skip
+        self.system, self._name, self._states, self._rng = system, name, states, rng
+        self._bodies = tuple(bodies)
+        self._faults = tuple(faults)
+        self._upright = rotation_x(math.pi / 2) if system.up == "y" else np.eye(3)
+        self._world_from_system = rotation_z(math.radians(system.yaw_deg)) @ self._upright
+        self._rotation, self._origin = surveyed(system, errors, rng)
+        self._last: tuple[SeenBody, ...] | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of all bodies in the system."""
+        return [self._body(entity).name or entity for entity in self._bodies]
+
+    def is_silent(self, now_s: float) -> bool:
+        """Return whether a fault keeps its frames back."""
+        return standing(self._faults, FaultKind.CAPTURE_SILENT, now_s, self._name) is not None
+
+    def frame(self, now_s: float) -> tuple[SeenBody, ...]:
+        """Return what it sees now; a frozen one its last frame."""
+        if self._last is not None and standing(self._faults, FaultKind.CAPTURE_FROZEN, now_s, self._name) is not None:
+            return self._last
+        at = dict(zip(self._bodies, self._states(), strict=True))
+        swapped = standing(self._faults, FaultKind.BODIES_SWAPPED, now_s)
+        if swapped is not None and swapped.other is not None:
+            at[swapped.entity], at[swapped.other] = at[swapped.other], at[swapped.entity]
+        self._last = tuple(self._seen(entity, row, now_s) for entity, row in at.items() if not math.isnan(row[0]))
+        return self._last
+
+    def _seen(self, entity: str, row: Array, now_s: float) -> SeenBody:
+        """Return the body on an entity, given the entity's true state."""
+        body, noise = self._body(entity), self._rng.standard_normal(6)
+        place_std, turn_std = self.system.pose_std_m, math.radians(self.system.heading_std_deg)
+        base = rotation_from_euler(*(row[6:9] + turn_std * noise[3:]).tolist())
+        origin = row[:3] + base @ np.array(body.position_m) + place_std * noise[:3]
+        jumped = standing(self._faults, FaultKind.BODY_JUMPED, now_s, entity)
+        if jumped is not None:
+            origin = origin + np.array([jumped.amount, 0.0, 0.0])
+        origin = self._rotation.T @ (origin - self._origin)
+        world_from_body = self._rotation.T @ base @ rotation_z(math.radians(body.yaw_deg))
+        system_from_world = self._world_from_system.T
+        place = system_from_world @ (origin - np.array(self.system.position_m))
+        turned = system_from_world @ world_from_body @ self._upright
+        box = self.system.volume_m
+        spans = zip(row[:3], (box.x_m, box.y_m, box.z_m), strict=True)
+        inside = all(low <= value <= high for value, (low, high) in spans)
+        x, y, z = place.tolist()
+        return SeenBody(body.name or entity, (x, y, z), quaternion_of(turned), inside)
+
+    def _body(self, entity: str) -> SiteBody:
+        return self.system.bodies.get(entity, SiteBody())
+
+
+def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
+    """Return (x, y, z, w) of a rotation (3, 3), by the eigenvector of its largest eigenvalue (Bar-Itzhack 2000)."""
+    r = rotation
+    K = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
+            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
+        ]
+    )
+    x, y, z, w = np.linalg.eigh(K)[1][:, -1].tolist()
+    return (x, y, z, w) if w >= 0 else (-x, -y, -z, -w)

@@ -35,7 +35,7 @@ class ChildSpec:
     what it shows the router, or the router shows others (None: nobody asks); clock: id of the run's clock where that is
     another host's ("": this host's own); nice: below 0 for a larger share of the processor (docs/decisions/0137);
     spoken_since_ns: since when others have spoken in its place (0: nobody does); at_most_hz: by key, how many samples a
-    second its bus lets in. Whoever thins only looks, and is woken as seldom as can be (docs/decisions/0173).
+    second its bus lets in. Whoever thins only looks, and is woken as seldom as can be (docs/decisions/0169).
     """
 
     name: str

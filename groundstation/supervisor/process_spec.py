@@ -59,7 +59,7 @@ class ProcessSpec:
     on_terminal: it writes to the operator's terminal. entities: the vehicles or the camera that a device speaks of.
     kernels: it computes with compiled kernels, which are made before anything starts. nice: its share of the processor,
     beside that of others (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152).
-    at_most_hz: by key, how many samples a second are enough for it (docs/decisions/0173).
+    at_most_hz: by key, how many samples a second are enough for it (docs/decisions/0169).
     """
 
     name: str

@@ -18,7 +18,9 @@ _BATCH = 10
     "  groundstation experiment missions --flights 30 --understated 1 --seed 500\n\n"
     "Exit codes: 0 all flew, within the fence and apart, and stand; 1 some did not; 2 wrong settings."
 )
-@click.option("--flights", type=click.IntRange(1), default=30, show_default=True, help="Number of flights.")
+@click.option(
+    "--flights", type=click.IntRange(1), default=30, show_default=True, help="Number of flights, one for each seed."
+)
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
 @click.option(
     "--understated",

@@ -20,7 +20,6 @@ from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
 from groundstation.control.view import Localisation, spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation
-from groundstation.estimation.attitude_intake import Lean
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.entity_estimate import entity_estimate
 from groundstation.estimation.fixed_lag import FixedLagFilter
@@ -162,10 +161,6 @@ class Tracker:
             self.holding = False
         self._watch_plan(now_ns)
         return self._belief
-
-    def lean_of(self, message: RelativeObservation) -> Lean:
-        """Return how a sighting's observer leans, as the filter takes it."""
-        return self._intake.lean_of(message)
 
     def take_corrections(self) -> list[Correction]:
         """Return and forget what became of the observations since the last call."""

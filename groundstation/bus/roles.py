@@ -17,6 +17,8 @@ class Role(StrEnum):
     """Speaks for one camera."""
     TARGET = "target"
     """Speaks of one target's own motion."""
+    DIAGNOSIS = "diagnosis"
+    """Says which figure of the field is wrong."""
     RECORDER = "recorder"
     """Writes all of it down."""
     CONSOLE = "console"

@@ -51,6 +51,7 @@ _DRIVER = frozenset({Role.DRIVER})
 _CAMERA = frozenset({Role.CAMERA})
 _TARGET = frozenset({Role.TARGET})
 _TRACKER = frozenset({Role.TRACKER})
+_DIAGNOSIS = frozenset({Role.DIAGNOSIS})
 _SUPERVISOR = frozenset({Role.SUPERVISOR})
 _CONSOLE = frozenset({Role.CONSOLE})
 _SIMULATOR = frozenset({Role.SIM_BRIDGE})
@@ -96,6 +97,8 @@ PLAN = Topic("plan", m.Plan, 10, Quality.STATE, _TRACKER)
 """Tracker: the plan that was adopted, with its alternatives."""
 INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE, _TRACKER)
 """Tracker: the result of each observation."""
+SUSPICION = Topic("suspicion", m.Suspicion, 0.2, Quality.STATE, _DIAGNOSIS)
+"""Diagnosis to tracker: which figure of the field is suspected."""
 EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)
@@ -148,6 +151,7 @@ TOPICS: dict[tuple[Plane, str], Topic] = {
         LEASE,
         PLAN,
         INNOVATION,
+        SUSPICION,
         EVENT,
         PROCESS_STATUS,
         PREFLIGHT,

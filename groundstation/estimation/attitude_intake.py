@@ -2,28 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from groundstation.bus.messages import ImuSample, Odometry, Verdict
 from groundstation.estimation.frozen_sensor import FreezeWatch
 from groundstation.estimation.inertial import InertialAttitude
 from groundstation.estimation.measurement import OdometrySample
-from groundstation.time_units import NS_PER_S
 
 _FROZEN_COUNT, _FROZEN_S = 10, 0.1
-_RATE_NS = 40_000_000  # how fast a robot leans is told over this
 _MOST = 1e3  # neither turns nor accelerations that a vehicle survives are as large
-
-
-@dataclass(frozen=True, slots=True)
-class Lean:
-    """How a robot leans at an exposure [rad], how fast that changes [rad/s], and whether its IMU says so."""
-
-    roll_rad: float
-    pitch_rad: float
-    roll_rate: float = 0.0
-    pitch_rate: float = 0.0
-    by_imu: bool = False
 
 
 class AttitudeIntake:
@@ -85,17 +71,6 @@ class AttitudeIntake:
         inertial = self._inertial.get(robot)
         tilt = None if inertial is None else inertial.tilt_at(stamp_ns)
         return reported if tilt is None else tilt
-
-    def lean(self, robot: str, stamp_ns: int, reported: tuple[float, float]) -> Lean:
-        """Return how a robot leans at an exposure, as `tilt` has it, with its rates where the IMU tells them."""
-        inertial = self._inertial.get(robot)
-        if inertial is None:
-            return Lean(*reported)
-        before, here, after = (inertial.tilt_at(stamp_ns + step) for step in (-_RATE_NS // 2, 0, _RATE_NS // 2))
-        if here is None or before is None or after is None:
-            return Lean(*(reported if here is None else here), by_imu=here is not None)
-        roll_rate, pitch_rate = ((b - a) / (_RATE_NS / NS_PER_S) for a, b in zip(before, after, strict=True))
-        return Lean(*here, roll_rate, pitch_rate, by_imu=True)
 
 
 class _HeadingSource:

@@ -17,7 +17,7 @@ from groundstation.bus.messages import (
     VehicleStatus,
     Verdict,
 )
-from groundstation.estimation.attitude_intake import AttitudeIntake, Lean
+from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
 from groundstation.estimation.measurement import Measurement
@@ -193,11 +193,6 @@ class Intake:
 
     def _tilt(self, message: RelativeObservation, stamp_ns: int) -> tuple[float, float]:
         return self._attitudes.tilt(message.observer, stamp_ns, (message.roll_rad, message.pitch_rad))
-
-    def lean_of(self, message: RelativeObservation) -> Lean:
-        """Return how a sighting's observer leans as the filter takes it, not as the vehicle says."""
-        stamp_ns, reported = self._local_stamp(message), (message.roll_rad, message.pitch_rad)
-        return Lean(*reported) if stamp_ns is None else self._attitudes.lean(message.observer, stamp_ns, reported)
 
     def _local_stamp(self, message: Message) -> int | None:
         if message.header.clock == self._clock:

@@ -110,6 +110,8 @@ def process_table(
     if simulation is not None:
         table.append(_sim_bridge(field, simulation))
     table.append(replace(rows.TRACKER, section=core))
+    if field.cameras:  # only where a fixed camera sees the team can sightings contradict the field
+        table.append(replace(rows.DIAGNOSIS, section=core))
     if field.recording.enabled:
         table.append(replace(rows.RECORDER, section=core))
     table += device_rows(field)

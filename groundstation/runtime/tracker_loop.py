@@ -10,14 +10,13 @@ import msgspec
 from groundstation import plug_ins
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Message, RelativeObservation, Severity
+from groundstation.bus.messages import Message, Severity, Suspicion
 from groundstation.bus.notice import Notice
 from groundstation.bus.topics import SEARCH_MAP
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.announcer import TEAM, Announcer
 from groundstation.runtime.consistency_watch import ConsistencyWatch
-from groundstation.runtime.figure_watch import FigureWatch
 from groundstation.runtime.health import UnseenWatch
 from groundstation.runtime.inbox import Inbox
 from groundstation.runtime.journal import FAULT, Adoption, entry_of
@@ -27,10 +26,9 @@ from groundstation.runtime.rejoin_watch import RejoinWatch
 from groundstation.tracker import Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
-_LOOPS_HZ = 5
 # What is not due at each tick: in which of its ticks it is. All in one made that tick late, once a second; beliefs stay
 # where recordings made earlier have them.
-_PLAN_PHASE, _BELIEF_PHASE, _MAP_PHASE, _LOOPS_PHASE, _FIGURES_PHASE, _WATCH_PHASE = 0, 0, 2, 3, 14, 24
+_PLAN_PHASE, _BELIEF_PHASE, _MAP_PHASE, _WATCH_PHASE = 0, 0, 2, 24
 _PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
 EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
 
@@ -108,12 +106,11 @@ class Tracking:
         self._contradictions = ConsistencyWatch(self.tracker.parameters.estimator.entities)
         self._rejoining = RejoinWatch(self.tracker.robots)
         self._picture_age = PictureAge(field, feed.clock)
-        self._figures = FigureWatch(field, feed.clock)
+        self._suspected = ""
         self._unseen = UnseenWatch(field.safety.unseen_land_after_s)
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
         self._map_every = max(1, round(self.rate_hz / SEARCH_MAP.rate_hz))
-        self._loops_every = max(1, round(self.rate_hz / _LOOPS_HZ))
         self._worker = feed.worker_of(self.tracker.planner)
         self._tick = feed.first_tick
         self._known_refusals: Counter[str] = Counter()
@@ -123,11 +120,12 @@ class Tracking:
         tracker, announcer = self.tracker, self._announcer
         ingested = self.inbox.pop_ready()
         for key, message in ingested:
+            if isinstance(message, Suspicion):
+                self._suspected = message.cause
+                continue
             verdict = tracker.ingest(key, message, now_ns)
             if verdict is None:
                 self._picture_age.take(message)
-                if isinstance(message, RelativeObservation):
-                    self._figures.take(message, tracker.lean_of(message))
             else:
                 self._contradictions.refused(message, verdict, now_ns)
         tracker.advance(now_ns)
@@ -168,12 +166,8 @@ class Tracking:
         for name in self._unseen.step(now_ns, tracker.unlocalised_s()):
             text = "flies, and nobody knows well enough where it is: its driver lands it"
             self.notices.append(Notice(Severity.WARNING, text, "check its camera links and its marker", name))
-        if self._is_due(self._loops_every, _LOOPS_PHASE):
-            self._figures.close_loops(now_ns)
-        if self._is_due(self.rate_hz, _FIGURES_PHASE):
-            self.notices += self._figures.notices(now_ns)
         if self._is_due(self.rate_hz, _WATCH_PHASE):
-            self.notices += self._contradictions.notices(now_ns, self._figures.cause) + self._picture_age.notices()
+            self.notices += self._contradictions.notices(now_ns, self._suspected) + self._picture_age.notices()
             self._report_refusals()
 
     def _report_refusals(self) -> None:

@@ -26,7 +26,9 @@ Finding = tuple[KeyPath, str]
 
 # Names of processes and of scopes on the bus: an entity of the same name would be taken for them. So would one that
 # starts with sim_ (the simulator) or ends with _camera (the driver of the camera that a drone carries).
-RESERVED = frozenset({"team", "operator", "router", "tracker", "recorder", "console", "monitor", "supervisor"})
+RESERVED = frozenset(
+    {"team", "operator", "router", "tracker", "diagnosis", "recorder", "console", "monitor", "supervisor"}
+)
 _ROBOT_HEIGHT_M = 0.3
 
 

@@ -61,6 +61,16 @@ RECORDER = ProcessSpec(
     stop_order=StopOrder.RECORDS,
     stop_limit_s=8.0,  # it writes what it still holds, and the index
 )
+DIAGNOSIS = ProcessSpec(
+    name="diagnosis",
+    role="diagnosis",
+    entry="groundstation.diagnosis.process:run",
+    required=False,  # nobody flies by it
+    nice=_LAST,
+    silence_limit_s=5.0,
+    hang_limit_s=10.0,  # a verdict on many robots holds the interpreter
+    stop_order=StopOrder.DECIDES,
+)
 DRONE = ProcessSpec(  # name and entry are those of the drone
     name="",
     role="driver",
@@ -114,4 +124,4 @@ MONITOR = ProcessSpec(
     stop_order=StopOrder.DECIDES,  # the terminal is the operator's again before the shut-down writes on it
     on_terminal=True,
 )
-ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, RECORDER, DRONE, CAMERA, TARGET, LIAISON, CONSOLE, MONITOR)
+ROWS = (GUARDIAN, ROUTER, SIM_BRIDGE, TRACKER, DIAGNOSIS, RECORDER, DRONE, CAMERA, TARGET, LIAISON, CONSOLE, MONITOR)

@@ -12,6 +12,7 @@ from groundstation.bus.messages.belief import (
     JournalEntry,
     SearchMap,
     SensorLateness,
+    Suspicion,
     TargetSearch,
     Verdict,
 )
@@ -92,6 +93,7 @@ __all__ = [
     "SimStatus",
     "SolverReport",
     "Supervision",
+    "Suspicion",
     "TargetSearch",
     "TruthState",
     "Vector3",

@@ -104,6 +104,13 @@ class Belief(Message, frozen=True, kw_only=True):
     """Delay errors of the cameras whose delay the flight reveals."""
 
 
+class Suspicion(Message, frozen=True, kw_only=True):
+    """Which figure of the field is suspected in flight; nothing acts on it."""
+
+    cause: str
+    """What explains best why the team's sightings do not meet, in a few words; empty: no figure is suspected."""
+
+
 class Verdict(StrEnum):
     """What became of a measurement."""
 

@@ -80,7 +80,7 @@ def test_truth_is_for_witnesses_only() -> None:
     key = keys.expression("lab", TRUTH, "drone_1", "sim_bridge")
     deaf = {role for role in Role if not covers(audible("lab", role), key)}
     devices = {Role.DRIVER, Role.CAMERA, Role.TARGET}
-    assert deaf == devices | {Role.SUPERVISOR, Role.TRACKER, Role.CLI, Role.LIAISON, Role.HOST}
+    assert deaf == devices | {Role.SUPERVISOR, Role.TRACKER, Role.DIAGNOSIS, Role.CLI, Role.LIAISON, Role.HOST}
 
 
 def test_each_topic_that_is_spoken_of_has_a_sender() -> None:

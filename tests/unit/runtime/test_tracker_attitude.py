@@ -1,7 +1,6 @@
 """The tracker levels what a drone sees by its IMU: wind leans it, and its own attitude says nothing of that."""
 
 import math
-from collections import defaultdict
 
 import numpy as np
 import pytest
@@ -16,11 +15,8 @@ from groundstation.bus.messages import (
     VehicleStatus,
     Verdict,
 )
-from groundstation.bus.notice import Notice
-from groundstation.estimation.attitude_intake import Lean
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
-from groundstation.runtime.figure_watch import FigureWatch
 from groundstation.tracker import tracker_from_field
 
 MS, START, GRAVITY = 1_000_000, 7_000_000_000_000, 9.80665
@@ -35,8 +31,6 @@ class Hover:
         self.tracker = tracker_from_field(field, "here", 1)
         self.now, self.seq = START, 0
         self.verdicts: list[Verdict | None] = []
-        self.watches: dict[str, FigureWatch] = {}
-        self.told: defaultdict[str, list[Notice]] = defaultdict(list)
         self.magnetic_rad, self.shaking = 0.0, 1e-6
         self.lean(roll_rad=LEAN_RAD)
 
@@ -75,8 +69,6 @@ class Hover:
                 self.send(ImuSample(header=header, angular_velocity_rad_s=rates, specific_force_m_s2=(x, y, z)))
             if step % 4 == 0 and state is FlightState.FLYING:
                 self.look()
-            for which, watch in self.watches.items():
-                self.told[which] += watch.notices(self.now) if step % 100 == 0 else []
             self.tracker.advance(self.now)
 
     def look(self) -> None:
@@ -97,8 +89,6 @@ class Hover:
             covariance=COVARIANCE,
         )
         self.send(sighting)
-        for which, watch in self.watches.items():
-            watch.take(sighting, Lean(0.0, 0.0) if which == "raw" else self.tracker.lean_of(sighting))
 
     @property
     def target_error_m(self) -> float:
@@ -119,14 +109,6 @@ def test_what_a_leaning_drone_sees_is_levelled_by_its_imu(hover: Hover) -> None:
 def test_without_an_imu_its_word_counts(hover: Hover) -> None:
     hover.run(2.0, inertial=False)
     assert hover.target_error_m > 0.06
-
-
-def test_no_figure_is_blamed_for_a_lean_that_only_the_imu_shows(hover: Hover, lab_field: ResolvedField) -> None:
-    hover.lean(pitch_rad=LEAN_RAD)
-    hover.watches = {which: FigureWatch(lab_field, "here") for which in ("raw", "levelled")}
-    hover.run(15.0)
-    assert "drone_1's camera" in hover.told["raw"][0].text
-    assert not hover.told["levelled"]
 
 
 def test_an_imu_that_hangs_is_refused_and_the_drones_own_attitude_counts_again(hover: Hover) -> None:

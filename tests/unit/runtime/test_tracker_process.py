@@ -251,8 +251,6 @@ def test_no_tick_does_more_than_two_things_that_are_not_due_at_each(lab_field: R
         "plan": (tracking._plan_every, tracker_loop._PLAN_PHASE),
         "belief": (tracking._belief_every, tracker_loop._BELIEF_PHASE),
         "map": (tracking._map_every, tracker_loop._MAP_PHASE),
-        "loops": (tracking._loops_every, tracker_loop._LOOPS_PHASE),
-        "figures": (tracking.rate_hz, tracker_loop._FIGURES_PHASE),
         "watch": (tracking.rate_hz, tracker_loop._WATCH_PHASE),
     }
     done: Counter[str] = Counter()
@@ -262,4 +260,4 @@ def test_no_tick_does_more_than_two_things_that_are_not_due_at_each(lab_field: R
         assert len(due) <= 2, (tick, due)
         done.update(due)
     tracking.close()
-    assert done == {"plan": 10, "belief": 5, "map": 2, "loops": 5, "figures": 1, "watch": 1}
+    assert done == {"plan": 10, "belief": 5, "map": 2, "watch": 1}

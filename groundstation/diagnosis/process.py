@@ -1,0 +1,39 @@
+"""The diagnosis process: says in flight which figure of the field is wrong. Nobody flies by it.
+
+Started as `groundstation.diagnosis.process:run`. Numba, which the models of sensors need, is imported only after the
+cache of its kernels is chosen.
+"""
+
+import msgspec
+
+from groundstation.bus import clock
+from groundstation.field.resolved import ResolvedField
+from groundstation.process import numba_cache
+from groundstation.process.child import Child
+from groundstation.time_units import NS_PER_MS
+
+_PERIOD_NS = 100 * NS_PER_MS
+
+
+class DiagnosisSection(msgspec.Struct, frozen=True):
+    """What the supervisor hands to the diagnosis: the resolved field."""
+
+    field: ResolvedField
+
+
+def run(child: Child) -> int:
+    """Watch until asked to stop or until the supervisor is gone."""
+    numba_cache.activate()
+    from groundstation.diagnosis.loop import Diagnosis
+
+    diagnosis = Diagnosis(child, msgspec.json.decode(child.section, type=DiagnosisSection).field)
+    child.ready()
+    ticks = 0
+    while not child.stop_requested and child.supervisor_alive:
+        now_ns = clock.now_ns()
+        diagnosis.turn(now_ns)
+        ticks += 1
+        child.beat()
+        child.tick_status(ticks=ticks, overflowed=diagnosis.overflowed)
+        child.sleep_until(now_ns + _PERIOD_NS)
+    return 0

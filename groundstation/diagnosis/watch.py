@@ -1,0 +1,46 @@
+"""From one verdict after another to what the operator is told: new suspicions, and those that are refuted. Pure."""
+
+import math
+
+from groundstation.bus.messages import Severity
+from groundstation.bus.notice import Notice
+from groundstation.diagnosis.suspects import Charge, Suspect, Verdict
+from groundstation.diagnosis.wording import remedies, sentence
+from groundstation.field.resolved import ResolvedField
+
+_REFUTED = math.log(3.0)
+
+
+class FigureWatch:
+    """Fed with verdicts; no action follows. `cause`: what stands, in a few words, or ""."""
+
+    def __init__(self, field: ResolvedField) -> None:
+        self._field = field
+        self._standing: dict[tuple[Suspect, ...], str] = {}
+
+    @property
+    def cause(self) -> str:
+        """What explains best why sightings do not meet."""
+        return "; ".join(self._standing.values())
+
+    def take(self, verdict: Verdict) -> list[Notice]:
+        """Return what is new of a verdict."""
+        named = {_suspects(charges): charges for charges in verdict.causes}
+        refuted = [one for one in self._standing if all(verdict.leads.get(s, 0.0) < _REFUTED for s in one)]
+        notices = [self._accusation(charges) for key, charges in named.items() if key not in self._standing]
+        for key in refuted:
+            text = f"{self._standing.pop(key)}: what was told is refuted"
+            notices.append(Notice(Severity.INFO, text, entity=key[0][0]))
+        if named:  # what explained it before is explained otherwise
+            self._standing = {key: sentence(charges, self._field) for key, charges in named.items()}
+        return notices
+
+    def _accusation(self, charges: tuple[Charge, ...]) -> Notice:
+        text = f"{sentence(charges, self._field)}: that explains best why the team's sightings do not meet"
+        if len(charges) > 1:
+            text += "; which of them cannot be told yet, the first is likeliest"
+        return Notice(Severity.WARNING, text, remedies(charges, self._field), charges[0].suspect[0])
+
+
+def _suspects(charges: tuple[Charge, ...]) -> tuple[Suspect, ...]:
+    return tuple(sorted(charge.suspect for charge in charges))

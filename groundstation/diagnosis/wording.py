@@ -1,0 +1,89 @@
+"""A suspected figure in words: what is wrong, by how much, how sure, and what to do about it. Pure."""
+
+from collections.abc import Sequence
+
+from groundstation.calibration.team_settings import paths_of, unit_of
+from groundstation.diagnosis.suspects import Charge
+from groundstation.field.resolved import ResolvedField
+
+_MOST_TOLD = 3
+_UNITS = {"tilted": "roll", "aside": "x"}
+# Of a camera's mounting: what is more, and what is less.
+_MOUNTED = {
+    "pan": ("looks {size} farther to the left", "looks {size} farther to the right"),
+    "tilt": ("looks {size} lower", "looks {size} higher"),
+    "ahead": ("sits {size} farther ahead", "sits {size} farther behind"),
+    "left": ("sits {size} farther to the left", "sits {size} farther to the right"),
+    "up": ("sits {size} higher", "sits {size} lower"),
+    "z": ("hangs {size} higher", "hangs {size} lower"),
+    "aside": ("hangs {size} aside", "hangs {size} aside"),
+    "yaw": ("is turned by {size}", "is turned by {size}"),
+    "tilted": ("is tilted by {size}", "is tilted by {size}"),
+}
+_REPORTED = {"velocity_delay": "velocities", "height_delay": "heights"}
+_LENS = "calibrate the lens of {who} (groundstation calibrate camera)"
+_SURVEY = "fix the camera {who} where the field has it, or survey it anew (groundstation calibrate extrinsics)"
+
+
+def sentence(charges: Sequence[Charge], field: ResolvedField) -> str:
+    """Return who is named, in a few words."""
+    return " or ".join(_what(one, field) for one in charges[:_MOST_TOLD])
+
+
+def remedies(charges: Sequence[Charge], field: ResolvedField) -> str:
+    """Return what a person can do, for each that is named."""
+    return "; or ".join(dict.fromkeys(_remedy(one, field) for one in charges[:_MOST_TOLD]))
+
+
+def _what(charge: Charge, field: ResolvedField) -> str:
+    (who, what), more = charge.suspect, charge.size > 0.0
+    factor, unit = unit_of(_UNITS.get(what, what))
+    digits = 1 if unit in ("deg", "%") else 0
+    size = f"{abs(factor * charge.size):.{digits}f} +- {factor * charge.std:.{digits}f} {unit}"
+    camera = "every drone's camera" if not who else f"the camera {who}" if who in field.cameras else f"{who}'s camera"
+    if what in _MOUNTED:
+        return f"{camera} {_MOUNTED[what][not more].format(size=size)} {_against(what)}"
+    if what == "print":
+        marker = f"{who}'s marker is" if who else "all markers are"
+        return f"{marker} {size} {'larger' if more else 'smaller'} than the field says"
+    if what == "focal":
+        return f"{camera} has a focal length {size} {'longer' if more else 'shorter'} than calibrated"
+    if what == "scale":
+        return f"{who}'s true velocities are {size} {'larger' if more else 'smaller'} than the field says"
+    reported = _REPORTED.get(what)
+    pictures = f"{who}'s pictures" if who in field.cameras else f"the pictures of {camera}"
+    late = f"{who}'s {reported}" if reported else pictures
+    return f"{late} are {size} {'older' if more else 'newer'} than configured"
+
+
+def _against(what: str) -> str:
+    return "against the field" if what in ("yaw", "tilted", "aside") else "than the field says"
+
+
+def _remedy(charge: Charge, field: ResolvedField) -> str:
+    who, what = charge.suspect
+    if what == "print":
+        return "measure it with a ruler; print it without scaling, or set its size in the field"
+    if what == "focal":
+        return _LENS.format(who=who or "each drone")
+    if what.endswith("delay"):
+        return "groundstation calibrate delay"
+    if who in field.cameras:
+        return _SURVEY.format(who=who)
+    if what == "scale":
+        return "groundstation calibrate team"
+    names = (who,) if who else tuple(field.drones)
+    return f"fix the mounting, or set {', '.join(_setting(name, what, charge.size, field) for name in names)}"
+
+
+def _setting(name: str, part: str, error: float, field: ResolvedField) -> str:
+    """Return the setting that a camera's mounting would have, if it stays as it is."""
+    path = ".".join(paths_of(field, (name, part))[0])
+    camera, factor = field.drones[name].camera, unit_of(part)[0]
+    now = {"pan": camera.pan_left_deg, "tilt": camera.tilt_down_deg}.get(part)
+    if now is not None:
+        return f"{path}: {now + factor * error:.1f}"
+    place = list(camera.position_m)
+    axis = ("ahead", "left", "up").index(part)
+    place[axis] = round(place[axis] + error, 3)
+    return f"{path}: {place}"

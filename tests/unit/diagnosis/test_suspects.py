@@ -1,0 +1,68 @@
+"""A stretch of flight names the figure that is wrong, with its size, and nothing where all are right."""
+
+import math
+
+import numpy as np
+import pytest
+from swinging_lab import CLOCK, Lab
+
+from groundstation.calibration.flown import Flown
+from groundstation.calibration.team_figures import Suspicion
+from groundstation.diagnosis.suspects import verdict_on, weighed
+from groundstation.field.resolved import ResolvedField
+from sim_bridge.study.wrong_figures import WrongFigures
+
+SURVEYED = np.array([0.003, 0.003, 0.006])
+
+
+def suspicions() -> tuple[Suspicion, ...]:
+    columns = np.eye(3)
+    single = [Suspicion(name, "print", columns[:, [i]], np.array([0.08])) for i, name in enumerate("ab")]
+    both = Suspicion("", "print", columns[:, [0]] + columns[:, [1]], np.array([0.08]))
+    return (*single, both, Suspicion("c", "delay", columns[:, [2]], np.array([0.08])))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("errors", "suspect", "size"),
+    [
+        ({}, None, 0.0),
+        ({("ceiling", "delay"): 50.0}, ("ceiling", "delay"), 0.05),
+        ({("drone_1", "delay"): -50.0}, ("drone_1", "delay"), -0.05),
+        ({("drone_1", "pan"): 3.0, ("drone_2", "pan"): 3.0}, ("", "pan"), math.radians(3.0)),
+        ({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0)),
+        ({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05),
+        ({("drone_1", "focal"): 0.04}, ("drone_1", "focal"), 0.04),
+    ],
+)
+def test_a_wrong_figure_is_likeliest_with_its_size(
+    lab_field: ResolvedField, errors: dict[tuple[str, str], float], suspect: tuple[str, str] | None, size: float
+) -> None:
+    verdict = verdict_on(Lab(lab_field, WrongFigures(errors)).flown(), lab_field)
+    assert verdict is not None
+    assert [charges[0].suspect for charges in verdict.causes] == ([] if suspect is None else [suspect])
+    for charges in verdict.causes:
+        assert charges[0].size == pytest.approx(size, rel=0.25)
+        assert charges[0].std < 0.25 * abs(size)
+
+
+def test_two_causes_are_told_apart_and_what_is_too_small_is_not_told() -> None:
+    H = np.diag([1e6, 1e6, 1e6])
+    two = weighed(H, H @ np.array([0.05, 0.0, 0.06]), SURVEYED, suspicions())
+    assert {charges[0].suspect for charges in two.causes} == {("a", "print"), ("c", "delay")}
+    small = weighed(H, H @ np.array([0.015, 0.0, 0.02]), SURVEYED, suspicions())
+    assert small.causes == ()
+    assert small.leads[("a", "print")] > math.log(100.0), "sure, and yet not worth telling"
+
+
+def test_what_explains_it_as_well_is_named_beside_it() -> None:
+    direction = np.array([1.0, 1.0, 0.0])
+    H = 1e6 * np.outer(direction, direction)
+    (charges,) = weighed(H, H @ np.array([0.05, 0.0, 0.0]), SURVEYED, suspicions()).causes
+    assert {one.suspect for one in charges} == {("a", "print"), ("b", "print"), ("", "print")}
+
+
+def test_a_flight_that_no_fixed_camera_saw_has_no_verdict(lab_field: ResolvedField) -> None:
+    flown = Lab(lab_field, WrongFigures({})).flown()
+    blind = tuple((now, tuple(p for p in inputs if p[0] != "observation")) for now, inputs in flown.ticks)
+    assert verdict_on(Flown(blind, CLOCK, {}), lab_field) is None

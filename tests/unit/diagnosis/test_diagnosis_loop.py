@@ -58,7 +58,6 @@ def test_what_another_clock_stamped_tells_nothing() -> None:
     assert window.flown() is None
 
 
-@pytest.mark.slow
 def test_a_wrong_figure_is_told_to_operator_and_tracker(
     lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
 ) -> None:

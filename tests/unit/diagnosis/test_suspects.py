@@ -22,7 +22,6 @@ def suspicions() -> tuple[Suspicion, ...]:
     return (*single, both, Suspicion("c", "delay", columns[:, [2]], np.array([0.08])))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("errors", "suspect", "size"),
     [

@@ -1,0 +1,170 @@
+"""What a message must be before anybody computes with it: checks of shape and size, duplicates, sensors that hang."""
+
+import math
+from collections.abc import Container
+from operator import itemgetter
+
+from groundstation.bus.messages import (
+    FlightState,
+    ImuSample,
+    Message,
+    Odometry,
+    PoseHypothesis,
+    RangeObservation,
+    RelativeObservation,
+    ReportedMotion,
+    VehicleStatus,
+    Verdict,
+)
+from groundstation.estimation.fixed_lag import FUTURE_NS
+from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
+
+# No vehicle here moves so fast or so far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
+_ABSURD = 1e3
+# Message identities per key against which duplicates are looked for: all that are not late yet, but no more than these.
+_REMEMBERED, _REMEMBERED_AT_MOST = 512, 8192
+# A sensor that still measures does not repeat itself so often for so long [s].
+_FROZEN_ODOMETRY, _FROZEN_SIGHT = (10, 0.5), (4, 0.3)
+_SYMMETRY = 1e-6  # of covariances, beside the deviations of their rows
+# What takes the triangles out of row-major values, by rows: most covariances are symmetric to the bit.
+_TRIANGLES = {
+    3: (itemgetter(1, 2, 5), itemgetter(3, 6, 7)),
+    4: (itemgetter(1, 2, 3, 6, 7, 11), itemgetter(4, 8, 12, 9, 13, 14)),
+}
+_STALE = {Novelty.NEW: None, Novelty.REPEATED: Verdict.DUPLICATE, Novelty.FROZEN: Verdict.FROZEN}
+
+
+class MessageScreen:
+    """Judges messages one by one, each with what came before it.
+
+    tells_steps: vehicles whose values repeat because they are rounded; lag_ns: messages older than this come too late.
+    """
+
+    def __init__(self, tells_steps: Container[str], lag_ns: int) -> None:
+        self._tells_steps, self._lag_ns = tells_steps, lag_ns
+        self._seen: dict[str, dict[tuple[int, int], int]] = {}
+        self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
+        self._standing: dict[str, tuple[int, bool]] = {}
+
+    def stands(self, entity: str) -> bool:
+        """Return whether a vehicle said last that it is on the ground."""
+        return self._standing.get(entity, (0, False))[1]
+
+    def refusal(self, key: str, message: Message, stamp_ns: int, now_ns: int) -> Verdict | None:
+        """Return why a message that came under a key must not be used, or None; stamp_ns: of our clock, as now_ns."""
+        if not isinstance(message, ImuSample) and self._is_duplicate(key, message, stamp_ns, now_ns):
+            return Verdict.DUPLICATE
+        match message:
+            case ImuSample():
+                return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + FUTURE_NS else None
+            case Odometry():
+                return self._odometry(message, stamp_ns, now_ns)
+            case RelativeObservation():
+                return self._observation(message, stamp_ns)
+            case RangeObservation():
+                return self._range(message, stamp_ns)
+            case ReportedMotion():
+                return _fault_of_report(message)
+            case VehicleStatus():
+                return self._status(message, stamp_ns, now_ns)
+        return None
+
+    def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict | None:
+        if stamp_ns > now_ns + FUTURE_NS:
+            return Verdict.IMPLAUSIBLE
+        entity = message.header.entity
+        if stamp_ns >= self._standing.get(entity, (0, False))[0]:
+            self._standing[entity] = stamp_ns, message.flight_state is FlightState.LANDED
+        return None
+
+    def _odometry(self, message: Odometry, stamp_ns: int, now_ns: int) -> Verdict | None:
+        attitude = (message.yaw_rad, message.roll_rad, message.pitch_rad)
+        if len(message.velocity_m_s) != 3 or not _plausible(*message.velocity_m_s, *attitude, message.height_m or 0.0):
+            return Verdict.IMPLAUSIBLE
+        if stamp_ns > now_ns + FUTURE_NS:
+            return Verdict.IMPLAUSIBLE
+        values = (message.velocity_m_s, *attitude, message.height_m)
+        entity = message.header.entity
+        frozen = self._odometry_watch.is_frozen(entity, values, stamp_ns) and entity not in self._tells_steps
+        # A vehicle that tells whole numbers repeats them as long as it stands.
+        return Verdict.FROZEN if frozen and not self.stands(entity) else None
+
+    def _observation(self, message: RelativeObservation, stamp_ns: int) -> Verdict | None:
+        if message.header.entity != message.observer:
+            return Verdict.UNKNOWN_ENTITY
+        for pose in (message, message.alternative):
+            fault = _fault_of(pose) if pose is not None else None
+            if fault is not None:
+                return fault
+        if not _plausible(message.roll_rad, message.pitch_rad):
+            return Verdict.IMPLAUSIBLE
+        values = (message.position_m, message.yaw_rad)
+        return self._stale((message.observer, message.camera, message.subject), values, stamp_ns)
+
+    def _range(self, message: RangeObservation, stamp_ns: int) -> Verdict | None:
+        values = (*message.ranges_m.values(), *(message.position_m or ()), message.std_m)
+        if not _plausible(*values, *message.covariance) or not message.std_m > 0.0:
+            return Verdict.IMPLAUSIBLE
+        if message.position_m is not None and (
+            len(message.position_m) != 3 or not _is_covariance(message.covariance, 3)
+        ):
+            return Verdict.SINGULAR
+        told = tuple(sorted(message.ranges_m.items()))
+        return self._stale((message.observer, "", message.subject), told, stamp_ns) if len(told) > 1 else None
+
+    def _stale(self, source: tuple[str, ...], values: tuple[object, ...], stamp_ns: int) -> Verdict | None:
+        """Return why a reading says nothing new, or None: no second picture measures the same to the last bit."""
+        return _STALE[self._sight_watch.judge(source, values, stamp_ns)]
+
+    def _is_duplicate(self, key: str, message: Message, stamp_ns: int, now_ns: int) -> bool:
+        identity = (message.header.seq, message.header.stamp_ns)
+        seen = self._seen.setdefault(key, {})
+        if identity in seen:
+            return True
+        seen[identity] = stamp_ns
+        # Beyond the rewind a message is late by itself; what could still count is remembered at any rate.
+        while len(seen) > _REMEMBERED:
+            oldest = next(iter(seen))
+            if seen[oldest] >= now_ns - self._lag_ns and len(seen) <= _REMEMBERED_AT_MOST:
+                break
+            del seen[oldest]
+        return False
+
+
+def _fault_of_report(message: ReportedMotion) -> Verdict | None:
+    velocity = message.velocity_m_s
+    usable = len(velocity) == 2 and _plausible(*velocity, message.std_m_s) and message.std_m_s > 0.0
+    return None if usable else Verdict.IMPLAUSIBLE
+
+
+def _fault_of(pose: RelativeObservation | PoseHypothesis) -> Verdict | None:
+    """Return why a measured pose cannot be used whatever the belief, or None."""
+    if len(pose.position_m) != 3 or not _plausible(*pose.position_m, pose.yaw_rad or 0.0):
+        return Verdict.IMPLAUSIBLE
+    if not all(map(math.isfinite, pose.covariance)):
+        return Verdict.IMPLAUSIBLE
+    rows = 3 if pose.yaw_rad is None else 4
+    return None if _is_covariance(pose.covariance, rows) else Verdict.SINGULAR
+
+
+def _is_covariance(values: tuple[float, ...], rows: int) -> bool:
+    """Return whether row-major values are square, of positive variances and symmetric (the filter does the rest)."""
+    if len(values) != rows * rows:
+        return False
+    variances = values[:: rows + 1]
+    if min(variances) <= 0.0:
+        return False
+    upper, lower = _TRIANGLES[rows]
+    return upper(values) == lower(values) or all(
+        abs(values[i * rows + j] - values[j * rows + i])
+        <= _SYMMETRY * math.sqrt(variances[i]) * math.sqrt(variances[j])
+        for i in range(rows)
+        for j in range(i)
+    )
+
+
+def _plausible(*values: float) -> bool:
+    for value in values:  # noqa: SIM110 - a third of the time of a generator, ten thousand times a second
+        if not -_ABSURD < value < _ABSURD:  # nan compares false
+            return False
+    return True

@@ -1,8 +1,9 @@
 """What a tracker took in: the input of every calibration."""
 
+from collections import Counter
 from dataclasses import dataclass
 
-from groundstation.bus.messages import Message
+from groundstation.bus.messages import Message, RelativeObservation
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,9 +12,14 @@ class Flown:
 
     ticks: tuple[tuple[int, tuple[tuple[str, Message], ...]], ...]
     clock: str
-    cameras: dict[str, int]
 
     @property
     def duration_s(self) -> float:
         """Return how long it is."""
         return (self.ticks[-1][0] - self.ticks[0][0]) / 1e9
+
+    @property
+    def cameras(self) -> Counter[str]:
+        """Return how many observations each camera made."""
+        messages = (message for _, inputs in self.ticks for _, message in inputs)
+        return Counter(message.camera for message in messages if isinstance(message, RelativeObservation))

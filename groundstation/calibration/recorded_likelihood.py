@@ -34,16 +34,12 @@ def flown_of(source: Source) -> Flown:
             lives.append([])
         lives[-1].append((tick.entry.now_ns, tuple(tick.inputs)))
     longest = max(lives, key=len, default=[])
-    cameras: dict[str, int] = {}
-    for _, inputs in longest:
-        for _, message in inputs:
-            if isinstance(message, RelativeObservation):
-                cameras[message.camera] = cameras.get(message.camera, 0) + 1
-    if not cameras:
+    flown = Flown(tuple(longest), clock)
+    if not flown.cameras:
         raise OperatorMistake(
             f"{source.name}: no journal, or no observation of any camera is in it: nothing to measure"
         )
-    return Flown(tuple(longest), clock, cameras)
+    return flown
 
 
 def costs(flown: Flown, resolved: ResolvedField, later_ms: Mapping[str, float]) -> Costs:

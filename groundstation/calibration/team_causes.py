@@ -5,8 +5,9 @@ the linear Gaussian model most, until none raises it enough.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_figures import Suspicion
 
 # By how much (log) a cause must raise the evidence; causes this much worse than the best are ruled out.
-SURE, _RULED_OUT = math.log(1e4), math.log(20.0)
+_SURE, _RULED_OUT = math.log(1e4), math.log(20.0)
 _MOST = 8
 
 
@@ -27,26 +28,49 @@ class Cause:
     rivals: tuple[Suspicion, ...]
 
 
-def causes(
-    H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion], sure: float = SURE
-) -> tuple[tuple[Cause, ...], Array]:
-    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it.
+@dataclass(frozen=True, slots=True)
+class Round:
+    """What lets each suspicion explain more: sigma (n, n): the prior so far; gains (log): of those that are left."""
 
-    H (n, n), g (n): information and pull. sure: by how much (log) each cause must raise the evidence.
+    sigma: Array
+    gains: tuple[tuple[Suspicion, float], ...]
+
+    @property
+    def best(self) -> tuple[Suspicion, float]:
+        """Return the suspicion that explains most, and its gain."""
+        return max(self.gains, key=lambda one: one[1])
+
+    @property
+    def near(self) -> tuple[tuple[Suspicion, float], ...]:
+        """Return the best and those that are not ruled out beside it."""
+        least = self.best[1] - _RULED_OUT
+        return tuple(one for one in self.gains if one[1] > least)
+
+
+def rounds(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]) -> Iterator[Round]:
+    """Yield one round after another; in each the best is let loose for those that follow.
+
+    H (n, n), g (n): information and pull on figures that were surveyed to one sigma (n).
     """
-    sigma, left, found = np.diag(surveyed**2), list(suspicions), list[Cause]()
-    here = evidence(H, g, sigma)
-    while left and len(found) < _MOST:
-        tried = [evidence(H, g, sigma + spread(s)) - here for s in left]
-        best = int(np.argmax(tried))
-        if tried[best] < sure:
-            break
-        rivals = [
-            s for s, gain in zip(left, tried, strict=True) if gain > tried[best] - _RULED_OUT and s is not left[best]
-        ]
-        found.append(Cause(left[best], tried[best], tuple(rivals)))
-        sigma = sigma + spread(left.pop(best))
+    sigma, left = np.diag(surveyed**2), list(suspicions)
+    while left:
         here = evidence(H, g, sigma)
+        one = Round(sigma, tuple((s, evidence(H, g, sigma + spread(s)) - here) for s in left))
+        yield one
+        best, _ = one.best
+        left = [s for s in left if s is not best]
+        sigma = sigma + spread(best)
+
+
+def causes(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]) -> tuple[tuple[Cause, ...], Array]:
+    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it."""
+    sigma, found = np.diag(surveyed**2), list[Cause]()
+    for one in islice(rounds(H, g, surveyed, suspicions), _MOST):
+        best, gain = one.best
+        if gain < _SURE:
+            break
+        found.append(Cause(best, gain, tuple(s for s, _ in one.near if s is not best)))
+        sigma = one.sigma + spread(best)
     return tuple(found), sigma
 
 

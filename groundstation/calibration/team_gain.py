@@ -60,7 +60,7 @@ def redetected(flown: Flown, old: ResolvedField, new: ResolvedField) -> Flown:
         return _again(message, old, new) if isinstance(message, RelativeObservation) else message
 
     ticks = tuple((now, tuple((key, again(message)) for key, message in inputs)) for now, inputs in flown.ticks)
-    return Flown(ticks, flown.clock, flown.cameras)
+    return Flown(ticks, flown.clock)
 
 
 def _again(o: RelativeObservation, old: ResolvedField, new: ResolvedField) -> RelativeObservation:

@@ -24,14 +24,19 @@ class DiagnosisSection(msgspec.Struct, frozen=True):
 def run(child: Child) -> int:
     """Watch until asked to stop or until the supervisor is gone."""
     numba_cache.activate()
+    from groundstation.diagnosis.judging import OnThread
     from groundstation.diagnosis.loop import Diagnosis
 
-    diagnosis = Diagnosis(child, msgspec.json.decode(child.section, type=DiagnosisSection).field)
+    section = msgspec.json.decode(child.section, type=DiagnosisSection)
+    diagnosis = Diagnosis(child.bus, section.field, OnThread())
     child.ready()
     ticks = 0
     while not child.stop_requested and child.supervisor_alive:
         now_ns = clock.now_ns()
         diagnosis.turn(now_ns)
+        for notice in diagnosis.notices:
+            child.event(notice.severity, notice.text, notice.remedy, notice.entity or None)
+        diagnosis.notices.clear()
         ticks += 1
         child.beat()
         child.tick_status(ticks=ticks, overflowed=diagnosis.overflowed)

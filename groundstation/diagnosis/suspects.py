@@ -7,13 +7,14 @@ operator reads them as suspicions and a flight is short.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
 from groundstation.arrays import Array, Vector
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.team_batch import TeamBatch
-from groundstation.calibration.team_causes import evidence, posterior, spread
+from groundstation.calibration.team_causes import posterior, rounds, spread
 from groundstation.calibration.team_figures import Suspicion
 from groundstation.calibration.team_record import team_record
 from groundstation.errors import OperatorMistake
@@ -22,8 +23,7 @@ from groundstation.field.resolved import ResolvedField
 Suspect = tuple[str, str]
 """One thing that may be wrong: whose ("": of all), and what."""
 
-# By how much (log) a suspect must raise the evidence to be named; rivals this much behind it are ruled out.
-_SURE, _RULED_OUT = math.log(100.0), math.log(20.0)
+_SURE = math.log(100.0)  # by how much a suspect must raise the evidence to be named
 # Less does not harm, and is not told: [m], [rad], [s], shares.
 _WORTH_TELLING = {
     "print": 0.02,
@@ -75,28 +75,25 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
 
 def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicion]) -> Verdict:
     """Return the verdict by information (n, n) and pull (n) on figures that were surveyed to one sigma (n)."""
-    sigma, left = np.diag(surveyed**2), list(suspicions)
-    first: dict[Suspect, float] = {}
+    leads: dict[Suspect, float] = {}
     causes: list[tuple[Charge, ...]] = []
-    while left and len(causes) < _MOST:
-        here = evidence(H, g, sigma)
-        charges = sorted((_charge(H, g, sigma, s, here) for s in left), key=lambda one: -one.lead)
-        first = first or {one.suspect: one.lead for one in charges}
-        best = charges[0]
-        if best.lead < _SURE or abs(best.size) < _WORTH_TELLING.get(best.suspect[1], _WORTH_TELLING_M):
+    for one in islice(rounds(H, g, surveyed, suspicions), _MOST):
+        leads = leads or {(s.who, s.what): lead for s, lead in one.gains}
+        nearest = sorted(one.near, key=lambda pair: -pair[1])
+        charges = tuple(_charge(H, g, one.sigma, s, lead) for s, lead in nearest)
+        if charges[0].lead < _SURE or abs(charges[0].size) < _worth_telling(charges[0].suspect):
             break
-        causes.append(tuple(one for one in charges if one.lead > best.lead - _RULED_OUT))
-        found = next(s for s in left if (s.who, s.what) == best.suspect)
-        left.remove(found)
-        sigma = sigma + spread(found)
-    return Verdict(tuple(causes), first)
+        causes.append(charges)
+    return Verdict(tuple(causes), leads)
 
 
-def _charge(H: Array, g: Vector, sigma: Array, s: Suspicion, here: float) -> Charge:
-    freed = sigma + spread(s)
-    error, covariance = posterior(H, g, freed)
+def _worth_telling(suspect: Suspect) -> float:
+    return _WORTH_TELLING.get(suspect[1], _WORTH_TELLING_M)
+
+
+def _charge(H: Array, g: Vector, sigma: Array, s: Suspicion, lead: float) -> Charge:
+    error, covariance = posterior(H, g, sigma + spread(s))
     moved = np.flatnonzero(np.any(s.directions != 0.0, axis=1))
     most = moved[int(np.argmax(np.abs(error[moved])))]
     size = float(np.hypot(*error[moved])) if s.directions.shape[1] == 2 else float(error[most])
-    std = math.sqrt(max(0.0, float(covariance[most, most])))
-    return Charge((s.who, s.what), size, std, evidence(H, g, freed) - here)
+    return Charge((s.who, s.what), size, math.sqrt(max(0.0, float(covariance[most, most]))), lead)

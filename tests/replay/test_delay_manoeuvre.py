@@ -85,7 +85,7 @@ def test_a_right_delay_raises_no_warning(lab_field: ResolvedField, manoeuvre: Ma
 def test_velocities_are_dated_by_a_flight_that_dashes_to_and_fro(
     lab_field: ResolvedField, manoeuvre: Manoeuvre
 ) -> None:
-    found = {one.sensor: one for one in delays(Flown(tuple(manoeuvre.ticks), CLOCK, {}), lab_field)}
+    found = {one.sensor: one for one in delays(Flown(tuple(manoeuvre.ticks), CLOCK), lab_field)}
     tick_ms = TICK_NS / 1e6
     for name, onboard in manoeuvre.world.onboard.items():
         truth_ms = tick_ms * math.ceil(1e3 * onboard.velocity_delay_s / tick_ms)

@@ -3,15 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from groundstation.bus import clock
-from groundstation.bus.messages import RelativeObservation, Suspicion
+from groundstation.bus.messages import RelativeObservation
 from groundstation.bus.notice import Notice
-from groundstation.bus.topics import OBSERVATION, SUSPICION
-from groundstation.calibration.flown import Flown
-from groundstation.diagnosis.loop import PAUSE_NS
-from groundstation.diagnosis.suspects import verdict_on
-from groundstation.diagnosis.watch import FigureWatch
-from groundstation.diagnosis.window import TOPICS, Window
+from groundstation.bus.topics import OBSERVATION
+from groundstation.diagnosis.judging import AtOnce
+from groundstation.diagnosis.loop import Diagnosis
 from groundstation.doctor.finding import Level
 from groundstation.preflight.judge import pad_findings
 from groundstation.preflight.pad_record import PadRecord
@@ -19,8 +15,6 @@ from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight
 from sim_bridge.study.wrong_figures import WrongFigures
-
-_CAPACITY = 8192
 
 
 class CulpritFlight(ScenarioFlight):
@@ -39,10 +33,7 @@ class CulpritFlight(ScenarioFlight):
         self.told: list[tuple[float, str, str, str, str]] = []
         self._pads = PadRecord(self._field.world_sensors)
         self._sightings = self._bus("preflight").subscribe([OBSERVATION])
-        self._diagnosis_bus = self._bus("diagnosis")
-        self._arrived = self._diagnosis_bus.subscribe(TOPICS, capacity=_CAPACITY)
-        self._window, self._figures = Window(clock.clock_id()), FigureWatch(self._field)
-        self._verdict_due_ns = 0
+        self._diagnosis = Diagnosis(self._bus("diagnosis"), self._field, AtOnce())
 
     def may_start(self) -> bool:
         """Judge the pads once the team has stood for a while; then it may."""
@@ -59,24 +50,12 @@ class CulpritFlight(ScenarioFlight):
         return False
 
     def step(self) -> None:
-        """Advance by a tick; the diagnosis takes in what arrived and gives verdicts, as its process does."""
+        """Advance by a tick, with the diagnosis."""
         super().step()
-        now_ns = self.now_ns
-        for received in self._arrived.drain():
-            if received.message is not None:
-                self._window.take(str(received.key), received.message, now_ns)
-        if now_ns >= self._verdict_due_ns and (flown := self._window.flown()) is not None:
-            self._verdict_due_ns = now_ns + PAUSE_NS
-            self._diagnose(flown)
-
-    def _diagnose(self, flown: Flown) -> None:
-        verdict = verdict_on(flown, self._field)
-        if verdict is None:
-            return
-        for notice in self._figures.take(verdict):
+        self._diagnosis.turn(self.now_ns)
+        for notice in self._diagnosis.notices:
             self.note(self.world.time_s, notice)
-        header = self._diagnosis_bus.header("diagnosis", self.now_ns)
-        self._diagnosis_bus.publish(SUSPICION, Suspicion(header=header, cause=self._figures.cause))
+        self._diagnosis.notices.clear()
 
     def note(self, now_s: float, notice: Notice) -> None:
         """Keep what is told, with its time."""

@@ -113,7 +113,7 @@ class Lab:
         for tick in range(round(SECONDS * 50)):
             t = 100.0 + tick / 50.0
             ticks.append((round(t * 1e9) + 1, tuple(self._later(self.messages(tick / 50.0, tick)))))
-        return Flown(tuple(ticks), CLOCK, {"ceiling": 1})
+        return Flown(tuple(ticks), CLOCK)
 
     def _later(self, messages: Iterator[tuple[str, Message]]) -> Iterator[tuple[str, Message]]:
         for key, message in messages:

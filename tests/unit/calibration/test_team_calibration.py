@@ -72,4 +72,4 @@ def test_a_recording_in_which_no_fixed_camera_saw_a_drone_is_refused(lab_field: 
     flown = Lab(lab_field, WrongFigures({})).flown()
     blind = tuple((now, tuple(p for p in inputs if p[0] != "observation")) for now, inputs in flown.ticks)
     with pytest.raises(OperatorMistake, match="no fixed camera saw any drone"):
-        calibrate_team(Flown(blind, CLOCK, {}), lab_field)
+        calibrate_team(Flown(blind, CLOCK), lab_field)

@@ -1,44 +1,42 @@
 """The loop of the diagnosis: what it takes in, when it judges, and what it says."""
 
+import threading
 import time
-from typing import cast
 
+import msgspec
 import pytest
 from swinging_lab import Lab
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import FlightState, Header, Message, Suspicion, VehicleStatus
+from groundstation.bus.messages import (
+    FlightState,
+    Header,
+    Message,
+    Odometry,
+    RelativeObservation,
+    Severity,
+    Suspicion,
+    VehicleStatus,
+)
 from groundstation.bus.topics import OBSERVATION, ODOMETRY, SUSPICION, VEHICLE_STATUS
-from groundstation.diagnosis.loop import PAUSE_NS, Diagnosis
+from groundstation.diagnosis.judging import AtOnce, OnThread
+from groundstation.diagnosis.loop import Diagnosis
+from groundstation.diagnosis.suspects import Verdict
 from groundstation.diagnosis.window import Window
 from groundstation.field.resolved import ResolvedField
-from groundstation.process.child import Child
 from sim_bridge.study.wrong_figures import WrongFigures
 
 TOPIC_OF = {"status": VEHICLE_STATUS, "odometry": ODOMETRY, "observation": OBSERVATION}
 S = 1_000_000_000
 
 
-class FakeChild:
-    """Notes what the diagnosis says."""
-
-    name = "diagnosis"
-
-    def __init__(self, bus: MemoryBus) -> None:
-        self.bus = bus
-        self.events: list[tuple[str, str]] = []
-
-    def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:
-        self.events.append((str(severity), text))
-
-
 def status(at_s: float, state: FlightState, clock_id: str = "c") -> Message:
     return VehicleStatus(header=Header(round(at_s * S), clock_id, "drone_1", "d", 1), flight_state=state, mode="TRACK")
 
 
-def test_only_a_flight_of_some_seconds_is_judged_and_its_last_forty() -> None:
-    window = Window("c")
+def test_only_a_flight_of_some_seconds_is_judged_and_its_last_forty(lab_field: ResolvedField) -> None:
+    window = Window(lab_field, "c")
     assert window.flown() is None
     for second in range(6):
         window.take("k", status(second, FlightState.FLYING), second * S)
@@ -51,11 +49,49 @@ def test_only_a_flight_of_some_seconds_is_judged_and_its_last_forty() -> None:
     assert window.flown() is None, "nobody flies"
 
 
-def test_what_another_clock_stamped_tells_nothing() -> None:
-    window = Window("c")
+def test_what_another_clock_stamped_tells_nothing(lab_field: ResolvedField) -> None:
+    window = Window(lab_field, "c")
     for second in range(20):
         window.take("k", status(second, FlightState.FLYING, "elsewhere"), second * S)
     assert window.flown() is None
+
+
+def hanging(message: Message, at_s: float) -> Message:
+    """Return a message as it comes again and again from a picture or an autopilot that hangs."""
+    header = msgspec.structs.replace(message.header, stamp_ns=round(at_s * S), seq=round(1e3 * at_s))
+    return msgspec.structs.replace(message, header=header)
+
+
+@pytest.mark.parametrize("kind", [Odometry, RelativeObservation])
+def test_what_hangs_is_absurd_or_comes_from_the_future_does_not_count(
+    lab_field: ResolvedField, kind: type[Message]
+) -> None:
+    rows = Lab(lab_field, WrongFigures({})).flown().ticks
+    sample = next(message for _, inputs in rows for _, message in inputs if isinstance(message, kind))
+    absurd = {"velocity_m_s": (1e200, 0.0, 0.0)} if kind is Odometry else {"position_m": (1e200, 0.0, 1.0)}
+    window = Window(lab_field, "c")
+    for step in range(200):
+        at_s = 100.0 + 0.05 * step
+        window.take("status", status(at_s, FlightState.FLYING), round(at_s * S))
+        window.take("k", hanging(sample, at_s), round(at_s * S))
+        window.take("absurd", msgspec.structs.replace(hanging(sample, at_s), **absurd), round(at_s * S))
+        if kind is Odometry:
+            window.take("late", hanging(sample, at_s + 3600.0), round(at_s * S))
+    flown = window.flown()
+    assert flown is not None
+    counted = [m for _, inputs in flown.ticks for _, m in inputs if isinstance(m, kind)]
+    assert len(counted) <= 10, "until it is sure that it hangs"
+
+
+def fed(diagnosis: Diagnosis, exchange: MemoryExchange, lab: Lab) -> int:
+    """Send a flight of the lab through the bus; returns when it ended [ns]."""
+    buses = {name: MemoryBus(exchange, "lab", name) for name in ("ceiling", *lab.field.drones)}
+    now_ns = 0
+    for now_ns, inputs in lab.flown().ticks:
+        for kind, message in inputs:
+            buses[message.header.source].publish(TOPIC_OF[kind], message)
+        diagnosis.turn(now_ns)
+    return now_ns
 
 
 def test_a_wrong_figure_is_told_to_operator_and_tracker(
@@ -63,22 +99,26 @@ def test_a_wrong_figure_is_told_to_operator_and_tracker(
 ) -> None:
     monkeypatch.setattr(clock, "clock_id", lambda: "c")
     exchange = MemoryExchange()
-    child = FakeChild(MemoryBus(exchange, "lab", "diagnosis"))
     heard = MemoryBus(exchange, "lab", "tracker").subscribe([SUSPICION])
-    buses = {name: MemoryBus(exchange, "lab", name) for name in ("ceiling", *lab_field.drones)}
-    diagnosis = Diagnosis(cast("Child", child), lab_field)
-    now_ns = 0
-    for now_ns, inputs in Lab(lab_field, WrongFigures({("drone_1", "delay"): 60.0})).flown().ticks:
-        for kind, message in inputs:
-            buses[message.header.source].publish(TOPIC_OF[kind], message)
-        diagnosis.turn(now_ns)
-    for _ in range(200):
-        time.sleep(0.1)
-        now_ns += PAUSE_NS
-        diagnosis.turn(now_ns)
-        if child.events:
-            break
-    (severity, text), *_ = child.events
-    assert severity == "WARNING" and "the pictures of drone_1's camera are" in text
+    diagnosis = Diagnosis(MemoryBus(exchange, "lab", "diagnosis"), lab_field, AtOnce())
+    fed(diagnosis, exchange, Lab(lab_field, WrongFigures({("drone_1", "delay"): 60.0})))
+    (notice,) = diagnosis.notices
+    assert notice.severity is Severity.WARNING and "the pictures of drone_1's camera are" in notice.text
     causes = [one.message.cause for one in heard.drain() if isinstance(one.message, Suspicion)]
-    assert "the pictures of drone_1's camera are" in causes[-1]
+    assert causes and "the pictures of drone_1's camera are" in causes[-1]
+    assert diagnosis.overflowed == 0
+
+
+def test_a_verdict_on_a_thread_keeps_the_loop_waiting_for_nothing() -> None:
+    judging, may_end, verdict = OnThread(), threading.Event(), Verdict((), {})
+
+    def judge() -> Verdict:
+        may_end.wait(10.0)
+        return verdict
+
+    judging.begin(judge)
+    assert judging.busy and judging.take() is None
+    may_end.set()
+    while judging.busy:
+        time.sleep(0.001)
+    assert judging.take() is verdict and judging.take() is None

@@ -64,4 +64,4 @@ def test_what_explains_it_as_well_is_named_beside_it() -> None:
 def test_a_flight_that_no_fixed_camera_saw_has_no_verdict(lab_field: ResolvedField) -> None:
     flown = Lab(lab_field, WrongFigures({})).flown()
     blind = tuple((now, tuple(p for p in inputs if p[0] != "observation")) for now, inputs in flown.ticks)
-    assert verdict_on(Flown(blind, CLOCK, {}), lab_field) is None
+    assert verdict_on(Flown(blind, CLOCK), lab_field) is None

@@ -17,7 +17,7 @@ class WrongLab:
     """One thing that is wrong.
 
     errors, exchanged, faults: what it is; cameras: how bad their pictures are besides. says: what must be told first,
-    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: nothing is wrong, and nothing may be told.
+    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: no figure is wrong, and none may be blamed.
     size: in the unit of that text; None: it has none. on_pads: it must be found before anybody takes off.
     """
 
@@ -39,6 +39,7 @@ class WrongLab:
 _FIGURE = r"(-?[\d.]+) \+- [\d.]+"
 _LATE_MS, _TURN_DEG, _ASIDE_M, _PRINT, _FOCAL = 50.0, 3.0, 0.2, 0.05, 0.03
 _BUMP_DEG, _BUMPED_AT_S = 5.0, 22.0
+_FAILS_AT_S = 22.0
 
 
 def labs_of(field: Mapping[str, Any]) -> tuple[WrongLab, ...]:
@@ -52,6 +53,7 @@ def labs_of(field: Mapping[str, Any]) -> tuple[WrongLab, ...]:
         *_sizes(target, one, field["drones"]),
         *_roots(ceiling),
         *_places(one, other),
+        *_failures(ceiling, one),
     )
 
 
@@ -110,6 +112,19 @@ def _places(one: str, other: str) -> Iterable[WrongLab]:
     turned = ((one, "pad_yaw", 20.0),)
     said = rf".*: {one}'s marker is turned by {_FIGURE} deg"
     yield WrongLab("turned on its pad", turned, says=said, size=20.0, on_pads=True)
+
+
+def _failures(ceiling: str, one: str) -> Iterable[WrongLab]:
+    """Yield labs in which every figure is right and a device fails."""
+
+    def fails(name: str, kind: str, entity: str, value: float | None = None) -> WrongLab:
+        fault = {"kind": kind, "entity": entity, "start_s": _FAILS_AT_S} | ({} if value is None else {"value": value})
+        return WrongLab(name, faults=(fault,))
+
+    yield fails("ceiling's picture hangs", "picture_frozen", ceiling)
+    yield fails("a drone's picture hangs", "picture_frozen", one)
+    yield fails("a drone's telemetry hangs", "telemetry_frozen", one)
+    yield fails("a drone's velocity is stuck", "velocity_stuck", one, 0.0)
 
 
 def size_told(lab: WrongLab, line: str) -> float | None:

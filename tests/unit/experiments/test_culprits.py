@@ -71,6 +71,15 @@ def test_a_healthy_lab_must_be_silent() -> None:
     )
 
 
+def test_a_device_that_fails_makes_no_figure_wrong() -> None:
+    lab = LABS["ceiling's picture hangs"]
+    (fault,) = lab.faults
+    assert (fault["kind"], fault["entity"]) == ("picture_frozen", "ceiling") and lab.since_s > 8.0
+    assert verdict_on(lab, flown((19.0, "a", "messages are refused: FROZEN")))["end"] == "silent"
+    blamed = "ceiling's pictures are 48 +- 3 ms older than configured" + EXPLAINS
+    assert verdict_on(lab, flown((19.0, "ceiling", blamed)))["end"] == "false alarm"
+
+
 def test_a_row_counts_what_was_wanted_and_names_the_rest() -> None:
     lab = WrongLab("x", says="a: (\\d+) off", size=10.0, on_pads=True)
     ends = ((1, 0.1, "refused"), (2, 0.4, "refused"), (3, 0.0, "right"), (4, None, "wrong"))

@@ -4,13 +4,12 @@ Pose and heading are what the wheels add up to, in a frame of their own.
 """
 
 import math
-import os
 import time
 from collections.abc import Iterable
 from dataclasses import replace
 
 from drivers.rmw_zenoh.wire import graph, vehicle
-from sim_bridge.devices.ros2_router import ANY_HASH, Ros2Router, topic_of
+from sim_bridge.devices.ros2_router import ANY_HASH, PublishingRouter, topic_of
 from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.wheel_odometry import PERIOD_S, WheelOdometry
 from sim_bridge.world.world import TICK_S
@@ -18,7 +17,7 @@ from sim_bridge.world.world import TICK_S
 _EVERY = round(PERIOD_S / TICK_S)
 
 
-class OdometryRouter:
+class OdometryRouter(PublishingRouter):
     """Router and publisher around one base; `sim_bridge.world.emulation.Emulator`.
 
     source: topic and domain; faults: those of this target's odometry.
@@ -27,22 +26,13 @@ class OdometryRouter:
     def __init__(
         self, name: str, place: tuple[str, int], source: str, wheels: WheelOdometry, faults: Iterable[Fault] = ()
     ) -> None:
-        self.silent = self.deaf = False
+        super().__init__(name, place)
         self._wheels, self._faults, self._ticks = wheels, tuple(faults), 0
         self._told: vehicle.OdometryMessage | None = None
         self._x = self._y = self._yaw = 0.0
-        self._router = Ros2Router(name, f"tcp/{place[0]}:{place[1]}")
         domain, topic = topic_of(source)
         key = graph.topic_key(domain, topic, vehicle.ODOMETRY, ANY_HASH)
-        self._publisher = self._router.publisher(key)
-        self._bell = os.eventfd(0, os.EFD_NONBLOCK)  # nothing is ever heard
-
-    def fileno(self) -> int:
-        """Return a descriptor that never becomes readable."""
-        return self._bell
-
-    def receive(self) -> None:
-        """Hear nothing: nobody tells it anything."""
+        self._publisher = self.publisher(key)
 
     def send(self) -> None:
         """Publish what is due at this tick."""
@@ -53,7 +43,7 @@ class OdometryRouter:
         if self._told is None or not standing(self._faults, FaultKind.ODOMETRY_FROZEN, now_s):
             self._told = self._measured(now_s)
         message = replace(self._told, stamp_ns=time.time_ns())
-        self._router.publish(self._publisher, vehicle.encode_odometry(message, "odom", "base_footprint"))
+        self.publish(self._publisher, vehicle.encode_odometry(message, "odom", "base_footprint"))
 
     def _measured(self, now_s: float) -> vehicle.OdometryMessage:
         """Return what it has to say, without a stamp."""
@@ -65,8 +55,3 @@ class OdometryRouter:
         self._y += speed * math.sin(self._yaw) * PERIOD_S
         turned = (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
         return vehicle.OdometryMessage(0, (self._x, self._y, 0.0), turned, (speed, 0.0, 0.0), (0.0, 0.0, turn_rate))
-
-    def close(self) -> None:
-        """End node and router."""
-        self._router.close()
-        os.close(self._bell)

@@ -1,38 +1,28 @@
 """An emulated node that publishes what a motion capture system sees as PoseStamped, and its Zenoh router."""
 
-import os
 import time
 
 from drivers.motion_capture.wire import ros2_pose
 from drivers.rmw_zenoh.wire import graph
 from sim_bridge.devices.captured_bodies import FRAME_TICKS, TICK_S, CapturedBodies
-from sim_bridge.devices.ros2_router import ANY_HASH, Ros2Router, topic_of
+from sim_bridge.devices.ros2_router import ANY_HASH, PublishingRouter, topic_of
 
 
-class PoseRouter:
+class PoseRouter(PublishingRouter):
     """Router and publishers around what a system sees; `sim_bridge.world.emulation.Emulator`.
 
     Topics and domain stand in the system's source. A body that is not tracked is not published.
     """
 
     def __init__(self, name: str, place: tuple[str, int], seen: CapturedBodies) -> None:
-        self.silent = self.deaf = False
+        super().__init__(name, place)
         self._seen, self._ticks = seen, 0
-        self._router = Ros2Router(name, f"tcp/{place[0]}:{place[1]}")
         domain, path = topic_of(seen.system.source)
         topics = {body: f"{path}/{body}/pose" for body in seen.names}
         keys = {b: graph.topic_key(domain, topic, ros2_pose.POSE_STAMPED, ANY_HASH) for b, topic in topics.items()}
-        self._publishers = {body: self._router.publisher(key) for body, key in keys.items()}
+        self._publishers = {body: self.publisher(key) for body, key in keys.items()}
         self._late_ticks = round(seen.system.delay_ms / 1000 / TICK_S)
         self._waiting: list[tuple[int, str, bytes]] = []
-        self._bell = os.eventfd(0, os.EFD_NONBLOCK)  # nothing is ever heard
-
-    def fileno(self) -> int:
-        """Return a descriptor that never becomes readable."""
-        return self._bell
-
-    def receive(self) -> None:
-        """Hear nothing: nobody tells it anything."""
 
     def send(self) -> None:
         """End a tick: look when a frame is due, and publish the poses whose time on the way is over."""
@@ -47,9 +37,4 @@ class PoseRouter:
         while self._waiting and self._waiting[0][0] <= self._ticks:
             _, body, payload = self._waiting.pop(0)
             if not self.silent and not self._seen.is_silent(now_s):
-                self._router.publish(self._publishers[body], payload)
-
-    def close(self) -> None:
-        """End node and router."""
-        self._router.close()
-        os.close(self._bell)
+                self.publish(self._publishers[body], payload)

@@ -45,3 +45,24 @@ class Ros2Router:
     def close(self) -> None:
         """End node and router."""
         self.session.close()
+
+
+class PublishingRouter(Ros2Router):
+    """A router whose node only publishes; `sim_bridge.world.emulation.Emulator`, but for `send`."""
+
+    def __init__(self, name: str, place: tuple[str, int]) -> None:
+        super().__init__(name, f"tcp/{place[0]}:{place[1]}")
+        self.silent = self.deaf = False
+        self._bell = os.eventfd(0, os.EFD_NONBLOCK)
+
+    def fileno(self) -> int:
+        """Return a descriptor that never becomes readable."""
+        return self._bell
+
+    def receive(self) -> None:
+        """Hear nothing."""
+
+    def close(self) -> None:
+        """End node and router."""
+        super().close()
+        os.close(self._bell)

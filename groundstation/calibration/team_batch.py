@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.arrays import Array, IntArray, Vector
 from groundstation.calibration.team_elimination import Knots, eliminated
-from groundstation.calibration.team_figures import Figures
+from groundstation.calibration.team_figures import OWN, Figures
 from groundstation.calibration.team_paths import (
     ROBOT,
     TARGET,
@@ -153,19 +153,13 @@ class TeamBatch:
 
     def _refresh(self, theta: Vector) -> None:
         for name, path in self.robots.items():
-            scale, later, height = (
-                theta[self.figures.place[name, part]] for part in ("scale", "velocity_delay", "height_delay")
-            )
-            path.refresh(float(scale), float(later), float(height))
+            path.refresh(*(float(theta[self.figures.place[name, part]]) for part in OWN))
 
     def _eliminated(self, theta: Vector, forgiving: float) -> tuple[Array, Vector, "Knots"]:
         rows = Rows()
         for name, path in self.robots.items():
             drone, columns = self.field.drones[name], self._columns(name)
-            scale, velocity, height = (
-                self.figures.place[name, part] for part in ("scale", "velocity_delay", "height_delay")
-            )
-            robot_rows(rows, path, drone, columns, (scale, velocity, height))
+            robot_rows(rows, path, drone, columns, {part: self.figures.place[name, part] for part in OWN})
             if name in self._record.stands:
                 stand_rows(rows, path, columns, self._record.stands[name], *_pad(self.field, name))
         for name, target in self.targets.items():
@@ -221,6 +215,7 @@ class TeamBatch:
         self._by_figures(rows, at, by)
         for names, part in ((s.observers, "observer"), (s.subjects, "subject")):
             self._by_knots(rows, at, by[part], names, times)
+            self._by_attitude(rows, at, by[part], names, times)
 
     def _nearer(self, here: Array) -> Array:
         """Return seen minus predicted, of the pose that is nearer where the detector gave two."""
@@ -253,13 +248,22 @@ class TeamBatch:
                     columns = np.repeat(first_column + entry + self._stride * (knot + step), 4)
                     rows.by_knots(at[mine].ravel(), columns, (values * part[:, None]).ravel())
 
+    def _by_attitude(self, rows: Rows, at: IntArray, slopes_: Array, names: tuple[str, ...], times: Array) -> None:
+        """Add how attitudes change with the delay of all that a drone tells."""
+        for name, path in self.robots.items():
+            mine = np.array([i for i, other in enumerate(names) if other == name], dtype=np.intp)
+            values = np.einsum("nic,nc->ni", slopes_[mine, :, 3:], path.turning(times[mine]))
+            rows.by_figures(
+                at[mine].ravel(), np.full(4 * len(mine), self.figures.place[name, "own_delay"]), values.ravel()
+            )
+
     def _by_bulge(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
         """Add how the way between knots bends with the velocity's scale and delay, and with the heading."""
         path, place = self.robots[name], self.figures.place
         bulge, later = path.bulge(times)
         turned = np.column_stack((-bulge[:, 1], bulge[:, 0]))
         knot, _ = path.grid.between(times)
-        for part, change in (("scale", bulge), ("velocity_delay", later)):
+        for part, change in (("scale", bulge), ("velocity_delay", later), ("own_delay", later)):
             values = np.einsum("nic,nc->ni", slopes_[:, :, :2], change)
             rows.by_figures(at.ravel(), np.full(at.size, place[name, part]), values.ravel())
         values = 0.5 * np.einsum("nic,nc->ni", slopes_[:, :, :2], turned)

@@ -25,6 +25,7 @@ _SURVEYED = {
     "scale": 0.04,
     "velocity_delay": 0.012,
     "height_delay": 0.02,
+    "own_delay": 0.006,
 }
 _WRONG = {
     "print": 0.08,
@@ -38,6 +39,7 @@ _WRONG = {
     "scale": 0.15,
     "velocity_delay": 0.06,
     "height_delay": 0.08,
+    "own_delay": 0.08,
     "x": 0.4,
     "y": 0.4,
     "z": 0.4,
@@ -47,7 +49,7 @@ _WRONG = {
 }
 ONBOARD = ("pan", "tilt", "ahead", "left", "up", "focal", "delay")
 FIXED = ("x", "y", "z", "roll", "pitch", "yaw", "focal", "delay")
-OWN = ("scale", "velocity_delay", "height_delay")
+OWN = ("scale", "velocity_delay", "height_delay", "own_delay")  # the last: of all that a drone tells of itself
 _PLACES, _ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
 

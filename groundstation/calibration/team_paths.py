@@ -14,7 +14,7 @@ from groundstation.geometry.rotations import world_from_downward_optical
 ROBOT, TARGET = 6, 3
 """Entries of a knot: (x, y, z, correction of the heading, errors of roll and pitch); (x, y, heading)."""
 _SPACING_S = 0.2
-_STEP_S = 0.002
+_STEP_S, _TURNING_STEP_S = 0.002, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +44,16 @@ class RobotPath:
         self.own, self.grid, self.knots = own, grid, knots
         self._scale, self._delay_s = drone.odometry.velocity_scale, drone.odometry.velocity_delay_ms / 1000
         self._height_delay_s = drone.odometry.height_delay_ms / 1000
-        self.refresh(0.0, 0.0, 0.0)
+        self.refresh(0.0, 0.0, 0.0, 0.0)
 
-    def refresh(self, scale: float, later_s: float, height_later_s: float) -> None:
-        """Add up the reported velocities anew, under errors of their scale (a share) and of the delays [s]."""
-        self.height_delay_s = self._height_delay_s + height_later_s
+    def refresh(self, scale: float, later_s: float, height_later_s: float, own_later_s: float) -> None:
+        """Add up the reported velocities anew, under errors of their scale (a share) and of the delays [s].
+
+        own_later_s: of attitudes, and of velocities and heights besides.
+        """
+        self.height_delay_s = self._height_delay_s + height_later_s + own_later_s
+        self._own_later_s = own_later_s
+        later_s += own_later_s
         self._now, self._later = self._way(scale, later_s), self._way(scale, later_s + _STEP_S)
         self.at_knots, self.later_at_knots = self._told(self.grid.times), self._told_later(self.grid.times)
 
@@ -56,7 +61,7 @@ class RobotPath:
         """Return times (n) and the way until then (n, 2)."""
         own, grid = self.own, self.grid
         times = own.times - self._delay_s - later_s
-        heading = np.interp(times, own.times, own.yaw) + np.interp(times, grid.times, self.knots[:, 3])
+        heading = self._angle(own.yaw, times) + np.interp(times, grid.times, self.knots[:, 3])
         c, s = np.cos(heading), np.sin(heading)
         vx, vy = self._scale * (1.0 + scale) * own.velocities.T
         velocity = np.column_stack((c * vx - s * vy, s * vx + c * vy))
@@ -84,8 +89,17 @@ class RobotPath:
         poses = _between(self.knots, first, share)
         poses[:, :2] += self.bulge(times)[0]
         for column, angle in ((3, own.yaw), (4, own.roll), (5, own.pitch)):
-            poses[:, column] += np.interp(times, own.times, angle)
+            poses[:, column] += self._angle(angle, times)
         return np.asarray(poses)
+
+    def _angle(self, angle: Array, times: Array) -> Array:
+        return np.asarray(np.interp(times + self._own_later_s, self.own.times, angle))
+
+    def turning(self, times: Array) -> Array:
+        """Return how fast yaw, roll and pitch change (n, 3) [rad/s]: their derivative by the delay of all."""
+        own, step = self.own, _TURNING_STEP_S
+        columns = [self._angle(a, times + step) - self._angle(a, times - step) for a in (own.yaw, own.roll, own.pitch)]
+        return np.column_stack(columns) / (2.0 * step)
 
 
 class TargetPath:

@@ -1,5 +1,6 @@
 """Rows of the batch: residuals in deviations, with their derivatives by knots and by figures; what joins the knots."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,16 +72,16 @@ class Columns:
         return self.first + entry + self.stride * knots
 
 
-def robot_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figures: tuple[int, int, int]) -> None:
-    """Add what a drone tells of itself; figures: columns of its velocity's scale and delay and its height's delay."""
-    _way_rows(rows, path, drone, columns, figures[:2])
+def robot_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figures: Mapping[str, int]) -> None:
+    """Add what a drone tells of itself; figures: columns of its own figures, by part."""
+    _way_rows(rows, path, drone, columns, figures)
     _heading_rows(rows, path, drone, columns)
     _lean_rows(rows, path, drone, columns)
     _bend_rows(rows, path.knots[:, 2], columns, 2, _CLIMB_M_S2 * path.grid.spacing_s**2)
-    _height_rows(rows, path, drone, columns, figures[2])
+    _height_rows(rows, path, drone, columns, figures)
 
 
-def _way_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figures: tuple[int, int]) -> None:
+def _way_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figures: Mapping[str, int]) -> None:
     habits, odometry = kind_named(drone.kind).habits, drone.odometry
     knots = np.arange(len(path.grid.times) - 1)
     told = np.diff(path.at_knots, axis=0)
@@ -97,8 +98,10 @@ def _way_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, 
         rows.by_knots(at, columns.of(knots + 1, axis), weight)
         for knot in (knots, knots + 1):
             rows.by_knots(at, columns.of(knot, 3), -0.5 * weight * bent[:, axis])
-        rows.by_figures(at, np.full(len(at), figures[0]), -weight * told[:, axis])
-        rows.by_figures(at, np.full(len(at), figures[1]), -weight * hasty[:, axis])
+        rows.by_figures(at, np.full(len(at), figures["scale"]), -weight * told[:, axis])
+        # Where attitudes are late too, the headings of these velocities turn a little; that is left out.
+        for part in ("velocity_delay", "own_delay"):
+            rows.by_figures(at, np.full(len(at), figures[part]), -weight * hasty[:, axis])
 
 
 def _heading_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns) -> None:
@@ -125,7 +128,7 @@ def _lean_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns)
         rows.by_knots(at, columns.of(knots + 1, entry), weight)
 
 
-def _height_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figure: int) -> None:
+def _height_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figures: Mapping[str, int]) -> None:
     own, odometry = path.own, drone.odometry
     known = np.flatnonzero(np.isfinite(own.height) & (own.height > _LOWEST_M))
     if not len(known):
@@ -141,7 +144,8 @@ def _height_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Column
     rows.by_knots(at, columns.of(first, 2), weight * (1.0 - share))
     rows.by_knots(at, columns.of(first + 1, 2), weight * share)
     climb = (z[first + 1] - z[first]) / path.grid.spacing_s
-    rows.by_figures(at, np.full(len(at), figure), -weight * climb)
+    for part in ("height_delay", "own_delay"):
+        rows.by_figures(at, np.full(len(at), figures[part]), -weight * climb)
 
 
 def target_rows(rows: Rows, path: TargetPath, acceleration_m_s2: float, columns: Columns) -> None:

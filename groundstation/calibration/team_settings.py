@@ -29,7 +29,7 @@ def unit_of(part: str) -> tuple[float, str]:
 
 
 def paths_of(field: ResolvedField, key: Key) -> tuple[Path, ...]:
-    """Return the settings that a figure stands in."""
+    """Return the settings that a figure stands in; none where stamps must be mended instead."""
     who, part = key
     if part == "print":
         owner: Path = (
@@ -40,6 +40,8 @@ def paths_of(field: ResolvedField, key: Key) -> tuple[Path, ...]:
     camera: Path = ("cameras", who) if who in field.cameras else ("drones", who, "camera")
     if part == "focal":
         return ((*camera, "calibration", "fx_px"), (*camera, "calibration", "fy_px"))
+    if part == "own_delay":
+        return ()
     if part in _ODOMETRY:
         return (("drones", who, "odometry", _ODOMETRY[part]),)
     if part in ("roll", "pitch", "yaw"):

@@ -23,6 +23,7 @@ _WORDS = {
     "scale": "velocity scale",
     "velocity_delay": "delay of its velocity",
     "height_delay": "delay of its height",
+    "own_delay": "delay of all its telemetry",
     "aside": "place",
     "tilted": "tilt",
     "yaw": "turn about the vertical",
@@ -113,6 +114,8 @@ def _lines(found: "TeamCalibration") -> list[str]:
             f"the tracker's distance from the targets' likeliest paths: {found.gain.before_m:.3f} m as flown, "
             f"{found.gain.after_m:.3f} m with the changes"
         )
+    if not found.settings:
+        return [*lines, "no setting of the field mends that: check the clock of the drone and the link to it"]
     from groundstation.settings.patched import fragment
 
     return [*lines, "change in the field file:", fragment(found.settings).rstrip()]

@@ -36,6 +36,7 @@ _WORTH_TELLING = {
     "scale": 0.16,
     "velocity_delay": 0.04,
     "height_delay": 0.06,
+    "own_delay": 0.03,
 }
 _WORTH_TELLING_M = 0.06
 # Mean squared deviation of a healthy simulated flight, whose sightings differ at random; where it is more, they share

@@ -21,6 +21,7 @@ _MOUNTED = {
     "tilted": ("is tilted by {size}", "is tilted by {size}"),
 }
 _REPORTED = {"velocity_delay": "velocities", "height_delay": "heights"}
+_STAMPS = "check the clock of {who} and the link to it: all that it tells of itself is stamped wrong"
 _LENS = "calibrate the lens of {who} (groundstation calibrate camera)"
 _SURVEY = "fix the camera {who} where the field has it, or survey it anew (groundstation calibrate extrinsics)"
 
@@ -50,6 +51,8 @@ def _what(charge: Charge, field: ResolvedField) -> str:
         return f"{camera} has a focal length {size} {'longer' if more else 'shorter'} than calibrated"
     if what == "scale":
         return f"{who}'s true velocities are {size} {'larger' if more else 'smaller'} than the field says"
+    if what == "own_delay":
+        return f"{who}'s telemetry is {size} {'older' if more else 'newer'} than its stamps say"
     reported = _REPORTED.get(what)
     pictures = f"{who}'s pictures" if who in field.cameras else f"the pictures of {camera}"
     late = f"{who}'s {reported}" if reported else pictures
@@ -66,6 +69,8 @@ def _remedy(charge: Charge, field: ResolvedField) -> str:
         return "measure it with a ruler; print it without scaling, or set its size in the field"
     if what == "focal":
         return _LENS.format(who=who or "each drone")
+    if what == "own_delay":
+        return _STAMPS.format(who=who)
     if what.endswith("delay"):
         return "groundstation calibrate delay"
     if who in field.cameras:

@@ -17,7 +17,7 @@ class WrongLab:
     """One thing that is wrong.
 
     errors, exchanged, faults: what it is; cameras: how bad their pictures are besides. says: what must be told first,
-    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: no figure is wrong, and none may be blamed.
+    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: no figure is wrong, none may be blamed.
     size: in the unit of that text; None: it has none. on_pads: it must be found before anybody takes off.
     """
 
@@ -33,7 +33,8 @@ class WrongLab:
     @property
     def since_s(self) -> float:
         """When it begins to be wrong, in seconds after the order to take off; 0: it always was."""
-        return max((fault["start_s"] - STAND_S for fault in self.faults), default=0.0)
+        starts = [float(fault["start_s"]) for fault in self.faults]
+        return max([STAND_S, *starts]) - STAND_S
 
 
 _FIGURE = r"(-?[\d.]+) \+- [\d.]+"
@@ -69,6 +70,9 @@ def _delays(ceiling: str, one: str) -> Iterable[WrongLab]:
 
     yield WrongLab("ceiling's pictures", ((ceiling, "delay", _LATE_MS),), says=late(ceiling), size=_LATE_MS)
     yield WrongLab("a drone's pictures", ((one, "delay", _LATE_MS),), says=late(one), size=_LATE_MS)
+    stamped = {"kind": "telemetry_delayed", "entity": one, "start_s": 0.0, "value": _LATE_MS / 1e3}
+    told = rf"{one}: {one}'s telemetry is {_FIGURE} ms older"
+    yield WrongLab("a drone's telemetry", faults=(stamped,), says=told, size=_LATE_MS)
 
 
 def _mountings(one: str, other: str) -> Iterable[WrongLab]:

@@ -45,8 +45,12 @@ class Lab:
         self.seq += 1
         return Header(round(t * 1e9), CLOCK, name, name, self.seq)
 
+    def late(self, name: str) -> float:
+        return self.wrong.errors.get((name, "own_delay"), 0.0) / 1e3
+
     def own(self, name: str, t: float) -> Odometry:
         odometry = self.field.drones[name].odometry
+        stamp, t = t, t - self.late(name)
         then = t - odometry.velocity_delay_ms / 1e3
         (before, _), (after, _) = self.pose(name, then - 0.005), self.pose(name, then + 0.005)
         yaw = self.pose(name, t)[1]
@@ -55,7 +59,7 @@ class Lab:
         height = float(self.pose(name, t - odometry.height_delay_ms / 1e3)[0][2])
         covariance = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.01)
         return Odometry(
-            header=self.header(t, name),
+            header=self.header(stamp, name),
             velocity_m_s=(vx, vy, 0.0),
             velocity_covariance=covariance,
             yaw_rad=yaw + 0.4,

@@ -2,12 +2,14 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from swinging_lab import CLOCK, Lab
 
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.team import TeamCalibration, calibrate_team
-from groundstation.calibration.team_settings import with_changes
+from groundstation.calibration.team_figures import Figures
+from groundstation.calibration.team_settings import changes, with_changes
 from groundstation.errors import OperatorMistake
 from groundstation.field.resolved import ResolvedField
 from sim_bridge.study.wrong_figures import WrongFigures
@@ -48,6 +50,13 @@ def test_one_wrong_figure_is_proposed_with_its_size(
     settings = {".".join(path): value for path, value in found.settings.items()}
     now = lab_field.drones["drone_1"].camera.calibration.fx_px if what == "focal" else 1.0
     assert settings[setting] / now == pytest.approx(wanted, abs=within)
+
+
+def test_late_telemetry_changes_no_setting(lab_field: ResolvedField) -> None:
+    figures = Figures(lab_field, tuple(lab_field.drones))
+    late = np.zeros(len(figures.keys))
+    late[figures.place["drone_1", "own_delay"]] = 0.05
+    assert changes(figures, late, late != 0.0) == {}
 
 
 @pytest.mark.slow

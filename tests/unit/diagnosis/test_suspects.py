@@ -28,6 +28,7 @@ def suspicions() -> tuple[Suspicion, ...]:
         ({}, None, 0.0),
         ({("ceiling", "delay"): 50.0}, ("ceiling", "delay"), 0.05),
         ({("drone_1", "delay"): -50.0}, ("drone_1", "delay"), -0.05),
+        ({("drone_1", "own_delay"): 80.0}, ("drone_1", "own_delay"), 0.08),
         ({("drone_1", "pan"): 3.0, ("drone_2", "pan"): 3.0}, ("", "pan"), math.radians(3.0)),
         ({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0)),
         ({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05),

@@ -57,6 +57,12 @@ def test_of_two_that_cannot_be_told_apart_the_likelier_comes_first(lab_field: Re
         (("ceiling", "delay"), 0.05, "ceiling's pictures are 50 +- 10 ms older than configured", "calibrate delay"),
         (("drone_1", "delay"), -0.05, "the pictures of drone_1's camera are 50 +- 10 ms newer", "calibrate delay"),
         (("", "delay"), 0.05, "the pictures of every drone's camera are 50 +- 10 ms older", "calibrate delay"),
+        (
+            ("drone_1", "own_delay"),
+            0.06,
+            "drone_1's telemetry is 60 +- 12 ms older than its stamps say",
+            "the clock of",
+        ),
         (("drone_1", "velocity_delay"), 0.06, "drone_1's velocities are 60 +- 12 ms older", "calibrate delay"),
         (("drone_1", "scale"), 0.2, "drone_1's true velocities are 20.0 +- 4.0 % larger", "calibrate team"),
         (("drone_1", "focal"), -0.03, "drone_1's camera has a focal length 3.0 +- 0.6 % shorter", "calibrate the lens"),

@@ -1,5 +1,6 @@
 """The shared part of experiments that fly batches of message-level flights: options, field, and the runs."""
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -61,6 +62,16 @@ def flown_field(path: Path, options: Sequence[str]) -> dict[str, Any]:
     field = load_field(path, (*options, "recording.raw_datagrams=false"))
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     return {"field": msgspec.to_builtins(resolved_field(field)), "sections": sections}
+
+
+def order_of(name: str, scenario: str, options: Sequence[str], seconds: float, **own: Any) -> str:
+    """Return the simulator's order besides the seeds, by names of field and scenario; own: what one study asks for."""
+    from groundstation.settings.files import find_field, find_scenario
+    from groundstation.settings.scenario import load_scenario
+
+    path = find_field(name)
+    order = {"scenario": load_scenario(find_scenario(scenario, path)), "seconds": seconds}
+    return json.dumps(flown_field(path, options) | order | own, sort_keys=True)
 
 
 def fly_all(

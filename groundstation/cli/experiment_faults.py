@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.experiment_campaign import campaign_options, fly_all, order_of
 from groundstation.cli.numbers import FiniteRange
 
 
@@ -38,7 +38,9 @@ from groundstation.cli.numbers import FiniteRange
     help="Only these kinds of faults, by commas (default: all that are drawn); none: healthy flights only.",
 )
 @campaign_options("faults")
-def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any) -> int:
+def faults(
+    flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, kinds: str, **flown: Any
+) -> int:
     """Fly random fields with one or two random faults; the drivers, watchdogs and tracker are those that fly.
 
     Message level: no processes, no pictures. Each seed is one flight and gives the same end again. Unsafe is a
@@ -49,7 +51,8 @@ def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_
     from groundstation.experiments.runner import write_atomically
 
     began = time.monotonic()
-    planned = batches(_order(**flown), seed, flights, size=max(1, min(20, flights // max(1, 2 * workers or 4))))
+    order = order_of(**flown, kinds=[kind.strip() for kind in kinds.split(",") if kind.strip()])
+    planned = batches(order, seed, flights, size=max(1, min(20, flights // max(1, 2 * workers or 4))))
     found, timing = flights_of(fly_all(planned, scheduler, workers, flights == 1, out))
     summary = totals(found, timing) | {"elapsed_s": round(time.monotonic() - began, 1)}
     by_kinds = by_kind(found)
@@ -60,20 +63,6 @@ def faults(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_
     else:
         _tell(table(by_kinds), summary, out)
     return ExitCode.FAILED if summary["unsafe"] else ExitCode.OK
-
-
-def _order(name: str, scenario: str, options: tuple[str, ...], seconds: float, kinds: str) -> str:
-    """Return the simulator's order besides the seeds."""
-    from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.scenario import load_scenario
-
-    path = find_field(name)
-    order = flown_field(path, options) | {
-        "scenario": load_scenario(find_scenario(scenario, path)),
-        "seconds": seconds,
-        "kinds": [kind.strip() for kind in kinds.split(",") if kind.strip()],
-    }
-    return json.dumps(order, sort_keys=True)
 
 
 def _tell(lines: list[str], summary: dict[str, Any], folder: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.experiment_campaign import campaign_options, fly_all, order_of
 from groundstation.cli.numbers import FiniteRange
 
 _BATCH = 10
@@ -35,7 +35,9 @@ _BATCH = 10
 @click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
 @click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors.")
 @campaign_options("missions")
-def missions(flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any) -> int:
+def missions(
+    flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, understated: float, **flown: Any
+) -> int:
     """Fly random rooms, pads and targets to the end: take-off, tracking, the order to land, the floor.
 
     Rooms of 6 to 12 m by 5 to 8 m; targets stand, or drive on one of the paths of scenarios at 0.15 to 0.6 m/s. Nothing
@@ -46,7 +48,7 @@ def missions(flights: int, seed: int, scheduler: str, workers: int, out: Path, a
     from groundstation.experiments.missions import rows_of, table
     from groundstation.experiments.runner import write_atomically
 
-    planned = batches(_order(**flown), seed, flights, _BATCH, "missions")
+    planned = batches(order_of(**flown, understated=understated), seed, flights, _BATCH, "missions")
     found, _ = flights_of(fly_all(planned, scheduler, workers, len(planned) == 1, out))
     rows = rows_of(found)
     document = {"experiment": "missions", "rows": rows, "flights": found}
@@ -54,17 +56,3 @@ def missions(flights: int, seed: int, scheduler: str, workers: int, out: Path, a
     click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
     amiss = any(row["violations"] or row["not_landed"] or row["not_flown"] for row in rows)
     return ExitCode.FAILED if amiss else ExitCode.OK
-
-
-def _order(name: str, scenario: str, options: tuple[str, ...], seconds: float, understated: float) -> str:
-    """Return the simulator's order besides the seeds."""
-    from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.scenario import load_scenario
-
-    path = find_field(name)
-    order = flown_field(path, options) | {
-        "scenario": load_scenario(find_scenario(scenario, path)),
-        "seconds": seconds,
-        "understated": understated,
-    }
-    return json.dumps(order, sort_keys=True)

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from importlib import import_module
 from typing import Any
 
 from groundstation.errors import SettingsError
@@ -12,6 +13,8 @@ from sim_bridge.settings_files import named_scenario, resolved_field
 from sim_bridge.study.summary import summary
 
 _WRONG_SETTINGS = 2
+# Studies that the ground station's experiments start, with an order on standard input.
+_CAMPAIGNS = ("faults", "scenarios", "culprits", "missions")
 _EXAMPLES = """examples:
   python -m sim_bridge.study demo --seed 3 --duration 60
   python -m sim_bridge.study demo --seeds 10 --set planner.hysteresis=0.1 --json
@@ -43,22 +46,8 @@ def main() -> int:
         from sim_bridge.study.vision.command import main as vision
 
         return vision(sys.argv[2:])
-    if sys.argv[1:2] == ["faults"]:
-        from sim_bridge.study.faults.command import main as faults
-
-        return faults()
-    if sys.argv[1:2] == ["scenarios"]:
-        from sim_bridge.study.scenarios.command import main as scenarios
-
-        return scenarios()
-    if sys.argv[1:2] == ["culprits"]:
-        from sim_bridge.study.culprits.command import main as culprits
-
-        return culprits()
-    if sys.argv[1:2] == ["missions"]:
-        from sim_bridge.study.missions.command import main as missions
-
-        return missions()
+    if sys.argv[1:2] and sys.argv[1] in _CAMPAIGNS:
+        return int(import_module(f"sim_bridge.study.{sys.argv[1]}.command").main())
     arguments = _parser().parse_args()
     try:
         field = resolved_field(arguments.field, arguments.set)

@@ -11,6 +11,7 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
 from groundstation.settings.sections import CAMERA, driver_sections
+from sim_bridge.study.faults import flight_order
 from sim_bridge.study.faults.command import fly
 
 SECONDS = 20.0
@@ -64,7 +65,7 @@ def order() -> dict[str, Any]:
 
 def safely_flown(order: dict[str, Any], seed: int, kinds: list[str]) -> dict[str, Any]:
     """Return the flight of a seed, which has the faults that it stands for, and did nothing unsafe."""
-    flown: dict[str, Any] = fly(order, seed, events=True)
+    flown: dict[str, Any] = fly(flight_order.order_of(order | {"seeds": [seed]}), seed)
     assert flown["kinds"] == kinds, "the seed stands for another flight now"
     assert flown["unsafe"] == {}
     return flown

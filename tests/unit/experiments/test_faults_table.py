@@ -114,7 +114,8 @@ def test_another_program_flies_anew(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_an_unknown_kind_is_the_operators_mistake() -> None:
-    (batch,) = batches(json.dumps({"kinds": ["wind", "gremlins"]}), 1, 1)
+    order = {"field": {"drones": {}}, "sections": [], "scenario": {}, "seconds": 20.0, "kinds": ["wind", "gremlins"]}
+    (batch,) = batches(json.dumps(order), 1, 1)
     with pytest.raises(OperatorMistake, match=r"no kind of fault: gremlins; there are .*wind"):
         fly(batch)
 

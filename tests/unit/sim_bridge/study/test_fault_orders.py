@@ -20,7 +20,8 @@ from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER
 def test_kinds_that_mean_nothing_are_refused_in_one_line(
     kinds: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps({"kinds": kinds})))
+    order = {"field": {"drones": {}}, "sections": [], "scenario": {}, "seeds": [1], "seconds": 20.0, "kinds": kinds}
+    monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(order)))
     assert main() == WRONG_ORDER
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and lines[0].startswith(said)

@@ -1,0 +1,59 @@
+"""The order of a campaign on standard input, and what each study does with it: fly its seeds, a JSON line for each."""
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from groundstation.process import numba_cache
+from sim_bridge.scenario import Scenario, parse_scenario
+from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER, unhosted
+
+_SHARED = ("field", "sections", "scenario", "seeds", "seconds")
+
+
+class WrongOrder(ValueError):
+    """Something that cannot be flown as ordered."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightOrder:
+    """What is to be flown.
+
+    field: resolved, plain values; sections: of its drivers as (kind, section); own: what one study asks for besides.
+    """
+
+    field: dict[str, Any]
+    sections: tuple[tuple[str, str], ...]
+    scenario: Scenario
+    seeds: tuple[int, ...]
+    seconds: float
+    own: Mapping[str, Any]
+
+
+def fly_seeds(fly: Callable[[FlightOrder, int], dict[str, Any]]) -> int:
+    """Fly each seed of the order; WRONG_ORDER for a kind of vehicle that is not hosted, and where `fly` says so."""
+    numba_cache.activate()
+    try:
+        order = order_of(json.load(sys.stdin))
+        for seed in order.seeds:
+            print(json.dumps(fly(order, seed)), flush=True)
+    except WrongOrder as refusal:
+        print(refusal, file=sys.stderr)
+        return WRONG_ORDER
+    return 0
+
+
+def order_of(values: dict[str, Any]) -> FlightOrder:
+    """Return an order from its JSON values; raises WrongOrder for a kind of vehicle that is not hosted."""
+    if refusal := unhosted(values["field"]["drones"]):
+        raise WrongOrder(refusal)
+    return FlightOrder(
+        values["field"],
+        tuple((kind, section) for kind, section in values["sections"]),
+        parse_scenario(json.dumps(values["scenario"])),
+        tuple(values["seeds"]),
+        values["seconds"],
+        {name: value for name, value in values.items() if name not in _SHARED},
+    )

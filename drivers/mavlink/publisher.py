@@ -5,10 +5,9 @@ partly ours: it goes out with an inflated covariance, more so where the autopilo
 is replaced by what its gyros say, whose increments are its own measurement (docs/explanation/estimation.md 8).
 """
 
-import math
-
 from drivers.mavlink.convert import BaseAttitude, attitude_quaternion
 from drivers.mavlink.settings import VehicleSettings
+from drivers.mavlink.turning import heading_rate_rad_s, lasting_s
 from drivers.mavlink.uncertainty import StatedUncertainty
 from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
 from groundstation.bus.api import Bus
@@ -33,10 +32,7 @@ class GyroHeading:
 
     def update(self, stamp_ns: int, attitude: BaseAttitude) -> None:
         """Take the turn rate of a sample."""
-        _, q, r = attitude.rates_rad_s
-        # Rate of the heading about the vertical, not about the tilted body axis.
-        sine, cosine = math.sin(attitude.roll_rad), math.cos(attitude.roll_rad)
-        rate = (q * sine + r * cosine) / max(0.2, math.cos(attitude.pitch_rad))
+        rate = heading_rate_rad_s(attitude)
         if self._stamp_ns is not None:
             elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
             if elapsed_s > _GAP_S:
@@ -44,6 +40,12 @@ class GyroHeading:
             else:
                 self.yaw_rad = wrap(self.yaw_rad + 0.5 * (rate + self._rate_rad_s) * elapsed_s)
         self._stamp_ns, self._rate_rad_s = stamp_ns, rate
+
+    def at(self, stamp_ns: int) -> float:
+        """Return the heading a little after the last sample [rad]."""
+        if self._stamp_ns is None:
+            return self.yaw_rad
+        return wrap(self.yaw_rad + lasting_s(stamp_ns - self._stamp_ns) * self._rate_rad_s)
 
 
 class TelemetryPublisher:
@@ -73,7 +75,7 @@ class TelemetryPublisher:
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=velocity_m_s,
             velocity_covariance=_covariance(std_m_s),
-            yaw_rad=self._heading.yaw_rad,
+            yaw_rad=self._heading.at(stamp_ns),
             roll_rad=attitude.roll_rad,
             pitch_rad=attitude.pitch_rad,
             attitude_std_rad=max(self._attitude_std_rad, self.stated.attitude_std_rad(stamp_ns)),

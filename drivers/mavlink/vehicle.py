@@ -1,13 +1,14 @@
 """One MAVLink vehicle behind the interface `drivers.base.Vehicle`: its messages in, decisions of the watchdog out."""
 
 from collections import Counter, deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from drivers.base import LinkHealth
 from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
-from drivers.mavlink.convert import LIMITS, BaseAttitude
+from drivers.mavlink.convert import LIMITS
+from drivers.mavlink.latest_telemetry import LatestTelemetry
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.requests import Requests
@@ -38,27 +39,6 @@ _WARNING = 4
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
-
-
-@dataclass(frozen=True, slots=True)
-class LatestTelemetry:
-    """The newest word of the vehicle; times 0: never. moved_ns is of the last velocity."""
-
-    heard_ns: int = 0
-    moved_ns: int = 0
-    heartbeat_ns: int = 0
-    base_mode: int = 0
-    custom_mode: int = 0
-    status: int = 0
-    landed: int = 0
-    healthy: int = 0
-    ekf: int = 0
-    battery: float | None = None
-    battery_ns: int = 0
-    attitude: BaseAttitude | None = None
-    inertial: tuple[float, ...] = ()
-    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
-    position_m: Vector3 | None = None
 
 
 class MavlinkVehicle:
@@ -115,7 +95,7 @@ class MavlinkVehicle:
             case telemetry.AttitudeQuaternion():
                 attitude = convert.attitude_from_quaternion(message)
                 self._publisher.attitude(now_ns, attitude)
-                known = replace(known, attitude=attitude)
+                known = replace(known, attitude=attitude, attitude_ns=now_ns)
             case telemetry.HighresImu():
                 known = self._felt(now_ns, *convert.imu_from_highres(message), known)
             case telemetry.RawImu():
@@ -135,17 +115,19 @@ class MavlinkVehicle:
         if (jump_ms := self._boot_clock.hear(now_ns, message.time_boot_ms)) != 0:
             self._refused["clock_jump"] += 1
             self._jumps.append(jump_ms)
-        if known.attitude is None:
+        attitude = known.attitude_at(now_ns)
+        if known.attitude is None or attitude is None:
             return known
-        velocity = convert.velocity_from_local(message, known.attitude)
+        velocity = convert.velocity_from_local(message, attitude)
         position = convert.position_from_local(message)
+        # As it came: what is turned on by its age no longer shows that it is stuck.
         sample = convert.sample_from_local(now_ns, message, known.attitude, known.inertial)
         report = self._plausibility.update(sample, self._state(known))
-        self._publisher.velocity(now_ns, velocity, known.attitude, report)
+        self._publisher.velocity(now_ns, velocity, attitude, report)
         return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
 
     def _felt(self, now_ns: int, rates: Vector3, force: Vector3, known: LatestTelemetry) -> LatestTelemetry:
-        self._publisher.imu(now_ns, rates, force, known.attitude)
+        self._publisher.imu(now_ns, rates, force, known.attitude_at(now_ns))
         return replace(known, inertial=(*rates, *force))
 
     def _take_rare(self, now_ns: int, message: tuple[object, ...], known: LatestTelemetry) -> LatestTelemetry:
@@ -289,14 +271,15 @@ class MavlinkVehicle:
             events.append((4, f"{text} ({'; '.join(reasons)})" if reasons else text))
 
     def _feed(self, now_ns: int, known: LatestTelemetry) -> list[tuple[object, ...]]:
-        if now_ns < self._next_vision_ns or known.attitude is None:
+        attitude = known.attitude_at(now_ns)
+        if now_ns < self._next_vision_ns or attitude is None:
             return []
         self._next_vision_ns = max(self._next_vision_ns + self._vision_period_ns, now_ns)
         if (pose := self.vision.pose(now_ns, bool(known.base_mode & ARMED) and self.orders.lift.lifted)) is None:
             return []
         if self.flavour is Flavour.PX4:
-            return [convert.odometry_from_pose(pose, known.attitude, self.vision.resets)]
-        return [convert.vision_from_pose(pose, known.attitude, self.vision.resets)]
+            return [convert.odometry_from_pose(pose, attitude, self.vision.resets)]
+        return [convert.vision_from_pose(pose, attitude, self.vision.resets)]
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals; those of the link are shared by all vehicles on it."""

@@ -23,7 +23,7 @@ _SURVEYED = {
     "up": 0.005,
     "delay": 0.006,
     "scale": 0.04,
-    "velocity_delay": 0.012,
+    "velocity_delay": 0.02,  # over healthy flights (docs/explanation/estimation.md 10)
     "height_delay": 0.02,
     "own_delay": 0.006,
 }

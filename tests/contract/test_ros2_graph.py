@@ -20,6 +20,9 @@ from groundstation.engineering_views.ros2.codec import Ros2Codec
 from groundstation.engineering_views.ros2.live import Ros2View
 from groundstation.errors import OperatorMistake
 from groundstation.recording.timeline import Timeline
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 
 
 def opened(**settings: Any) -> Any:
@@ -71,6 +74,24 @@ def test_a_foreign_client_lists_and_decodes(router: str) -> None:
     finally:
         bridge.close()
         listening.undeclare()
+        foreign.close()
+
+
+def test_what_a_field_will_tell_is_listed_before_its_first_message(router: str) -> None:
+    field = resolved_field(load_field(find_field("lab")))
+    foreign = opened(mode="client", connect={"endpoints": [router]})
+    bridge = Ros2View(router, 7, "jazzy", field, Timeline(clock.clock_id(), clock.unix_offset_ns()))
+    wanted = {"tf", "tf_static", "skein%markers", "rosout", "diagnostics", "turtlebot%odom", "ceiling%camera_info"}
+    wanted |= {f"drone_{n}%{what}" for n in (1, 2) for what in ("pose", "odom", "setpoint", "battery")}
+    try:
+        listed, deadline = set[str](), time.monotonic() + 5
+        while not wanted <= listed and time.monotonic() < deadline:
+            tokens = [str(reply.ok.key_expr) for reply in foreign.liveliness().get("@ros2_lv/7/**") if reply.ok]
+            listed = {token.split("/")[-4].removeprefix("%") for token in tokens if "/MP/" in token}
+        assert wanted <= listed
+        assert not {name for name in listed if "truth" in name}
+    finally:
+        bridge.close()
         foreign.close()
 
 

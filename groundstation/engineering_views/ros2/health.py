@@ -13,6 +13,9 @@ _OK, _WARN, _ERROR = 0, 1, 2
 _LOG_LEVEL = {m.Severity.INFO: 20, m.Severity.WARNING: 30, m.Severity.ERROR: 40}
 _GRAVE = frozenset({m.FlightState.LOST, m.FlightState.EMERGENCY})
 _LIPO = 3
+BATTERY = "sensor_msgs/msg/BatteryState"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+LOG = "rcl_interfaces/msg/Log"
 
 
 class HealthMaker:
@@ -50,7 +53,7 @@ class HealthMaker:
         """Return a line of the log."""
         return self._codec.message(
             "/rosout",
-            "rcl_interfaces/msg/Log",
+            LOG,
             stamp=self._build.time(stamp_ns),
             level=_LOG_LEVEL[event.severity],
             name=f"skein.{event.header.entity}",
@@ -66,7 +69,7 @@ class HealthMaker:
         )
         return self._codec.message(
             f"/{name}/battery",
-            "sensor_msgs/msg/BatteryState",
+            BATTERY,
             header=self._build.header(stamp_ns, name),
             **unmeasured,
             percentage=math.nan if share is None else float(share),
@@ -89,5 +92,4 @@ class HealthMaker:
             hardware_id=name,
             values=[self._make("diagnostic_msgs/msg/KeyValue", key=key, value=str(v)) for key, v in facts.items()],
         )
-        kind = "diagnostic_msgs/msg/DiagnosticArray"
-        return self._codec.message("/diagnostics", kind, header=self._build.header(stamp_ns), status=[status])
+        return self._codec.message("/diagnostics", DIAGNOSTICS, header=self._build.header(stamp_ns), status=[status])

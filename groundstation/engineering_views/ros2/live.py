@@ -15,6 +15,7 @@ from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.keys import Key
 from groundstation.bus.thinning import rates_by_key
 from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, SETPOINT, TRUTH, VEHICLE_STATUS
+from groundstation.engineering_views.ros2.advertised import advertised
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import STATES, Ros2Scene
 from groundstation.errors import MessageError, OperatorMistake
@@ -79,7 +80,8 @@ class Ros2View:
         self._zid = str(self._session.zid())
         node = graph.node_token(domain, self._zid, _NODE)
         self._tokens: list[Any] = [self._session.liveliness().declare_token(node)]
-        self._publishers: dict[str, tuple[Any, bytes, int]] = {}
+        # Before the first message of each: a tool lists a topic, and a subscriber waits for it, from the start.
+        self._publishers = {topic: self._declare(topic, kind) for topic, kind in advertised(field, truth).items()}
         self._keys: dict[str, Key] = {}
         self._next_static_ns = 0
 
@@ -115,16 +117,16 @@ class Ros2View:
         return self._scene.take(stamp_ns, message)
 
     def _publish(self, message: RosMessage) -> None:
-        publisher, identity, count = self._publishers.get(message.topic) or self._declare(message)
+        publisher, identity, count = self._publishers.get(message.topic) or self._declare(message.topic, message.type)
         self._publishers[message.topic] = publisher, identity, count + 1
         publisher.put(message.data, attachment=graph.attachment(count + 1, time.time_ns(), identity))
 
-    def _declare(self, message: RosMessage) -> tuple[Any, bytes, int]:
-        type_hash = self._codec.hash_of(message.type)
-        key = graph.topic_key(self._domain, message.topic, message.type, type_hash)
+    def _declare(self, topic: str, kind: str) -> tuple[Any, bytes, int]:
+        type_hash = self._codec.hash_of(kind)
+        key = graph.topic_key(self._domain, topic, kind, type_hash)
         publisher = self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
         number = len(self._tokens)
-        token = graph.publisher_token(self._domain, self._zid, _NODE, number, message.topic, message.type, type_hash)
+        token = graph.publisher_token(self._domain, self._zid, _NODE, number, topic, kind, type_hash)
         self._tokens.append(self._session.liveliness().declare_token(token))
         return publisher, os.urandom(16), 0
 

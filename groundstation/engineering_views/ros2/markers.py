@@ -18,6 +18,7 @@ _ARROW, _DISC, _LINE_STRIP, _TEXT = 0, 3, 4, 9
 _LIFETIME_S = 1
 _DISC_M, _TEXT_M, _SHAFT_M, _HEAD_M = 0.01, 0.18, 0.03, 0.07
 _FAINT = 0.35
+MARKERS = "visualization_msgs/msg/MarkerArray"
 
 
 class MarkerScene:
@@ -45,7 +46,7 @@ class MarkerScene:
         self._next_ns = stamp_ns + _PERIOD_NS
         markers = [*self._bodies(stamp_ns, bodies), *self._links(stamp_ns), *self._arrows(stamp_ns)]
         self._plan, self._setpoints = None, {}
-        return [self._codec.message("/skein/markers", "visualization_msgs/msg/MarkerArray", markers=markers)]
+        return [self._codec.message("/skein/markers", MARKERS, markers=markers)]
 
     def _bodies(self, stamp_ns: int, bodies: Iterable[Body]) -> Iterator[Any]:
         for body in bodies:

@@ -9,7 +9,7 @@ from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.geometry import Builder
 from groundstation.field.room import LensCalibration
 
-_PICTURE, _LENS = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
+PICTURE, LENS = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
 
 
 class PictureMaker:
@@ -23,10 +23,10 @@ class PictureMaker:
         """Return a picture, and its lens where that is known."""
         header = self._build.header(stamp_ns, camera)
         data = np.frombuffer(jpeg, np.uint8)
-        found = [self._codec.message(f"/{camera}/image/compressed", _PICTURE, header=header, format="jpeg", data=data)]
+        found = [self._codec.message(f"/{camera}/image/compressed", PICTURE, header=header, format="jpeg", data=data)]
         lens = self._lenses.get(camera)
         if lens is not None:
-            found.append(self._codec.message(f"/{camera}/camera_info", _LENS, header=header, **lens))
+            found.append(self._codec.message(f"/{camera}/camera_info", LENS, header=header, **lens))
         return found
 
     def _lens(self, lens: LensCalibration) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from groundstation.bus import keys
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.topics import TOPICS, Topic
+from groundstation.engineering_views.ros2.advertised import advertised
 from groundstation.engineering_views.ros2.bag import write_bag
 from groundstation.engineering_views.ros2.codec import DISTRIBUTIONS, Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import SHOWN, Ros2Scene
@@ -169,4 +170,7 @@ def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
     topics = {one.channel.topic for one in read}
     assert unread == [] and len(read) == count and len(topics) >= 15, topics
     assert {"/tf", "/tf_static", "/drone_1/odom", "/skein/markers", "/diagnostics"} <= topics
+    field = resolved_field(load_field(find_field("lab")))
+    types = {one.channel.topic: one.schema.name for one in read if one.schema}
+    assert types.items() <= advertised(field, truth=True).items(), "a live view advertises all that a flight tells"
     assert (tmp_path / "bag" / "metadata.yaml").is_file()

@@ -1,0 +1,30 @@
+"""Which topics a flight of a field will have, to be advertised before the first message of each."""
+
+from collections.abc import Mapping
+
+from groundstation.engineering_views.ros2.health import BATTERY, DIAGNOSTICS, LOG
+from groundstation.engineering_views.ros2.markers import MARKERS
+from groundstation.engineering_views.ros2.pictures import LENS, PICTURE
+from groundstation.engineering_views.ros2.stencils import FRAMES, ODOMETRY, POSE, SURE_POSE, TWIST
+from groundstation.field.resolved import ResolvedField
+
+
+def advertised(field: ResolvedField | None, truth: bool) -> Mapping[str, str]:
+    """Return the type of each topic by its name; truth: with true states. None: what every field has."""
+    found = {
+        "/tf": FRAMES.type,
+        "/tf_static": FRAMES.type,
+        "/skein/markers": MARKERS,
+        "/diagnostics": DIAGNOSTICS,
+        "/rosout": LOG,
+    }
+    if field is None:
+        return found
+    for name in (*field.drones, *field.tracked):
+        found |= {f"/{name}/pose": SURE_POSE.type, f"/{name}/odom": ODOMETRY.type}
+        found |= {f"/{name}/truth": POSE.type} if truth else {}
+    for name in field.drones:
+        found |= {f"/{name}/setpoint": TWIST.type, f"/{name}/battery": BATTERY}
+    for name in field.calibrations:
+        found |= {f"/{name}/image/compressed": PICTURE, f"/{name}/camera_info": LENS}
+    return found

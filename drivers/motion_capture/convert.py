@@ -12,6 +12,8 @@ from groundstation.geometry.rotations import euler_from_rotation, rotation_z
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+# No volume is so large; beyond, sums of jumps lose what a body moved by, and products overflow.
+_FARTHEST_M = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class Placement:
         position [m], quaternion (x, y, z, w): of the body, in the system's axes.
         """
         length = math.sqrt(sum(value * value for value in quaternion))
-        if not 0.5 < length < 2.0 or not all(math.isfinite(value) for value in position):  # nan compares false
+        if not 0.5 < length < 2.0 or not all(abs(value) < _FARTHEST_M for value in position):  # nan compares false
             return None
         system_from_body = _rotation_of(quaternion, length)
         # WIRE (docs/reference/natnet.md 5): a body's axes are the system's at the moment of its definition, so what

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from groundstation.arrays import Array
+from groundstation.bus.messages import Message, ReportedMotion
 from groundstation.settings.files import find_field, find_scenario
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
@@ -19,17 +20,18 @@ from groundstation.settings.scenario import load_scenario
 from groundstation.settings.sections import CAMERA, driver_sections
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.stand_ins import manual_clock
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
 
 pytestmark = [pytest.mark.slow, pytest.mark.study]
 
 
-def order(name: str) -> tuple[Drawn, list[Section]]:
-    """Return what a flight of a scenario in the lab begins with, seed 1."""
+def order(name: str, *options: str) -> tuple[Drawn, list[Section]]:
+    """Return what a flight of a scenario in the lab begins with, seed 1; options: of the field."""
     path = find_field("lab")
     scenario = parse_scenario(json.dumps(load_scenario(find_scenario(name, path))))
-    field = load_field(path, ("recording.raw_datagrams=false",))
+    field = load_field(path, ("recording.raw_datagrams=false", *options))
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     return as_drawn(msgspec.to_builtins(resolved_field(field)), scenario, 1), sections
 
@@ -55,6 +57,28 @@ def test_a_target_that_wanders_is_found_and_held(strategy: str) -> None:
     assert (flown["landings"], flown["violations"]) == (0, [])
     if strategy == "string":
         assert flown["switches"] <= 1
+
+
+class HearingFlight(ScenarioFlight):
+    """Notes what the tracker is told of the target's own motion, and how old it is [ns]."""
+
+    heard: list[tuple[ReportedMotion, int]] | None = None
+
+    def heeds(self, message: Message) -> bool:
+        if isinstance(message, ReportedMotion):
+            self.heard = [*(self.heard or ()), (message, self.now_ns - message.header.stamp_ns)]
+        return super().heeds(message)
+
+
+def test_a_target_that_tells_its_odometry_is_heard_in_the_study() -> None:
+    flight = HearingFlight(*order("random-walk", "target.odometry.source=ros2://127.0.0.1/odom"), 1.0, "ours")
+    with manual_clock(lambda: flight.now_ns):
+        while flight.world.time_s < 2.0:
+            flight.step()
+    assert flight.heard is not None and 38 <= len(flight.heard) <= 41, "20 a second"
+    assert {message.header.entity for message, _ in flight.heard} == {"turtlebot"}
+    assert all(20e6 <= age_ns <= 41e6 for _, age_ns in flight.heard), "late by delay_ms, and by a tick of the tracker"
+    assert not [reason for reason in flight.tracking.tracker.rejected if "ReportedMotion" in reason]
 
 
 class WatchedFlight(ScenarioFlight):

@@ -17,7 +17,7 @@ from groundstation.bus.api import Received
 from groundstation.bus.keys import Key
 from groundstation.bus.messages import Message
 from groundstation.bus.notice import Notice
-from groundstation.bus.topics import OBSERVATION, SEARCHED_PICTURE, Topic
+from groundstation.bus.topics import OBSERVATION, REPORTED_MOTION, SEARCHED_PICTURE, Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
 from groundstation.planning.planner import Planner, PlanRequest
@@ -39,6 +39,7 @@ from sim_bridge.study.faults.orders import TeamOrders
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
 from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of
 from sim_bridge.study.faults.wrong_cameras import WrongEye
+from sim_bridge.study.odometry_model import odometry_of
 from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
@@ -145,6 +146,8 @@ class FaultFlight:
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
         self._exposures, self._eyes = Exposures(eyes), {eye.name: eye for eye in eyes}
+        # Apart, so that cameras expose when they do without.
+        self._reports = Exposures(odometry_of(self.site, world, scenario.cameras.mounting_errors, seed))
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
         self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S, root=self._only_root())
@@ -182,6 +185,7 @@ class FaultFlight:
             device.send()
         mark = self._spent("world", mark)
         self._look()
+        self._hear()
         mark = self._spent("cameras", mark)
         now_ns, ticks = self.now_ns, self.world.ticks
         read_all(self._readers)
@@ -212,6 +216,13 @@ class FaultFlight:
                 self._send(arrival_ns, OBSERVATION, self._wrong.reported(sighting))
             if (searched := eye.searched(seen, now_ns, clock.clock_id())) is not None:
                 self._send(searched.header.stamp_ns + round(delay_ms * 1e6), SEARCHED_PICTURE, searched)
+
+    def _hear(self) -> None:
+        """Send on what targets say of their own motion."""
+        now_ns = self.now_ns
+        for ear in self._reports.due(self.world.time_s):
+            for told in ear.look(self.world, now_ns, clock.clock_id()):
+                self._send(now_ns + round(ear.lateness_ms * 1e6), REPORTED_MOTION, told)
 
     def _send(self, arrival_ns: int, topic: Topic, message: Message) -> None:
         heapq.heappush(self._queue, (arrival_ns, next(self._order), topic, message))

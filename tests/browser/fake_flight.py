@@ -15,6 +15,7 @@ from groundstation.bus import topics as t
 from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
+TURN_S, DESCENT_M_S = 0.02, 0.3
 
 
 class FakeFlight(threading.Thread):
@@ -38,6 +39,7 @@ class FakeFlight(threading.Thread):
         self.braked: set[str] = set()
         self.unseen_s: dict[str, float] = {}  # for how long nobody has seen it
         self.deaf: set[str] = set()
+        self._sunk_m = dict.fromkeys(drones, 0.0)  # since each began to land
         self.frozen = self.fenced = False
         self.findings: tuple[m.PreflightFinding, ...] = ()  # of the checks before a take-off
         self.distance_m = 1.3  # of the drones from the target
@@ -63,7 +65,7 @@ class FakeFlight(threading.Thread):
             self.steered += [r.message for r in steering.drain() if isinstance(r.message, m.SimCommand)]
             self._answer()
             tick += 1
-            due += 0.02
+            due += TURN_S
             time.sleep(max(0.0, due - time.monotonic()))
 
     def finish(self) -> None:
@@ -91,7 +93,12 @@ class FakeFlight(threading.Thread):
         tx, ty, *_ = self.target_at(s)
         angle = 0.12 * s + {"drone_1": 2.2, "drone_3": 4.3}.get(name, 0.0)
         px, py = 0.75 * tx + self.distance_m * math.cos(angle), 0.75 * ty + self.distance_m * math.sin(angle)
-        return px, py, {"drone_1": 2.1, "drone_3": 1.6}.get(name, 1.2), math.atan2(ty - py, tx - px)
+        height = {"drone_1": 2.1, "drone_3": 1.6}.get(name, 1.2) - self._sunk_m[name]
+        return px, py, max(0.0, height) if name in self.flying() else 0.0, math.atan2(ty - py, tx - px)
+
+    def _sink(self) -> None:
+        for name, mode in self.modes.items():
+            self._sunk_m[name] = self._sunk_m[name] + TURN_S * DESCENT_M_S if mode == "LANDING" else 0.0
 
     def sees(self, observer: str, subject: str) -> bool:
         """Whether this observer, if it flies, has this subject in sight."""
@@ -104,6 +111,7 @@ class FakeFlight(threading.Thread):
     # --- what is said ---
 
     def _turn(self, tick: int, s: float) -> None:
+        self._sink()
         self._say_truth(s)
         if not self.frozen:
             self._say_estimate(s)
@@ -128,7 +136,7 @@ class FakeFlight(threading.Thread):
                 position_m=(px, py, pz),
                 velocity_m_s=(0.0, 0.0, 0.0),
                 attitude_rad=(0.0, 0.0, yaw),
-                on_ground=False,
+                on_ground=name in self.drones and name not in self.flying(),
             )
             bus.publish(t.TRUTH, state)
 

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from clipping import clipped
-from fake_flight import FakeFlight
+from fake_flight import DRONES, FakeFlight
 
 
 def slowness() -> float:
@@ -265,3 +265,13 @@ def test_the_map_says_why_the_topology_is_as_it_is(stage: Any) -> None:
     assert line.inner_text().startswith("Switched ") and line.inner_text().endswith(f": {change['reason']}")
     page.there("layer-graph").click()
     assert line.is_hidden()
+
+
+def test_the_heights_fall_while_the_drones_land(stage: Any) -> None:
+    """On the map's belief and in the view from the side; so that a picture of a landing shows one."""
+    page = stage.open()
+    before = page.wait(lambda s: set(DRONES) <= set(s["at"]))["at"]
+    stage.flight.modes = dict.fromkeys(DRONES, "LANDING")
+    after = page.wait(lambda s: all(s["at"][name][2] < before[name][2] - 0.3 for name in DRONES))["at"]
+    words = page.there("heights").get_attribute("aria-label")
+    assert all(f"{name} {before[name][2]:.1f} m" not in words for name in DRONES), (words, after)

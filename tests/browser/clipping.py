@@ -40,11 +40,22 @@ _MEASURE = """([scrolls, hidden]) => {
 _COVERED = """() => { const found = [];
   for (const part of ["#shell", "main .map", "#team"]) {
     const pressed = document.querySelectorAll(`${part} :is(button, summary)`);
-    const buttons = [...pressed].filter((one) => one.checkVisibility());
+    const seen = (one) => one.checkVisibility() && !(part === "#shell" && one.closest(".stops"));
+    const buttons = [...pressed].filter(seen);
     buttons.forEach((one, index) => { const a = one.getBoundingClientRect();
       for (const other of buttons.slice(index + 1)) { const b = other.getBoundingClientRect();
         if (a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom)
           found.push(`${one.textContent} covers ${other.textContent}`); } });
+    const texts = document.createTreeWalker(document.querySelector(part), NodeFilter.SHOW_TEXT);
+    while (texts.nextNode()) {
+      const text = texts.currentNode, holder = text.parentElement, range = document.createRange();
+      if (!text.textContent.trim() || holder.closest("button, summary, .sheet") || !holder.checkVisibility()) continue;
+      range.selectNodeContents(text);
+      for (const line of range.getClientRects()) for (const one of buttons) { const box = one.getBoundingClientRect();
+        if (line.left < box.right - 1 && box.left < line.right - 1
+          && line.top < box.bottom - 3 && box.top < line.bottom - 3)
+          found.push(`${one.textContent} covers ${text.textContent.trim()}`); }
+    }
   }
   return found; }"""
 
@@ -55,5 +66,5 @@ def clipped(page: Any) -> list[str]:
 
 
 def covered(page: Any) -> list[str]:
-    """Return the pairs of buttons of one part of the page that lie over each other."""
+    """Return what a button lies over in its part of the page: other buttons, and words."""
     return list(page.evaluate(_COVERED))

@@ -33,12 +33,12 @@ function banners(own) {
 
 function ending({ severity, text: words }) {
   const landed = severity === "INFO", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
-  return { kind: "ended", level: landed ? "calm" : "grave", title, more: runOver() ? "The stop buttons are off: this run takes no more orders." : "", shell: !landed };
+  return { kind: "ended", level: landed ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !landed };
 }
 
 function silentTracker() {
   return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}`, rank: "WATCH",
-    more: "Nothing to do: the drones hover, and soon land by themselves. Positions are old; LAND ALL works without it." };
+    more: "Nothing to do: the drones hover, then land by themselves. LAND ALL still works." };
 }
 
 // As the console's process judges it, but for what only this page can know.
@@ -57,7 +57,7 @@ export function showBanners() {
   if (host.dataset.kinds !== kinds) {
     noteSilence(kinds.split(","), (host.dataset.kinds ?? "").split(","), { tracker: estimateAge(), silent: silentS() });
     host.dataset.kinds = kinds;
-    host.replaceChildren(...all.map(({ kind, shell }) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop without this page: ", el("code", {}, "groundstation land")) : null)));
+    host.replaceChildren(...all.map(({ kind, shell }) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop: ", el("code", {}, "groundstation land")) : null)));
   }
   all.forEach(({ level, title, more, rank }, index) => {
     const node = host.children[index];

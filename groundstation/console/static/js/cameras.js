@@ -89,7 +89,7 @@ function draw(name, { canvas, bitmap, stamp }) {
       g.arc(u, v, r, 0, 7);
       g.stroke();
     }
-    g.font = `700 ${13 * Math.min(2, devicePixelRatio || 1)}px system-ui, "DejaVu Sans", sans-serif`;
+    g.font = `700 ${14 * Math.min(2, devicePixelRatio || 1)}px system-ui, "DejaVu Sans", sans-serif`;
     g.lineWidth = 4;
     g.strokeStyle = "#000";
     const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`;

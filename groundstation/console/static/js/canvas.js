@@ -8,7 +8,7 @@ export function path(g, view, points, close = false) {
   if (close) g.closePath();
 }
 
-export function label(g, textValue, x, y, colour, size = 12, weight = 600, align = "center") {
+export function label(g, textValue, x, y, colour, size = 14, weight = 600, align = "center") {
   g.font = `${weight} ${size}px system-ui, "DejaVu Sans", sans-serif`;
   g.textAlign = align;
   g.lineWidth = 3;

@@ -30,11 +30,11 @@ function build(chart, host) {
   });
   const root = el("div", { class: "chart" }, el("div", { class: "title" }, el("b", {}, chart.title), ...values.map(({ node }) => node)));
   host.append(root);
-  const axis = { stroke: ink().dim, grid: { stroke: ink().grid, width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
+  const axis = { stroke: ink().dim, grid: { stroke: ink().grid, width: 1 }, ticks: { show: false }, font: "14px system-ui, sans-serif" };
   const plot = new uPlot({
     width: Math.max(200, root.clientWidth), height: HEIGHT, legend: { show: false }, cursor: { points: { show: false } }, padding: [6, 18, 0, 0],
     scales: { x: { time: false, range: (_plot, low) => [Math.min(low ?? 0, -30), 0] }, y: { range: (_plot, _low, high) => [0, Math.max(high * 1.15, chart.band ? 2 : 1e-3)] } },
-    axes: [{ ...axis, size: 20, values: (_plot, ticks) => ticks.map((tick) => (tick === 0 ? "now" : `${tick} s`)) }, { ...axis, size: 44 }],
+    axes: [{ ...axis, size: 24, values: (_plot, ticks) => ticks.map((tick) => (tick === 0 ? "now" : `${tick} s`)) }, { ...axis, size: 52 }],
     series: [{}, ...chart.curves.map(([, name, colour]) => ({ label: name, stroke: colour(), width: 2, points: { show: false } }))],
     hooks: chart.band ? { drawClear: [drawBand] } : {},
   }, [[], ...chart.curves.map(() => [])], root);

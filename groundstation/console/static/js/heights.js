@@ -4,7 +4,7 @@ import { label } from "./canvas.js";
 import { colourOf, ink } from "./palette.js";
 import { entities, estimateAge, isTarget, store } from "./store.js";
 
-const MARGIN = 14, GAP = 13, STALE_S = 0.5;
+const MARGIN = 14, GAP = 16, STALE_S = 0.5;
 
 export function drawHeights(canvas, ratio) {
   const width = canvas.clientWidth, height = canvas.clientHeight;
@@ -25,7 +25,7 @@ export function drawHeights(canvas, ratio) {
     g.strokeStyle = colourOf(name);
     g.lineWidth = 3;
     g.beginPath(); g.moveTo(22, at); g.lineTo(36, at); g.stroke();
-    label(g, `${mean[2].toFixed(2)} m`, 39, words + 4, colourOf(name), 12, 600, "left");
+    label(g, `${mean[2].toFixed(2)} m`, 39, words + 4, colourOf(name), 14, 600, "left");
   }
   g.globalAlpha = 1;
   canvas.setAttribute("aria-label", `Heights. ${flying.map(({ name, mean }) => `${name} ${mean[2].toFixed(1)} m`).join("; ")}`);
@@ -35,6 +35,6 @@ function drawScale(g, y, top) {
   g.strokeStyle = ink().axis;
   g.lineWidth = 1;
   g.beginPath(); g.moveTo(22, y(0)); g.lineTo(22, y(top)); g.stroke();
-  for (let z = 0; z <= top; z++) label(g, `${z}`, 18, y(z) + 4, ink().dim, 11, 500, "right");
-  label(g, "z [m]", 22, y(top) - 4, ink().dim, 11, 500, "left");
+  for (let z = 0; z <= top; z++) label(g, `${z}`, 18, y(z) + 4, ink().dim, 14, 500, "right");
+  label(g, "z [m]", 22, y(top) - 4, ink().dim, 14, 500, "left");
 }

@@ -83,7 +83,7 @@ export function drawBodies(g, view, stale) {
     const age = estimateAge() + body.age_s;
     const suffix = stale ? `, ${seconds(age)} ago` : isLost(body.name) ? `, lost for ${seconds(age)}` : "";
     keepClear(x, y, bodyRadius(view) / 2);
-    note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 13), colourOf(body.name), 13, 700);
+    note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 14), colourOf(body.name), 14, 700);
   }
   g.globalAlpha = alpha;
 }
@@ -97,7 +97,7 @@ export function drawStanding(g, view) {
     drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), colourOf(name));
     g.globalAlpha = alpha;
     keepClear(x, y, bodyRadius(view) / 2);
-    note(g, NAME, name, `${name} stands`, around(x, y, bodyRadius(view), 13), colourOf(name), 13, 500);
+    note(g, NAME, name, `${name} stands`, around(x, y, bodyRadius(view), 14), colourOf(name), 14, 500);
   }
 }
 
@@ -159,8 +159,8 @@ export function drawVelocities(g, view, stale) {
     drawArrow(g, from, tip(setpoint.velocity), 3, ink().text);
     const limits = limitsOf(control);
     if (!limits) continue;
-    const places = around(from[0], from[1], bodyRadius(view) + 6, 11).slice(1);
-    note(g, FIGURE, name, `slowed by ${limits}`, places, ink().text, 11, 500);
+    const places = around(from[0], from[1], bodyRadius(view) + 6, 14).slice(1);
+    note(g, FIGURE, name, `slowed by ${limits}`, places, ink().text, 14, 500);
   }
 }
 
@@ -174,7 +174,7 @@ export function drawTruth(g, view) {
     g.moveTo(x - r, y + r); g.lineTo(x + r, y - r);
     g.moveTo(x, y); g.lineTo(...view.point(position[0] + 0.32 * Math.cos(yaw), position[1] + 0.32 * Math.sin(yaw)));
     g.stroke();
-    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, `${name} (truth)`, around(x, y, 10, 11), ink().truth, 11, 500);
+    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, `${name} (truth)`, around(x, y, 10, 14), ink().truth, 14, 500);
   }
 }
 
@@ -187,5 +187,5 @@ export function drawGhost(g, view, [wx, wy]) {
   g.arc(x, y, Math.max(9, 0.18 * view.scale), 0, 7);
   g.stroke();
   g.setLineDash([]);
-  label(g, `put here (${wx.toFixed(1)}, ${wy.toFixed(1)})`, x, y - 18, ink().truth, 12, 600);
+  label(g, `put here (${wx.toFixed(1)}, ${wy.toFixed(1)})`, x, y - 18, ink().truth, 14, 600);
 }

@@ -24,10 +24,10 @@ export function drawRoom(g, view) {
 }
 
 function drawTicks(g, view, w, h, colours) {
-  for (let x = Math.ceil(-w / 2); x <= w / 2; x++) { const [px, py] = view.point(x, -h / 2); label(g, `${x}`, px, py + 15, colours.dim, 11, 400); }
-  for (let y = Math.ceil(-h / 2); y <= h / 2; y++) { const [px, py] = view.point(-w / 2, y); label(g, `${y}`, px - 8, py + 4, colours.dim, 11, 400, "right"); }
+  for (let x = Math.ceil(-w / 2); x <= w / 2; x++) { const [px, py] = view.point(x, -h / 2); label(g, `${x}`, px, py + 15, colours.dim, 14, 400); }
+  for (let y = Math.ceil(-h / 2); y <= h / 2; y++) { const [px, py] = view.point(-w / 2, y); label(g, `${y}`, px - 8, py + 4, colours.dim, 14, 400, "right"); }
   const [px, py] = view.point(w / 2, -h / 2);
-  label(g, "x, y [m]", px, py + 30, colours.dim, 11, 400, "right");
+  label(g, "x, y [m]", px, py + 30, colours.dim, 14, 400, "right");
 }
 
 function drawFence(g, view) {

@@ -50,7 +50,7 @@ function drawWorldView(g, view, points, words) {
   g.setLineDash([]);
   const x = points.map((p) => p[0]), y = points.map((p) => p[1]);
   const [left, low] = view.point(Math.min(...x), Math.min(...y)), [right, high] = view.point(Math.max(...x), Math.max(...y));
-  note(g, FIGURE, words, words, [[left, low + 13, "left"], [right, low + 13, "right"], [left, high - 5, "left"], [right, high - 5, "right"]], ink().dim, 11, 400);
+  note(g, FIGURE, words, words, [[left, low + 13, "left"], [right, low + 13, "right"], [left, high - 5, "left"], [right, high - 5, "right"]], ink().dim, 14, 400);
 }
 
 // The box in which a motion capture system sees bodies, at whatever height.
@@ -90,7 +90,7 @@ export function drawGraph(g, view) {
     if (Math.hypot(a[0] - b[0], a[1] - b[1]) * view.scale < FIGURE_PX) continue;
     const figure = information > 0 ? `± ${precision(information)}` : "";
     const places = [0.5, 0.4, 0.6, 0.3, 0.7].map((share) => onLink(view, a, b, share));
-    note(g, FIGURE, `${observer} ${subject}`, `${figure}${seen ? "" : " planned"}`, places, colour, 11, 500);
+    note(g, FIGURE, `${observer} ${subject}`, `${figure}${seen ? "" : " planned"}`, places, colour, 14, 500);
   }
 }
 
@@ -114,5 +114,5 @@ function drawSensor(g, view, sensor) {
   g.fillStyle = ink().floor;
   g.fill();
   keepClear(x, y, 7);
-  note(g, SENSOR, sensor.name, sensor.name, around(x, y, 8, 11).slice(1), ink().dim, 11, 500);
+  note(g, SENSOR, sensor.name, sensor.name, around(x, y, 8, 14).slice(1), ink().dim, 14, 500);
 }

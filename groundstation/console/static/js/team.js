@@ -105,8 +105,9 @@ function showLink(node, share) {
 }
 
 function showBattery(node, status) {
-  text(node.previousElementSibling, lastsWords(status) || "battery");
   const [words, level] = batteryWords(status), known = status.battery !== null;
+  // What must be charged before it flies again lasts for no flight.
+  text(node.previousElementSibling, words.endsWith("charge!") ? "battery" : lastsWords(status) || "battery");
   if (node.dataset.words === words) return;
   node.dataset.words = words;
   node.className = level;

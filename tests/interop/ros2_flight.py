@@ -89,7 +89,7 @@ def main(python: str, folder: Path) -> None:
         # How well it flies is not judged here, so a busy machine does without the checks before take-off.
         run = SitlRun(folder, "sitl", "lab", "--anyway", "--duration", "240")
         stack.callback(run.close)
-        run.until(lambda: all(run.mode(name) for name in run.record.drones), _START_S, "all drones heard")
+        run.until(lambda: all(run.mode(name) == "TRACK" for name in run.record.drones), _START_S, "all track")
         run.until(lambda: any(run.run_dir.glob("state*.mcap")), _START_S, "a recording, which has the field")
         told: dict[str, Any] = {"before": stage.heard()}
         view = stage.start("view", [*COMMAND, "view", "--ros2"])

@@ -271,8 +271,7 @@ class MavlinkVehicle:
             events.append((4, f"{text} ({'; '.join(reasons)})" if reasons else text))
 
     def _feed(self, now_ns: int, known: LatestTelemetry) -> list[tuple[object, ...]]:
-        attitude = known.attitude_at(now_ns)
-        if now_ns < self._next_vision_ns or attitude is None:
+        if now_ns < self._next_vision_ns or (attitude := known.attitude_at(now_ns)) is None:
             return []
         self._next_vision_ns = max(self._next_vision_ns + self._vision_period_ns, now_ns)
         if (pose := self.vision.pose(now_ns, bool(known.base_mode & ARMED) and self.orders.lift.lifted)) is None:

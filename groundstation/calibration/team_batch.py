@@ -215,7 +215,6 @@ class TeamBatch:
         self._by_figures(rows, at, by)
         for names, part in ((s.observers, "observer"), (s.subjects, "subject")):
             self._by_knots(rows, at, by[part], names, times)
-            self._by_attitude(rows, at, by[part], names, times)
 
     def _nearer(self, here: Array) -> Array:
         """Return seen minus predicted, of the pose that is nearer where the detector gave two."""
@@ -241,6 +240,7 @@ class TeamBatch:
             knot, share = self._path(name).grid.between(times[mine])
             if name in self.robots:
                 self._by_bulge(rows, at[mine], slopes_[mine], name, times[mine])
+                self._by_attitude(rows, at[mine], slopes_[mine], name, times[mine])
             channels = (0, 1, 2, 3, 4, 5) if name in self.robots else (0, 1, 3)
             for entry, channel in enumerate(channels):
                 values = slopes_[mine, :, channel]
@@ -248,14 +248,10 @@ class TeamBatch:
                     columns = np.repeat(first_column + entry + self._stride * (knot + step), 4)
                     rows.by_knots(at[mine].ravel(), columns, (values * part[:, None]).ravel())
 
-    def _by_attitude(self, rows: Rows, at: IntArray, slopes_: Array, names: tuple[str, ...], times: Array) -> None:
-        """Add how attitudes change with the delay of all that a drone tells."""
-        for name, path in self.robots.items():
-            mine = np.array([i for i, other in enumerate(names) if other == name], dtype=np.intp)
-            values = np.einsum("nic,nc->ni", slopes_[mine, :, 3:], path.turning(times[mine]))
-            rows.by_figures(
-                at[mine].ravel(), np.full(4 * len(mine), self.figures.place[name, "own_delay"]), values.ravel()
-            )
+    def _by_attitude(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
+        """Add how an attitude changes with the delay of all that its drone tells."""
+        values = np.einsum("nic,nc->ni", slopes_[:, :, 3:], self.robots[name].turning(times))
+        rows.by_figures(at.ravel(), np.full(at.size, self.figures.place[name, "own_delay"]), values.ravel())
 
     def _by_bulge(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
         """Add how the way between knots bends with the velocity's scale and delay, and with the heading."""

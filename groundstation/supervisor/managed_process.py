@@ -51,6 +51,11 @@ class ManagedProcess:
         """Whether its start is finished and it still runs."""
         return self.running and self.state in (SlotState.READY, SlotState.DEGRADED)
 
+    @property
+    def begins(self) -> bool:
+        """Whether it was started once, and is neither up nor dead yet."""
+        return self.running and self.life == 1 and not self.is_up
+
     def adopt(self, handle: subprocess.Popen[bytes], now_ns: int) -> None:
         """Take over a process that was just started; ends it and raises OSError when it cannot be watched."""
         try:

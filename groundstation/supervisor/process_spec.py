@@ -55,8 +55,9 @@ class ProcessSpec:
     entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of
     a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
     silence_limit_s: heartbeat older than this starts its fail-safe datagrams; hang_limit_s: it is killed (both after
-    READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it.
-    on_terminal: it writes to the operator's terminal. entities: the vehicles or the camera that a device speaks of.
+    READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it. awaited: a
+    start waits for it, if only for a moment. on_terminal: it writes to the operator's terminal. entities: the vehicles
+    or the camera that a device speaks of.
     kernels: it computes with compiled kernels, which are made before anything starts. nice: its share of the processor,
     beside that of others (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152).
     at_most_hz: by key, how many samples a second are enough for it (docs/decisions/0169).
@@ -71,6 +72,7 @@ class ProcessSpec:
     restart: Restart = Restart.ALWAYS
     restart_delay_s: float = 0.0
     required: bool = True
+    awaited: bool = True
     silence_limit_s: float = 0.4
     hang_limit_s: float = 0.8
     start_limit_s: float = 60.0

@@ -66,6 +66,7 @@ DIAGNOSIS = ProcessSpec(
     role="diagnosis",
     entry="groundstation.diagnosis.process:run",
     required=False,  # nobody flies by it
+    awaited=False,  # its models take seconds to import, and its first verdict needs seconds of flight
     nice=_LAST,
     silence_limit_s=5.0,
     hang_limit_s=10.0,  # a verdict on many robots holds the interpreter

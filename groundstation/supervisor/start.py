@@ -46,7 +46,7 @@ class Start:
         optional = [p for p in others if not p.spec.required]
         self._launch_all(optional)
         supervisor.write_runtime_file()
-        self._wait_for(optional, _OPTIONAL_GRACE_S)
+        self._wait_for([p for p in optional if p.spec.awaited], _OPTIONAL_GRACE_S)
 
     def show_screen(self) -> None:
         """Hand the terminal to the process that draws on it, if the table has one; once."""

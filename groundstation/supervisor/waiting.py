@@ -49,7 +49,7 @@ class Waiting:
     def _is_late(self, process: ManagedProcess, now_s: float) -> bool:
         if self._grace_s is None:
             return now_s - self._began_s > process.spec.start_limit_s
-        if process.is_up or process.life:
+        if not process.begins:
             return now_s - self._begun_s.setdefault(process.spec.name, now_s) > self._grace_s
         return now_s - self._began_s > _TO_BEGIN * self._grace_s
 

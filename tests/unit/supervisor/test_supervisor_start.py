@@ -86,7 +86,7 @@ def test_devices_begin_once_what_emulates_them_answers(make: Callable[..., Super
 def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("groundstation.supervisor.start._OPTIONAL_GRACE_S", 1.0)
+    monkeypatch.setattr("groundstation.supervisor.start._OPTIONAL_GRACE_S", 0.3)
     supervisor = make(spec("ceiling", "crashing", required=False), spec("drone_1", "never_ready", required=False))
     start(supervisor)
     camera = supervisor.processes[1]
@@ -95,6 +95,20 @@ def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     assert supervisor.unwell == ["ceiling", "drone_1"]
     told = (tmp_path / "terminal").read_text()
     assert "ceiling: ended with code 1: RuntimeError: no luck; restarting" in told
+
+
+@pytest.mark.parametrize(("awaited", "up"), [(True, True), (False, False)])
+def test_what_imports_slowly_holds_the_start_where_it_is_awaited_and_alarms_nobody(
+    make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, awaited: bool, up: bool
+) -> None:
+    monkeypatch.setattr("groundstation.supervisor.start._OPTIONAL_GRACE_S", 0.5)
+    supervisor = make(spec("diagnosis", "obedient", required=False, awaited=awaited, section='{"slow_s": 2.0}'))
+    start(supervisor)
+    diagnosis = supervisor.processes[1]
+    assert diagnosis.is_up is up
+    assert not supervisor.unwell
+    until(supervisor, lambda: diagnosis.is_up)
+    assert "not ready" not in (tmp_path / "terminal").read_text()
 
 
 def test_late_start_is_waited_for_and_a_recovery_told(make: Callable[..., Supervisor], tmp_path: Path) -> None:
@@ -106,7 +120,7 @@ def test_late_start_is_waited_for_and_a_recovery_told(make: Callable[..., Superv
 @pytest.mark.parametrize(("grace_s", "up"), [(5.0, []), (None, ["ceiling"])], ids=["optional", "required"])
 def test_a_device_that_may_still_answer_is_waited_for(grace_s: float | None, up: list[str]) -> None:
     row = SimpleNamespace(name="ceiling", start_limit_s=60.0)
-    ceiling = SimpleNamespace(spec=row, is_up=True, life=1, state=SlotState.DEGRADED)
+    ceiling = SimpleNamespace(spec=row, is_up=True, begins=False, life=1, state=SlotState.DEGRADED)
 
     def taken() -> list[str]:
         waiting.take_up()  # who dies of its first work is not up: only the second look counts

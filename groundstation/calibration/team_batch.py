@@ -13,6 +13,7 @@ from groundstation.arrays import Array, IntArray, Vector
 from groundstation.calibration.team_elimination import Knots, eliminated
 from groundstation.calibration.team_figures import OWN, Figures
 from groundstation.calibration.team_paths import (
+    LATER_S,
     ROBOT,
     TARGET,
     RobotPath,
@@ -31,7 +32,7 @@ from groundstation.preflight.stand import PLACED_M, PLACED_RAD, stand_of
 
 LEAST_SEEN = 60
 """Sightings of a drone by fixed cameras that its path needs, and of a target by drones."""
-_FREEDOM, _RATE_S = 8.0, 0.02
+_FREEDOM = 8.0
 # Sightings this near to a jump of the drone's own heading are left out [s].
 _JUMP_S = 0.4
 # First rounds forgive more, so that what is far off still draws.
@@ -44,17 +45,29 @@ _DAMPED = 0.5
 @dataclass(frozen=True, slots=True)
 class Fit:
     """theta (n): the figures' errors; information (n, n), pull (n): of the recording alone, about zero; misfit: mean
-    squared deviation of a sighting's row; used: sightings."""
+    squared deviation of a sighting's row; used: sightings; cost: twice the negative log likelihood, but for a constant,
+    of paths and theta."""
 
     theta: Vector
     information: Array
     pull: Vector
     misfit: float
     used: int
+    cost: float
 
     def if_alike(self, count: float) -> tuple[Array, Vector]:
         """Return information and pull if so many sightings say the same."""
         return self.information / count, self.pull / count
+
+    def log_evidence(self, sigma: Array, count: float) -> float:
+        """Return the log evidence, but for a constant, of the prior (n, n) that this fit had; as `if_alike`.
+
+        The cost is that of the paths which fit this prior best, not what the paths of another fit let expect: delays
+        bend the paths, and from the best delay it does not follow how well another explains the same flight.
+        """
+        spread = np.linalg.slogdet(np.eye(len(self.theta)) + sigma @ self.information / count)[1]
+        prior = float(self.theta @ np.linalg.solve(sigma, self.theta))
+        return -0.5 * (self.cost / count + prior + float(spread))
 
 
 class TeamBatch:
@@ -149,7 +162,7 @@ class TeamBatch:
                 break
         self._refresh(theta)
         H, g, _ = self._eliminated(theta, 1.0)
-        return Fit(theta, H, g + H @ theta, self._misfit, len(self._sightings.times))
+        return Fit(theta, H, g + H @ theta, self._misfit, len(self._sightings.times), self._cost)
 
     def _refresh(self, theta: Vector) -> None:
         for name, path in self.robots.items():
@@ -167,6 +180,7 @@ class TeamBatch:
         self._sighting_rows(rows, theta, forgiving)
         count = self._stride * len(next(iter(self.robots.values())).grid.times)
         r, local, figures = rows.matrices(count, len(theta))
+        self._cost = float(r @ r) + rows.beyond
         return eliminated(r, local, figures, 3 * self._stride)
 
     def _columns(self, name: str) -> Columns:
@@ -198,8 +212,8 @@ class TeamBatch:
         times = s.times - figures.of(theta, s.observers, "delay")
         scene = self._scene(theta, times)
         here = predicted(self._looks, scene)
-        after, before = (predicted(self._looks, self._scene(theta, times + step)) for step in (_RATE_S, -_RATE_S))
-        rates = off(after, before) / (2.0 * _RATE_S)
+        after, before = (predicted(self._looks, self._scene(theta, times + step)) for step in (LATER_S, -LATER_S))
+        rates = off(after, before) / (2.0 * LATER_S)
         gap = self._nearer(here)
         factor = np.linalg.inv(np.linalg.cholesky(noise(s.covariance, s.seen, rates, STAMP_STD_S)))
         squares = (np.einsum("nij,nj->ni", factor, gap) ** 2).sum(axis=1)
@@ -208,6 +222,7 @@ class TeamBatch:
         factor = factor * weight[:, None, None]
         at, _ = rows.add(np.einsum("nij,nj->ni", factor, gap).ravel(), 1.0)
         at = at.reshape(-1, 4)
+        rows.beyond += float(np.sum((_FREEDOM + 4.0) * np.log1p(squares / _FREEDOM) - weight**2 * squares))
         by = {
             part: np.einsum("nij,njc->nic", factor, table) for part, table in slopes(self._looks, scene, here).items()
         }

@@ -15,7 +15,7 @@ from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_figures import Suspicion
 
 # By how much (log) a cause must raise the evidence; causes this much worse than the best are ruled out.
-_SURE, _RULED_OUT = math.log(1e4), math.log(20.0)
+_SURE, RULED_OUT = math.log(1e4), math.log(20.0)
 _MOST = 8
 
 
@@ -43,7 +43,7 @@ class Round:
     @property
     def near(self) -> tuple[tuple[Suspicion, float], ...]:
         """Return the best and those that are not ruled out beside it."""
-        least = self.best[1] - _RULED_OUT
+        least = self.best[1] - RULED_OUT
         return tuple(one for one in self.gains if one[1] > least)
 
 

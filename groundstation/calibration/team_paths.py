@@ -14,7 +14,11 @@ from groundstation.geometry.rotations import world_from_downward_optical
 ROBOT, TARGET = 6, 3
 """Entries of a knot: (x, y, z, correction of the heading, errors of roll and pitch); (x, y, heading)."""
 _SPACING_S = 0.2
-_STEP_S, _TURNING_STEP_S = 0.002, 0.02
+LATER_S = 0.04
+"""Half of the step by which derivatives by delays are taken [s]: about what a wrong delay comes to.
+
+Over less they are mostly noise of the velocities, which the fit would take for knowledge of the delay.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +58,8 @@ class RobotPath:
         self.height_delay_s = self._height_delay_s + height_later_s + own_later_s
         self._own_later_s = own_later_s
         later_s += own_later_s
-        self._now, self._later = self._way(scale, later_s), self._way(scale, later_s + _STEP_S)
+        self._now = self._way(scale, later_s)
+        self._later, self._earlier = self._way(scale, later_s + LATER_S), self._way(scale, later_s - LATER_S)
         self.at_knots, self.later_at_knots = self._told(self.grid.times), self._told_later(self.grid.times)
 
     def _way(self, scale: float, later_s: float) -> tuple[Array, Array]:
@@ -73,7 +78,7 @@ class RobotPath:
 
     def _told_later(self, times: Array) -> Array:
         """Return the derivative of the way by the delay of the velocity."""
-        return (_along(self._later, times) - _along(self._now, times)) / _STEP_S
+        return (_along(self._later, times) - _along(self._earlier, times)) / (2.0 * LATER_S)
 
     def bulge(self, times: Array) -> tuple[Array, Array]:
         """Return how far the way between two knots is from their line (n, 2), and its derivative by the delay."""
@@ -97,7 +102,7 @@ class RobotPath:
 
     def turning(self, times: Array) -> Array:
         """Return how fast yaw, roll and pitch change (n, 3) [rad/s]: their derivative by the delay of all."""
-        own, step = self.own, _TURNING_STEP_S
+        own, step = self.own, LATER_S
         columns = [self._angle(a, times + step) - self._angle(a, times - step) for a in (own.yaw, own.roll, own.pitch)]
         return np.column_stack(columns) / (2.0 * step)
 

@@ -20,12 +20,16 @@ _UNHEARD_M_S = 0.5
 
 @dataclass
 class Rows:
-    """Residuals and derivatives that are collected; `local` columns are knots', `figures` those of figures."""
+    """Residuals and derivatives that are collected; `local` columns are knots', `figures` those of figures.
+
+    beyond: by how much their cost is more than their squares, where outliers count less.
+    """
 
     residuals: list[Vector] = field(default_factory=list)
     local: list[tuple[IntArray, IntArray, Vector]] = field(default_factory=list)
     figures: list[tuple[IntArray, IntArray, Vector]] = field(default_factory=list)
     count: int = 0
+    beyond: float = 0.0
 
     def add(self, residual: Vector, std: Vector | float) -> tuple[IntArray, Vector]:
         """Take residuals (what is seen minus predicted); returns their row numbers and weights (1 over deviation)."""

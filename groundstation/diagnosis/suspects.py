@@ -14,7 +14,7 @@ import numpy as np
 from groundstation.arrays import Array, Vector
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.team_batch import TeamBatch
-from groundstation.calibration.team_causes import posterior, rounds, spread
+from groundstation.calibration.team_causes import RULED_OUT, posterior, rounds, spread
 from groundstation.calibration.team_figures import Suspicion
 from groundstation.calibration.team_record import team_record
 from groundstation.errors import OperatorMistake
@@ -70,8 +70,31 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
         fit = batch.fit(np.diag(batch.figures.wide**2))
     except (OperatorMistake, np.linalg.LinAlgError):
         return None
-    H, g = fit.if_alike(max(1.0, fit.misfit / _USUAL_MISFIT))
-    return weighed(H, g, batch.figures.surveyed, tuple(batch.figures.suspicions()))
+    count = max(1.0, fit.misfit / _USUAL_MISFIT)
+    verdict = weighed(*fit.if_alike(count), batch.figures.surveyed, tuple(batch.figures.suspicions()))
+    return _tried(verdict, batch, count)
+
+
+def _tried(verdict: Verdict, batch: TeamBatch, count: float) -> Verdict:
+    """Return what is left of a verdict once the flight was explained with each charge, and without any."""
+    known = {(s.who, s.what): s for s in batch.figures.suspicions()}
+    sigma, causes = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]]()
+    for accused in verdict.causes:
+        without = batch.fit(sigma).log_evidence(sigma, count)
+        tried = [_retried(batch, sigma, known[charge.suspect], without, count) for charge in accused]
+        best = max(tried, key=lambda charge: charge.lead)
+        charges = [charge for charge in sorted(tried, key=lambda one: -one.lead) if charge.lead > best.lead - RULED_OUT]
+        if not _is_told(charges[0]):
+            break
+        causes.append(tuple(charges))
+        sigma = sigma + spread(known[best.suspect])
+    return Verdict(tuple(causes), verdict.leads)
+
+
+def _retried(batch: TeamBatch, sigma: Array, s: Suspicion, without: float, count: float) -> Charge:
+    freed = sigma + spread(s)
+    fit = batch.fit(freed)
+    return _charge(*fit.if_alike(count), sigma, s, fit.log_evidence(freed, count) - without)
 
 
 def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicion]) -> Verdict:
@@ -82,14 +105,14 @@ def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicio
         leads = leads or {(s.who, s.what): lead for s, lead in one.gains}
         nearest = sorted(one.near, key=lambda pair: -pair[1])
         charges = tuple(_charge(H, g, one.sigma, s, lead) for s, lead in nearest)
-        if charges[0].lead < _SURE or abs(charges[0].size) < _worth_telling(charges[0].suspect):
+        if not _is_told(charges[0]):
             break
         causes.append(charges)
     return Verdict(tuple(causes), leads)
 
 
-def _worth_telling(suspect: Suspect) -> float:
-    return _WORTH_TELLING.get(suspect[1], _WORTH_TELLING_M)
+def _is_told(charge: Charge) -> bool:
+    return charge.lead >= _SURE and abs(charge.size) >= _WORTH_TELLING.get(charge.suspect[1], _WORTH_TELLING_M)
 
 
 def _charge(H: Array, g: Vector, sigma: Array, s: Suspicion, lead: float) -> Charge:

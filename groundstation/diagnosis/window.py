@@ -12,7 +12,8 @@ from groundstation.time_units import NS_PER_S
 
 TOPICS = (ODOMETRY, IMU, OBSERVATION, VEHICLE_STATUS)
 _LASTS_NS = 40 * NS_PER_S
-_LEAST_NS = 8 * NS_PER_S
+# So much flight is judged; more where it began in the air and no pad tells from where, so that figures bend paths.
+_LEAST_NS, _LEAST_ALOFT_NS = 8 * NS_PER_S, 20 * NS_PER_S
 _DOWN = frozenset({FlightState.LANDED, FlightState.UNKNOWN})
 
 
@@ -27,6 +28,7 @@ class Window:
         self._screen = MessageScreen(parameters_from_field(field).tells_steps, _LASTS_NS)
         self._rows: deque[tuple[int, tuple[tuple[str, Message], ...]]] = deque()
         self._flying: dict[str, bool] = {}
+        self._stood: set[str] = set()
 
     def take(self, key: str, message: Message, now_ns: int) -> None:
         """Take a message; what another clock stamped tells nothing here."""
@@ -34,13 +36,18 @@ class Window:
         if message.header.clock != self._clock or self._screen.refusal(key, message, stamp_ns, now_ns):
             return
         if isinstance(message, VehicleStatus):
-            self._flying[message.header.entity] = message.flight_state not in _DOWN
+            name = message.header.entity
+            self._flying[name] = message.flight_state not in _DOWN
+            if message.flight_state is FlightState.LANDED:
+                self._stood.add(name)
         self._rows.append((now_ns, ((key, message),)))
         while self._rows[0][0] < now_ns - _LASTS_NS:
             self._rows.popleft()
 
     def flown(self) -> Flown | None:
-        """Return what was taken; None while nobody flies, or for less than 8 s."""
-        if not any(self._flying.values()) or self._rows[-1][0] - self._rows[0][0] < _LEAST_NS:
+        """Return what was taken; None while nobody flies, or for less than 8 s, 20 s where a start was missed."""
+        aloft = {name for name, flies in self._flying.items() if flies}
+        least_ns = _LEAST_NS if aloft <= self._stood else _LEAST_ALOFT_NS
+        if not aloft or self._rows[-1][0] - self._rows[0][0] < least_ns:
             return None
         return Flown(tuple(self._rows), self._clock)

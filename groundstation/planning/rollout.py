@@ -16,23 +16,18 @@ from groundstation.planning.records import (
     ROBOT_CONTROLS,
     SIN,
     TARGET_STATES,
-    VX,
-    VY,
     YAW,
     CostOptions,
     CostProblem,
-    EdgeRow,
     EdgeTape,
     Tape,
     X,
     Y,
     Z,
 )
-from groundstation.sensing.occlusion import SOFT_M, sight
-from groundstation.sensing.visibility import SPREAD, CameraRow, available
+from groundstation.planning.sightings import look_around, views_of
 
 _EDGE_TAPE = EdgeTape.dtype
-_BEYOND = 12.0  # so many widths of its edge beyond a range, what is no edge of the topology is not counted
 
 
 @kernel(inlined=True)
@@ -73,61 +68,6 @@ def climb(u: Vector, problem: CostProblem, i: int, after: Matrix, motion: Matrix
 
 
 @kernel()
-def look(camera: CameraRow, edge: EdgeRow, x: float, y: float, z: float, c: float, s: float, tape: EdgeTape) -> None:
-    """Record how likely a camera sees a subject at (x, y, z) from its observer (or from the world's origin if fixed).
-
-    c, s: cosine and sine of the observer's heading.
-    """
-    tape.x, tape.y = x, y
-    bx, by = c * x + s * y, -s * x + c * y
-    rx, ry, rz = bx - camera.position[0], by - camera.position[1], z - camera.position[2]
-    tape.z, tape.square = rz, rx * rx + ry * ry + rz * rz
-    if edge.wanted == 0 and tape.square > camera.range_m * camera.range_m:
-        width2 = camera.width_m * camera.width_m + SPREAD * (edge.blur_m2 + edge.turn_rad2 * tape.square)
-        beyond = camera.range_m + _BEYOND * math.sqrt(width2)
-        if tape.square > beyond * beyond:
-            tape.a = tape.a_x = tape.a_y = tape.a_z = tape.a_yaw = 0.0
-            return
-    R = camera.rotation
-    seen = available(
-        camera,
-        R[0, 0] * rx + R[0, 1] * ry + R[0, 2] * rz,
-        R[1, 0] * rx + R[1, 1] * ry + R[1, 2] * rz,
-        R[2, 0] * rx + R[2, 1] * ry + R[2, 2] * rz,
-        edge.blur_m2, edge.turn_rad2, camera.tail_share if edge.wanted > 0 else 0.0,
-    )  # fmt: skip
-    gx = R[0, 0] * seen.a_x + R[1, 0] * seen.a_y + R[2, 0] * seen.a_z
-    gy = R[0, 1] * seen.a_x + R[1, 1] * seen.a_y + R[2, 1] * seen.a_z
-    tape.a, tape.a_x, tape.a_y = seen.a, c * gx - s * gy, s * gx + c * gy
-    tape.a_z = R[0, 2] * seen.a_x + R[1, 2] * seen.a_y + R[2, 2] * seen.a_z
-    tape.a_yaw = gx * by - gy * bx if edge.observer >= 0 else 0.0
-
-
-@kernel()
-def hide(problem: CostProblem, tape: Tape, i: int, e: int) -> None:
-    """Count what boxes hide of one edge in one step: less is available, and it depends on where both are."""
-    edge, seen = problem.edges[e], tape.sightings[i * problem.edges.shape[0] + e]
-    seen.along_x = seen.along_y = seen.along_z = 0.0
-    if seen.a <= 0.0:
-        return
-    camera, a, c, s, x, y, z = problem.cameras[edge.camera], edge.observer, 1.0, 0.0, 0.0, 0.0, 0.0
-    if a >= 0:
-        place = tape.path[i + 1, a]
-        c, s, x, y, z = place[COS], place[SIN], place[X], place[Y], place[Z]
-    off_x, off_y = c * camera.position[0] - s * camera.position[1], s * camera.position[0] + c * camera.position[1]
-    z += camera.position[2]
-    width = math.sqrt(SOFT_M * SOFT_M + SPREAD * edge.blur_m2)
-    free = sight(problem.boxes, width, x + off_x, y + off_y, z, x + seen.x, y + seen.y, z + seen.z)
-    seen.along_x, seen.along_y = seen.a * (free.eye_x + free.x), seen.a * (free.eye_y + free.y)
-    seen.along_z = seen.a * (free.eye_z + free.z)
-    seen.a_x, seen.a_y = free.a * seen.a_x + seen.a * free.x, free.a * seen.a_y + seen.a * free.y
-    seen.a_z = free.a * seen.a_z + seen.a * free.z
-    if a >= 0:
-        seen.a_yaw = free.a * seen.a_yaw + seen.a * (off_x * free.eye_y - off_y * free.eye_x)
-    seen.a *= free.a
-
-
-@kernel()
 def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
     """Return repulsion between robots and soft fence at one step; adds d/d(x, y) to gradient (n, 3)."""
     n, cost = path.shape[0], 0.0
@@ -152,29 +92,6 @@ def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
                 cost += wall * out * out
                 gradient[a, axis] += 2.0 * wall * (high if high > low else -low)
     return cost
-
-
-@kernel(inlined=True)
-def look_around(problem: CostProblem, tape: Tape, i: int) -> None:
-    """Record in the tape what all edges see in one step."""
-    edges, cameras, targets, markers, path, sightings = (
-        problem.edges, problem.cameras, problem.targets, problem.markers, tape.path, tape.sightings
-    )  # fmt: skip
-    n, m, ahead = path.shape[1], edges.shape[0], (i + 1) * problem.options.step_s
-    for e in range(m):
-        edge, seen = edges[e], sightings[i * m + e]
-        a, b, c, s = edge.observer, edge.subject, 1.0, 0.0
-        if b < n:
-            x, y, z = path[i + 1, b, X], path[i + 1, b, Y], path[i + 1, b, Z] + markers[b]
-        else:
-            t = b - n
-            x, y, z = targets[t, X] + ahead * targets[t, VX], targets[t, Y] + ahead * targets[t, VY], markers[b]
-        if a >= 0:
-            x, y, z = x - path[i + 1, a, X], y - path[i + 1, a, Y], z - path[i + 1, a, Z]
-            c, s = path[i + 1, a, COS], path[i + 1, a, SIN]
-        look(cameras[edge.camera], edge, x, y, z, c, s, seen)
-        if problem.boxes.shape[0] > 0:
-            hide(problem, tape, i, e)
 
 
 @kernel(inlined=True)
@@ -238,13 +155,15 @@ def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]
     for r in range(n):
         path[0, r, X], path[0, r, Y] = problem.poses[r, X], problem.poses[r, Y]
         path[0, r, YAW] = problem.poses[r, POSE_YAW]
+    views, m = views_of(problem), problem.edges.shape[0]
+    points, found = np.empty((3, m)), np.empty((4, m))
     uncertainty = extra = 0.0
     discount = 1.0
     for i in range(h):
         move(u, path[i], options.step_s, path[i + 1], motion[i])
         climb(u, problem, i, path[i + 1], motion[i])
         predict(P, n, options)
-        look_around(problem, tape, i)
+        look_around(problem, tape, i, views, points, found)
         weigh(problem, tape, i)
         fuse(P, problem, tape, i)
         discount *= options.discount

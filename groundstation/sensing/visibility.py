@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
-from groundstation.arrays import Array
+from groundstation.arrays import Array, Matrix
 from groundstation.kernel import Record, Rows, kernel
+from groundstation.sensing.elementary import decay, log_of_sum
 from groundstation.sensing.models import OnboardCameraModel, Softness, WorldCameraModel
 
 STEEPEST_COS = math.cos(math.radians(70.0))
@@ -42,6 +43,23 @@ class CameraRow(Record):
     caution: float
 
 
+class ViewLimits(NamedTuple):
+    """What bounds a camera's view, as one value: fields of `CameraRow`, and upwards as the camera sees it."""
+
+    half_width_tan: float
+    half_height_tan: float
+    across_cos: float
+    along_cos: float
+    up_x: float
+    up_y: float
+    up_z: float
+    range_m: float
+    border_m: float
+    width_m: float
+    tail_m: float
+    caution: float
+
+
 class Availability(NamedTuple):
     """In what share of exposures a marker counts as shown, and the derivatives by its optical position [1/m]."""
 
@@ -69,67 +87,99 @@ def camera_rows(cameras: Sequence[WorldCameraModel | OnboardCameraModel], soft: 
     return rows
 
 
-@kernel(inlined=True)
-def share_of(exponent: float) -> float:
-    """Return exp(exponent), and 0 for what would not count."""
-    return math.exp(exponent) if exponent > -20.0 else 0.0
-
-
 @kernel()
-def margin(camera: CameraRow, x: float, y: float, z: float, distance: float) -> Availability:
+def limits_of(camera: CameraRow) -> ViewLimits:
+    """Return what bounds a camera's view."""
+    R = camera.rotation
+    return ViewLimits(
+        camera.half_width_tan, camera.half_height_tan, camera.across_cos, camera.along_cos, R[0, 2], R[1, 2], R[2, 2],
+        camera.range_m, camera.border_m, camera.width_m, camera.tail_m, camera.caution,
+    )  # fmt: skip
+
+
+@kernel(inlined=True)
+def lesser(a: float, b: float) -> float:
+    """Return the lesser of two numbers, without the questions after NaN that keep `min` from being vectorised."""
+    return a if a < b else b
+
+
+@kernel(inlined=True)
+def margin(view: ViewLimits, x: float, y: float, z: float, distance: float) -> Availability:
     """Return the soft minimum of the distances to the view's limits at an optical point [m], and its derivatives.
 
     Limits: four side planes, the range, and the steepest angle between the marker's normal, which points up, and the
     line of sight.
     """
-    tx, ty, border, width = camera.half_width_tan, camera.half_height_tan, camera.border_m, camera.width_m
-    nx, ny, R, per_width = camera.across_cos, camera.along_cos, camera.rotation, 1.0 / width
-    ux, uy, uz = R[0, 2], R[1, 2], R[2, 2]
+    tx, ty, border, width = view.half_width_tan, view.half_height_tan, view.border_m, view.width_m
+    nx, ny, per_width = view.across_cos, view.along_cos, 1.0 / width
+    ux, uy, uz = view.up_x, view.up_y, view.up_z
     m0, m1 = (z * tx - x) * nx - border, (z * tx + x) * nx - border
     m2, m3 = (z * ty - y) * ny - border, (z * ty + y) * ny - border
-    m4, m5 = camera.range_m - distance, -(ux * x + uy * y + uz * z) - STEEPEST_COS * distance
-    least = min(min(min(m0, m1), min(m2, m3)), min(m4, m5))
-    e0, e1 = share_of((least - m0) * per_width), share_of((least - m1) * per_width)
-    e2, e3 = share_of((least - m2) * per_width), share_of((least - m3) * per_width)
-    e4, e5 = share_of((least - m4) * per_width), share_of((least - m5) * per_width)
+    m4, m5 = view.range_m - distance, -(ux * x + uy * y + uz * z) - STEEPEST_COS * distance
+    least = lesser(lesser(lesser(m0, m1), lesser(m2, m3)), lesser(m4, m5))
+    e0, e1 = decay((least - m0) * per_width), decay((least - m1) * per_width)
+    e2, e3 = decay((least - m2) * per_width), decay((least - m3) * per_width)
+    e4, e5 = decay((least - m4) * per_width), decay((least - m5) * per_width)
     total = e0 + e1 + e2 + e3 + e4 + e5
     away, per_total = (e4 + STEEPEST_COS * e5) / distance, 1.0 / total
     return Availability(
-        least - width * math.log(total),
+        least - width * log_of_sum(total),
         ((e1 - e0) * nx - away * x - e5 * ux) * per_total,
         ((e3 - e2) * ny - away * y - e5 * uy) * per_total,
         ((e0 + e1) * nx * tx + (e2 + e3) * ny * ty - away * z - e5 * uz) * per_total,
     )
 
 
-@kernel()
+@kernel(inlined=True)
 def available(
-    camera: CameraRow, x: float, y: float, z: float, blur_m2: float, turn_rad2: float, share: float
+    view: ViewLimits, x: float, y: float, z: float, blur_m2: float, turn_rad2: float, share: float
 ) -> Availability:
     """Return the availability of a marker at an optical point [m] that is counted on if its place is in doubt.
 
     blur_m2: variance of the relative position per axis; turn_rad2: of the direction of view; share: of the tail that
-    attracts. Expected under these variances, `camera.caution` standard deviations farther out.
+    attracts. Expected under these variances, `view.caution` standard deviations farther out.
     """
     square = x * x + y * y + z * z + 1e-6
-    m = margin(camera, x, y, z, math.sqrt(square))
+    m = margin(view, x, y, z, math.sqrt(square))
     error2 = blur_m2 + turn_rad2 * square
     error = math.sqrt(error2 + 1e-12)
-    inside = m.a - camera.caution * error
+    inside = m.a - view.caution * error
     # A logistic edge, seen with a Gaussian error, is again nearly logistic (MacKay 1992): only wider.
-    width2 = camera.width_m * camera.width_m + SPREAD * error2
+    width2 = view.width_m * view.width_m + SPREAD * error2
     width = math.sqrt(width2)
-    logistic = 1.0 / (1.0 + math.exp(min(-inside / width, 500.0)))
-    flat, slope = 1.0, 0.0
-    if inside < 0.0:
-        ratio = inside / camera.tail_m
-        flat = 1.0 / (1.0 + ratio * ratio)
-        slope = -2.0 * ratio / camera.tail_m * flat * flat
+    rare = decay(-abs(inside) / width)
+    rare = rare / (1.0 + rare)
+    logistic = rare if inside < 0.0 else 1.0 - rare
+    ratio = lesser(inside, 0.0) / view.tail_m
+    flat = 1.0 / (1.0 + ratio * ratio)
+    slope = -2.0 * ratio / view.tail_m * flat * flat
     steep = (1.0 - share) * logistic * (1.0 - logistic) / width
     inwards = steep + share * slope
     # d width = SPREAD turn / width * (x, y, z), d error = turn / error * (x, y, z)
-    widening = -steep * inside / width2 * SPREAD * turn_rad2 - inwards * camera.caution * turn_rad2 / error
+    widening = -steep * inside / width2 * SPREAD * turn_rad2 - inwards * view.caution * turn_rad2 / error
     return Availability(
         (1.0 - share) * logistic + share * flat,
         inwards * m.a_x + widening * x, inwards * m.a_y + widening * y, inwards * m.a_z + widening * z,
     )  # fmt: skip
+
+
+@kernel()
+def available_at_once(views: Matrix, points: Matrix, found: Matrix) -> None:
+    """Write `available` (4, m) of m optical points (3, m) [m], each seen by a camera of its own.
+
+    views (15, m): the limits in the order of `ViewLimits`, then blur_m2, turn_rad2 and share. One loop without
+    branches, which is vectorised: the arithmetic is that of a single point, to the bit.
+    """
+    tx, ty, nx, ny, ux, uy, uz, ranges = (
+        views[0], views[1], views[2], views[3], views[4], views[5], views[6], views[7]
+    )  # fmt: skip
+    borders, widths, tails, cautions = views[8], views[9], views[10], views[11]
+    blurs, turns, shares = views[12], views[13], views[14]
+    x, y, z = points[0], points[1], points[2]
+    a, a_x, a_y, a_z = found[0], found[1], found[2], found[3]
+    for e in range(points.shape[1]):
+        limits = ViewLimits(
+            tx[e], ty[e], nx[e], ny[e], ux[e], uy[e], uz[e], ranges[e], borders[e], widths[e], tails[e], cautions[e]
+        )
+        seen = available(limits, x[e], y[e], z[e], blurs[e], turns[e], shares[e])
+        a[e], a_x[e], a_y[e], a_z[e] = seen.a, seen.a_x, seen.a_y, seen.a_z

@@ -15,7 +15,7 @@ from groundstation.planning.lbfgs import search_state, solve
 from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import Box, Frustum, OnboardCameraModel, Softness, WorldCameraModel
 from groundstation.sensing.occlusion import BoxRow, box_rows
-from groundstation.sensing.visibility import available, camera_rows
+from groundstation.sensing.visibility import available, camera_rows, limits_of
 
 CEILING = WorldCameraModel((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0))
 ONBOARD = OnboardCameraModel((0.09, 0.0, 0.02), Frustum.of_picture(640, 360, 460, 460, 1.9), pan_left_rad=0.1)
@@ -97,7 +97,7 @@ def seen_by(case: Case, edge: EdgeRow, places: Array, yaws: Array, height: Array
         rise = point[2] - height[a] - eye.position_m[2]
     share = Softness().tail_share if edge["wanted"] else 0.0
     x, y, z = optical.tolist()
-    seen = available(CAMERAS[camera], x, y, z, float(edge["blur_m2"]), float(edge["turn_rad2"]), share)
+    seen = available(limits_of(CAMERAS[camera]), x, y, z, float(edge["blur_m2"]), float(edge["turn_rad2"]), share)
     return (
         seen.a,
         float(optical @ optical),

@@ -18,7 +18,7 @@ from groundstation.sensing.models import (
     Softness,
     WorldCameraModel,
 )
-from groundstation.sensing.visibility import available, camera_rows, margin
+from groundstation.sensing.visibility import available, camera_rows, limits_of, margin
 
 CEILING = WorldCameraModel((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 1179, 5.0, border_m=0.0))
 ONBOARD = OnboardCameraModel((0.09, 0.0, 0.0), Frustum.of_picture(640, 360, 460, 460, 1.9, border_m=0.0))
@@ -35,7 +35,7 @@ def availability(
 ) -> np.ndarray:
     """Return the availability of a marker at an optical point, then its derivatives."""
     x, y, z = point
-    return np.array(available(camera_rows([camera], soft)[0], x, y, z, blur_m2, turn_rad2, soft.tail_share))
+    return np.array(available(limits_of(camera_rows([camera], soft)[0]), x, y, z, blur_m2, turn_rad2, soft.tail_share))
 
 
 def test_the_ceiling_footprint_shrinks_with_height() -> None:
@@ -110,7 +110,7 @@ def test_a_view_is_counted_on_as_far_inside_as_its_place_is_in_doubt(point: tupl
     """An error of place lasts: at the very edge a marker is seen all the time or never, not every other time."""
     doubt_m, soft = 0.1, Softness(tail_share=0.0)
     row, distance = camera_rows([ONBOARD], soft)[0], math.hypot(*point)
-    inside = margin(row, *point, distance).a - 1.5 * doubt_m
+    inside = margin(limits_of(row), *point, distance).a - 1.5 * doubt_m
     width = math.hypot(soft.width_m, math.sqrt(math.pi / 8) * doubt_m)
     careful = availability(ONBOARD, point, doubt_m**2, soft=soft)[0]
     assert careful == pytest.approx(1.0 / (1.0 + math.exp(-inside / width)), rel=1e-4)

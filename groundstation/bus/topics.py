@@ -98,7 +98,7 @@ PLAN = Topic("plan", m.Plan, 10, Quality.STATE, _TRACKER)
 INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE, _TRACKER)
 """Tracker: the result of each observation."""
 SUSPICION = Topic("suspicion", m.Suspicion, 0.2, Quality.STATE, _DIAGNOSIS)
-"""Diagnosis to tracker: which figure of the field is suspected."""
+"""Diagnosis to tracker and operator: which figures of the field are suspected now."""
 EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)

@@ -27,6 +27,7 @@ from groundstation.bus.topics import (
     PROCESS_STATUS,
     SETPOINT,
     SIM_STATUS,
+    SUSPICION,
     TRUTH,
     VEHICLE_STATUS,
 )
@@ -59,7 +60,7 @@ _KEEPING_S = 3.0
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
 # Looked at in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of what this process does.
-_LESS_OFTEN = (PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS, PREFLIGHT)
+_LESS_OFTEN = (PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS, PREFLIGHT, SUSPICION)
 _EACH = (EVENT, COMMAND, COMMAND_ACK, LEASE, OBSERVATION, INNOVATION)
 # Of these only the newest message counts.
 STATES = (*_NEWEST, *_LESS_OFTEN, TRUTH)

@@ -15,7 +15,7 @@ from groundstation.console.innovation_statistics import InnovationStatistics
 from groundstation.console.snapshot import Snapshot
 from groundstation.console.standing import StandingDrones
 from groundstation.field.room import WorldCamera
-from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.alarms import Alarm, alarms_of
 from groundstation.monitor.batteries import Battery, battery_of
 from groundstation.monitor.endurance import AIRBORNE
 from groundstation.monitor.safety import safety_of
@@ -142,12 +142,24 @@ class ConsoleState:
         board.put("search_maps", self._search_maps())
         alarms = alarms_of(known, now_ns)
         self.alarm_log.note(alarms, now_ns)
-        board.put("alarms", [{**asdict(alarm), "asks": alarm.asks} for alarm in alarms])
+        board.put("alarms", [_alarm(alarm) for alarm in alarms])
         board.put("safety", asdict(safety_of(known, alarms)))
         board.put("past_alarms", self.alarm_log.as_json())
         board.put("health", self.health.summary())
         if self.preflight is not None:
             board.put("preflight", {"at": _ms(self.preflight), "findings": self.preflight.message.findings})
+
+
+def _alarm(alarm: Alarm) -> dict[str, Any]:
+    told = None if alarm.told_ns is None else alarm.told_ns / 1e6
+    return {
+        "about": alarm.about,
+        "text": alarm.text,
+        "grave": alarm.grave,
+        "advice": alarm.advice,
+        "asks": alarm.asks,
+        "told": told,
+    }
 
 
 def _ms(seen: StampedMessage[Any]) -> float:

@@ -33,6 +33,7 @@ class Diagnosis:
         self._window, self._watch = Window(field, clock.clock_id()), FigureWatch(field)
         self._begun_ns: int | None = None
         self._due_ns = 0
+        self._told_ns = 0
 
     @property
     def overflowed(self) -> int:
@@ -50,6 +51,10 @@ class Diagnosis:
             took_ns = now_ns - self._begun_ns
             self._due_ns, self._begun_ns = max(self._begun_ns + _PAUSE_NS, now_ns + _PAUSES * took_ns), None
             self._tell(now_ns)
+        if (
+            self._watch.figures and now_ns >= self._told_ns + _PAUSE_NS
+        ):  # a console that was started again has not heard it
+            self._publish(now_ns)
         if now_ns >= self._due_ns and (flown := self._window.flown()) is not None:
             self._begun_ns = now_ns
             self._judging.begin(partial(verdict_on, flown, self._field))
@@ -57,6 +62,10 @@ class Diagnosis:
     def _tell(self, now_ns: int) -> None:
         verdict = self._judging.take()
         if verdict is not None:
-            self.notices += self._watch.take(verdict)
-            header = self._bus.header(self._bus.source, now_ns)
-            self._bus.publish(SUSPICION, Suspicion(header=header, cause=self._watch.cause))
+            self.notices += self._watch.take(verdict, now_ns)
+            self._publish(now_ns)
+
+    def _publish(self, now_ns: int) -> None:
+        self._told_ns = now_ns
+        header = self._bus.header(self._bus.source, now_ns)
+        self._bus.publish(SUSPICION, Suspicion(header=header, cause=self._watch.cause, figures=self._watch.figures))

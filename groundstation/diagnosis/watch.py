@@ -2,7 +2,7 @@
 
 import math
 
-from groundstation.bus.messages import Severity
+from groundstation.bus.messages import Severity, SuspectedFigure
 from groundstation.bus.notice import Notice
 from groundstation.diagnosis.suspects import Charge, Suspect, Verdict
 from groundstation.diagnosis.wording import remedies, sentence
@@ -16,24 +16,34 @@ class FigureWatch:
 
     def __init__(self, field: ResolvedField) -> None:
         self._field = field
-        self._standing: dict[tuple[Suspect, ...], str] = {}
+        self._standing: dict[tuple[Suspect, ...], SuspectedFigure] = {}
+
+    @property
+    def figures(self) -> tuple[SuspectedFigure, ...]:
+        """What stands: told, and not refuted."""
+        return tuple(self._standing.values())
 
     @property
     def cause(self) -> str:
         """What explains best why sightings do not meet."""
-        return "; ".join(self._standing.values())
+        return "; ".join(figure.text for figure in self.figures)
 
-    def take(self, verdict: Verdict) -> list[Notice]:
-        """Return what is new of a verdict."""
+    def take(self, verdict: Verdict, now_ns: int) -> list[Notice]:
+        """Return what is new of a verdict that was reached at this time."""
         named = {_suspects(charges): charges for charges in verdict.causes}
         refuted = [one for one in self._standing if all(verdict.leads.get(s, 0.0) < _REFUTED for s in one)]
         notices = [self._accusation(charges) for key, charges in named.items() if key not in self._standing]
         for key in refuted:
-            text = f"{self._standing.pop(key)}: what was told is refuted"
+            text = f"{self._standing.pop(key).text}: what was told is refuted"
             notices.append(Notice(Severity.INFO, text, entity=key[0][0]))
         if named:  # what explained it before is explained otherwise
-            self._standing = {key: sentence(charges, self._field) for key, charges in named.items()}
+            self._standing = {key: self._suspected(key, charges, now_ns) for key, charges in named.items()}
         return notices
+
+    def _suspected(self, key: tuple[Suspect, ...], charges: tuple[Charge, ...], now_ns: int) -> SuspectedFigure:
+        known = self._standing.get(key)
+        who, text, remedy = charges[0].suspect[0], sentence(charges, self._field), remedies(charges, self._field)
+        return SuspectedFigure(who, text, remedy, known.told_ns if known else now_ns)
 
     def _accusation(self, charges: tuple[Charge, ...]) -> Notice:
         text = f"{sentence(charges, self._field)}: that explains best why the team's sightings do not meet"

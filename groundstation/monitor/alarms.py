@@ -37,12 +37,14 @@ class Alarm:
 
     about: the same for as long as it is the same alarm, while figures in its text change.
     advice: whether an operator must do something now, which it says first, and what happens next.
+    told_ns: when it was told, where it stands from then on.
     """
 
     about: str
     text: str
     grave: bool = True
     advice: str = ""
+    told_ns: int | None = None
 
     @property
     def asks(self) -> bool:
@@ -59,6 +61,7 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
         *_cameras(state, now_ns),
         *_processes(state, now_ns),
         *_events(state, now_ns),
+        *_suspected(state),
     ]
     return sorted(dict.fromkeys(alarms), key=lambda alarm: (not alarm.asks, not alarm.grave))
 
@@ -159,3 +162,10 @@ def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         if seen.message.severity is Severity.ERROR and seen.age_s(now_ns) < _EVENT_SHOWN_S:
             advice = f"{_TO_DO}{seen.message.remedy}" if seen.message.remedy else ""
             yield Alarm(seen.message.sentence, seen.message.sentence, advice=advice)
+
+
+def _suspected(state: MonitorState) -> Iterator[Alarm]:
+    """Figures of the field that the diagnosis holds wrong, until it withdraws them."""
+    for one in state.suspicion.figures if state.suspicion else ():
+        advice = f"Nothing to do now. When all have landed: {one.remedy}."
+        yield Alarm(f"suspected {one.entity} {one.told_ns}", f"Suspected: {one.text}", False, advice, one.told_ns)

@@ -20,6 +20,7 @@ from groundstation.bus.topics import (
     PLAN,
     PROCESS_STATUS,
     SIM_STATUS,
+    SUSPICION,
     VEHICLE_STATUS,
 )
 from groundstation.monitor.alarms import alarms_of
@@ -37,7 +38,7 @@ class Screen:
         self.state = MonitorState(cast=cast, hint=hint, started_ns=now_ns)
         self._console = console or Console()
         self._newest = bus.subscribe(
-            (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS), newest=True
+            (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS, SUSPICION), newest=True
         )
         # Of these each one counts, not only the newest of a key.
         self._each: Subscription = bus.subscribe((EVENT, COMMAND, COMMAND_ACK, OBSERVATION), capacity=1024)

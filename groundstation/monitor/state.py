@@ -70,6 +70,7 @@ class MonitorState:
     events: deque[StampedMessage[m.Event]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
     estimate: StampedMessage[m.Estimate] | None = None
     plan: StampedMessage[m.Plan] | None = None
+    suspicion: m.Suspicion | None = None
     lease: StampedMessage[m.Lease] | None = None
     sim: StampedMessage[m.SimStatus] | None = None
     command: StampedMessage[m.Command] | None = None
@@ -119,6 +120,8 @@ class MonitorState:
                 self.estimate = StampedMessage(stamp_ns, message)
             case m.Plan():
                 self.plan = StampedMessage(stamp_ns, message)
+            case m.Suspicion():
+                self.suspicion = message
             case m.Lease():
                 self.lease = StampedMessage(stamp_ns, message)
             case m.SimStatus():

@@ -10,6 +10,9 @@ from clipping import clipped
 from places import boxes, moved
 from situations import SITUATIONS
 
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
@@ -71,6 +74,36 @@ def test_past_alarms_outlive_a_reload_and_give_way_to_those_that_last(stage: Any
     page.wait(lambda s: page.there("more-alarms").is_visible())
     page.there("more-alarms").click()
     assert page.there("alarm-log").is_hidden() and page.page.locator(".banner:visible").count() >= 2
+
+
+def test_a_suspected_figure_stands_with_its_time_until_it_is_withdrawn(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    page.wait(lambda s: page.there("banner-none").is_visible())
+    before, bus = boxes(page), stage.flight.bus("diagnosis")
+    words = "the pictures of drone_1's camera are 42 +- 9 ms newer than configured"
+    words += " or drone_1's telemetry is 46 +- 11 ms older than its stamps say"
+    figure = m.SuspectedFigure("drone_1", words, "check the clock of drone_1", bus.header("diagnosis").stamp_ns)
+    bus.publish(t.SUSPICION, m.Suspicion(header=bus.header("diagnosis"), cause=words, figures=(figure,)))
+    page.wait(lambda s: "Suspected" in page.there("banners").inner_text())
+    told = page.there("banner-alarm").inner_text()
+    assert re.search(rf"Suspected: {re.escape(words)} \(told at \d\d:\d\d:\d\d\)", told)
+    assert "When all have landed: check the clock of drone_1." in told
+    assert page.there("safety").inner_text() == "WATCH" and moved(page, before) == {} and clipped(page.page) == []
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    fits = "(one) => one.scrollWidth <= one.clientWidth"
+    page.wait(lambda _: page.there("more-alarms").is_visible())
+    assert page.there("safety").evaluate(fits)
+    page.there("more-alarms").click()
+    behind = "(one) => getComputedStyle(one).backgroundColor"
+    assert page.there("verdict").evaluate(behind) != "rgba(0, 0, 0, 0)", "it lies over a card"
+    page.there("more-alarms").click()
+    page.page.set_viewport_size({"width": 1440, "height": 900})
+    page.page.wait_for_timeout(9000)  # longer than an event is shown
+    assert page.there("banner-alarm").inner_text() == told
+    bus.publish(t.SUSPICION, m.Suspicion(header=bus.header("diagnosis"), cause=""))
+    page.wait(lambda s: any(words in past["text"] for past in s["sections"]["past_alarms"]))
+    page.wait(lambda s: "Suspected" not in page.there("banners").inner_text())
 
 
 def test_what_only_the_page_noticed_is_a_past_alarm_as_well(stage: Any) -> None:

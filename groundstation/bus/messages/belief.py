@@ -104,11 +104,26 @@ class Belief(Message, frozen=True, kw_only=True):
     """Delay errors of the cameras whose delay the flight reveals."""
 
 
+class SuspectedFigure(msgspec.Struct, frozen=True):
+    """A figure of the field that is suspected now, or those that cannot be told apart."""
+
+    entity: str
+    """Whose figure it is, the likeliest; empty: of all."""
+    text: str
+    """What is wrong with it, by how much, in a few words."""
+    remedy: str
+    """What a person can do about it."""
+    told_ns: int
+    """When it was told first, on the clock of the header."""
+
+
 class Suspicion(Message, frozen=True, kw_only=True):
-    """Which figure of the field is suspected in flight; nothing acts on it."""
+    """Which figures of the field are suspected in flight; nothing acts on it."""
 
     cause: str
     """What explains best why the team's sightings do not meet, in a few words; empty: no figure is suspected."""
+    figures: tuple[SuspectedFigure, ...] = ()
+    """Each of them, until it is withdrawn."""
 
 
 class Verdict(StrEnum):

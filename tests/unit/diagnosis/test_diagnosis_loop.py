@@ -122,6 +122,25 @@ def test_a_wrong_figure_is_told_to_operator_and_tracker(
     assert diagnosis.overflowed == 0
 
 
+def test_what_is_suspected_is_said_again_for_consoles_that_come_later(
+    lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clock, "clock_id", lambda: "c")
+    exchange = MemoryExchange()
+    diagnosis = Diagnosis(MemoryBus(exchange, "lab", "diagnosis"), lab_field, AtOnce())
+    ended_ns = fed(diagnosis, exchange, Lab(lab_field, WrongFigures({("drone_1", "delay"): 60.0})))
+    for name in lab_field.drones:  # nobody flies any more: no further verdict is reached
+        landed = status(ended_ns / S, FlightState.LANDED)
+        header = msgspec.structs.replace(landed.header, entity=name, source=name)
+        MemoryBus(exchange, "lab", name).publish(VEHICLE_STATUS, msgspec.structs.replace(landed, header=header))
+    late = MemoryBus(exchange, "lab", "console").subscribe([SUSPICION])
+    for second in range(1, 12):
+        diagnosis.turn(ended_ns + second * S)
+    told = [one.message for one in late.drain() if isinstance(one.message, Suspicion)]
+    assert len(told) == 2 and "drone_1's camera" in told[0].figures[0].text
+    assert told[0].figures[0].told_ns < ended_ns
+
+
 def test_a_verdict_on_a_thread_keeps_the_loop_waiting_for_nothing() -> None:
     judging, may_end, verdict = OnThread(), threading.Event(), Verdict((), {})
 

@@ -9,6 +9,7 @@ from groundstation.diagnosis.suspects import Charge, Suspect, Verdict
 from groundstation.diagnosis.watch import FigureWatch
 from groundstation.field.resolved import ResolvedField
 
+S = 1_000_000_000
 PAN, LENS = ("drone_1", "pan"), ("drone_1", "focal")
 
 
@@ -23,22 +24,24 @@ def verdict(*causes: tuple[Charge, ...], **leads: float) -> Verdict:
 
 def test_a_suspicion_is_told_once_and_stands_until_it_is_refuted(lab_field: ResolvedField) -> None:
     watch, wrong = FigureWatch(lab_field), verdict((charge(PAN, math.radians(3.0)),))
-    (told,) = watch.take(wrong)
+    (told,) = watch.take(wrong, S)
     assert (told.severity, told.entity) == (Severity.WARNING, "drone_1")
     assert told.text.startswith("drone_1's camera looks 3.0 +- 0.6 deg farther to the left than the field says")
-    assert watch.take(wrong) == []
-    assert watch.take(verdict(pan=2.0)) == [] and watch.cause.startswith("drone_1's camera")
-    (refuted,) = watch.take(verdict(pan=0.5))
+    assert watch.take(wrong, 6 * S) == []
+    assert watch.take(verdict(pan=2.0), 11 * S) == [] and watch.cause.startswith("drone_1's camera")
+    (figure,) = watch.figures
+    assert (figure.entity, figure.told_ns, figure.remedy) == ("drone_1", S, told.remedy)
+    (refuted,) = watch.take(verdict(pan=0.5), 16 * S)
     assert refuted.severity is Severity.INFO and "refuted" in refuted.text
-    assert watch.cause == ""
+    assert watch.cause == "" and watch.figures == ()
 
 
 def test_of_two_that_cannot_be_told_apart_the_likelier_comes_first(lab_field: ResolvedField) -> None:
     watch = FigureWatch(lab_field)
-    (told,) = watch.take(verdict((charge(LENS, 0.03), charge(PAN, 0.05, 8.0))))
+    (told,) = watch.take(verdict((charge(LENS, 0.03), charge(PAN, 0.05, 8.0))), S)
     assert told.text.index("focal length") < told.text.index("farther to the left")
     assert "which of them cannot be told yet" in told.text and "; or " in told.remedy
-    (narrowed,) = watch.take(verdict((charge(LENS, 0.03),)))
+    (narrowed,) = watch.take(verdict((charge(LENS, 0.03),)), 6 * S)
     assert "farther" not in narrowed.text and watch.cause in narrowed.text
 
 
@@ -76,5 +79,5 @@ def test_of_two_that_cannot_be_told_apart_the_likelier_comes_first(lab_field: Re
 def test_each_suspect_has_a_sentence_and_a_remedy(
     lab_field: ResolvedField, suspect: Suspect, size: float, words: str, remedy: str
 ) -> None:
-    (told,) = FigureWatch(lab_field).take(verdict((charge(suspect, size),)))
+    (told,) = FigureWatch(lab_field).take(verdict((charge(suspect, size),)), S)
     assert words in told.text and remedy in told.remedy

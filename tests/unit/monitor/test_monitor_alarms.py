@@ -1,11 +1,12 @@
 """What the monitor and the console raise as alarms, and how grave each is."""
 
 import pytest
-from monitor_world import NOW, World
+from monitor_world import NOW, S, World
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.safety import Level, safety_of
 
 
 def _alarms(world: World) -> list[str]:
@@ -125,3 +126,18 @@ def test_each_alarm_says_first_whether_there_is_anything_to_do(world: World) -> 
     alarms = alarms_of(world.state, NOW)
     assert len(alarms) == 7 and {alarm.asks for alarm in alarms} == {True, False}
     assert all(alarm.advice.startswith(("Nothing to do", "To do")) for alarm in alarms), alarms
+
+
+def test_a_suspected_figure_stands_until_it_is_withdrawn(world: World) -> None:
+    world.vehicle("drone_1")
+    world.vehicle("drone_2")
+    world.estimate()
+    figure = m.SuspectedFigure("drone_1", "drone_1's camera looks 3 deg lower", "fix the mounting", NOW - 60 * S)
+    world.say(t.SUSPICION, m.Suspicion(header=world.header("diagnosis", 60.0), cause="x", figures=(figure,)))
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert alarm.text == "Suspected: drone_1's camera looks 3 deg lower" and alarm.told_ns == NOW - 60 * S
+    assert not alarm.grave and not alarm.asks and "When all have landed: fix the mounting." in alarm.advice
+    assert safety_of(world.state, [alarm]).level is Level.WATCH
+    world.say(t.SUSPICION, m.Suspicion(header=world.header("diagnosis"), cause=""))
+    assert _alarms(world) == []

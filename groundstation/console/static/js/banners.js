@@ -5,6 +5,7 @@ import { byId, el, seconds, text } from "./dom.js";
 import { resultWords } from "./ending.js";
 import { drawn } from "./map.js";
 import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
+import { momentWords } from "./playback.js";
 import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
@@ -24,7 +25,7 @@ function banners(own) {
   if (!ended && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
   for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
   for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, SHOWN) : []) {
-    if (alarm.about !== "tracker silent") all.push({ kind: "alarm", level: alarm.grave ? "grave" : "mild", title: alarm.text, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" });
+    if (alarm.about !== "tracker silent") all.push({ kind: "alarm", level: alarm.grave ? "grave" : "mild", title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" });
   }
   if (!all.length && !replaying()) all.push({ kind: "none", level: "calm", title: store.s.safety?.reason ?? "No alarms yet." });
   const urgency = ({ level, rank }) => (rank === "ACT" ? 0 : level === "grave" ? 1 : 2);
@@ -45,7 +46,8 @@ function silentTracker() {
 function safetyWord(own) {
   const { ended, safety } = store.s;
   if (ended) return ended.severity === "INFO" ? "SAFE" : "ACT";
-  return own.length ? "ACT" : safety?.level ?? "WATCH";
+  const level = own.length ? "ACT" : safety?.level ?? "WATCH";
+  return level === "SAFE" && trackerSilent() ? "WATCH" : level;
 }
 
 export function showBanners() {

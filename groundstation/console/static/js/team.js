@@ -27,7 +27,7 @@ export function buildTeam() {
   byId("team").replaceChildren(...nodes);
 }
 
-const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % ellipse [m]", speed: "speed", by: "seen by" };
+const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % sure within [m]", speed: "speed", by: "seen by" };
 const BELIEF = ["position", "ellipse", "speed"];
 // What stays on a screen that is read from 3 m, and on a low one.
 const CHIEF = new Set(["battery", "seen"]), FIRST = { drone: new Set(["battery", "link", "heard", "seen"]), target: new Set(["seen", "speed", "by"]) };
@@ -147,6 +147,6 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
   const { major, minor } = ellipse95(body.cov);
   text(values.position, body.mean.slice(0, drone ? 3 : 2).map((value) => value.toFixed(2)).join("  "));
-  text(values.ellipse, `${major.toFixed(2)} × ${minor.toFixed(2)}${body.converged ? "" : " unfit"}`);
+  text(values.ellipse, `${major.toFixed(2)} × ${minor.toFixed(2)}${body.converged ? "" : ", too unsure to fly by"}`);
   text(values.speed, `${Math.hypot(...body.velocity.slice(0, 2)).toFixed(2)} m/s`);
 }
